@@ -71,6 +71,16 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--resolution", type=float, metavar="DPI", help="dots per inch, 50 to 600")
     one.add_argument("--out", type=_path, required=True, metavar="PNG")
 
+    one = add("best", commands.best)
+    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
+    one.add_argument(
+        "--where", nargs="+", action="extend", default=[], metavar="CONDITION",
+        help='such as "friction<0.3" or "hardening=none"; runs must meet all',
+    )  # fmt: skip
+    one.add_argument("--lowest", action="store_true", help="the lowest numbers first")
+    one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
+
     one = add("export", commands.export)
     one.add_argument("path", type=_path, metavar="RUN|DIR")
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")

@@ -115,6 +115,19 @@ def plot(options: argparse.Namespace) -> int:
     return OK
 
 
+def best(options: argparse.Namespace) -> int:
+    """List the runs of a study with the highest, or the lowest, values of a number."""
+    from studies.views.best import best_runs, best_table
+    from studies.views.reading import open_study
+
+    with open_study(options.path) as dataset:
+        runs = best_runs(
+            dataset, options.of, options.where, lowest=options.lowest, count=options.count
+        )
+        print(best_table(dataset, options.of, runs))
+    return OK
+
+
 def export(options: argparse.Namespace) -> int:
     """Write the fields at the nodes of a run (keep = "fields") as files for ParaView."""
     from solver.errors import ModelError

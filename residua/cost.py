@@ -17,13 +17,16 @@ def dry_run(study: Study, store: Store) -> str:
     found = estimate(study, store)
     unknown = "not known"
     lines = {
-        "runs": f"{found.runs} in all, {found.to_compute} to compute",
+        "runs": f"at most {found.runs}, of which some may be there"
+        if study.asks
+        else f"{found.runs} in all, {found.to_compute} to compute",
         "loading paths": f"{found.paths} to walk",
         "unknowns": unknown if found.unknowns is None else f"at most {found.unknowns} a run",
         "increments": unknown
         if found.increments is None
         else f"{found.increments} in all, at most {found.longest} on a path",
         "processor time": _time(found) or unknown,
+        "memory": unknown if found.memory is None else f"about {_size(found.memory)} a worker",
         "disk": f"about {_size(found.bytes)}",
         "estimated from": found.basis,
     }

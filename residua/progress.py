@@ -7,10 +7,11 @@ import time
 from typing import TextIO
 
 from studies.definition.cases import Case
+from studies.definition.points import CASE, is_points
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
 from studies.execution.run import StudyEvent
-from studies.views.columns import counted
+from studies.views.columns import counted, value_text
 
 _WIDTH = 28
 _REDRAW = 0.1
@@ -30,7 +31,7 @@ class Progress:
         self._stream = stream or sys.stderr
         self._bar = self._stream.isatty()
         cases = () if self._bar else study.cases()  # a bar names no runs
-        self._size = study.size
+        self._size, self._asks = study.size, study.asks is not None
         self._names = {case.id: _place(study, case) for case in cases}
         self._started = time.monotonic()
         self._begun: float | None = None
@@ -45,7 +46,8 @@ class Progress:
         """Process an event."""
         if self._begun is None:
             self._begun = event.progress
-            if event.kind == "path" and event.fraction == 0.0:  # nothing is done yet
+            first = event.kind == "path" and event.fraction == 0.0  # nothing is done yet
+            if first and not self._asks:
                 self._reused = round(event.progress * self._size)
             if self._reused and not self._bar:
                 text = f"{self._reused} of {self._size} runs exist already"
@@ -59,7 +61,8 @@ class Progress:
             self._failed += event.status != OK
             if not self._bar:
                 reason = f": {event.message}" if event.status != OK else ""
-                line = f"{100 * event.progress:3.0f} %  {event.status}  {self._names[event.run]}"
+                place = event.place or self._names[event.run]
+                line = f"{100 * event.progress:3.0f} %  {event.status}  {place}"
                 print(line + reason, file=self._stream, flush=True)
         now = time.monotonic()
         self._progress = event.progress
@@ -79,7 +82,8 @@ class Progress:
         failed = f", {self._failed} failed" if self._failed else ""
         bar = f"{'█' * filled}{'·' * (_WIDTH - filled)}"
         reused = f" ({self._reused} were there)" if self._reused else ""
-        runs = f"{self._reused + self._seen} of {self._size} runs{reused}{failed}"
+        most = "at most " if self._asks else ""
+        runs = f"{self._reused + self._seen} of {most}{self._size} runs{reused}{failed}"
         left = "  combining the data set" if progress >= 1.0 else self._remaining(progress)
         text = f"{bar} {100 * progress:3.0f} %  {runs}{left}"
         print(f"\r{text}\x1b[K", end="", file=self._stream, flush=True)
@@ -94,5 +98,14 @@ class Progress:
 
 
 def _place(study: Study, case: Case) -> str:
-    place = study.place(case).items()
-    return ", ".join(f"{name} = {counted(value)}" for name, value in place) or study.name
+    """Return the values of a run on the axes, and of a point its name and what it sets."""
+    parts = []
+    for (name, value), index in zip(study.place(case).items(), case.index, strict=True):
+        axis = study.sweep[name]
+        text = f"{name} = {counted(value)}"
+        if is_points(axis):
+            sets = axis[index].items()
+            own = (each if key == CASE else f"{key} = {value_text(each)}" for key, each in sets)
+            text += ": " + ", ".join(own)
+        parts.append(text)
+    return ", ".join(parts) or study.name

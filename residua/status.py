@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import sys
 
+LONGEST = 100_000
+"""Number of characters of the message."""
+
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
 def complain(reason: object, status: int) -> int:
     """Print why a command ends, and return its exit status."""
-    print(f"residua: {reason}", file=sys.stderr)
+    print(f"residua: {str(reason)[:LONGEST]}", file=sys.stderr)  # without imports, see neighbours
     return status

@@ -51,7 +51,8 @@ def needed(request: Request) -> Scope | None:
 class Gate:
     """Middleware that refuses a request before its body is read.
 
-    The caller's scope is stored in ``request.state.caller``: a `Scope`, or None without a key.
+    The caller's scope is stored in ``request.state.caller``: a `Scope`, or None without a key; in
+    ``request.state.name`` the name of the key, or the address of a caller without one.
     """
 
     def __init__(self, app: ASGIApp, settings: Settings, keys: Keys) -> None:
@@ -101,6 +102,7 @@ class Gate:
 
     async def caller(self, request: Request) -> Scope | None:
         """Return the caller's scope, or raise `HTTPException` if it is not sufficient."""
+        request.state.name = request.client.host if request.client else ""
         if not self.keys_needed:
             return Scope.ADMIN
         wanted, header = needed(request), request.headers.get("authorization", "")
@@ -110,8 +112,8 @@ class Gate:
         given = text.strip() if kind.lower() == "bearer" else ""
         try:
             with fail_after(SECONDS):  # in a thread, which is left alone if the disk hangs
-                scope = await run_sync(
-                    self.keys.scope_of, given, limiter=self.one, abandon_on_cancel=True
+                owner = await run_sync(
+                    self.keys.owner, given, limiter=self.one, abandon_on_cancel=True
                 )
         except (KeysError, TimeoutError) as error:
             if wanted is None:
@@ -119,6 +121,7 @@ class Gate:
             reason = str(error) or f"the keys cannot be read within {SECONDS:g} s"
             raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, reason) from None
         challenge = 'Bearer realm="residua"'
+        name, scope = owner or ("", None)
         if scope is None:
             status, detail = HTTPStatus.UNAUTHORIZED, "this needs authorization: Bearer <API key>"
             if header:
@@ -129,6 +132,7 @@ class Gate:
             detail = f"this needs an API key of scope {wanted}; the scope of this one is {scope}"
             challenge += f', error="insufficient_scope", scope="{wanted}"'
         else:
+            request.state.name = name
             return scope
         raise HTTPException(status, detail, {"www-authenticate": challenge})
 

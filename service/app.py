@@ -81,8 +81,9 @@ def create_app(settings: Settings) -> FastAPI:
     mend = Mender(jobs, store).look
     runner = Runner(settings, jobs, Pool.of(settings, held), Starter("service.child", held), mend)
     examiner = Examiner(settings)
-    kept = settings.keep_days, settings.keep_bytes, settings.max_scenes_bytes
-    keeper = Keeper(jobs, store, runner.computes, *kept)
+    kept = settings.keep_days, settings.keep_bytes
+    scenes = settings.max_scenes_bytes, settings.max_key_scenes_bytes
+    keeper = Keeper(jobs, store, runner.computes, *kept, *scenes)
     metrics = Metrics(jobs, store, runner)
 
     @contextlib.asynccontextmanager
@@ -107,7 +108,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.jobs = jobs
     app.state.runner = runner
     app.state.examiner = examiner
-    app.state.inspector = Inspector()
+    app.state.inspector = Inspector(settings.reader_seconds)
     app.state.details = Details(jobs, store)
     app.state.keeper = keeper
     app.state.metrics = metrics

@@ -68,6 +68,13 @@ async def get_caller(request: Request) -> Scope | None:
     return scope
 
 
+async def get_name(request: Request) -> str:
+    """Return the name of the caller's key; without one its address."""
+    name: str = request.state.name
+    return name
+
+
 TheCaller = Annotated[Scope | None, Depends(get_caller)]
+TheName = Annotated[str, Depends(get_name)]
 TheJob = Annotated[Job, Depends(get_job)]
 TheRun = Annotated[dict[str, Any], Depends(get_run)]

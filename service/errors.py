@@ -20,6 +20,7 @@ from service.methods import offered
 from studies import StudyError
 from studies.errors import (
     LONGEST_FIELD,
+    LONGEST_TEXT,
     MOST_MISTAKES,
     CatalogueDamaged,
     FileDamaged,
@@ -30,8 +31,12 @@ from studies.errors import (
     cut,
     worded,
 )
+from studies.storage.room import FULL
 
 log = logging.getLogger(__name__)
+
+LATER = {"retry-after": "10"}
+"""Header with the time after which a repeated request may succeed [s]."""
 
 
 class NotFound(LookupError):
@@ -43,7 +48,21 @@ class Conflict(RuntimeError):
 
 
 class Busy(RuntimeError):
-    """Not now: too many requests of this kind wait, or what is asked for is being made again."""
+    """Not now: too many requests of this kind wait, or what is asked for is being made again.
+
+    Parameters
+    ----------
+    reason : why
+    seconds : time after which a repeated request may succeed [s]
+    """
+
+    def __init__(self, reason: str, seconds: int = 10) -> None:
+        super().__init__(reason)
+        self.later = {"retry-after": str(seconds)}
+
+
+class NoRoom(RuntimeError):
+    """What is asked for takes more room than the disk has."""
 
 
 class QueueLost(RuntimeError):
@@ -57,6 +76,7 @@ STATUS: dict[type[Exception], HTTPStatus] = {
     Conflict: HTTPStatus.CONFLICT,
     Busy: HTTPStatus.SERVICE_UNAVAILABLE,
     QueueLost: HTTPStatus.SERVICE_UNAVAILABLE,
+    NoRoom: HTTPStatus.INSUFFICIENT_STORAGE,
     StoreFull: HTTPStatus.INSUFFICIENT_STORAGE,
     CatalogueDamaged: HTTPStatus.SERVICE_UNAVAILABLE,
     FileDamaged: HTTPStatus.NOT_FOUND,
@@ -66,9 +86,10 @@ STATUS: dict[type[Exception], HTTPStatus] = {
 }
 
 NO_ROOM = "no room is left on the disk of the data directory"
+NO_ROOM_NOW = "no room is left for temporary files"
 
-LATER = {"retry-after": "10"}
-"""Header with the time after which a repeated request may succeed [s]."""
+LONGEST_DETAIL = 20_000
+"""Number of characters of a detail; with the mistakes an answer has less than 1 MB."""
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -121,7 +142,7 @@ def problem(
     document = ProblemDocument(
         title=status.phrase,
         status=status.value,
-        detail=detail,
+        detail=cut(detail, LONGEST_DETAIL),
         instance=request.url.path if request else "",
         errors=list(errors),
     )
@@ -143,6 +164,11 @@ def shown(value: object) -> str | int | float | bool | None:
     return cut(text, LONGEST_FIELD)
 
 
+def mistake(field: str, value: object, allowed: str) -> dict[str, Any]:
+    """Return one of the ``errors`` of a problem document."""
+    return {"field": shown(field), "value": shown(value), "allowed": cut(allowed, LONGEST_TEXT)}
+
+
 def dotted(location: Sequence[str | int]) -> str:
     """Return a pydantic location as ``sweep.friction[2]``, without ``body`` or ``query``."""
     path = location[1:] if len(location) > 1 else location
@@ -154,22 +180,19 @@ def validation_errors(exc: RequestValidationError) -> list[dict[str, Any]]:
     """Return field, value and what is allowed for each error FastAPI found."""
     errors = []
     for error in exc.errors()[:MOST_MISTAKES]:
-        field, value, allowed = dotted(error["loc"]), shown(error.get("input")), worded(error)
+        field, value, allowed = dotted(error["loc"]), error.get("input"), worded(error)
         if error["type"] == "json_invalid":
             reason = f"{error['ctx']['error']} at character {error['loc'][-1]}"
             field, value, allowed = "body", None, f"valid JSON ({reason})"
         elif field == "body":
             allowed = "a JSON object, sent with the header content-type: application/json"
-        errors.append({"field": field, "value": value, "allowed": allowed})
+        errors.append(mistake(field, value, allowed))
     return errors
 
 
 def on_scene_error(request: Request, exc: SceneError) -> Problem:
     """Answer a scene file with all its mistakes."""
-    errors = [
-        {"field": shown(each.field), "value": shown(each.value), "allowed": each.allowed}
-        for each in exc.mistakes
-    ]
+    errors = [mistake(each.field, each.value, each.allowed) for each in exc.mistakes]
     texts = [f"{each['field']}: {each['allowed']}" for each in errors]
     texts += exc.listed[len(errors) :]
     return problem(request, status_of(exc), "; ".join(texts), errors)
@@ -177,9 +200,8 @@ def on_scene_error(request: Request, exc: SceneError) -> Problem:
 
 def on_field_error(request: Request, exc: StudyError) -> Problem:
     """Answer an error that names its field."""
-    error = {"field": shown(exc.field), "value": shown(exc.value), "allowed": exc.allowed}
-    detail = f"{error['field']}: {exc.allowed}"
-    return problem(request, status_of(exc), detail, [error])
+    error = mistake(exc.field, exc.value, exc.allowed)
+    return problem(request, status_of(exc), f"{error['field']}: {exc.allowed}", [error])
 
 
 def on_validation_error(request: Request, exc: RequestValidationError) -> Problem:
@@ -194,7 +216,7 @@ def on_validation_error(request: Request, exc: RequestValidationError) -> Proble
 def on_plain_error(request: Request, exc: Exception) -> Problem:
     """Answer with an error of one sentence."""
     status = status_of(exc)
-    later = LATER if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
+    later = getattr(exc, "later", LATER) if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
     texts = {StoreFull: NO_ROOM, StoreBusy: "the data directory is held by another process"}
     said = texts.get(type(exc), str(exc))
     return problem(request, status, said, headers=later)
@@ -209,6 +231,8 @@ def on_unusable(request: Request, exc: Unusable) -> Problem:
 def on_system_error(request: Request, exc: OSError) -> Problem:
     """Answer an error of the operating system, without the path."""
     log.error("%s", exc)
+    if exc.errno in FULL:  # of the data directory `StoreFull` is raised
+        return problem(request, STATUS[StoreFull], NO_ROOM_NOW, headers=LATER)
     detail = f"the data directory cannot be used: {exc.strerror or 'see the log of the service'}"
     return problem(request, status_of(exc), detail, headers=LATER)
 
@@ -217,6 +241,8 @@ def on_http_error(request: Request, exc: HTTPException) -> Response:
     """Answer errors of the framework: unknown paths, methods, large bodies."""
     if isinstance(exc.__cause__, StudyError):  # raised while the framework reads the body
         return on_field_error(request, exc.__cause__)
+    if isinstance(exc.__cause__, OSError):
+        return on_system_error(request, exc.__cause__)
     headers = dict(exc.headers or {})
     status, detail, errors = HTTPStatus(exc.status_code), exc.detail, []
     if status is HTTPStatus.METHOD_NOT_ALLOWED:
@@ -227,7 +253,7 @@ def on_http_error(request: Request, exc: HTTPException) -> Response:
         form = request.headers.get("content-type", "").lower().startswith("multipart")
         kind = "a form of files" if form else "JSON"
         allowed = f"{kind} that can be read ({exc.__cause__ or exc.detail})"
-        detail, errors = f"body: {allowed}", [{"field": "body", "value": None, "allowed": allowed}]
+        detail, errors = f"body: {allowed}", [mistake("body", None, allowed)]
     return problem(request, status, detail, errors, headers)
 
 
@@ -242,9 +268,10 @@ def on_unexpected(request: Request, exc: Exception) -> Problem:
 HANDLERS: dict[type[Exception], Callable[[Request, Any], Response]] = {
     StudyError: on_field_error,
     SceneError: on_scene_error,
+    Unusable: on_unusable,
     RequestValidationError: on_validation_error,
     **dict.fromkeys(
-        (NotFound, Conflict, Busy, QueueLost, StoreFull, CatalogueDamaged, FileDamaged),
+        (NotFound, Conflict, Busy, NoRoom, QueueLost, StoreFull, CatalogueDamaged, FileDamaged),
         on_plain_error,
     ),
     OSError: on_system_error,

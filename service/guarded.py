@@ -1,4 +1,4 @@
-"""Call functions in a separate process, one after the other, with limits of time and memory.
+"""Call functions in other processes, two at a time, with limits of time and memory.
 
 A large study takes seconds and memory to check, and a malicious mesh could take both without end.
 Meanwhile the service answers other requests.
@@ -6,10 +6,14 @@ Meanwhile the service answers other requests.
 
 from __future__ import annotations
 
+import os
 import resource
 import signal
+import time
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
+from math import ceil
+from pathlib import Path
 from typing import TypeVar
 
 from anyio import BrokenWorkerProcess, CapacityLimiter, fail_after
@@ -18,14 +22,43 @@ from anyio.to_process import run_sync
 from service.errors import Busy
 from studies import StudyError
 
-BYTES = 8 * 2**30
-"""Address space of the process."""
+READERS = 2
+"""Number of calls of a queue at a time."""
+
+MINUTE = 60.0
+"""Time after which a caller has its whole budget again [s]."""
 
 Found = TypeVar("Found")
 
 
+def memory(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path("/sys/fs/cgroup")) -> int:
+    """Return the memory that this process and those it starts may have [bytes].
+
+    The smallest limit of its control groups, of version 2 or 1, or all of the machine. In a
+    container the path of a group may be that outside, and its files are at the top.
+    """
+    found = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")]
+    with suppress(OSError):
+        for line in groups.read_text().splitlines():
+            _, kinds, path = line.split(":", 2)
+            if kinds and "memory" not in kinds.split(","):
+                continue
+            top, name = (
+                (mounted / "memory", "memory.limit_in_bytes") if kinds else (mounted, "memory.max")
+            )
+            own = top / path.lstrip("/")
+            for folder in (own, *own.parents):
+                with suppress(OSError, ValueError):  # no such file, or "max"
+                    found.append(int((folder / name).read_text()))
+    return min(found)
+
+
+BYTES = min(max(memory() // 3, 2**30), 8 * 2**30)
+"""Address space of a process [bytes]: the service and two of them share the memory."""
+
+
 class Guarded:
-    """A queue of calls to such a process.
+    """A queue of calls to such processes.
 
     Parameters
     ----------
@@ -36,15 +69,15 @@ class Guarded:
 
     def __init__(self, field: str, waiting: int, seconds: float) -> None:
         self.field, self.waiting, self.seconds = field, waiting, seconds
-        self.one = CapacityLimiter(1)
+        self.readers = CapacityLimiter(READERS)
 
     @asynccontextmanager
     async def turn(self) -> AsyncIterator[None]:
-        """Wait until no other call is carried out; raise `Busy` if too many wait."""
-        if self.one.statistics().tasks_waiting >= self.waiting:
+        """Wait until a process is free; raise `Busy` if too many wait."""
+        if self.readers.statistics().tasks_waiting >= self.waiting:
             waiting = f"{self.waiting} requests to read a {self.field} wait already"
             raise Busy(f"{waiting}: ask later")
-        async with self.one:
+        async with self.readers:
             yield
 
     async def call(
@@ -69,11 +102,42 @@ class Guarded:
         except BrokenWorkerProcess:
             raise Busy(f"the process that reads a {self.field} has ended: ask again") from None
         except (TimeoutError, MemoryError):
-            allowed = f"must be read within {self.seconds:g} s and {BYTES >> 30} GiB of memory"
-            raise StudyError(self.field, name, allowed + advice) from None
+            raise beyond(self.field, name, self.seconds, advice) from None
+
+
+def beyond(field: str, name: object, seconds: float, advice: str = "") -> StudyError:
+    """Return the error for what takes more than this time, or more memory than is allowed."""
+    allowed = f"must be read within {seconds:g} s and {BYTES / 2**30:.3g} GiB of memory"
+    return StudyError(field, name, allowed + advice)
 
 
 def _limited(function: Callable[..., Found], *given: object) -> Found:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the service's to handle
     resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
     return function(*given)
+
+
+class Budget:
+    """Processor time that each caller has: some seconds at once, and again within a minute.
+
+    Parameters
+    ----------
+    seconds : the budget of a caller [s]
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self.even: dict[str, float] = {}
+
+    def check(self, caller: str) -> None:
+        """Raise `Busy` if a caller has used its budget, with the time to wait."""
+        wait = self.even.get(caller, 0.0) - time.monotonic() - MINUTE
+        if wait >= 0.0:
+            used = f"{self.seconds:g} s of processor time in a minute are used"
+            raise Busy(f"{used}: ask later", max(ceil(wait), 1))
+
+    def charge(self, caller: str, seconds: float) -> None:
+        """Take time from the budget of a caller."""
+        now = time.monotonic()
+        self.even = {name: at for name, at in self.even.items() if at > now}
+        self.even[caller] = self.even.get(caller, now) + seconds / self.seconds * MINUTE

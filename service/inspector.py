@@ -1,8 +1,14 @@
-"""Check scene files before they are stored; nothing in them is executed."""
+"""Check scene files before they are stored; nothing in them is executed.
+
+A scene is read in a process without a network, which writes in one folder; a caller has a budget of
+the time of these processes.
+"""
 
 from __future__ import annotations
 
+import errno
 import json
+import logging
 from collections.abc import AsyncIterator, Mapping
 from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
@@ -11,7 +17,8 @@ from typing import Any
 from anyio import CancelScope
 from anyio.to_thread import run_sync as run_in_thread
 
-from service.guarded import Guarded
+from service.alone import Answer, alone
+from service.guarded import Budget, Guarded, beyond
 from service.schemas import KeptScene
 from studies import StudyError
 from studies.errors import SceneError
@@ -21,8 +28,10 @@ from studies.scenes.scene import FileScene, read_scene
 from studies.scenes.table import FILE_NAME
 from studies.scratch import scratch
 
-SECONDS = 60
-"""Longest time of reading a scene [s]."""
+log = logging.getLogger(__name__)
+
+SLOW = 10.0
+"""Longest time of reading a scene, as a multiple of its processor time: others compute too."""
 WAITING = 20
 """Number of scenes that may wait to be read."""
 FORMATS = (".msh", ".vtk", ".vtu", ".mesh", ".bdf", ".nas")
@@ -33,22 +42,34 @@ _FILE = "scene.toml"
 
 
 class Inspector:
-    """Checks scenes, one after the other."""
+    """Checks scenes, two at a time.
 
-    def __init__(self) -> None:
-        self.process = Guarded("scene", WAITING, SECONDS)
+    Parameters
+    ----------
+    seconds : processor time that the scenes of a caller may take in a minute, and the longest of
+        one
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds, self.budget = seconds, Budget(seconds)
+        self.process = Guarded("scene", WAITING, SLOW * seconds)
+        self.told = ""
 
     async def inspect(
-        self, text: bytes, meshes: Mapping[str, bytes]
+        self, text: bytes, meshes: Mapping[str, bytes], caller: str
     ) -> tuple[KeptScene, Description]:
         """Return the scene of a file and its meshes, and their content.
+
+        Parameters
+        ----------
+        caller : whose budget it takes
 
         Raises
         ------
         StudyError, SceneError
             with all its mistakes
         Busy
-            if too many others wait, or the process was killed
+            if too many others wait, the budget is used, or the process was killed
         """
         if len(text) > LONGEST:
             raise StudyError("scene", f"{len(text)} bytes", f"must have at most {LONGEST} bytes")
@@ -56,12 +77,28 @@ class Inspector:
             if not (FILE_NAME.fullmatch(name) and name.lower().endswith(FORMATS)):
                 allowed = f"must be the name of a file and end in one of {', '.join(FORMATS)}"
                 raise StudyError("meshes", name, allowed)
-        async with self.process.turn(), _written({**meshes, _FILE: text}) as folder:
-            found = json.loads(await self.process.call(inspected, str(folder), name=_FILE))
+        self.budget.check(caller)
+        async with self.process.turn():
+            self.budget.check(caller)  # others of this caller may have been read meanwhile
+            async with _written({**meshes, _FILE: text}) as folder:
+                answer = await self.process.call(inspected, folder, self.seconds, name=_FILE)
+        self.budget.charge(caller, answer.seconds)
+        found = self._read(answer)
         if mistakes := found.get("mistakes"):
             raise SceneError(_FILE, [StudyError(*each) for each in mistakes], found["count"])
         given = {name: MeshFile(name, data) for name, data in meshes.items()}
         return KeptScene(**found["scene"]), Description(_FILE, found["content"], given)
+
+    def _read(self, answer: Answer) -> dict[str, Any]:
+        if answer.open != self.told:
+            self.told = answer.open
+            log.warning("this system does not take from a process that reads: %s", answer.open)
+        if answer.failed == errno.ENOSPC:
+            raise OSError(errno.ENOSPC, "no room is left for temporary files")
+        if answer.failed:
+            raise beyond("scene", _FILE, self.seconds)
+        found: dict[str, Any] = json.loads(answer.text)
+        return found
 
 
 @asynccontextmanager
@@ -82,11 +119,22 @@ async def _written(files: Mapping[str, bytes]) -> AsyncIterator[Path]:
             await run_in_thread(kept.close)
 
 
-def inspected(folder: str) -> str:
+def inspected(folder: Path, seconds: float) -> Answer:
+    """Return what a copy of this process answers, which has loaded what a scene needs."""
+    import meshio  # noqa: F401
+
+    import solver.contact.system
+    import solver.results.samples  # noqa: F401
+    import studies.scenes.building  # noqa: F401
+
+    return alone(_told, folder, folder=folder, seconds=seconds)
+
+
+def _told(folder: Path) -> str:
     """Return the scene in a folder and its content, or its mistakes, as JSON."""
     answer: dict[str, Any]
     try:
-        scene = _read(Path(folder))
+        scene = _read(folder)
         kept = {"id": scene.id, "name": scene.name, "summary": scene.summary}
         answer = {"scene": kept, "content": scene.description.content}
     except SceneError as error:

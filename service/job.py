@@ -5,14 +5,14 @@ from __future__ import annotations
 import logging
 import sqlite3
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
+from typing import Any
+
+from studies.storage.database import checksum
 
 log = logging.getLogger(__name__)
 
-COLUMNS = (
-    "id, name, scene, size, state, message, progress, since, priority, submitted, started, finished"
-)
 UNREADABLE = "its row in the queue cannot be read: post the study again"
 
 
@@ -40,12 +40,14 @@ class Job:
     id : content id of the study
     name, scene : name and scene of the study
     size : number of its runs
-    state, message : its state, and the reason if there is one
+    state, message, stood : its state, the reason if there is one, and its state before a retry
     progress : completed percentage of the work
     since : time of the last retry [ns since 1970], 0 without one: runs that failed before it are
         computed again
     priority : the study with the greater priority is computed first
     submitted, started, finished : ISO 8601, UTC
+    turn : the greater was accepted or retried later
+    digest : checksum of the text of the study
     """
 
     id: str
@@ -56,24 +58,33 @@ class Job:
     message: str
     progress: float
     since: int
+    stood: str
     priority: int
     submitted: str
     started: str | None
     finished: str | None
+    turn: int
+    digest: int
+
+
+COLUMNS = tuple(each.name for each in fields(Job))
+"""Columns of the table beside the text of the study and the checksum of these."""
 
 
 def job_of(row: sqlite3.Row) -> Job | None:
-    """Return the job of a row of the table; None if the row is not valid."""
-    found = dict(row)
-    try:
-        found |= {key: int(found[key]) for key in ("size", "since", "priority")}
-        found |= {"state": StudyState(found["state"]), "progress": float(found["progress"])}
-        if not all(isinstance(found[key], str) for key in ("name", "scene", "message")):
-            raise TypeError
-    except (ValueError, TypeError):
+    """Return the job of a row of the table; None if the row is not what was written."""
+    *values, known = row
+    if checksum(values) != known:
         log.error("%s: %s", row["id"], UNREADABLE)
         return None
-    return Job(**found)
+    return Job(**{**dict(zip(COLUMNS, values, strict=True)), "state": StudyState(row["state"])})
+
+
+def row_of(job: Job) -> list[Any]:
+    """Return the row of a job: its columns, and their checksum."""
+    values = [getattr(job, name) for name in COLUMNS]
+    plain = [str(each) if isinstance(each, StudyState) else each for each in values]
+    return [*plain, checksum(plain)]
 
 
 def wanted(state: StudyState | None = None, tag: str | None = None) -> tuple[str, list[str]]:

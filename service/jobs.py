@@ -2,7 +2,8 @@
 
 The state of a study is in its row alone. Routes write the requests of users into it (accept,
 dismiss, retry); the runner reads these, and writes the results. After a crash the service reads
-the remaining work from it. A row that cannot be read does not affect other rows.
+the remaining work from it. Each row has a checksum; one that cannot be read does not affect others.
+The ids of runs have none: they are made from content, and one that is wrong has no file.
 """
 
 from __future__ import annotations
@@ -13,16 +14,20 @@ import sys
 import time
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from service import schema
 from service.errors import Busy, Conflict, NotFound, QueueLost
-from service.job import COLUMNS, UNREADABLE, Job, StudyState, job_of, wanted
-from studies.storage.database import Database, check
+from service.job import COLUMNS, UNREADABLE, Job, StudyState, job_of, row_of, wanted
+from studies.storage.database import Database, check, checksum
 
-NEXT_TURN = "(SELECT COALESCE(MAX(turn), 0) + 1 FROM job)"
+ALL = ", ".join((*COLUMNS, "checksum"))
+MARKS = ", ".join("?" * len(ALL.split(",")))
+NEXT_TURN = "SELECT COALESCE(MAX(turn), 0) + 1 FROM job"
+BEGUN = {"state": StudyState.RUNNING, "message": "", "finished": None}
 SHARED = """SELECT 1 FROM run AS mine JOIN run AS theirs ON theirs.run = mine.run
     WHERE mine.job = ? AND theirs.job IN (SELECT value FROM json_each(?)) LIMIT 1"""
 
@@ -69,26 +74,28 @@ class Jobs(Database):
         with self.transaction() as connection:
             with suppress(NotFound, Conflict):
                 self._study(connection, job_id)
-                return self._read(connection, job_id), False
+                return self.read(connection, job_id), False
             count = "SELECT COUNT(*) FROM job WHERE state = ?"
             (waiting,) = connection.execute(count, (StudyState.ACCEPTED,)).fetchone()
             if self.longest is not None and waiting >= self.longest:
                 raise Busy(f"{waiting} studies wait already, the largest number: post it later")
             connection.execute("DELETE FROM job WHERE id = ?", (job_id,))  # an unreadable row
             connection.execute("DELETE FROM run WHERE job = ?", (job_id,))
-            connection.executemany(
+            size = connection.executemany(
                 "INSERT INTO run VALUES (?, ?, ?)",
                 ((job_id, position, run) for position, run in enumerate(runs)),
-            )
-            connection.execute(
-                "INSERT INTO job SELECT ?, ?, ?, ?, COUNT(*), ?, '', 0, 0, '', ?, ?, NULL, NULL,"
-                f" {NEXT_TURN} FROM run WHERE job = ?",
-                (
-                    job_id, study["name"], study["scene"], json.dumps(study), StudyState.ACCEPTED,
-                    priority, now(), job_id,
-                ),
+            ).rowcount
+            text = json.dumps(study)
+            job = Job(
+                id=job_id, name=study["name"], scene=study["scene"], size=max(size, 0),
+                state=StudyState.ACCEPTED, message="", progress=0.0, since=0, stood="",
+                priority=priority, submitted=now(), started=None, finished=None,
+                turn=connection.execute(NEXT_TURN).fetchone()[0], digest=checksum([text]),
             )  # fmt: skip
-            return self._read(connection, job_id), True
+            connection.execute(
+                f"INSERT INTO job ({ALL}, study) VALUES ({MARKS}, ?)", [*row_of(job), text]
+            )
+            return job, True
 
     def get(self, job_id: str) -> Job:
         """Return one job.
@@ -99,7 +106,7 @@ class Jobs(Database):
             If no study with this id was accepted.
         """
         with self.transaction("BEGIN") as connection:
-            return self._read(connection, job_id)
+            return self.read(connection, job_id)
 
     def study(self, job_id: str) -> dict[str, Any]:
         """Return the study of a job as ``Study.to_dict`` gave it."""
@@ -121,11 +128,18 @@ class Jobs(Database):
         with self.transaction("BEGIN") as connection:
             (total,) = connection.execute(f"SELECT COUNT(*) FROM job {where}", values).fetchone()
             rows = connection.execute(
-                f"SELECT {COLUMNS} FROM job {where} ORDER BY turn DESC LIMIT ? OFFSET ?",
+                f"SELECT {ALL} FROM job {where} ORDER BY turn DESC LIMIT ? OFFSET ?",
                 (*values, limit, offset),
             )
-            found = [job_of(row) for row in rows]
-            return [job for job in found if job is not None], total
+            return [job for job in map(job_of, rows) if job], total
+
+    def ended(self) -> list[Job]:
+        """Return the jobs that have ended, the oldest end first."""
+        with self.transaction("BEGIN") as connection:
+            rows = connection.execute(
+                f"SELECT {ALL} FROM job WHERE finished IS NOT NULL ORDER BY finished, turn"
+            )
+            return [job for job in map(job_of, rows) if job and job.state.final]
 
     def states(self) -> dict[str, int]:
         """Return the number of jobs by state, without states that no job has."""
@@ -150,26 +164,25 @@ class Jobs(Database):
             for row in waiting:
                 if connection.execute(SHARED, (row["id"], others)).fetchone():
                     continue
-                connection.execute(
-                    "UPDATE job SET state = ?, message = '', started = ?, finished = NULL"
-                    " WHERE id = ? AND state = ?",
-                    (StudyState.RUNNING, now(), row["id"], StudyState.ACCEPTED),
-                )
                 try:
-                    return self._read(connection, row["id"])
+                    job = self.read(connection, row["id"])
                 except NotFound:
                     end = (StudyState.FAILED, UNREADABLE, row["id"])
                     connection.execute("UPDATE job SET state = ?, message = ? WHERE id = ?", end)
+                    continue
+                if job.state is StudyState.RUNNING:
+                    return job
+                return put(connection, job, **BEGUN, started=now())
             return None
 
     def resume(self, busy: Collection[str]) -> None:
         """Mark jobs as running, in a queue that was made again while processes work on them."""
         with self.transaction() as connection:
-            connection.executemany(
-                "UPDATE job SET stood = IIF(state = ?, '', state), state = ?, message = '',"
-                " progress = 0, started = ?, finished = NULL WHERE id = ?",
-                [(StudyState.ACCEPTED, StudyState.RUNNING, now(), job_id) for job_id in busy],
-            )
+            for job_id in busy:
+                with suppress(NotFound):
+                    job = self.read(connection, job_id)
+                    stood = str(job.state) if job.state.final else ""
+                    put(connection, job, **BEGUN, stood=stood, progress=0.0, started=now())
 
     def waiting(self) -> dict[str, str]:
         """Return, by id, the reason for which running jobs wait, without those that do not."""
@@ -188,21 +201,19 @@ class Jobs(Database):
         standing: StudyState = StudyState.RUNNING,
     ) -> None:
         """Write the final state of a job; if it was dismissed meanwhile, it stays dismissed."""
-        with self.transaction() as connection:
-            connection.execute(
-                "UPDATE job SET state = ?, message = ?, finished = ?,"
-                " progress = CASE ? WHEN 'successful' THEN 100 ELSE progress END"
-                " WHERE id = ? AND state = ?",
-                (state, message, now(), state, job_id, standing),
-            )
+        done = {"progress": 100.0} if state is StudyState.SUCCESSFUL else {}
+        self._put_if(job_id, standing, state=state, message=message, finished=now(), **done)
 
     def note(self, job_id: str, progress: float, message: str = "") -> None:
         """Write the progress of a running job, and the reason for which it waits, if it does."""
-        with self.transaction() as connection:
-            connection.execute(
-                "UPDATE job SET message = ?, progress = ? WHERE id = ? AND state = ?",
-                (message, progress, job_id, StudyState.RUNNING),
-            )
+        self._put_if(job_id, StudyState.RUNNING, message=message, progress=float(progress))
+
+    def _put_if(self, job_id: str, standing: StudyState, **changes: Any) -> None:
+        """Change a job that is in a state; one that is gone or in another state stays."""
+        with self.transaction() as connection, suppress(NotFound):
+            job = self.read(connection, job_id)
+            if job.state is standing:
+                put(connection, job, **changes)
 
     def dismiss(self, job_id: str) -> Job:
         """Request that the work on a job stops; a repeated request has no further effect.
@@ -217,17 +228,15 @@ class Jobs(Database):
             If it has ended already.
         """
         with self.transaction() as connection:
-            job = self._read(connection, job_id)
+            job = self.read(connection, job_id)
             if job.state in (StudyState.SUCCESSFUL, StudyState.FAILED):
                 raise Conflict(f"the study is {job.state} already: there is no work to stop")
-            if job.state is not StudyState.DISMISSED:
-                connection.execute(
-                    "UPDATE job SET state = IIF(stood = 'successful', stood, ?), message = '',"
-                    " progress = IIF(stood = 'successful', 100, progress), finished = ?"
-                    " WHERE id = ?",
-                    (StudyState.DISMISSED, now(), job_id),
-                )
-            return self._read(connection, job_id)
+            if job.state is StudyState.DISMISSED:
+                return job
+            stood = job.stood == StudyState.SUCCESSFUL
+            state = StudyState.SUCCESSFUL if stood else StudyState.DISMISSED
+            progress = 100.0 if stood else job.progress
+            return put(connection, job, state=state, message="", progress=progress, finished=now())
 
     def retry(self, job_id: str, failed: bool = True) -> Job:
         """Put a job that has ended back into the queue, in the last place.
@@ -242,15 +251,14 @@ class Jobs(Database):
             If it is waiting or running.
         """
         with self.transaction() as connection:
-            job = self._read(connection, job_id)
+            job = self.read(connection, job_id)
             if not job.state.final:
                 raise Conflict(f"the study is {job.state}: wait for its end or dismiss it first")
-            connection.execute(
-                "UPDATE job SET stood = state, state = ?, message = '', progress = 0, since = ?,"
-                f" started = NULL, finished = NULL, turn = {NEXT_TURN} WHERE id = ?",
-                (StudyState.ACCEPTED, time.time_ns() if failed else job.since, job_id),
-            )
-            return self._read(connection, job_id)
+            return put(
+                connection, job, stood=str(job.state), state=StudyState.ACCEPTED, message="",
+                progress=0.0, since=time.time_ns() if failed else job.since, started=None,
+                finished=None, turn=connection.execute(NEXT_TURN).fetchone()[0],
+            )  # fmt: skip
 
     @contextmanager
     def transaction(
@@ -265,24 +273,30 @@ class Jobs(Database):
             connection.text_factory = lambda text: text.decode(errors="replace")
             yield connection
 
-    @staticmethod
-    def _study(connection: sqlite3.Connection, job_id: str) -> dict[str, Any]:
+    def _study(self, connection: sqlite3.Connection, job_id: str) -> dict[str, Any]:
         row = connection.execute("SELECT study FROM job WHERE id = ?", (job_id,)).fetchone()
         if row is None:
             raise unknown(job_id)
-        try:
-            study: dict[str, Any] = json.loads(row["study"])
-        except ValueError:
-            raise Conflict(UNREADABLE) from None
+        if checksum([row["study"]]) != self.read(connection, job_id).digest:
+            raise Conflict(UNREADABLE)
+        study: dict[str, Any] = json.loads(row["study"])
         return study
 
     @staticmethod
-    def _read(connection: sqlite3.Connection, job_id: str) -> Job:
-        row = connection.execute(f"SELECT {COLUMNS} FROM job WHERE id = ?", (job_id,)).fetchone()
+    def read(connection: sqlite3.Connection, job_id: str) -> Job:
+        """Return a job in the transaction of a connection; raise `NotFound`."""
+        row = connection.execute(f"SELECT {ALL} FROM job WHERE id = ?", (job_id,)).fetchone()
         job = job_of(row) if row else None
         if job is None:
             raise unknown(job_id)
         return job
+
+
+def put(connection: sqlite3.Connection, job: Job, **changes: Any) -> Job:
+    """Change a job in the transaction of a connection, and return it."""
+    job = replace(job, **changes)
+    connection.execute(f"UPDATE job SET ({ALL}) = ({MARKS}) WHERE id = ?", [*row_of(job), job.id])
+    return job
 
 
 def unknown(job_id: str) -> NotFound:

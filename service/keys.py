@@ -85,14 +85,14 @@ class Keys:
                 raise FileDamaged(self.path, _NAME, type(error).__name__, state) from None
         return dict(self._read[1])
 
-    def scope_of(self, text: str) -> Scope | None:
-        """Return the scope of the key ``text``; None if it is unknown.
+    def owner(self, text: str) -> tuple[str, Scope] | None:
+        """Return the name and the scope of the key ``text``; None if it is unknown.
 
         Every hash is compared, in a time that does not depend on the position of a difference.
         """
-        given, known = _digest(text).encode(), self.all().values()
-        fits = [key for key in known if hmac.compare_digest(key.sha256.encode(), given)]
-        return fits[0].scope if fits else None
+        given, known = _digest(text).encode(), self.all().items()
+        fits = [own for own in known if hmac.compare_digest(own[1].sha256.encode(), given)]
+        return (fits[0][0], fits[0][1].scope) if fits else None
 
     def add(self, name: str, scope: Scope) -> str:
         """Make a key and return its text, which is not stored; the name must be new.

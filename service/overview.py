@@ -15,6 +15,7 @@ from service.job import Job
 from service.jobs import Jobs
 from service.schemas import StudyDetail, StudyRun, StudySummary, Window
 from studies import Store
+from studies.definition.sweep import labels
 from studies.definition.vocabulary import taken
 from studies.storage.seal import state_of
 
@@ -85,7 +86,7 @@ class Details:
             counts[taken(status, allow)] += number
         if pending := job.size - sum(counts.values()):
             counts[PENDING] = pending
-        axes = {name: list(axis) for name, axis in study["sweep"].items()}  # of tables the labels
+        axes = {name: labels(name, axis) for name, axis in study["sweep"].items()}
         page = self.jobs.runs(job.id, window.limit, window.offset)
         rows = self.store.catalogue.rows(page)
         return StudyDetail(

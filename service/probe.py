@@ -41,6 +41,7 @@ def look(store: Store, jobs: Jobs) -> dict[str, Any]:
     found: dict[str, Any] = {}
     with suppress(OSError), tempfile.TemporaryFile(dir=store.directory) as probe:
         probe.write(b"1")
+        probe.flush()  # a full disk is told here
         found["data_writable"] = True
     with suppress(QueueLost, StoreFull, OSError):
         found["waiting"] = jobs.waiting()

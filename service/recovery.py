@@ -75,6 +75,8 @@ def _add(study_id: str, jobs: Jobs, store: Store, begun: bool = True) -> None:
         if getattr(error, "value", None) != study_id:  # that is of another version of the solver
             log.warning("studies/%s: not restored: %s", study_id, error)
         return
+    if study.asks:  # no study of the queue
+        return
     counts = store.outcomes(study.id)
     if not (counts or begun):
         return

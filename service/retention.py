@@ -12,15 +12,18 @@ import asyncio
 import logging
 import shutil
 import sqlite3
+import threading
+import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from service.errors import Conflict, NotFound
-from service.jobs import Jobs
-from studies import FileDamaged, Store
+from service.job import Job, StudyState
+from service.jobs import Jobs, put
+from studies import FileDamaged, Store, Study
 from studies.scenes.description import Description
 from studies.storage.seal import content_of
 
@@ -28,6 +31,9 @@ log = logging.getLogger(__name__)
 
 INTERVAL = 300.0
 """Seconds between two checks of age and size."""
+
+FRESH = 24 * 3600 * 10**9
+"""Time in which a scene that no study needs is not deleted for its size [ns]."""
 
 DELETED = "deleted in part: delete it again to complete that, or retry it"
 """Message of a study that is being deleted; also correct after a crash."""
@@ -41,9 +47,11 @@ class Keeper:
     ----------
     jobs, store : the queue and the store
     computes : (study id) -> whether a process may still work on it
-    days, size : age [days], and total size of runs and studies [bytes], beyond which studies that
-        have ended are deleted, the oldest first; None for no limit
-    scenes : largest size of all posted scenes [bytes]; None for no limit
+    days, size : age of studies [days], and size of runs, scenes and studies together [bytes],
+        beyond which first scenes that no study needs, then studies that have ended are deleted, the
+        oldest first; None for no limit
+    scenes, own : largest size of all posted scenes, and of those of a key [bytes]; None for no
+        limit
     """
 
     jobs: Jobs
@@ -52,6 +60,8 @@ class Keeper:
     days: float | None = None
     size: int | None = None
     scenes: int | None = None
+    own: int | None = None
+    _one: threading.Lock = field(default_factory=threading.Lock)
 
     def delete_run(self, run_id: str) -> None:
         """Delete a run; raise `Conflict` if a waiting or running study needs it."""
@@ -66,21 +76,30 @@ class Keeper:
                     raise Conflict(f"{needed}: dismiss it first, or wait for its end")
             self.store.discard([run_id])
 
-    def keep_scene(self, scene_id: str, description: Description) -> bool:
-        """Store a posted scene; return whether it is new.
+    def accept(self, study: Study, runs: list[str], priority: int) -> tuple[Job, bool]:
+        """Store a study, and put it into the queue; its scene is not deleted in between."""
+        with self._one:
+            self.store.save_study(study)
+            return self.jobs.accept(study.id, study.to_dict(), runs, priority)
+
+    def keep_scene(self, scene_id: str, description: Description, owner: str) -> bool:
+        """Store a posted scene for a key; return whether it is new.
 
         Raises
         ------
         Conflict
-            If all posted scenes would take more than is allowed.
+            If all posted scenes, or those of the key, would take more than is allowed.
         """
-        if self.store.scene(scene_id, whole=False) is None:
-            given = sum(len(mesh.data) for mesh in (description.meshes or {}).values())
-            taken = size(self.store.directory / "scenes") + given
-            if self.scenes is not None and taken > self.scenes:
-                allowed = f"at most {self.scenes} are allowed: delete some"
-                raise Conflict(f"the posted scenes would take {taken} bytes, {allowed}")
-        return self.store.keep_scene(scene_id, description)
+        with self._one:
+            if self.store.scene(scene_id, whole=False) is None:
+                given = sum(len(mesh.data) for mesh in (description.meshes or {}).values())
+                there = self.store.scene_sizes()
+                own, every = there.get(owner, 0), sum(there.values())
+                for whose, taken, most in (("your", own, self.own), ("the", every, self.scenes)):
+                    if most is not None and taken + given > most:
+                        would = f"{whose} posted scenes would take {taken + given} bytes"
+                        raise Conflict(f"{would}, at most {most} are allowed: delete some")
+            return self.store.keep_scene(scene_id, description, owner)
 
     def delete_scene(self, scene_id: str) -> None:
         """Delete a posted scene, also one that this version does not allow.
@@ -94,16 +113,21 @@ class Keeper:
         """
         if not (self.store.directory / "scenes" / scene_id).is_dir():
             raise NotFound(f"no posted scene has the id {scene_id}")
-        for path in (self.store.directory / "studies").glob("*/study.json"):
-            study_id = path.parent.name
-            with suppress(FileDamaged):
-                if content_of(path, f"study {study_id}").get("scene") == scene_id:
-                    raise Conflict(f"the study {study_id} needs this scene: delete it first")
-        with self.jobs.transaction() as queue:
-            user = queue.execute("SELECT id FROM job WHERE scene = ?", (scene_id,)).fetchone()
-            if user:
-                raise Conflict(f"the study {user['id']} needs this scene: delete it first")
+        with self._one:
+            if user := self._users().get(scene_id):
+                raise Conflict(f"the study {user} needs this scene: delete it first")
             self.store.discard_scene(scene_id)
+
+    def _users(self) -> dict[str, str]:
+        """Return a study for each scene that is named, in the queue or by the command line."""
+        found: dict[str, str] = {}
+        for study_id in self.store.study_ids():
+            path = self.store.study_directory(study_id) / "study.json"
+            with suppress(FileDamaged):
+                found[str(content_of(path, f"study {study_id}").get("scene"))] = study_id
+        with self.jobs.transaction("BEGIN") as queue:
+            found.update(queue.execute("SELECT scene, id FROM job").fetchall())
+        return found
 
     def purge(self, study_id: str) -> int:
         """Delete a study, its data set, and those of its runs that no other study needs.
@@ -119,10 +143,9 @@ class Keeper:
         Conflict
             If it is waiting or running, or its process has not ended yet.
         """
-        with self._ended(study_id) as queue:
-            queue.execute(
-                "UPDATE job SET state = 'dismissed', message = ? WHERE id = ?", (DELETED, study_id)
-            )
+        with self._ended(study_id) as queue, suppress(NotFound):  # its row cannot be read
+            job = self.jobs.read(queue, study_id)
+            put(queue, job, state=StudyState.DISMISSED, message=DELETED)
         elsewhere = self._needed_elsewhere()
         directory = self.store.study_directory(study_id)
         with self._ended(study_id) as queue:
@@ -143,26 +166,40 @@ class Keeper:
     def sweep(self) -> None:
         """Purge studies that are too old, and the oldest ones while the total size is too large.
 
-        Studies that only the command line has computed are kept.
+        Scenes that no study needs go before them. Studies that only the command line has computed
+        are kept, and so are scenes of the last day, for the studies that will name them.
         """
         if self.days is None and self.size is None:
             return
-        with self.jobs.transaction("BEGIN") as queue:
-            ended = queue.execute(
-                "SELECT id, finished FROM job WHERE state NOT IN ('accepted', 'running')"
-                " AND finished IS NOT NULL ORDER BY finished, turn"
-            ).fetchall()
         oldest = datetime.now(UTC) - timedelta(days=self.days) if self.days else None
-        used = sum(size(self.store.directory / name) for name in ("runs", "studies"))
-        excess = used - self.size if self.size is not None else 0
-        for job in ended:
-            old = oldest is not None and datetime.fromisoformat(job["finished"]) < oldest
+        excess = 0
+        if self.size is not None:
+            used = sum(size(self.store.directory / name) for name in ("runs", "studies"))
+            excess = used + sum(self.store.scene_sizes().values()) - self.size
+        if excess > 0:
+            excess -= self._sweep_scenes(excess)
+        for job in self.jobs.ended():
+            old = oldest is not None and datetime.fromisoformat(str(job.finished)) < oldest
             if not (old or excess > 0):
                 return
             with suppress(Conflict, NotFound):
-                excess -= self.purge(job["id"])
+                excess -= self.purge(job.id)
                 reason = f"older than {self.days} days" if old else f"above {self.size} bytes"
-                log.info("deleted a study: %s", reason, extra={"study": job["id"]})
+                log.info("deleted a study: %s", reason, extra={"study": job.id})
+
+    def _sweep_scenes(self, excess: int) -> int:
+        """Delete scenes that no study needs, the oldest first; return the bytes freed."""
+        freed, before, users = 0, time.time_ns() - FRESH, self._users()
+        for scene in reversed(self.store.scenes(limit=-1)):
+            if freed >= excess or scene.added > before:
+                break
+            if scene.id in users:
+                continue
+            with suppress(Conflict, NotFound):
+                self.delete_scene(scene.id)
+                freed += scene.size
+                log.info("deleted a posted scene: above %s bytes", self.size)
+        return freed
 
     @asynccontextmanager
     async def working(self) -> AsyncIterator[None]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import sqlite3
 
+from service.job import COLUMNS
 from studies.errors import StudyError
+from studies.storage.database import checksum
 
-VERSION = 1
+VERSION = 2
 
 TABLES = (
     """CREATE TABLE job (
@@ -24,7 +26,9 @@ TABLES = (
         submitted TEXT NOT NULL,
         started TEXT,
         finished TEXT,
-        turn INTEGER NOT NULL
+        turn INTEGER NOT NULL,
+        digest INTEGER,
+        checksum INTEGER
     )""",
     "CREATE INDEX job_by_turn ON job (turn)",
     "CREATE INDEX job_by_state ON job (state, priority, turn)",
@@ -39,13 +43,25 @@ TABLES = (
 FIRST_FORM = (
     """INSERT INTO job SELECT id, json_extract(study, '$.name'), json_extract(study, '$.scene'),
         study, size, state, message, progress, again * 1000000000
-        * CAST(strftime('%s', 'now') AS INTEGER), '', 0, submitted, started, finished, turn
-        FROM first""",
+        * CAST(strftime('%s', 'now') AS INTEGER), '', 0, submitted, started, finished, turn,
+        NULL, NULL FROM first""",
     """INSERT INTO run SELECT first.id, each.key, each.value
         FROM first, json_each(first.runs) AS each""",
     "DROP TABLE first",
 )
 """Copies the rows of the first form, in which a row held all its runs as one text."""
+
+
+SECOND_FORM = (
+    "ALTER TABLE job ADD COLUMN digest INTEGER",
+    "ALTER TABLE job ADD COLUMN checksum INTEGER",
+)
+"""Adds the columns that the second form, the first with rows of runs, has not."""
+
+CHECKSUMS = (
+    "UPDATE job SET digest = checksum(study)",
+    f"UPDATE job SET checksum = checksum({', '.join(COLUMNS)})",
+)
 
 
 def prepare(connection: sqlite3.Connection, new: bool) -> None:
@@ -67,7 +83,12 @@ def prepare(connection: sqlite3.Connection, new: bool) -> None:
         raise StudyError("jobs.sqlite", f"form {version}", allowed)
     if not new and "job" not in known:
         raise sqlite3.DatabaseError("it holds no queue")
-    if "job" in known:
-        connection.execute("ALTER TABLE job RENAME TO first")
-    for statement in TABLES + (FIRST_FORM if "job" in known else ()):
+    connection.create_function("checksum", -1, lambda *values: checksum(values))
+    if "run" in known:
+        statements: tuple[str, ...] = (*SECOND_FORM, TABLES[-1], *CHECKSUMS)
+    elif "job" in known:
+        statements = ("ALTER TABLE job RENAME TO first", *TABLES, *FIRST_FORM, *CHECKSUMS)
+    else:
+        statements = TABLES
+    for statement in statements:
         connection.execute(statement)

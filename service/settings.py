@@ -67,6 +67,14 @@ class Settings(BaseSettings):
         ge=0,
         description="size of all posted scenes above which none is kept",
     )
+    max_key_scenes_bytes: int = Field(
+        default=2_000_000_000, ge=0, description="the same for the scenes of a key"
+    )
+    reader_seconds: float = Field(
+        default=10.0,
+        gt=0,
+        description="processor time in a minute for the scenes that a key posts, and for each [s]",
+    )
     connections: int = Field(default=500, ge=1, description="most connections at a time")
     arrival_seconds: float = Field(
         default=20.0, gt=0, description="time in which a request, head and body, must arrive"
@@ -120,10 +128,12 @@ class Settings(BaseSettings):
     max_increments: int = Field(
         default=50_000, ge=1, description="most increments of a loading path"
     )
-    max_cpu_seconds: float | None = Field(
-        default=None, gt=0, description="most processor time a study is likely to take"
+    max_cpu_seconds: float = Field(
+        default=50_000.0, gt=0, description="most processor time a study is likely to take"
     )
-    max_bytes: int | None = Field(default=None, ge=1, description="most bytes a study may store")
+    max_bytes: int = Field(
+        default=50_000_000_000, ge=1, description="most bytes a study is likely to store"
+    )
     log_format: Literal["plain", "json"] = Field(default="plain", description="form of the log")
 
     @property

@@ -1,4 +1,4 @@
-"""Refuse JSON objects with a name that occurs twice; Python's reader silently keeps the last."""
+"""Refuse JSON that is nested too deep, or has a name twice: Python's reader keeps the last."""
 
 from __future__ import annotations
 
@@ -10,19 +10,23 @@ from fastapi import Request, Response
 from fastapi.routing import APIRoute
 
 from studies import StudyError
-from studies.toml import DEEPEST, depth
+from studies.toml import check_depth
 
 
 class StrictRequest(Request):
-    """A request that refuses a JSON object with two members of one name."""
+    """A request that refuses such JSON."""
 
     async def json(self) -> Any:
         """Return the body, read as JSON."""
-        content = json.loads(await self.body(), object_pairs_hook=_distinct)
-        if (levels := depth(content)) > DEEPEST:
-            allowed = f"must have lists and objects at most {DEEPEST} deep"
-            raise StudyError("body", f"{levels} deep", allowed)
-        return content
+        body = await self.body()
+        text = body.decode(json.detect_encoding(body), "surrogatepass")
+        try:
+            check_depth(text)
+        except ValueError as error:
+            raise StudyError(
+                "body", f"{text[:50]}…", f"must not be nested so deep: {error}"
+            ) from None
+        return json.loads(text, object_pairs_hook=_distinct)
 
 
 class StrictRoute(APIRoute):

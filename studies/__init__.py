@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
     from studies.storage.store import Store
+    from studies.views.grids import to_grid
     from studies.views.reading import open_netcdf, open_study
     from studies.views.solution import to_xarray
 
@@ -48,6 +49,7 @@ _HOMES = {
     "run_study": "execution.run",
     "scene_schema": "definition.parameters",
     "sweep": "execution.function",
+    "to_grid": "views.grids",
     "to_xarray": "views.solution",
 }
 
@@ -75,6 +77,7 @@ __all__ = [
     "run_study",
     "scene_schema",
     "sweep",
+    "to_grid",
     "to_xarray",
 ]
 

@@ -1,11 +1,14 @@
-"""Read TOML files of studies and scenes, and the files of points that a study names."""
+"""Read TOML files of studies and scenes, and the files of points and curves that a study names."""
 
 from __future__ import annotations
 
+import csv
 import json
+import re
 import stat
 import tomllib
-from itertools import chain
+from contextlib import suppress
+from itertools import accumulate, chain
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +20,14 @@ LARGEST = 50_000_000
 
 DEEPEST = 50
 """Largest number of tables and lists inside one another."""
+
+_TEXT = re.compile(
+    r""""{3}(?:\\.|[^\\])*?(?:"{3,5}|\Z)|'{3}.*?(?:'{3,5}|\Z)"""
+    r"""|"(?:\\.|[^"\\\n])*+"?|'[^'\n]*+'?|\#[^\n]*+""",
+    re.DOTALL,
+)
+_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
+_STEP = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
 def read_bytes(path: Path | str, field: str) -> bytes:
@@ -36,6 +47,19 @@ def read_bytes(path: Path | str, field: str) -> bytes:
         return Path(path).read_bytes()
     except OSError as error:
         raise StudyError(field, str(path), f"cannot be read: {error.strerror}") from None
+
+
+def check_depth(text: str) -> None:
+    """Raise `ValueError` for a text of TOML or JSON that nests more than `DEEPEST` lists or tables.
+
+    The time of a parser may grow with the square of the parts of a dotted key, and one that calls
+    itself for each bracket may end the process. So this is found before anything is parsed.
+    """
+    bare = _TEXT.sub("s", text)
+    levels = max(accumulate(map(_STEP.__getitem__, re.findall(r"[][{}]", bare))), default=0)
+    if levels > DEEPEST or _KEY.search(bare):
+        found = f"lists or tables {levels}" if levels > DEEPEST else f"keys over {DEEPEST} tables"
+        raise ValueError(f"it has {found} deep; at most {DEEPEST} are allowed")
 
 
 def depth(content: Any) -> int:
@@ -63,23 +87,85 @@ def read_toml(path: Path | str, field: str) -> dict[str, Any]:
 def read_study(path: Path | str) -> dict[str, Any]:
     """Return the tables of a study file.
 
-    Among parameters and in the sweep, a text that ends in ``.csv`` or ``.txt`` names a file beside
-    the study. Its points take its place, so that the content of a study needs no other file.
+    ``[points] file = "tests.csv"`` names a table beside the study, and so does an axis of the sweep
+    that has this entry: see `read_table`. A value of a parameter that ends in ``.csv`` or ``.txt``
+    names the points of a curve. What is in the files takes their place, so that the content of a
+    study needs no other file.
 
     Raises
     ------
     StudyError
-        for ``file``, when the study cannot be read or is no TOML; for the place that names a file
-        of points which cannot be read
+        for ``file``, when the study cannot be read or is no TOML; for the place that names another
+        file which cannot be read
     """
-    tables = read_toml(path, "file")
+    tables, folder = read_toml(path, "file"), Path(path).parent
+    if "points" in tables:
+        tables["points"] = _with_table(tables["points"], "points", folder)
+    if isinstance(sweep := tables.get("sweep"), dict):
+        for name in sweep:
+            sweep[name] = _with_table(sweep[name], f"sweep.{name}", folder)
     for table in _MAY_NAME_FILES:
         if table in tables:
-            tables[table] = _with_points(tables[table], table, Path(path).parent)
+            tables[table] = _with_points(tables[table], table, folder)
     return tables
 
 
-_MAY_NAME_FILES, _OF_POINTS = ("parameters", "sweep"), (".csv", ".txt")
+_MAY_NAME_FILES, _OF_POINTS = ("parameters", "points", "sweep"), (".csv", ".txt")
+
+
+def _with_table(axis: Any, field: str, folder: Path) -> Any:
+    """Return the rows of a file of points in place of its name."""
+    if not isinstance(axis, dict) or not isinstance(axis.get("file"), str):
+        return axis
+    for key in axis.keys() - {"file"}:
+        raise StudyError(f"{field}.{key}", axis[key], "must be in the file, or left out")
+    return read_table(folder / axis["file"], f"{field}.file")
+
+
+def read_table(path: Path | str, field: str) -> list[dict[str, Any]]:
+    """Return the rows of a table of text, each by the heading of its columns.
+
+    The first line has the headings. Columns are separated by comma, semicolon or tab; after a
+    semicolon numbers may have a decimal comma. Lines that begin with ``#`` and empty ones are left
+    out, and so is an empty cell: its row does not have this heading.
+
+    Raises
+    ------
+    StudyError
+        for ``field``, when the file cannot be read, has no row, or a row of another length
+    """
+    name = Path(path).name
+    try:
+        lines = read_bytes(path, field).decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise StudyError(field, name, "must be text in UTF-8") from None
+    numbered = [(k, each) for k, each in enumerate(lines, 1) if each.strip() and each[0] != "#"]
+    if len(numbered) < 2:
+        raise StudyError(field, name, "must have a line of headings, and a line for each point")
+    delimiter = next((each for each in ";\t" if each in numbered[0][1]), ",")
+    rows = csv.reader((each for _, each in numbered), delimiter=delimiter, skipinitialspace=True)
+    headings, *cells = ([cell.strip() for cell in row] for row in rows)
+    twice = [heading for k, heading in enumerate(headings) if heading in headings[:k]]
+    if twice or "" in headings:
+        allowed = f"has the heading {twice[0]!r} twice" if twice else "has a column without heading"
+        raise StudyError(field, name, allowed)
+    for (number, _), row in zip(numbered[1:], cells, strict=False):
+        if len(row) != len(headings):
+            allowed = f"has {len(row)} cells in line {number}, and {len(headings)} headings"
+            raise StudyError(field, name, allowed)
+    return [
+        {key: _cell(text, delimiter) for key, text in zip(headings, row, strict=True) if text}
+        for row in cells
+    ]
+
+
+def _cell(text: str, delimiter: str) -> Any:
+    """Return a cell as a number or truth value, if it is one, or as text."""
+    plain = text.replace(",", ".") if delimiter == ";" else text
+    for read in (int, float, {"true": True, "false": False}.__getitem__):
+        with suppress(ValueError, KeyError):
+            return read(plain)
+    return text
 
 
 def _with_points(value: Any, field: str, folder: Path) -> Any:
@@ -107,10 +193,12 @@ def toml_of(data: bytes, field: str, name: str) -> dict[str, Any]:
         for ``field`` with the value ``name``, if the text is not TOML
     """
     try:
-        tables = tomllib.loads(data.decode("utf-8-sig"))
+        text = data.decode("utf-8-sig")
+        check_depth(text)
+        tables = tomllib.loads(text)
         if (levels := depth(tables)) > DEEPEST:
-            raise ValueError(f"it has tables or lists {levels} deep; at most {DEEPEST} are allowed")
+            raise ValueError(f"it has lists or tables {levels} deep; at most {DEEPEST} are allowed")
         plain: dict[str, Any] = json.loads(json.dumps(tables, default=str))
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise StudyError(field, name, f"must be valid TOML: {error}") from None
     return plain

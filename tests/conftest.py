@@ -86,11 +86,11 @@ def one_worker(request: pytest.FixtureRequest) -> Iterator[None]:
     own_workers = run.own_workers
 
     @contextmanager
-    def shared(workers: int, memory: str | None = None) -> Iterator[Access]:
+    def shared(workers: int, memory: str | None = None, need: int = 0) -> Iterator[Access]:
         if (workers, memory) == (1, None):
             yield request.getfixturevalue("lasting_worker")
         else:
-            with own_workers(workers, memory) as access:
+            with own_workers(workers, memory, need) as access:
                 yield access
 
     with pytest.MonkeyPatch.context() as patch:

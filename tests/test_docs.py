@@ -3,12 +3,12 @@
 The blocks of a page run from top to bottom in one empty directory that holds a copy of the
 studies and scene files of `data`, the studies on the coarsest meshes and with the values that the
 pages look at; so do those of every page that has any. What an earlier page has computed by the
-same command is there already. ``python`` blocks are programs, each in a file of its own, as workers
-import it; in ``console`` blocks each line ``$ residua …`` runs and must succeed, a study on one
-worker. A block after ``<!-- no-test -->`` is left out, which only those may be that need a server
-or compute for minutes. A block after ``<!-- from examples/NAME.py -->`` is not run: its lines stand
-in that script, which is. Links lead to files and headings that exist, and so do the files a page
-names.
+same command is there already. ``python`` blocks are programs, each in a file and a process of its
+own, as workers import it; in ``console`` blocks each line ``$ residua …`` runs in this process and
+must succeed, a study on one worker. A block after ``<!-- no-test -->`` is left out, which only
+those may be that need a server or compute for minutes. A block after
+``<!-- from examples/NAME.py -->`` is not run: its lines stand in that script, which is. Links lead
+to files and headings that exist, and so do the files a page names.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -27,6 +28,7 @@ from typing import Any
 
 import pytest
 
+from residua.cli import main
 from solver.results.quantities import QUANTITIES
 from solver.scenes import SCENES
 from tests.architecture.sources import ROOT, tracked
@@ -40,17 +42,6 @@ BLOCK = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 COSTLY = re.compile(r"https?://|residua (?:run|serve|submit|status|cancel|fetch)")
-COMMANDS = """\
-import shlex, sys
-from residua.cli import main
-for line in sys.argv[1:]:
-    print("$ residua", line, flush=True)
-    alone = ["--workers", "1"] if line.startswith("run ") else []
-    if code := main([*shlex.split(line), *alone]):
-        sys.exit(code)
-"""
-"""Commands one after the other in one process: each by itself would import for seconds, and so
-would a second process of a study."""
 SNIPPET = "snippet.py"
 CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
@@ -61,6 +52,7 @@ RUN = re.compile(r"run \S+ --out (?P<out>\S+)")
 FEWER = {
     "ball.toml": {"load_ratio": [1.5, 6.0], "hardening": ["none", "kinematic"]},
     "elastic-punch.toml": {"friction": [0.0, 0.4]},
+    "wheel-rail.toml": {"passes": [1, 2]},
     "wheel-rail-lateral.toml": {"lateral_position": [-7.5, -3.0], "traction": [-0.75, 0.75]},
     "shaft-hub.toml": {"friction": [0.0, 0.2], "loading": ["interference"]},
 }
@@ -90,8 +82,8 @@ class Block:
         return re.findall(r"^\$ residua (.*)$", self.text, re.MULTILINE)
 
 
-def programs(page: list[Block], folder: Path) -> Iterator[tuple[int, list[str]]]:
-    """Yield the line and the arguments for the interpreter of what a page runs, in order.
+def programs(page: list[Block], folder: Path) -> Iterator[tuple[int, list[str] | Path]]:
+    """Yield the line of what a page runs, in order, and commands or a file of Python.
 
     Python is written to a file in a folder, before it is yielded.
     """
@@ -100,12 +92,34 @@ def programs(page: list[Block], folder: Path) -> Iterator[tuple[int, list[str]]]
         some = list(group)
         if language == "console":
             if commands := [command for block in some for command in block.commands]:
-                yield some[0].line, ["-c", COMMANDS, *commands]
+                yield some[0].line, commands
             continue
         for block in some:
             # Empty lines in front: a traceback then names the line of the page.
             (folder / SNIPPET).write_text("\n" * block.line + block.text)
-            yield block.line, [SNIPPET]
+            yield block.line, folder / SNIPPET
+
+
+def carry_out(commands: list[str]) -> None:
+    """Run commands in this process: in one of their own they would import for seconds."""
+    for command in commands:
+        alone = ["--workers", "1"] if command.startswith("run ") else []
+        assert main([*shlex.split(command), *alone]) == 0, f"$ residua {command}"
+
+
+def run_python(file: Path) -> None:
+    """Run a file in its directory."""
+    done = subprocess.run(
+        [sys.executable, file.name],
+        cwd=file.parent,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
 
 
 def blocks(text: str) -> list[Block]:
@@ -163,11 +177,15 @@ def computed() -> dict[str, Path]:
 
 
 @pytest.mark.pages
+@pytest.mark.usefixtures("one_worker")
 @pytest.mark.parametrize("page", PAGES, ids=str)
-def test_blocks_of_a_page_run(page: Path, tmp_path: Path, computed: dict[str, Path]) -> None:
+def test_blocks_of_a_page_run(
+    page: Path, tmp_path: Path, computed: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     for folder in ("studies", "scenes"):
         shutil.copytree(ROOT / "data" / folder, tmp_path / "data" / folder)
-    for study in (tmp_path / "data" / "studies").iterdir():
+    for study in (tmp_path / "data" / "studies").glob("*.toml"):
         study.write_text(coarse(study.read_text()))
     for name, axes in FEWER.items():
         study = tmp_path / "data" / "studies" / name
@@ -176,19 +194,12 @@ def test_blocks_of_a_page_run(page: Path, tmp_path: Path, computed: dict[str, Pa
     for command, out in results(found).items():
         if command in computed:
             shutil.copytree(computed[command], tmp_path / out)
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
     for line, program in programs(found, tmp_path):
-        done = subprocess.run(
-            [sys.executable, *program],
-            cwd=tmp_path,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=300,
-            check=False,
-        )
-        assert done.returncode == 0, f"{page}:{line}\n{done.stdout}\n{done.stderr}"
+        print(f"{page}:{line}")  # shown where it fails
+        if isinstance(program, Path):
+            run_python(program)
+        else:
+            carry_out(program)
     computed |= {command: tmp_path / out for command, out in results(found).items()}
 
 
@@ -229,10 +240,10 @@ def test_every_kind_of_block_is_found(tmp_path: Path) -> None:
     assert (program.language, program.text, program.line) == ("python", "x = 1\n", 3)
     assert (server.skipped, command.skipped) == (True, False)
     made = programs(found, tmp_path)
-    assert next(made) == (3, [SNIPPET])
+    assert next(made) == (3, tmp_path / SNIPPET)
     assert (tmp_path / SNIPPET).read_text() == "\n\n\nx = 1\n"
-    assert next(made) == (command.line, ["-c", COMMANDS, "scenes punch", "scenes 'a b'"])
-    assert list(made) == [(last.line, [SNIPPET])]
+    assert next(made) == (command.line, ["scenes punch", "scenes 'a b'"])
+    assert list(made) == [(last.line, tmp_path / SNIPPET)]
 
 
 def test_the_results_of_a_page_are_known_by_the_command() -> None:
@@ -243,16 +254,16 @@ def test_the_results_of_a_page_are_known_by_the_command() -> None:
     assert results(blocks(page)) == {"run a.toml --out b": "b"}
 
 
-@pytest.mark.pages
-def test_the_first_command_that_fails_ends_a_page(tmp_path: Path) -> None:
-    (program,) = programs(
-        blocks("```console\n$ residua scenes\n$ residua scenes no\n```\n"), tmp_path
-    )
-    done = subprocess.run(
-        [sys.executable, *program[1]], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert done.returncode != 0
-    assert "$ residua scenes no\n" in done.stdout
+def test_the_first_command_that_fails_ends_a_page(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = "```console\n$ residua scenes\n$ residua scenes no\n$ residua scenes punch\n```\n"
+    ((_, commands),) = programs(blocks(page), tmp_path)
+    assert isinstance(commands, list)
+    with pytest.raises(AssertionError, match=r"\$ residua scenes no"):
+        carry_out(commands)
+    printed = capsys.readouterr()
+    assert "shaft_hub" in printed.out and "load_ratio" not in printed.out
 
 
 def test_the_page_of_the_audit_names_every_figure_and_no_other():

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from residua.cli import main
 from tests.architecture.sources import ROOT
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
@@ -40,15 +41,19 @@ def test_an_example_runs(script: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.pages
+@pytest.mark.usefixtures("one_worker")
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
-def test_the_cells_of_a_notebook_run_after_make_run(notebook: Path, tmp_path: Path) -> None:
+def test_the_cells_of_a_notebook_run_after_make_run(
+    notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """They run on a coarse and small form of the study that `make run` computes."""
     study = (ROOT / "data/studies/punch.toml").read_text()
     study = study.replace("[parameters]", '[parameters]\naccuracy = "draft"')
     study = study.replace("[0.0, 0.1, 0.2, 0.3, 0.4]", "[0.0, 0.2]")
     study = study.replace('["none", "isotropic", "kinematic"]', '["isotropic", "kinematic"]')
     (tmp_path / "punch.toml").write_text(study)
-    run(["-m", "residua", "run", "punch.toml", "--out", "out", "--workers", "1"], tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "punch.toml", "--out", "out", "--workers", "1"]) == 0
     cells = json.loads(notebook.read_text())["cells"]
     code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
     assert not any(cell.get("outputs") for cell in cells), "a notebook is kept without its outputs"

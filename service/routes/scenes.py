@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, File, Query, Request, Response, UploadFile
 
-from service.dependencies import TheInspector, TheKeeper, TheStore
+from service.dependencies import TheInspector, TheKeeper, TheName, TheStore
 from service.errors import REFUSED, NotFound
 from service.schemas import ContentId, KeptScene, SceneSummary, Window
 from studies import StudyError, scene_schema
@@ -44,6 +44,7 @@ async def post_scene(
     inspector: TheInspector,
     keeper: TheKeeper,
     store: TheStore,
+    caller: TheName,
     request: Request,
     response: Response,
     meshes: Annotated[
@@ -62,9 +63,9 @@ async def post_scene(
         if not each.filename or each.filename in files:
             raise StudyError("meshes", each.filename, "must have file names of their own")
         files[each.filename] = await each.read()
-    found, content = await inspector.inspect(await scene.read(), files)
+    found, content = await inspector.inspect(await scene.read(), files, caller)
     known = await asyncio.to_thread(store.scene, found.id, whole=False)
-    if not await asyncio.to_thread(keeper.keep_scene, found.id, content):
+    if not await asyncio.to_thread(keeper.keep_scene, found.id, content, caller):
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_scene", name=found.id).path
     if not isinstance(known, FileScene) or known.description.content == content.content:

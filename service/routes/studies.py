@@ -76,8 +76,7 @@ def taken_priority(content: dict[str, Any]) -> int:
 )
 async def submit(
     content: Annotated[dict[str, Any], Body(), WithJsonSchema(SUBMISSION)],
-    jobs: TheJobs,
-    store: TheStore,
+    keeper: TheKeeper,
     examiner: TheExaminer,
     request: Request,
     response: Response,
@@ -85,9 +84,7 @@ async def submit(
     """Accept a study; 200 when it is known already, whatever became of it."""
     priority = taken_priority(content)
     found = await examiner.examine(content)
-    study = found.study
-    await asyncio.to_thread(store.save_study, study)
-    job, new = await asyncio.to_thread(jobs.accept, study.id, study.to_dict(), found.runs, priority)
+    job, new = await asyncio.to_thread(keeper.accept, found.study, found.runs, priority)
     if not new:
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_study", study_id=job.id).path

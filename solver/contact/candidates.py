@@ -91,9 +91,7 @@ class Candidates:
     def touched(self, part: int) -> NDArray[np.int64]:
         """Return the unknowns of a part on which contact forces may act."""
         rows = self.rows[part]
-        if rows is None:
-            return np.zeros(0, dtype=np.int64)
-        return rows.dofs[rows.block.any(axis=0)]
+        return np.zeros(0, dtype=np.int64) if rows is None else rows.dofs
 
     def compliance(self, operators: Sequence[Operator]) -> NDArray[np.float64]:
         """Return the compliance W of the contact points: gaps and slips per force [mm/N]."""

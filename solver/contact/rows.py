@@ -20,10 +20,15 @@ class ContactRows:
 
 
 def joined(pieces: list[ContactRows]) -> ContactRows | None:
-    """Return the rows of all surfaces of a part; unknowns that surfaces share occur once."""
+    """Return the rows of all surfaces of a part, on the unknowns that change a gap or slip.
+
+    Unknowns that surfaces share occur once.
+    """
     if not pieces:
         return None
     every, block = np.concatenate([p.dofs for p in pieces]), np.hstack([p.block for p in pieces])
+    acts = block.any(axis=0)
+    every, block = every[acts], block[:, acts]
     order = np.argsort(every, kind="stable")
     dofs, first = np.unique(every[order], return_index=True)
     return ContactRows(dofs, np.add.reduceat(block[:, order], first, axis=1))

@@ -224,9 +224,9 @@ class System:
         return any(amplitude is not None for amplitude in amplitudes)
 
     @property
-    def prestressed(self) -> bool:
-        """Whether a body has stress before any load."""
-        return any(not load.varies for load in self._loads)
+    def prestressed(self) -> list[str]:
+        """Names of the bodies that have stress before any load."""
+        return [p.body.name for p in self.parts if not all(x.varies for x in p.body.every_load)]
 
     @cached_property
     def overlapping(self) -> bool:

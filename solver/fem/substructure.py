@@ -7,7 +7,6 @@ treated like any other.
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import replace
 from functools import cached_property
 from hashlib import sha256
@@ -22,15 +21,13 @@ from solver.fem.operators import Dense, Fixed
 from solver.fem.part import Part
 from solver.fem.surface import Surface
 from solver.linear.schur import SchurComplement
+from solver.memory import remembered
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.discretisation import Discretisation
     from solver.materials import PlasticState, Response
-
-_KEPT_IN_MEMORY = 8
-_CACHE: OrderedDict[str, _CondensedBody] = OrderedDict()
 
 
 class _CondensedBody:
@@ -179,10 +176,4 @@ def _key(part: Discretisation, kept: NDArray[np.int64], linear_solver: str) -> s
 
 def _condense(part: Discretisation, kept: NDArray[np.int64], linear_solver: str) -> _CondensedBody:
     key = _key(part, kept, linear_solver)
-    if key in _CACHE:
-        _CACHE.move_to_end(key)
-    else:
-        _CACHE[key] = _CondensedBody(part, kept, linear_solver)
-        while len(_CACHE) > _KEPT_IN_MEMORY:
-            _CACHE.popitem(last=False)
-    return _CACHE[key]
+    return remembered(key, lambda: _CondensedBody(part, kept, linear_solver))

@@ -155,6 +155,11 @@ class Pardiso:
         half = solve_triangular(self._schur[0], rows.T, lower=True, check_finite=False)
         return np.asarray(half.T @ half)
 
+    def __sizeof__(self) -> int:
+        """Return the bytes of the analysis and the factors, which are not on Python's heap."""
+        highest, analysis, factors = self._iparm[14:17]
+        return object.__sizeof__(self) + 1024 * int(max(highest, analysis + factors))
+
     def _call(
         self, phase: int, b: NDArray[np.float64], x: NDArray[np.float64], which: int = 0
     ) -> None:

@@ -68,6 +68,11 @@ class SuperLU:
         self._upper = upper.copy()
         self._kept = kept
 
+    def __sizeof__(self) -> int:
+        """Return the bytes of the factor, which is not on Python's heap."""
+        entries = self._factor.nnz if hasattr(self, "_factor") else 0
+        return object.__sizeof__(self) + 12 * entries
+
     def factorise(self, data: NDArray[np.float64]) -> None:
         """See `LinearSolver`."""
         self._upper.data = np.asarray(data, dtype=float)
@@ -210,14 +215,17 @@ class _PardisoFactors:
 
 
 def _twice(solver: LinearSolver, b: NDArray[np.float64], kept: NDArray[np.int64]) -> Begun:
-    """Return a solution that a second full solve finishes."""
+    """Return a solution that a second full solve finishes, if the right-hand side changes."""
+    first = solver.solve(b)
 
     def finish(change: NDArray[np.float64]) -> NDArray[np.float64]:
+        if not change.any():
+            return first
         changed = b.copy()
         changed[kept] += change
         return solver.solve(changed)
 
-    return Begun(solver.solve(b)[kept], finish)
+    return Begun(first[kept], finish)
 
 
 def _compliance(

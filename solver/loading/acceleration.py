@@ -37,10 +37,11 @@ _DEPTH = 5
 
 @dataclass(slots=True)
 class Series:
-    """Successive steps that hardly decrease, with the same contact status.
+    """Successive whole steps that hardly decrease, with the same contact status.
 
     They may alternate or circle about the solution. Steps that grow in one direction may mean that
-    a body flows plastically, and are not accelerated.
+    a body flows plastically, and are not accelerated. After a partial step points have changed
+    between elastic and plastic, and with them what the tangent lacks: it ends the series.
     """
 
     _key: bytes = b""
@@ -55,6 +56,9 @@ class Series:
 
         None if convergence is fast, as it nearly always is: the step itself is then used.
         """
+        if share < 1:
+            self._slow, self._places, self._steps = 0, [], []
+            return None
         place = np.concatenate([*u, candidates.forces])
         now = np.concatenate([*step.u, step.forces - candidates.forces])
         cut = np.cumsum([len(ui) for ui in u])
@@ -70,7 +74,7 @@ class Series:
             self._slow = self._slow + 1 if size > _SLOW * last else 0
         self._places = [*self._places[-_DEPTH:], place]
         self._steps = [*self._steps[-_DEPTH:], now]
-        if self._slow < _PATIENCE or share < 1:
+        if self._slow < _PATIENCE:
             return None
         moved = np.diff(self._places, axis=0)
         changed = np.diff(self._steps, axis=0)

@@ -9,7 +9,8 @@ From the last converged state, at the current displacements:
 4. the frictional contact problem on W, exactly; the free rigid motions of parts held by contact
    alone are extra unknowns with exact balance equations, as in FETI. If the problem has no
    solution, or steps are far too long, the tangent is blended with the elastic stiffness
-5. line search on the plastic residual, contact forces interpolated
+5. the whole step if it lessens the out-of-balance forces much; else a line search on the plastic
+   residual, contact forces interpolated
 6. converged when the residual with contact forces, and the violation of the contact conditions, are
    within the tolerances
 
@@ -55,6 +56,9 @@ _SHORT, _STIFF = 0.1, 3
 _PATIENCE = 15
 """Number of iterations without a smaller residual after which an increment has failed."""
 _DIVERGED = 1e4
+_LESS = 0.8
+"""Ratio of the out-of-balance forces after a whole step to those before; below it the step is taken
+without a line search. Close to a limit load the energy rises along many a step that leads on."""
 _UNBALANCED = 100.0
 _ROUNDED = 10.0
 """Factor between the force level of bodies without load and the level at which rounding errors
@@ -154,11 +158,11 @@ class Increment:
         origin = self.system.moved(self.guess or self.start, self.time)
         u, contacts = origin.u, origin.contacts
         responses = self._respond(u)
+        residuals = self._residuals(u, responses)
         best, since_best, softest, moving = np.inf, 0, SoftestStep(), False
         series, begun, crawled = Series(), 0.0, 0
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts)
-            residuals = self._residuals(u, responses)
             self._began = self._began or (residuals, candidates)
             scale, error, violation = self._errors(residuals, candidates)
             since_best = 0 if error < best else since_best + 1
@@ -194,7 +198,8 @@ class Increment:
                 raise
             if iteration >= _LATE:
                 softest = softer(softest, self.system.parts, step.u, responses)
-            before, (share, u, responses) = u, self._search(u, residuals, candidates, step)
+            before, found = u, self._search(u, residuals, candidates, step)
+            share, u, responses, residuals = found
             crawled = crawled + 1 if share < _SHORT else 0
             moving = share * largest(step.u) > _MOVING * largest(u, self.start.u)
             forces = (1 - share) * candidates.forces + share * step.forces
@@ -202,6 +207,7 @@ class Increment:
             if ahead is not None:
                 u, forces = ahead
                 responses = self._respond(u)
+                residuals = self._residuals(u, responses)
             contacts = candidates.states(contacts, forces, step.status)
             if self.elastic_only and any(r.yielding.any() for r in responses):
                 raise Yielded
@@ -276,8 +282,16 @@ class Increment:
         if scale == 0:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
             return 0.0, float(overlap < -self.system.touching), 0.0
-        out = [(r + c)[p.free] for p, r, c in zip(parts, residuals, inner, strict=True)]
-        return scale, norm(out) / scale, candidates.violation(self._stiffness(candidates)) / scale
+        error = self._unbalanced(residuals, candidates, candidates.forces) / scale
+        return scale, error, candidates.violation(self._stiffness(candidates)) / scale
+
+    def _unbalanced(
+        self, residuals: Vectors, candidates: Candidates, forces: NDArray[np.float64]
+    ) -> float:
+        """Return the norm of the out-of-balance forces of all parts under contact forces [N]."""
+        inner = on_parts(self.system, candidates, forces)
+        each = zip(self.system.parts, residuals, inner, strict=True)
+        return norm([(r + c)[part.free] for part, r, c in each])
 
     def _ends(
         self, u: Vectors, candidates: Candidates, scale: float, error: float, violation: float
@@ -335,8 +349,21 @@ class Increment:
 
     def _search(
         self, u: Vectors, residuals: Vectors, candidates: Candidates, step: NewtonStep
-    ) -> tuple[float, Vectors, tuple[Response, ...]]:
-        trial: tuple[Vectors, tuple[Response, ...]]
+    ) -> tuple[float, Vectors, tuple[Response, ...], Vectors]:
+        trial: tuple[Vectors, tuple[Response, ...], Vectors]
+
+        def left(share: float) -> Vectors:
+            """Return the residuals after a share of the step."""
+            nonlocal trial
+            moved = tuple(ui + share * du for ui, du in zip(u, step.u, strict=True))
+            responses = self._respond(moved)
+            trial = moved, responses, self._residuals(moved, responses)
+            return trial[-1]
+
+        whole = left(1.0)
+        out = self._unbalanced(residuals, candidates, candidates.forces)
+        if self._unbalanced(whole, candidates, step.forces) < _LESS * out:
+            return 1.0, *trial
         # if vertices change status, the slope with the contact forces before the step may be
         # negative; with those after the step it is the quadratic form of the tangent
         before = candidates.forces
@@ -347,13 +374,7 @@ class Increment:
             forces = (1 - share) * before + share * step.forces
             return step.slope(self.system, residual, candidates, forces)
 
-        def slope(share: float) -> float:
-            nonlocal trial
-            moved = tuple(ui + share * du for ui, du in zip(u, step.u, strict=True))
-            trial = moved, self._respond(moved)
-            return along(share, self._residuals(*trial))
-
-        share = search(slope, along(0.0, residuals))
+        share = search(lambda s: along(s, left(s)), along(0.0, residuals), along(1.0, whole))
         return share, *trial
 
     # -- 6: the converged state ----------------------------------------------------------------

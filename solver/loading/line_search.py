@@ -11,7 +11,7 @@ _EVALUATIONS = 10
 _SLACK = 0.2
 
 
-def search(slope: Callable[[float], float], start: float) -> float:
+def search(slope: Callable[[float], float], start: float, end: float) -> float:
     """Return the share of a step, in (0, 1], at which the energy stops falling.
 
     In an increment of associated plasticity the energy is convex, and its slope along the step
@@ -22,13 +22,13 @@ def search(slope: Callable[[float], float], start: float) -> float:
     Parameters
     ----------
     slope : (share) -> minus the derivative of the energy along the step (Illinois iteration)
-    start : its value at share zero; if it is not positive, the whole step is taken
+    start, end : its values at share zero and one; the whole step is taken if the first is not
+        positive
     """
     share = 1.0
-    now = slope(share)
-    if start <= 0 or now >= -_SLACK * start:
+    if start <= 0 or end >= -_SLACK * start:
         return share
-    low, at_low, high, at_high = 0.0, start, 1.0, now
+    low, at_low, high, at_high = 0.0, start, 1.0, end
     for _ in range(_EVALUATIONS):
         ratio = at_low / (at_low - at_high)
         share = low + (high - low) * min(max(ratio, 0.1), 0.9)

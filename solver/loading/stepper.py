@@ -130,7 +130,7 @@ class Stepper:
             balanced = Increment(self.system, state, state.time, contact=False).solve()
         except IncrementFailed as failure:
             raise ModelError(
-                "initial_stress", "this field",
+                "initial_stress", f"that of {', '.join(self.system.prestressed)}",
                 f"must have an equilibrium within the strength of the material: {failure}",
             ) from failure  # fmt: skip
         return self.system.at_rest(balanced.state)

@@ -8,6 +8,7 @@ others that are walked with it: it equals, bit for bit, that of the program walk
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from solver.loading.refinement import HALVINGS
 from solver.loading.stepper import Stepper, turned
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from solver.contact.state import Converged
     from solver.contact.system import System
@@ -78,22 +79,36 @@ class Walker:
         self._refinement = refinement
         self._stepper = Stepper(system, control, report, watch)
 
-    def walk(self, programs: Sequence[Program]) -> Iterator[Outcome]:
+    def walk(
+        self, programs: Iterable[Program], largest: Program | None = None
+    ) -> Iterator[Outcome]:
         """Yield the outcome of each program, in order, as soon as it is known.
 
         The cost is least if each program shares as many increments as possible with the previous
         one, as programs of increasing loads do.
+
+        With `largest` the next program is asked for after the outcome of the one before it, on
+        which it may depend. Any two programs then share with each other no more increments than one
+        of them shares with `largest`. Where a program left it the state is kept, for the two that
+        went furthest: one that lies between others goes on from there.
         """
-        last, settled = programs[0], Settled()
+        ahead = _with_next(iter(programs), largest)
+        first_pair = next(ahead, None)
+        if first_pair is None:
+            return
+        last, settled = first_pair[0], Settled()
         self._stepper.place = last.place
         if self._refinement is None:
             known = {0: self._start(last)}
         else:
             settled, first = self._settle(last)
-            programs = [program.refined(settled.times) for program in programs]
-            last = programs[0]
+            last = last.refined(settled.times)
             known = {last.laps[0].count: first}
-        for program, following in zip(programs, [*programs[1:], None], strict=True):
+        for pair in chain([first_pair], ahead):
+            program, following = pair
+            if self._refinement is not None:
+                program = program.refined(settled.times)
+                following = following and following.refined(settled.times)
             alike = shared(last, program)
             known = {at: walk for at, walk in known.items() if at <= alike}
             if not known:
@@ -103,8 +118,9 @@ class Walker:
                 at = max(known)
                 fork = shared(program, following) if following else 0
                 if fork > at:
-                    known = {min(known): known[min(known)],
-                             fork: self._along(known[at], program, at, fork)}  # fmt: skip
+                    kept = {min(known)} if largest is None else {min(known), at}
+                    forked = self._along(known[at], program, at, fork)
+                    known = {each: known[each] for each in kept} | {fork: forked}
                     at = fork
                 walk = self._along(known[at], program, at, program.count)
                 last = program
@@ -227,6 +243,21 @@ class Walker:
             tally = Tally(seconds=walk.point.tally.seconds)
         assert taken is not None
         return settled, taken
+
+
+def _with_next(
+    programs: Iterator[Program], largest: Program | None
+) -> Iterator[tuple[Program, Program | None]]:
+    """Yield each program with the one that follows; or with `largest`, and none in advance."""
+    program = next(programs, None)
+    while program is not None:
+        if largest is not None:
+            yield program, largest
+            program = next(programs, None)
+        else:
+            following = next(programs, None)
+            yield program, following
+            program = following
 
 
 def _repeated(walk: _Walk, cycle: int) -> _Walk:

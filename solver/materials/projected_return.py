@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 _IN_PLANE = np.array([0, 1, 3])
 _MODES = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, np.sqrt(2.0)]]) / np.sqrt(2.0)
+_FROM_ALL = np.zeros((3, 4))
+_FROM_ALL[:, _IN_PLANE] = _MODES
 _P = np.array([1 / 3, 1.0, 1.0])[:, None]
 _MAX_ITERATIONS = 50
 
@@ -48,9 +50,8 @@ class ProjectedReturn(PlaneStress):
 
     def stiffness(self, n_components: int = 4) -> Array:
         """Return the elastic stiffness (4, 4) on Mandel strain, row and column zz zero [MPa]."""
-        C = np.zeros((n_components, n_components))
-        C[np.ix_(_IN_PLANE, _IN_PLANE)] = _MODES.T @ np.diag(self._modal_stiffness()) @ _MODES
-        return C
+        del n_components
+        return np.asarray((_FROM_ALL.T * self._modal_stiffness()) @ _FROM_ALL)
 
     def respond(self, strain: Array, state: PlasticState) -> Response:
         """Return stress with zz = 0, consistent tangent and new state.

@@ -7,7 +7,6 @@ the load they are known in the zone that may yield; elsewhere they are NaN.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ import numpy as np
 from solver.contact.state import State
 from solver.fem.fields import Sampler, recovery
 from solver.materials.state import Response
+from solver.memory import kept
 from solver.model.body import Body
 from solver.tensors import to_tensor
 
@@ -152,7 +152,7 @@ class PrismBody:
         return PrismStage(State(time, (u,), (plastic,), ()), response)
 
 
-@lru_cache(maxsize=8)
+@kept
 def _sampler(section: Section, positions: bytes) -> Sampler:
     """Return the interpolation at positions (2, n) in a section; runs over a prism share it."""
     x = np.frombuffer(positions).reshape(2, -1)

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 _FIRST, _FACTOR = 0.5, 2.2e-5
 """Seconds of a set-up: at least, and per wave and unknown of the zone."""
+_LEAST_BYTES, _BYTES = 7.5e7, 4400.0
+"""Bytes of a path: at least, and per wave and unknown of the zone."""
 _STILL, _POINT = 0.01, 1.5e-6
 """Seconds of a pass where nothing yields: at least, and per point and station of the window."""
 _YIELDS = 28.0
@@ -41,9 +43,19 @@ class PrismSize:
     @property
     def set_up(self) -> float:
         """Seconds to set up the prism."""
+        return _FIRST + _FACTOR * self._factorised
+
+    @property
+    def memory(self) -> float:
+        """Most bytes of a path at a time, measured on rails and a raceway."""
+        return _LEAST_BYTES + _BYTES * self._factorised
+
+    @property
+    def _factorised(self) -> int:
+        """Unknowns of the zone in all waves."""
         along, up = self.columns, self.rows
         nodes = (along + 1) * (up + 1) + along * (up + 1) + up * (along + 1)
-        return _FIRST + _FACTOR * self.waves * 3 * nodes
+        return self.waves * 3 * nodes
 
     def passes(self, count: int, turns: int, *, scattered: bool) -> float:
         """Return the seconds of passes of ``turns`` loads in turn.
@@ -72,4 +84,5 @@ def effort_of(
         most_increments=count,
         seconds=size.passes(count, turns, scattered=scattered),
         set_up=size.set_up,
+        memory=size.memory,
     )

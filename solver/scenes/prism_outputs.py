@@ -118,10 +118,11 @@ def patch(run: FinishedRun) -> Values:
     contact: Any = run.outcome.points[run.view.loaded].touching
     grid, pressure = contact.grid, contact.pressure
     X, Z = np.meshgrid(run.view.x, run.view.z, indexing="ij")
+    places = _widened(grid.x[::-1]), _widened(grid.z)
 
     def sampled(values: Array, method: str = "linear", outside: float = 0.0) -> Array:
         at = RegularGridInterpolator(
-            (grid.x[::-1], grid.z), values[::-1], method, bounds_error=False, fill_value=outside
+            places, values[::-1], method, bounds_error=False, fill_value=outside
         )
         return np.asarray(at((X, Z)))
 
@@ -145,6 +146,12 @@ def patch(run: FinishedRun) -> Values:
         LONGITUDINAL_FORCE: float(force[0]),
         LATERAL_FORCE: float(force[2]),
     }
+
+
+def _widened(places: Array) -> Array:
+    """Return rising places, the outermost moved out by rounding: a place on them is inside."""
+    ends = 1e-9 * (places[-1] - places[0]) * np.array([-1.0, 1.0])
+    return np.concatenate([places[:1] + ends[0], places[1:-1], places[-1:] + ends[1]])
 
 
 def section(run: FinishedRun) -> Values:

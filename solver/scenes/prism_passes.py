@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -13,6 +13,7 @@ from solver.errors import ModelError, NotConverged, WindowTooSmall
 from solver.linear.threads import one_thread
 from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
+from solver.memory import kept
 from solver.prism.patch_passing import AppliedPatch, PatchPassing
 from solver.results.audit.plain_prism import PlainPrism
 from solver.results.audit.prism import audit_prism
@@ -225,7 +226,7 @@ class _Path:
         )
 
 
-@lru_cache(maxsize=2)
+@kept
 def _plain(track: PrismTrack) -> PlainPrism:
     """Return the second evaluation of a prism for the audit; all runs over it share it."""
     return PlainPrism(track)

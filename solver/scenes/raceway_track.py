@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from solver.errors import ModelError
 from solver.loading.bearing import too_much_shear
 from solver.materials import Elasticity
+from solver.memory import kept
 from solver.mesh.wheel_profile import crowned
 from solver.mesh.zone import Zone, raceway_mesh
 from solver.prism.given_patch import EllipticPatch
@@ -107,7 +107,7 @@ def geometry(parameters: RacewayParameters, reach: float = 1.0) -> RacewayGeomet
     )
 
 
-@lru_cache(maxsize=4)
+@kept
 def section_of(own: RacewayGeometry) -> Section:
     """Return the meshed section of a raceway, held at its foot."""
     E, nu = own.elasticity
@@ -118,7 +118,7 @@ def section_of(own: RacewayGeometry) -> Section:
     )
 
 
-@lru_cache(maxsize=2)
+@kept
 def track_of(own: RacewayGeometry) -> PrismTrack:
     """Return the raceway, set up once in a process for each geometry."""
     return own.window.track(section_of(own), _LEVELS)

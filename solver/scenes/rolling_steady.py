@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,7 @@ from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.linear.threads import one_thread
 from solver.loading.bearing import too_much_shear
 from solver.materials.material import Material
+from solver.memory import kept
 from solver.model.amplitude import Amplitude
 from solver.model.friction import effective_friction
 from solver.model.motion import Axle
@@ -89,7 +89,7 @@ def rim_of(parameters: RollingParameters) -> Rim:
     return _rim(p.radius, p.widest.reach, p.element_size, p.wheel_material)
 
 
-@lru_cache(maxsize=4)
+@kept
 def _rim(radius: float, reach: float, h: float, material: Material) -> Rim:
     still = Amplitude.constant(0.0)
     axle = Axle(centre=(0.0, radius), radius=radius, force=still, moment=still, position=still)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -116,6 +117,30 @@ class Scene:
             yield replace(self.record(run), parameters=each)
         monitor(1.0)
 
+    @property
+    def goes_on(self) -> bool:
+        """Whether a loading path goes on for values that are asked for later: see `follow`."""
+        return bool(self.branch) and self.method is None and type(self).path is Scene.path
+
+    def follow(
+        self, parameters: Any, values: Iterable[float], largest: float, monitor: Monitor
+    ) -> Iterator[Record]:
+        """Yield one record for each value of the branch parameter, which may depend on the last.
+
+        The next value is asked for after the record of the one before. Its run goes on from where
+        the path has been below it. The records are those of `path`.
+
+        Parameters
+        ----------
+        values : in any order
+        largest : a bound on the values
+        """
+        kind = type(getattr(self.parameters(), self.branch))
+        last = replace(parameters, **{self.branch: kind(largest)})
+        runs = (replace(parameters, **{self.branch: kind(value)}) for value in values)
+        for run in by_increments(self, runs, monitor, last):
+            yield self.record(run)
+
     def record(self, run: FinishedRun) -> Record:
         """Return the record of a run."""
         cost = _merged(run, self.costs)
@@ -182,8 +207,13 @@ def _merged(run: FinishedRun, outputs: Sequence[Output]) -> Values:
     return values
 
 
-def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterator[FinishedRun]:
-    """Solve the programs of runs that differ in the branch parameter; yield each when finished."""
+def by_increments(
+    scene: Scene, runs: Iterable[Any], monitor: Monitor, largest: Any = None
+) -> Iterator[FinishedRun]:
+    """Solve the programs of runs that differ in the branch parameter; yield each when finished.
+
+    With `largest`, a bound on the runs, the next run is asked for when the one before is finished.
+    """
     # these take half a second to import
     from solver.contact.system import System
     from solver.loading.walker import Walker
@@ -192,21 +222,35 @@ def by_increments(scene: Scene, runs: Sequence[Any], monitor: Monitor) -> Iterat
     from solver.results.samples import Samples
     from solver.results.tractions import tractions_of
 
-    last = runs[-1]
+    if largest is None:
+        runs = list(runs)
+    last = runs[-1] if isinstance(runs, list) else largest
     system = System(scene.model(last))
     samples = Samples(system, scene.view(last))
     tractions = tractions_of(system, symmetric=samples.view.symmetric, axis=samples.view.axis)
-    programs = [scene.program(run) for run in runs]
+    begun: deque[Any] = deque()
+    if isinstance(runs, list):
+        report = _counted([scene.program(run) for run in runs], monitor)
+    else:
+        report = partial(monitor, 0.0)  # how much is still to be asked for is not known
+
+    def programs() -> Iterator[Program]:
+        for run in runs:
+            begun.append(run)
+            yield scene.program(run)
+
     walker = Walker(
         system,
         Control(),
         trace=partial(scene.trace, samples) if scene.trace else None,
         refinement=scene.refinement(last) if scene.refinement else None,
-        report=_counted(programs, monitor),
+        report=report,
         watch=partial(scene.watch, last, samples) if scene.watch else None,
     )
     view = samples.view
-    for run, outcome in zip(runs, walker.walk(programs), strict=True):
+    bound = None if largest is None else scene.program(largest)
+    for outcome in walker.walk(programs(), bound):
+        run = begun.popleft()
 
         def check(outcome: Outcome = outcome) -> Audit:
             loaded, unloaded = outcome.points[view.loaded], outcome.points.get(view.unloaded)

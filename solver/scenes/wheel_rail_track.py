@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.materials import Elasticity
+from solver.memory import kept
 from solver.mesh.zone import Zone, rail_mesh
 from solver.prism.patch import RollingPatch
 from solver.prism.section import Section
@@ -194,7 +195,7 @@ def _check_points(name: str, points: str | Points, z: Array, curvature: Array, s
         raise ModelError(name, told, allowed)
 
 
-@lru_cache(maxsize=4)
+@kept
 def section_of(own: RailGeometry) -> Section:
     """Return the meshed section of a rail on its foundation."""
     E, nu = own.elasticity
@@ -230,7 +231,7 @@ def meshed(parameters: WheelRailParameters, own: RailGeometry) -> Section:
     return section
 
 
-@lru_cache(maxsize=4)
+@kept
 def settled_in(
     own: RailGeometry, rail: SectionStress, thermal_strain: float
 ) -> SettledStress | None:
@@ -238,7 +239,7 @@ def settled_in(
     return settled(section_of(own), rail, thermal_strain)
 
 
-@lru_cache(maxsize=2)
+@kept
 def track_of(own: RailGeometry, length: float | None = None) -> PrismTrack:
     """Return the rail, set up once in a process for each geometry.
 
@@ -249,7 +250,7 @@ def track_of(own: RailGeometry, length: float | None = None) -> PrismTrack:
     return own.window.track(section_of(own), _LEVELS, length=length, span=own.span)
 
 
-@lru_cache(maxsize=2)
+@kept
 def stressed_track(own: RailGeometry, rail: SectionStress, thermal_strain: float) -> PrismTrack:
     """Return the rail with its stress before the first pass."""
     track, initial = track_of(own), settled_in(own, rail, thermal_strain)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -13,6 +13,7 @@ from solver.fem.discretisation import Discretisation
 from solver.fem.loads import travelling_forces
 from solver.fem.surface import extract
 from solver.materials.material import Material
+from solver.memory import kept
 from solver.mesh import grid, within
 from solver.mesh.endless import MOST_COLUMNS, track_lines, window_depth, window_elements
 from solver.model.amplitude import Amplitude
@@ -203,7 +204,7 @@ def _body(x: Array, y: Array, contact: float, elasticity: Elasticity) -> Body:
     )
 
 
-@lru_cache(maxsize=8)
+@kept
 def track_of(
     half_width: float,
     element_size: float,

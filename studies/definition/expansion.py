@@ -14,7 +14,7 @@ from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.identity import Namer, Places, written
 from studies.definition.parameters import parameters_of
-from studies.definition.sweep import Axes
+from studies.definition.sweep import Axes, Position, positions
 from studies.errors import StudyError
 
 
@@ -74,7 +74,7 @@ class Expansion:
         shared = {name: value for name, value in self._values.items() if name != scene.branch}
         self._run = Namer("run", scene.name, self._values, self.source)
         self._path = Namer("path", scene.name, shared, self.source)
-        self._sets = [self._axis(_settings(name, axis)) for name, axis in axes.items()]
+        self._sets = [self._axis(positions(name, axis)) for name, axis in axes.items()]
         self._together = [axis.together(scene.branch) for axis in self._sets]
         self.size = math.prod(len(axis.settings) for axis in self._sets)
         self.path_count = math.prod(map(len, self._together))
@@ -114,13 +114,12 @@ class Expansion:
         for name, value in self._fixed.items():
             add(name, f"parameters.{name}", value, value)
         for axis, values in self._axes.items():
-            if isinstance(values, dict):
-                for label, settings in values.items():
-                    for name, value in settings.items():
-                        add(name, f"sweep.{axis}.{label}.{name}", value, value)
-            else:
-                for value in values:
-                    add(axis, f"sweep.{axis}", value, values)
+            for at in positions(axis, values):
+                for name, value in at.sets.items():
+                    if axis in known:
+                        add(name, f"sweep.{axis}", value, values)
+                    else:
+                        add(name, f"{at.field}.{name}", value, value)
         return found
 
     def run_ids(self) -> Iterator[str]:
@@ -165,18 +164,19 @@ class Expansion:
             values.update(zip(axis.names, setting.typed, strict=True))
         return self._scene.parameters(**values)
 
-    def _axis(self, settings: list[dict[str, Any]]) -> _SweepAxis:
+    def _axis(self, axis: Iterator[Position]) -> _SweepAxis:
         known = parameters_of(self._scene)
-        names = tuple(settings[0])
-        positions = [
+        every = [at.sets for at in axis]
+        names = tuple(every[0])
+        settings = [
             _Setting(
                 tuple(values.values()),
                 tuple(known[name].typed(value) for name, value in values.items()),
                 tuple(itertools.starmap(Namer.entry, values.items())),
             )
-            for values in settings
+            for values in every
         ]
-        return _SweepAxis(names, self._run.places(names), self._path.places(names), positions)
+        return _SweepAxis(names, self._run.places(names), self._path.places(names), settings)
 
     def located(self, error: ModelError, index: tuple[int, ...]) -> StudyError:
         """Return the error of the scene, with the field name of the study file.
@@ -188,16 +188,14 @@ class Expansion:
         of_scene = error.field.partition("[")[0].partition(".")[0] in known
         field, at, where = f"parameters.{error.field}" if of_scene else error.field, [], []
         for (name, axis), i in zip(self._axes.items(), index, strict=True):
-            if isinstance(axis, dict):
-                label = list(axis)[i]
-                where.append(f"{name} = {label}")
-                if error.field in axis[label]:
-                    field = f"sweep.{name}.{label}.{error.field}"
-            else:
-                one = axis[i]
+            position = next(itertools.islice(positions(name, axis), i, None))
+            one = position.at
+            if name in known:
                 at.append(f"{name} = {reprlib.repr(one) if isinstance(one, list) else one}")
-                if error.field == name:
-                    field = f"sweep.{name}[{i}]"
+            else:
+                where.append(f"{name} = {one if position.case is None else position.case}")
+            if error.field in position.sets:
+                field = position.field if name in known else f"{position.field}.{error.field}"
         parameter = known.get(error.field)
         if parameter is not None and not parameter.in_range(error.value):
             allowed = parameter.refusal(field, error.value).allowed
@@ -205,8 +203,3 @@ class Expansion:
             allowed = f"{error.allowed} (at {', '.join(at)})" if at else error.allowed
         labels = f", where {', '.join(where)}" if where else ""
         return StudyError(field, error.value, allowed + labels)
-
-
-def _settings(name: str, axis: Any) -> list[dict[str, Any]]:
-    """Return the values that each position of an axis sets, by parameter."""
-    return list(axis.values()) if isinstance(axis, dict) else [{name: value} for value in axis]

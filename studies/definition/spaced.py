@@ -9,10 +9,10 @@ from typing import Any
 from studies.errors import StudyError
 
 _KEYS = ("start", "stop", "num")
-_SPACINGS = ("linear", "log")
+SPACINGS = ("linear", "log")
 _MOST = 100_000
 _DIGITS = 12
-"""Number of digits to which values are rounded: 0.3, not 0.30000000000000004."""
+"""Number of digits to which values are rounded."""
 
 
 def spaced(name: str, content: Mapping[str, Any]) -> list[float]:
@@ -35,8 +35,8 @@ def spaced(name: str, content: Mapping[str, Any]) -> list[float]:
         )
         raise StudyError(field, dict(content), allowed)
     spacing, num = content.get("spacing", "linear"), content["num"]
-    if spacing not in _SPACINGS:
-        raise StudyError(f"{field}.spacing", spacing, "must be one of " + ", ".join(_SPACINGS))
+    if spacing not in SPACINGS:
+        raise StudyError(f"{field}.spacing", spacing, "must be one of " + ", ".join(SPACINGS))
     if isinstance(num, bool) or not isinstance(num, int) or not 2 <= num <= _MOST:
         raise StudyError(f"{field}.num", num, f"must be an integer >= 2 and <= {_MOST}")
     start, stop = (_number(f"{field}.{key}", content[key], spacing) for key in ("start", "stop"))
@@ -45,8 +45,13 @@ def spaced(name: str, content: Mapping[str, Any]) -> list[float]:
         found = [start * (stop / start) ** share for share in shares]
     else:
         found = [start + (stop - start) * share for share in shares]
-    rounded = [float(f"{value:.{_DIGITS}g}") for value in (start, *found[1:-1], stop)]
-    return [int(value) if value.is_integer() else value for value in rounded]
+    values = map(rounded, (start, *found[1:-1], stop))
+    return [int(value) if value.is_integer() else value for value in values]
+
+
+def rounded(value: float) -> float:
+    """Return a value with as many digits as a study needs: 0.3, not 0.30000000000000004."""
+    return float(f"{value:.{_DIGITS}g}")
 
 
 def _number(field: str, value: Any, spacing: str) -> float:

@@ -20,14 +20,17 @@ from pydantic import (
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
+from studies.definition.goal import Goal, checked_goal
 from studies.definition.identity import content_id
 from studies.definition.labels import checked_labels
-from studies.definition.parameters import parameters_of
+from studies.definition.parameters import build, parameters_of
+from studies.definition.points import ENTRIES, POINT, described, with_points
 from studies.definition.sweep import (
     Axes,
     checked_axes,
     checked_table,
     checked_text,
+    labels,
     linked_values,
     owners,
 )
@@ -47,15 +50,18 @@ class Study(BaseModel):
     name : 1 to 80 of ``A-Z a-z 0-9 . _ -``, not beginning with a dot
     scene : name of the scene; of a scene from a file its content id
     parameters : fixed parameters; the rest are the scene's defaults
-    sweep : axes: lists of values by parameter, and linked axes, which have names of their own
-        and set several parameters by label; see `checked_axes` for their order
+    sweep : axes: lists of values by parameter; and axes with names of their own, which set several
+        parameters: tables of labels, and lists of points, such as ``point``, which has what the
+        entries ``points`` and ``sample`` of a study say. See `checked_axes` for their order
     note, tags : the user's own text and labels, shown with the study; a tag finds studies
     keep : ``fields`` keeps the fields at all nodes in the file of each run
     allow : ``large_strain`` makes runs outside small-strain theory count as ok (see `taken`); it
         includes what the scene allows
+    goal : parameter, threshold and bracket of a value that is searched at each place of the axes
+        (`studies.definition.goal`); empty if the runs are those of the axes
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=described)
 
     name: str
     scene: str
@@ -65,6 +71,7 @@ class Study(BaseModel):
     tags: list[str] = Field(default_factory=list)
     keep: Literal["", "fields"] = ""
     allow: list[Literal["large_strain"]] = Field(default_factory=list)
+    goal: dict[str, Any] = Field(default_factory=dict)
     _problem: Scene = PrivateAttr()
 
     @classmethod
@@ -122,24 +129,39 @@ class Study(BaseModel):
         StudyError
             for the first combination that the scene refuses
         """
-        self.expansion.check()
+        if self.asks is None:
+            self.expansion.check()
+            return self
+        ends: Axes = {self.asks.parameter: list(self.asks.between)}
+        try:
+            Expansion(self.problem, self.parameters, self.sweep | ends).check()
+        except StudyError as error:
+            field = error.field.replace(f"sweep.{self.asks.parameter}", "goal.between")
+            raise StudyError(field, error.value, error.allowed) from None
         return self
 
     @model_validator(mode="before")
     @classmethod
     def _check(cls, content: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
         for key in content:
-            if key not in cls.model_fields:
-                raise StudyError(str(key), content[key], one_of(key, cls.model_fields))
+            if key not in cls.model_fields and key not in ENTRIES:
+                raise StudyError(str(key), content[key], one_of(key, [*cls.model_fields, *ENTRIES]))
         context = info.context if info.context is not None else {}
         scene = scene_named(content.get("scene"), context.get("scenes", nothing))
         context["found"] = scene
         known = parameters_of(scene)
         fixed = checked_table("parameters", content.get("parameters", {}), known)
-        axes = checked_axes(content.get("sweep", {}), known)
+        axes = checked_axes(with_points(content), known)
+        if POINT in axes and scene.places and scene.places(build(scene, {})).points:
+            allowed = (
+                "the runs of this scene have a dimension of this name, the points of the scene "
+                "file: give the points of the study another one, [sweep.NAME]"
+            )
+            raise StudyError(f"sweep.{POINT}", f"{len(axes[POINT])} points", allowed)
         for parameter, axis in owners(axes).items():
             if parameter in fixed:
-                allowed = f"is swept too, by sweep.{axis}: keep one"
+                by = "the points" if axis == POINT else f"sweep.{axis}"
+                allowed = f"is swept too, by {by}: keep one"
                 raise StudyError(f"parameters.{parameter}", fixed[parameter], allowed)
         name = checked_text("name", content.get("name"))
         parameters = {
@@ -147,6 +169,14 @@ class Study(BaseModel):
         }
         labels = checked_labels(content) | ({"allow": [*scene.allow]} if scene.allow else {})
         own = {"name": name, "scene": name_of(scene), "parameters": parameters, "sweep": axes}
+        if content.get("goal"):
+            goal = checked_goal(content["goal"], scene)
+            other = "parameters" if goal.parameter in fixed else owners(axes).get(goal.parameter)
+            if other is not None:
+                where = "parameters" if goal.parameter in fixed else f"sweep.{other}"
+                allowed = f"is what the goal searches: take it out of {where}"
+                raise StudyError("goal.parameter", goal.parameter, allowed)
+            own["goal"] = goal.content
         return own | labels
 
     def model_post_init(self, context: Any) -> None:
@@ -159,8 +189,13 @@ class Study(BaseModel):
         return self._problem
 
     @cached_property
+    def asks(self) -> Goal | None:
+        """What is searched at each place of the axes, if the study has a goal."""
+        return checked_goal(self.goal, self.problem) if self.goal else None
+
+    @cached_property
     def expansion(self) -> Expansion:
-        """The runs, built when they are requested."""
+        """The runs, built when they are requested; of a goal the places of the axes."""
         return Expansion(self.problem, self.parameters, self.sweep)
 
     @cached_property
@@ -177,38 +212,44 @@ class Study(BaseModel):
         }
         source = self.expansion.source
         labels = checked_labels(self.model_dump(include={"note", "tags", "keep", "allow"}))
-        beside = [labels] if labels else []
+        beside = [each for each in (labels, self.goal) if each]
         return content_id("study", self.name, self.scene, self.fixed, axes, source, *beside)
 
     @property
     def fixed(self) -> dict[str, Any]:
         """All parameters that are not swept, the scene's defaults included."""
         known = parameters_of(self.problem)
-        swept = owners(self.sweep)
+        swept = owners(self.sweep) | ({self.asks.parameter: ""} if self.asks else {})
         defaults = {name: p.default for name, p in known.items() if name not in swept}
         return defaults | self.parameters
 
     @cached_property
     def axes(self) -> dict[str, list[Any]]:
-        """Values on each axis, labels on a linked one, in the order of `Case.index`."""
-        return {name: list(axis) for name, axis in self.sweep.items()}
+        """Values on each axis, labels or numbers of points, in the order of `Case.index`."""
+        return {name: labels(name, axis) for name, axis in self.sweep.items()}
 
     @property
     def linked(self) -> dict[str, tuple[str, list[Any]]]:
-        """Parameter set by a linked axis -> the axis, and the values over its labels."""
+        """Parameter set by a linked axis or by points -> the axis, and the values over it."""
         return linked_values(self.sweep)
 
     @property
     def size(self) -> int:
-        """Number of runs."""
-        return self.expansion.size
+        """Number of runs; of a study with a goal the largest possible one."""
+        return self.expansion.size * (self.asks.most[1] if self.asks else 1)
 
     def run_ids(self) -> Iterator[str]:
-        """Yield the ids of the runs, in the order of `cases`, without building the cases."""
-        return self.expansion.run_ids()
+        """Yield the ids of the runs, in the order of `cases`, without building the cases.
+
+        Those of a study with a goal are not known: there are none.
+        """
+        return iter(()) if self.asks else self.expansion.run_ids()
 
     def cases(self) -> Iterator[Case]:
-        """Yield the runs of the study, the last axis fastest; none is kept in memory."""
+        """Yield the runs of the study, the last axis fastest; none is kept in memory.
+
+        Those of a study with a goal have the default of its parameter: they tell the places.
+        """
         return self.expansion.cases()
 
     def place(self, case: Case) -> dict[str, Any]:

@@ -1,8 +1,9 @@
-"""The sweep of a study: axes of one parameter, and linked axes, which move several together.
+"""The sweep of a study: axes of one parameter, and axes that move several together.
 
-An axis that is a list, or a range, has the name of a parameter and holds its values. A linked axis
-is a table with another name: it holds labels, and the parameters that each label sets. For each
-combination of labels, the parameters of the labels are fixed, and the lists are swept.
+An axis that is a list, or a range, has the name of a parameter and holds its values. Axes with
+other names set several parameters: a linked axis is a table of labels, an axis of points a list, a
+file or a sample (`studies.definition.points`). Each axis is a list of positions, which all set the
+same parameters. The runs are all combinations of positions.
 """
 
 from __future__ import annotations
@@ -10,11 +11,19 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from solver.results.quantities import QUANTITIES
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
+from studies.definition.points import (
+    CASE,
+    POINT,
+    checked_points,
+    describes_points,
+    field_of,
+    is_points,
+)
 from studies.definition.spaced import spaced
 from studies.errors import StudyError, nearest
 
@@ -25,6 +34,39 @@ LinkedAxis = dict[str, dict[str, Any]]
 """Label -> values of the parameters that the axis sets: the same ones for every label."""
 
 Axes = dict[str, list[Any] | LinkedAxis]
+"""Values of a parameter, labels, or points, by the name of the axis."""
+
+
+class Position(NamedTuple):
+    """One position of an axis.
+
+    Attributes
+    ----------
+    at : its value, its label, or its number
+    sets : the parameters that it sets
+    field : the entry of the study that has it
+    case : the name of a point, if it has one
+    """
+
+    at: Any
+    sets: Mapping[str, Any]
+    field: str
+    case: str | None = None
+
+
+def positions(name: str, axis: list[Any] | LinkedAxis) -> Iterator[Position]:
+    """Yield the positions of a normalised axis."""
+    if isinstance(axis, dict):
+        for label, settings in axis.items():
+            yield Position(label, settings, f"sweep.{name}.{label}")
+    elif is_points(axis):
+        for k, point in enumerate(axis):
+            sets = {parameter: value for parameter, value in point.items() if parameter != CASE}
+            yield Position(k, sets, f"{field_of(name)}[{k}]", point.get(CASE))
+    else:
+        for k, value in enumerate(axis):
+            yield Position(value, {name: value}, f"sweep.{name}[{k}]")
+
 
 _TEXT = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,79}")
 _AXIS = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,79}")
@@ -44,23 +86,43 @@ def checked_axes(content: Any, known: Mapping[str, Parameter]) -> Axes:
     """
     if not isinstance(content, Mapping):
         raise StudyError("sweep", content, "must be a table of axes")
-    content = {
-        name: spaced(name, axis) if name in known and isinstance(axis, Mapping) else axis
-        for name, axis in content.items()
+    given: dict[Any, Any] = {}
+    for name, axis in content.items():
+        if name in known and isinstance(axis, Mapping):
+            given[name] = spaced(name, axis)
+        elif name not in known and describes_points(name, axis):
+            _check_name(name, axis)
+            given[name] = checked_points(name, axis, known)
+        else:
+            given[name] = axis
+    tables = {
+        name: axis
+        for name, axis in sorted(given.items(), key=lambda each: str(each[0]))
+        if isinstance(axis, Mapping) or (name not in known and describes_points(name, axis))
     }
-    tables = {name: axis for name, axis in content.items() if isinstance(axis, Mapping)}
-    lists = checked_table(
-        "sweep", {name: axis for name, axis in content.items() if name not in tables}, known
-    )
-    _check_size(content)
-    linked = {name: _linked_axis(name, tables[name], known) for name in sorted(tables, key=str)}
+    lists = {name: axis for name, axis in given.items() if name not in tables}
+    lists = checked_table("sweep", lists, known)
+    _check_size(given)
+    linked = {
+        name: _linked_axis(name, axis, known) if isinstance(axis, Mapping) else axis
+        for name, axis in tables.items()
+    }
     axes: Axes = linked | {key: _axis(known[key], lists[key]) for key in known if key in lists}
     first: dict[str, str] = {}
-    for parameter, axis in _settings(axes):
-        if first.setdefault(parameter, axis) != axis:
-            allowed = f"sets {parameter}, which sweep.{first[parameter]} sets too: keep one"
-            raise StudyError(f"sweep.{axis}", content[axis], allowed)
+    for name, axis in axes.items():
+        at = next(positions(name, axis))
+        for parameter in [*at.sets, *([CASE] if at.case else [])]:
+            other = first.setdefault(parameter, name)
+            if other != name or (parameter == CASE and CASE in axes):
+                where = f"which {_field(other if other != name else CASE, axes)} sets too"
+                allowed = f"sets {parameter}, {where}: keep one"
+                raise StudyError(_field(name, axes), content[name], allowed)
     return axes
+
+
+def _field(name: str, axes: Axes) -> str:
+    """Return the entry of a study that has an axis."""
+    return field_of(name) if is_points(axes[name]) else f"sweep.{name}"
 
 
 def checked_table(field: str, content: Any, known: Mapping[str, Parameter]) -> dict[str, Any]:
@@ -83,28 +145,32 @@ def checked_text(field: str, text: Any) -> str:
 
 def owners(axes: Axes) -> dict[str, str]:
     """Return the axis of each swept parameter."""
-    return dict(_settings(axes))
-
-
-def linked_values(axes: Axes) -> dict[str, tuple[str, list[Any]]]:
-    """Return, for each parameter set by a linked axis, that axis and the values over its labels."""
     return {
-        parameter: (axis, [settings[parameter] for settings in labels.values()])
-        for axis, labels in axes.items()
-        if isinstance(labels, dict)
-        for parameter in _set_by(axis, labels)
+        parameter: name
+        for name, axis in axes.items()
+        for parameter in next(positions(name, axis)).sets
     }
 
 
-def _settings(axes: Axes) -> Iterator[tuple[str, str]]:
-    """Yield each parameter of each axis, and the axis."""
+def linked_values(axes: Axes) -> dict[str, tuple[str, list[Any]]]:
+    """Return what axes of several parameters set: parameter -> the axis, the values over it.
+
+    So are the names of points.
+    """
+    found: dict[str, tuple[str, list[Any]]] = {}
     for name, axis in axes.items():
-        for parameter in _set_by(name, axis):
-            yield parameter, name
+        if isinstance(axis, dict) or is_points(axis):
+            every = list(positions(name, axis))
+            if every[0].case is not None:
+                found[CASE] = name, [each.case for each in every]
+            for parameter in every[0].sets:
+                found[parameter] = name, [each.sets[parameter] for each in every]
+    return found
 
 
-def _set_by(name: str, axis: list[Any] | LinkedAxis) -> list[str]:
-    return list(next(iter(axis.values()))) if isinstance(axis, dict) else [name]
+def labels(name: str, axis: list[Any] | LinkedAxis) -> list[Any]:
+    """Return the value, label or number at each position of an axis."""
+    return [each.at for each in positions(name, axis)]
 
 
 def _check_size(axes: Mapping[str, Any]) -> None:
@@ -160,6 +226,8 @@ def _check_name(name: Any, content: Any) -> None:
     """Refuse the name of a linked axis that cannot be a dimension of the data set."""
     from studies.definition.vocabulary import LABEL_ATTRIBUTES
 
+    if name == POINT and describes_points(name, content):
+        return
     if name in QUANTITIES or name in LABEL_ATTRIBUTES:
         allowed = "the data set has a variable of this name: give the axis another one"
     elif not isinstance(name, str) or not _AXIS.fullmatch(name):

@@ -13,10 +13,14 @@ from pathlib import Path
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from studies.appearing import appearing
 
 _LIFE = timedelta(days=3650)
+
+_ENDS = x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH])
+"""Each end accepts and begins connections: workers talk to each other."""
 
 _Key = ec.EllipticCurvePrivateKey
 
@@ -60,8 +64,9 @@ def write_certificates(directory: Path) -> Sequence[Path]:
 
 def _certificate(name: str, own: _Key, issuer: str, key: _Key) -> bytes:
     """Return the certificate of a key that another key signs; one signed by itself may sign."""
-    now = datetime.now(UTC)
-    return (
+    now, signs = datetime.now(UTC), own is key
+    usages = [not signs, False, False, False, False, signs, signs, False, False]
+    begun = (
         x509.CertificateBuilder()
         .subject_name(_name(name))
         .issuer_name(_name(issuer))
@@ -69,10 +74,15 @@ def _certificate(name: str, own: _Key, issuer: str, key: _Key) -> bytes:
         .serial_number(x509.random_serial_number())
         .not_valid_before(now - timedelta(hours=1))  # clocks of other machines
         .not_valid_after(now + _LIFE)
-        .add_extension(x509.BasicConstraints(ca=own is key, path_length=None), critical=True)
-        .sign(key, hashes.SHA256())
-        .public_bytes(serialization.Encoding.PEM)
+        .add_extension(x509.BasicConstraints(ca=signs, path_length=None), critical=True)
+        .add_extension(x509.KeyUsage(*usages), critical=True)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(own.public_key()), critical=False)
+        .add_extension(
+            x509.AuthorityKeyIdentifier.from_issuer_public_key(key.public_key()), critical=False
+        )
     )
+    whole = begun if signs else begun.add_extension(_ENDS, critical=False)
+    return whole.sign(key, hashes.SHA256()).public_bytes(serialization.Encoding.PEM)
 
 
 def _name(text: str) -> x509.Name:

@@ -123,7 +123,7 @@ def _ignore_interrupts() -> None:
 
 
 @contextmanager
-def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
+def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Iterator[Access]:
     """Start worker processes of one thread each on this machine; they end with the context.
 
     Scheduler and workers listen on the loopback device only, and accept only connections with the
@@ -133,6 +133,8 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
     ----------
     workers : number of processes
     memory : largest memory of each, such as ``"2GB"``; by default its share of the machine's
+    need : bytes that each is expected to need; fewer are started where all would need more than the
+        machine has
 
     Yields
     ------
@@ -150,7 +152,9 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
         import dask  # takes half a second to import, while the workers' process loads the solver
         import distributed.utils
         from distributed import LocalCluster, Security
+        from distributed.system import MEMORY_LIMIT
 
+        workers = min(workers, max(1, MEMORY_LIMIT // need)) if need else workers
         distributed.utils._forkserver_preload_set = True  # or dask would load pandas everywhere
         started = {"distributed.worker.multiprocessing-method": method}
         security = Security.temporary()
@@ -169,7 +173,7 @@ def own_workers(workers: int, memory: str | None = None) -> Iterator[Access]:
                     local_directory=str(folder),
                     env={**os.environ, **_FROM_THE_START},  # through a pipe
                     silence_logs=logging.CRITICAL,
-                    **({"memory_limit": memory} if memory else {}),
+                    memory_limit=memory or MEMORY_LIMIT // max(workers, 1),
                 ).result()
             except RuntimeError as error:  # as where a thread of the script asks for them
                 raise RuntimeError(

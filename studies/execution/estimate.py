@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
 from collections.abc import Hashable, Iterator, Sequence
@@ -11,7 +12,11 @@ from typing import Any
 import numpy as np
 
 from solver.errors import ModelError
+from solver.memory import most_kept
+from solver.scenes import Effort
 from studies.definition.cases import LoadingPath
+from studies.definition.goal import Goal
+from studies.definition.parameters import build
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK, SOLVED
 from studies.errors import StudyError
@@ -26,6 +31,8 @@ _BYTES, _COMBINED = 1.1e6, 1.8
 """Size of a run's file if none is known; factor for the data set of a study beside the files."""
 _FIELDS = 100
 """Bytes per unknown that kept fields add to a run's file, if none is known: 55 to 185."""
+_LOADED = 2.1e8
+"""Bytes of a worker that has loaded all libraries."""
 _TOLD = 2.0
 """Factor of the low and high estimates where the scene tells the seconds."""
 _BATCH = 500
@@ -34,6 +41,9 @@ _BATCH = 500
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
     """The cost of a study. All numbers except `runs` are for the runs that the store lacks.
+
+    Of a study with a goal they are the most that it may cost: the longest possible searches, with
+    every run as expensive as the one of the largest value.
 
     Attributes
     ----------
@@ -46,6 +56,8 @@ class Estimate:
     cpu_seconds : processor time, low, likely and high: 16 %, 50 % and 84 % quantiles of past runs;
         half, once and twice what the scene tells, if it tells seconds
     bytes : size on the disk, with the data set
+    memory : most bytes of a worker process: libraries, the path that needs most, and what is kept
+        of paths before
     basis : on which data the estimate is based, as text
 
     A number that cannot be estimated is None.
@@ -59,6 +71,7 @@ class Estimate:
     longest: int | None
     cpu_seconds: tuple[float, ...] | None
     bytes: int
+    memory: int | None
     basis: str
 
 
@@ -135,12 +148,14 @@ def estimate(study: Study, store: Store) -> Estimate:
     ------
     StudyError
         for the first run, if the store has none and the scene can set up none
+    ModelError
+        if the setting of the memory that is kept is not a size
     """
     scene = study.problem
     pace = pace_of(store, scene.name)
-    to_compute, paths, unknowns, increments, longest = 0, 0, 0, 0, 0
+    to_compute, paths, unknowns, increments, longest, memory = 0, 0, 0, 0, 0, 0
     set_ups: dict[Hashable, list[float]] = {}
-    basis, alone = pace.basis, 0.0
+    basis, alone, kept = pace.basis, 0.0, most_kept()
     seconds = [0.0, 0.0, 0.0]
     refused: list[StudyError] = []
     for path, missing in _missing(study, store):
@@ -155,6 +170,7 @@ def estimate(study: Study, store: Store) -> Estimate:
                 continue
             set_up += effort.set_up
             unknowns = max(unknowns, effort.unknowns)
+            memory = max(memory, _of_a_worker(effort, kept))
             increments += effort.increments
             longest = max(longest, effort.most_increments)
             if effort.seconds is None:
@@ -181,8 +197,25 @@ def estimate(study: Study, store: Store) -> Estimate:
         longest=longest if known else None,
         cpu_seconds=(low, likely, high) if known else None,
         bytes=round(to_compute * _file_size(study, store, unknowns) * _COMBINED),
+        memory=memory if known else None,
         basis=basis if known else f"{scene.name} does not estimate the work of its paths",
     )
+
+
+def memory_needed(study: Study) -> int:
+    """Return the most bytes of a worker, see `Estimate`, for the first paths; 0 if not known."""
+    scene, most, kept = study.problem, 0, most_kept()
+    if scene.effort is None:
+        return most
+    for path, values in itertools.islice(_asked(study), _BATCH):
+        with contextlib.suppress(ModelError):  # its runs will end at once
+            most = max(most, _of_a_worker(scene.effort(path.parameters, values), kept))
+    return most
+
+
+def _of_a_worker(effort: Effort, kept: int) -> int:
+    """Return the most bytes of a worker that walks such a path, and keeps so many of others."""
+    return round(_LOADED + effort.memory + min(effort.memory, kept))
 
 
 def _shared(each: list[list[float]]) -> float:
@@ -198,6 +231,9 @@ def _shared(each: list[list[float]]) -> float:
 def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any]]]:
     """Yield each path that lacks runs, and the values of its branch parameter that it lacks."""
     branch = study.problem.branch
+    if study.asks:
+        yield from _longest(study, study.asks)
+        return
     paths = study.paths()
     while batch := list(itertools.islice(paths, _BATCH)):
         ids = (case.id for path in batch for case in path.cases)
@@ -205,6 +241,33 @@ def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any
         for path in batch:
             if missing := [case.values.get(branch) for case in path.cases if case.id not in done]:
                 yield path, missing
+
+
+def _asked(study: Study) -> Iterator[tuple[LoadingPath, list[Any]]]:
+    """Yield the loading paths of a study, and the values of its branch parameter on each."""
+    if study.asks:
+        yield from _longest(study, study.asks)
+        return
+    for path in study.paths():
+        yield path, [case.values.get(study.problem.branch) for case in path.cases]
+
+
+def _longest(study: Study, goal: Goal) -> Iterator[tuple[LoadingPath, list[Any]]]:
+    """Yield the loading paths of the longest possible searches, and their values."""
+    rounds, runs = goal.most
+    low, high = goal.between
+    for place in study.cases():
+        values = {**place.values, goal.parameter: high}
+        path = LoadingPath(place.id, build(study.problem, values), (place,))
+        if goal.branch and goal.goes_on:
+            yield path, [low, *goal.split(low, high, runs - rounds), high]
+            yield from itertools.repeat((path, [high]), rounds - 1)
+        elif goal.branch:
+            each = (runs - 2) // rounds
+            yield path, [low, *goal.split(low, high, each + 1), high]
+            yield from itertools.repeat((path, [high] * each), rounds - 1)
+        else:
+            yield from itertools.repeat((path, [high]), runs)
 
 
 def _file_size(study: Study, store: Store, unknowns: int) -> float:

@@ -5,10 +5,13 @@ after an update would find the new sources on the disk, and has the old code.
 
 The environment of this process is as old as the code. It is forgotten: each worker gets that of the
 process that starts it.
+
+What is loaded stays: a worker that looks for memory to free does not look there.
 """
 
 from __future__ import annotations
 
+import gc
 import os
 
 from studies.definition.identity import solver_hash
@@ -17,3 +20,4 @@ from studies.execution.forking import FORK_SERVER
 solver_hash()
 if FORK_SERVER in os.environ:
     os.environ.clear()
+    gc.freeze()

@@ -19,8 +19,10 @@ from studies.definition.identity import solver_hash
 from studies.definition.study import Study
 from studies.definition.vocabulary import KEEP, OK, SOLVED
 from studies.errors import StoreFull, StudyError, Unusable
-from studies.execution.bundles import bundles
+from studies.execution.bundles import Bundle, bundles
 from studies.execution.cluster import Access, connect, own_workers
+from studies.execution.estimate import memory_needed
+from studies.execution.goals import Goals, answers
 from studies.execution.limits import Limits
 from studies.execution.proof import Proof, proof_of
 from studies.execution.result import result
@@ -55,6 +57,7 @@ class StudyEvent:
     path : id of the path; empty while waiting
     fraction : fraction of this path that is done, 0 to 1
     run, status, message : id, status and message of the run, or the reason of waiting
+    place : of a study with a goal, where the run is and the round of its search
     """
 
     kind: str
@@ -64,6 +67,7 @@ class StudyEvent:
     run: str = ""
     status: str = ""
     message: str = ""
+    place: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,7 +122,8 @@ def run_study(
     study : a study, or the content of a study file
     store : the store of runs, shared by all studies
     scene : for the content of a study file, the user's own scene in place of a scene's name
-    workers : number of worker processes on this machine; by default one per core
+    workers : number of worker processes on this machine; by default one per core, or fewer if they
+        need more memory than the machine has
     scheduler : a running dask scheduler to use instead; its workers must see the store under the
         same path
     resume : compute only runs without a stored status; by default failed runs are computed again
@@ -160,6 +165,7 @@ def run_study(
         _answering(access)
     with store.writing():
         store.save_study(study)
+        goals = Goals(study, store, resume, since) if study.asks else None
         wanted: set[str] = set()
         ids = study.run_ids()
         while some := list(islice(ids, _BATCH)):
@@ -169,13 +175,17 @@ def run_study(
                 kept = study.keep in ("", row[KEEP])
                 if (solved and kept) or (not solved and resume and row["modified"] >= since):
                     wanted.discard(run_id)
-        work = _Work(study, store, wanted, limits, priority, on_event or (lambda event: None))
-        if wanted:
+        emit = on_event or (lambda event: None)
+        work = _Work(study, store, wanted, limits, priority, emit, goals)
+        if wanted or (goals and not goals.ended):
             if shutil.disk_usage(store.directory).free < _ROOM:
                 raise StoreFull(str(store.directory))  # before any path is computed in vain
-            work.compute(workers or os.cpu_count() or 1, access, stop)
-        stopped = stop_requested and bool(wanted - work.computed)
-        combined = result(study, store, complete=not wanted, stopped=stopped)
+            work.compute(workers, access, stop)
+        if goals:
+            stopped, combined = not goals.ended, answers(study, store, goals)
+        else:
+            stopped = stop_requested and bool(wanted - work.computed)
+            combined = result(study, store, complete=not wanted, stopped=stopped)
     return StudyOutcome(
         study_id=study.id,
         counts=combined.counts,
@@ -204,15 +214,17 @@ class _Work:
     limits: Limits
     priority: int
     emit: Callable[[StudyEvent], None]
+    goals: Goals | None = None
     computed: set[str] = field(default_factory=set)
     _left: deque[PathTask] = field(default_factory=deque)
     _walked: int = 0
     _walking: dict[str, tuple[int, float]] = field(default_factory=dict)
 
-    def compute(self, workers: int, access: Access | None, stop: Callable[[], bool]) -> None:
+    def compute(self, wanted: int | None, access: Access | None, stop: Callable[[], bool]) -> None:
         """Run a task for each bundle of paths that lack runs."""
         from studies.execution.grid import Finished, Grid, Message  # dask takes a second to import
 
+        workers = wanted or os.cpu_count() or 1
         grid: Grid | None = None
         unwritable: list[StoreFull | StudyError] = []
         with ExitStack() as opening:
@@ -220,7 +232,10 @@ class _Work:
             tasks = self._tasks(proof, lambda: grid.workers if grid else workers)
             if access is None:
                 first = list(islice(tasks, workers))
-                access = opening.enter_context(own_workers(len(first), self.limits.memory))
+                need = 0 if wanted else memory_needed(self.study)
+                count = sum(task is not None for task in first)
+                own = own_workers(count, self.limits.memory, need)
+                access = opening.enter_context(own)
                 tasks = chain(first, tasks)
             grid = opening.enter_context(Grid(access))
 
@@ -244,15 +259,24 @@ class _Work:
                 raise StoreFull(directory)
             raise Unusable("directory", directory, error.allowed)
 
-    def _tasks(self, proof: Proof, workers: Callable[[], int]) -> Iterator[PathTask]:
-        scene, directory = self.study.problem, self.store.directory.resolve()
-        lacking = (path for path in map(self._rest, self.study.paths()) if path.cases)
-        for paths in bundles(scene, lacking, workers):
-            self._walking.update({path.id: (len(path.cases), 0.0) for path in paths})
-            task = PathTask(scene, paths, directory, solver_hash(), self.study.keep, proof)
-            yield replace(task, stale=self.store.modified(case.id for case in task.cases))
+    def _tasks(self, proof: Proof, workers: Callable[[], int]) -> Iterator[PathTask | None]:
+        if self.goals is None:
+            lacking = (path for path in map(self._rest, self.study.paths()) if path.cases)
+            for paths in bundles(self.study.problem, lacking, workers):
+                yield self._task(proof, paths)
+            return
+        for asked in self.goals.paths():
+            yield asked and replace(
+                self._task(proof, (asked.path,)), limit=asked.limit, place=asked.place
+            )
 
-    def _with_left(self, tasks: Iterator[PathTask]) -> Iterator[PathTask | None]:
+    def _task(self, proof: Proof, paths: Bundle) -> PathTask:
+        scene, directory = self.study.problem, self.store.directory.resolve()
+        self._walking.update({path.id: (len(path.cases), 0.0) for path in paths})
+        task = PathTask(scene, paths, directory, solver_hash(), self.study.keep, proof)
+        return replace(task, stale=self.store.modified(case.id for case in task.cases))
+
+    def _with_left(self, tasks: Iterator[PathTask | None]) -> Iterator[PathTask | None]:
         """Yield tasks, first those that failed ones left; None if there is none for now."""
         while True:
             yield self._left.popleft() if self._left else next(tasks, None)
@@ -278,9 +302,12 @@ class _Work:
             self.store.catalogue.put(fresh)
         for row in fresh:
             self.computed.add(row["id"])
+            place = self.goals.about(path, row) if self.goals else ""
+            if self.goals:
+                self.goals.heard(path, row)
             self._tell(
                 "run", path=path, run=row["id"], status=self.study.taken(row["status"]),
-                message=row["message"],
+                message=row["message"], place=place,
             )  # fmt: skip
 
     def _tell(self, kind: str, **content: Any) -> None:
@@ -307,9 +334,16 @@ class _Work:
                     self._left.append(replace(task, paths=rest))
                 return
             self._walked += self._walking.pop(path.id)[0]
+            if self.goals:
+                owed = self.goals.owed(path.id) if error else None
+                if owed is not None:
+                    self._keep(path.id, [self.store.write_run(owed, str(error))])
+                self.goals.closed(path.id)
 
     def _progress(self) -> float:
         """Return the completed fraction of the study, including runs found in the store."""
+        if self.goals:
+            return self.goals.progress
         total = self.study.size
         walked = sum(cases * fraction for cases, fraction in self._walking.values())
         done = max(self._walked + walked, len(self.computed))

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from solver.memory import release
 from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
+from studies.definition.goal import PathLimit, Place
 from studies.definition.identity import solver_hash
 from studies.errors import StoreFull, StudyError, without_folders
 from studies.execution.proof import Proof, Unfit
@@ -42,6 +45,8 @@ class PathTask:
     proof : proof that the worker sees the directory; None if this is certain
     stale : by id, the time of change [ns] of files that the study replaces; a file with another
         time was written by a worker that died on this task, and is kept
+    limit : tells the run behind which no other of its path is needed; None if all are
+    place : of a path that goes on, the place whose search asks for its runs: the path has no cases
     """
 
     scene: Scene
@@ -51,10 +56,13 @@ class PathTask:
     keep: str = ""
     proof: Proof | None = None
     stale: Mapping[str, int] = field(default_factory=dict)
+    limit: PathLimit | None = None
+    place: Place | None = None
 
     def __dask_tokenize__(self) -> tuple[Any, ...]:
         """Return an identity of this task, so that dask need not hash its content."""
-        return type(self).__name__, self.source, [case.id for case in self.cases]
+        paths = [path.id for path in self.paths]
+        return type(self).__name__, self.source, paths, [case.id for case in self.cases]
 
     @property
     def cases(self) -> list[Case]:
@@ -81,7 +89,8 @@ def walk(
     died. If the scene raises an error, the runs without a record are written with the status
     ``error`` and the error as their message. A record that cannot be written, or whose file would
     differ, gives only its own run this status. The next path follows when all runs of a path are
-    stored: of a task that ends early, the first path that lacks one was being computed.
+    stored: of a task that ends early, the first path that lacks one was being computed. Between two
+    paths the process keeps no more than `solver.memory.most_kept`.
 
     Raises
     ------
@@ -102,7 +111,10 @@ def walk(
     stored = task.stored(store)
     with contextlib.suppress(StopAsked):
         for path in task.paths:
-            _walk(task, path, store, stored, report, should_stop)
+            try:
+                _walk(task, path, store, stored, report, should_stop)
+            finally:
+                release()
 
 
 def _walk(
@@ -134,6 +146,9 @@ def _walk(
         if stop:
             raise StopAsked
 
+    if task.place is not None:
+        _follow(task, path, task.place, store, keep, monitor)
+        return
     for case in path.cases:
         if case.id in stored:
             keep(stored[case.id])
@@ -149,12 +164,53 @@ def _walk(
                 row = _written(store, task, owed[value], record)
                 del owed[value]
                 keep(row)
+                if task.limit is not None and task.limit(row):
+                    return
     except (StopAsked, StoreFull, StudyError):
         raise
     except Exception as error:
         reason = _reason(error)
     for case in owed.values():
         keep(store.write_run(case, reason))
+
+
+def _follow(
+    task: PathTask,
+    path: LoadingPath,
+    place: Place,
+    store: Store,
+    keep: Callable[[dict[str, Any]], None],
+    monitor: Callable[[float], None],
+) -> None:
+    """Compute the runs that a search asks for, one after the other, on one path; see `walk`."""
+    search, owed = place.search, deque[Case]()
+
+    def known(row: dict[str, Any]) -> None:
+        place.hear(row)
+        keep(row)
+
+    def values() -> Iterator[float]:
+        while wanted := search.wants:
+            (case,) = place.runs(wanted[:1]).cases()
+            row = store.found(case.id) if store.run_path(case.id).exists() else None
+            if row is not None and place.stands(row):
+                known(row)
+                continue
+            monitor(0.0)
+            owed.append(case)
+            yield wanted[0]
+
+    reason = NO_RECORD
+    try:
+        largest = search.goal.between[1]
+        for record in task.scene.follow(path.parameters, values(), largest, monitor):
+            known(_written(store, task, owed.popleft(), record))
+    except (StopAsked, StoreFull, StudyError):
+        raise
+    except Exception as error:
+        reason = _reason(error)
+    if owed:
+        known(store.write_run(owed.popleft(), reason))
 
 
 def _written(store: Store, task: PathTask, case: Case, record: Record) -> dict[str, Any]:

@@ -20,6 +20,9 @@ from typing import Any, TypeGuard
 LONGEST = 200
 """Largest number of characters of an expression."""
 
+DEEPEST = 50
+"""Largest number of operations and parentheses inside one another."""
+
 FUNCTIONS: Mapping[str, tuple[Callable[..., float], int]] = {
     "sqrt": (math.sqrt, 1),
     "exp": (math.exp, 1),
@@ -116,13 +119,28 @@ def _read(text: str) -> ast.expr:
     python = _PARAMETER.sub(rf" {_MARK}\1 ", text).replace("^", "**")
     python = _CHOICE.sub(f"{_IF}(", python)
     try:
-        return ast.parse(" ".join(python.split()), mode="eval").body
+        tree = ast.parse(" ".join(python.split()), mode="eval").body
+        if _depth(tree) > DEEPEST:
+            raise RecursionError
+        return tree
+    except (RecursionError, MemoryError):
+        raise ExpressionError(
+            f"must have at most {DEEPEST} operations inside one another: use derived parameters"
+        ) from None
     except SyntaxError:
         allowed = (
             "numbers, 'words', $parameters, pi, + - * / ^ ( ), < <= > >= == !=, and, or, not, "
             f"if(condition, one, other) and {', '.join(FUNCTIONS)}"
         )
         raise ExpressionError(f"cannot be read as arithmetic: {allowed}") from None
+
+
+def _depth(tree: ast.AST) -> int:
+    """Return how many operations are inside one another."""
+    found, level = 0, [tree]
+    while level := [each for node in level for each in ast.iter_child_nodes(node)]:
+        found += 1
+    return found
 
 
 def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:

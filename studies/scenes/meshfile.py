@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from solver.errors import ModelError
+from solver.memory import kept
 from studies.scratch import scratch
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class MeshFile:
         return _mesh(self.name, self.data, part)
 
 
-@lru_cache(maxsize=32)
+@kept
 def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
     found = _read(name, data)
     points = np.asarray(found.points, dtype=float)

@@ -79,7 +79,7 @@ def file_scene(description: Description, *, built: bool = False) -> FileScene:
     if known is None or built:
         scene = examined(description, built=built)
         known = _SCENES.setdefault(description.key, _scene_of(description, scene))
-        while len(_SCENES) > _MOST:
+        while len(_SCENES) > _MOST or (len(_SCENES) > 1 and _kept_bytes() > _MOST_BYTES):
             del _SCENES[next(iter(_SCENES))]
     return known
 
@@ -87,6 +87,14 @@ def file_scene(description: Description, *, built: bool = False) -> FileScene:
 _SCENES: dict[tuple[str, str, bool], FileScene] = {}
 _MOST = 64
 """Largest number of scenes of files that a process keeps."""
+_MOST_BYTES = 100_000_000
+"""Largest size of all their meshes."""
+
+
+def _kept_bytes() -> int:
+    """Return the size of the meshes of all scenes that are kept."""
+    kept = (each.description.meshes or {} for each in _SCENES.values())
+    return sum(len(mesh.data) for meshes in kept for mesh in meshes.values())
 
 
 def _scene_of(description: Description, scene: tables.SceneFile) -> FileScene:

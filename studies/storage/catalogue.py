@@ -11,14 +11,13 @@ from __future__ import annotations
 
 import json
 import sqlite3
-import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from studies.errors import CatalogueDamaged, StoreBusy
-from studies.storage.database import Database, WrongContent, check
+from studies.storage.database import Database, WrongContent, check, checksum
 
 _COLUMNS = (
     "id", "scene", "status", "message", "parameters", "scalars", "path", "created",
@@ -191,7 +190,7 @@ def _stored(row: Mapping[str, Any]) -> list[Any]:
     plain = {"cpu_seconds": seconds if seconds is None else float(seconds)}
     texts = {column: json.dumps(row[column]) for column in _JSON}
     values = [(dict(row) | plain | texts).get(column) for column in _COLUMNS]
-    return [*values, _checksum(values)]
+    return [*values, checksum(values)]
 
 
 def _row(stored: Sequence[Any]) -> Row:
@@ -201,11 +200,7 @@ def _row(stored: Sequence[Any]) -> Row:
 
 def _values(stored: Sequence[Any]) -> list[Any]:
     """Return the values of a row that agree with their checksum."""
-    *values, checksum = stored
-    if _checksum(values) != checksum:
+    *values, known = stored
+    if checksum(values) != known:
         raise WrongContent(f"the row of run {values[0]!r} is damaged")
     return values
-
-
-def _checksum(values: Sequence[Any]) -> int:
-    return zlib.crc32(repr(values).encode("utf-8", "backslashreplace"))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable, Iterator
+import zlib
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any
 
 from studies.errors import StoreFull
 
@@ -73,6 +75,11 @@ class Database:
         reason = f"{self.path.name} cannot be used now: {error}"
         busy = code & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
         return self._busy(reason) if busy else OSError(reason)
+
+
+def checksum(values: Sequence[Any]) -> int:
+    """Return a checksum of the values of a row as SQLite gives them back; it has none itself."""
+    return zlib.crc32(repr(list(values)).encode("utf-8", "backslashreplace"))
 
 
 def check(connection: sqlite3.Connection) -> None:

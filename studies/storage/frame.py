@@ -22,6 +22,8 @@ SAME = 1e-9
 """Relative difference below which two grids are the same."""
 FRACTION = "_fraction"
 """Suffix of the index of grids that differ from run to run only in scale."""
+SETS = "sets"
+"""Attribute of an axis of labels or points: the coordinates that it sets."""
 _PIECE = 32
 """Least number of values along a dimension in a compressed chunk, if lengths differ."""
 _NO_COORDINATE = "_nc4_non_coord_"
@@ -35,7 +37,7 @@ class Frame:
     Attributes
     ----------
     scene, axes, usual : the scene; all sweep dimensions with their values; those of a run's file
-    linked : parameter set by a linked axis -> the axis, the values over it
+    linked : parameter set by a linked axis or by points -> the axis, the values over it
     labels : labelled dimension -> union of the labels
     grids, sizes, shortest : numeric dimension -> the grid, the longest of several that agree; the
         greatest length; the smallest
@@ -130,10 +132,10 @@ class Frame:
         """Create the dimensions and their coordinates."""
         lengths = dict(zip(self.axes, self.shape, strict=True)) | self.sizes
         file.dimensions = lengths | {name: len(labels) for name, labels in self.labels.items()}
-        own = {name: (name, values) for name, values in self.axes.items()}
-        for name, (axis, values) in (own | self.linked).items():
-            attributes = _axis_attributes(self.scene, name)
-            _write(file, name, (axis,), _axis_array(values), attributes, complete=True)
+        for name, (dims, values, attributes) in axis_variables(
+            self.scene, self.axes, self.linked
+        ).items():
+            _write(file, name, dims, values, attributes, complete=True)
         for name, labels in self.labels.items():
             texts = np.array(labels, dtype=object)
             _write(file, name, (name,), texts, layout.attributes_of(name), complete=True)
@@ -197,8 +199,22 @@ class Frame:
         return list(range(len(run[dimension])))
 
 
+def axis_variables(
+    scene: Scene, axes: Mapping[str, Sequence[Any]], linked: Mapping[str, tuple[str, list[Any]]]
+) -> dict[str, layout.Variable]:
+    """Return the coordinates of a sweep: its axes, and what axes of labels or points set."""
+    own = {name: (name, values) for name, values in axes.items()}
+    found = {}
+    for name, (axis, values) in (own | dict(linked)).items():
+        attributes = _axis_attributes(scene, name)
+        if sets := [parameter for parameter, (by, _) in linked.items() if by == name]:
+            attributes |= {SETS: " ".join(sets)}
+        found[name] = layout.Variable((axis,), _axis_array(values), attributes)
+    return found
+
+
 def _axis_attributes(scene: Scene, name: str) -> dict[str, str]:
-    """Return the attributes of a parameter of the scene, or of a linked axis."""
+    """Return the attributes of a parameter of the scene, or of an axis of labels or points."""
     known = name in parameters_of(scene)
     return layout.axis_attributes(scene, name) if known else layout.attributes_of(name)
 

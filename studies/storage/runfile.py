@@ -28,10 +28,10 @@ _LOCK = Lock()
 
 def sealed(run: layout.RunContent) -> bytes:
     """Return the content of a run's file: its netCDF, and the seal."""
-    return seal.sealed(f"run {run.attrs['id']}", _packed(run))
+    return seal.sealed(f"run {run.attrs['id']}", packed(run))
 
 
-def _packed(run: layout.RunContent) -> bytes:
+def packed(run: layout.RunContent) -> bytes:
     """Return a run as netCDF, made in memory: HDF5 does not survive a full disk."""
     import netCDF4  # a complete study does not need it
 

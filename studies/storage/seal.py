@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from studies.errors import FileDamaged
-from studies.toml import DEEPEST, LARGEST, depth
+from studies.toml import LARGEST, check_depth
 
 SEALED = {"checksum": "SHA-256 in the last line, after the end of HDF5"}
 """Attribute of netCDF files that have the line."""
@@ -107,12 +107,13 @@ def content_of(path: Path, name: str, largest: int = LARGEST) -> dict[str, Any]:
     """
     text, state = bytes_of(path, name, largest)
     try:
+        check_depth(text.decode())
         content = json.loads(text)
-        if not isinstance(content, dict) or depth(content) > DEEPEST:
-            raise ValueError("it is no JSON object of tables and lists")
+        if not isinstance(content, dict):
+            raise ValueError("it is no JSON object")
         if content.pop("seal", None) is not None or _looked(path, name)[1] != NO_SEAL:
             check(path, name)
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise FileDamaged(path, name, f"{error}", state) from None
     return content
 

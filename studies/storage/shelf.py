@@ -8,8 +8,11 @@ names one of its parameters.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from solver.scenes import Scene
@@ -20,30 +23,42 @@ from studies.scenes.description import Description, mesh_names
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.scene import FileScene, file_scene
 from studies.storage.database import Database
-from studies.storage.seal import bytes_of, content_of, sealed_json, state_of
+from studies.storage.seal import State, bytes_of, content_of, sealed_json, state_of
 
 _FILE = "scene.json"
-_COLUMNS = "id, name, summary, branch, parameters"
-_TABLE = f"CREATE TABLE IF NOT EXISTS scenes ({_COLUMNS}, state, added, PRIMARY KEY (id))"
+_COLUMNS = "id, name, summary, branch, size, owner, added, parameters"
+_TABLE = f"CREATE TABLE IF NOT EXISTS shelf ({_COLUMNS}, state, PRIMARY KEY (id))"
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A scene in the index: its content id, name, summary, branch, and names of parameters."""
+    """A scene in the index.
+
+    Attributes
+    ----------
+    id, name, summary, branch : content id, and as in `Scene`
+    size : of its files [bytes]
+    owner : who posted it first; empty if nobody did
+    added : time at which it was stored [ns since 1970]
+    parameters : names of its parameters
+    """
 
     id: str
     name: str
     summary: str
     branch: str
+    size: int
+    owner: str
+    added: int
     parameters: list[str]
 
 
-def keep(directory: Path, scene_id: str, description: Description) -> None:
+def keep(directory: Path, scene_id: str, description: Description, owner: str) -> None:
     """Store a scene of this content id."""
     folder = directory / "scenes" / scene_id
     folder.mkdir(parents=True, exist_ok=True)
     written = {name: mesh.data for name, mesh in (description.meshes or {}).items()}
-    content = {"file": description.file, "content": description.content}
+    content = {"file": description.file, "content": description.content, "owner": owner}
     written |= {_FILE: sealed_json(f"scene {scene_id}", content)}  # last: then all is there
     for name, data in written.items():
         with appearing(folder / name) as part:
@@ -62,7 +77,8 @@ def described(directory: Path, scene_id: str) -> Scene | None:
     ValueError
         if it is not, and this version does not allow the scene
     """
-    return _made(directory, scene_id, whole=False)
+    folder = directory / "scenes" / scene_id
+    return _described(folder, state_of(folder / _FILE), state_of(folder))
 
 
 def kept(directory: Path, scene_id: str) -> Scene | None:
@@ -75,12 +91,18 @@ def kept(directory: Path, scene_id: str) -> Scene | None:
     ValueError
         if it has, and this version does not allow the scene
     """
-    return _made(directory, scene_id, whole=True)
+    return _made(directory / "scenes" / scene_id, whole=True)
 
 
-def _made(directory: Path, scene_id: str, whole: bool) -> FileScene | None:
+@lru_cache(maxsize=256)
+def _described(folder: Path, *states: State | None) -> Scene | None:
+    """Return a scene without its meshes, read again when its folder or file has another state."""
+    return _made(folder, whole=False) if all(states) else None
+
+
+def _made(folder: Path, whole: bool) -> FileScene | None:
     """Return a scene made from the content of its file."""
-    folder, name = directory / "scenes" / scene_id, f"scene {scene_id}"
+    scene_id, name = folder.name, f"scene {folder.name}"
     state = state_of(folder / _FILE) and state_of(folder)
     if state is None:
         return None
@@ -111,28 +133,45 @@ class Index(Database):
         mode = "rwc" if self.path.exists() or there else "memory"
         with self.connection("BEGIN", mode) as connection:
             connection.execute(_TABLE)
-            known = dict(connection.execute("SELECT id, state FROM scenes").fetchall())
+            known = dict(connection.execute("SELECT id, state FROM shelf").fetchall())
         fresh = [name for name, (state, _) in there.items() if known.get(name) != state]
         rows = [
-            (name, scene.name, scene.summary, scene.branch,
-             json.dumps([*parameters_of(scene)]), *there[name])
+            (name, scene.name, scene.summary, scene.branch, *self._kept(name), there[name][1],
+             json.dumps([*parameters_of(scene)]), there[name][0])
             for name in fresh if (scene := read(name))
         ]  # fmt: skip
         gone = known.keys() - there.keys()
         if rows or gone:
             with self.connection("BEGIN IMMEDIATE", "rw") as connection:
-                connection.executemany("DELETE FROM scenes WHERE id = ?", [[each] for each in gone])
+                connection.executemany("DELETE FROM shelf WHERE id = ?", [[each] for each in gone])
                 connection.executemany(
-                    "INSERT OR REPLACE INTO scenes VALUES (?, ?, ?, ?, ?, ?, ?)", rows
+                    f"INSERT OR REPLACE INTO shelf VALUES ({', '.join('?' * 9)})", rows
                 )
+
+    def _kept(self, scene_id: str) -> tuple[int, str]:
+        """Return the size of the files of a scene, and its owner."""
+        folder = self.scenes / scene_id
+        size = sum(path.stat().st_size for path in folder.iterdir())
+        return size, str(content_of(folder / _FILE, f"scene {scene_id}").get("owner", ""))
 
     def page(self, limit: int, offset: int = 0, name: str | None = None) -> list[Entry]:
         """Return a page of the scenes, or of those of a name, the latest first."""
-        with self.connection("BEGIN", "rw" if self.path.exists() else "memory") as connection:
-            connection.execute(_TABLE)
+        with self._reading() as connection:
             rows = connection.execute(
-                f"SELECT {_COLUMNS} FROM scenes WHERE ? IN (name, '') "
+                f"SELECT {_COLUMNS} FROM shelf WHERE ? IN (name, '') "
                 "ORDER BY added DESC, id LIMIT ? OFFSET ?",
                 [name or "", limit, offset],
             )
-            return [Entry(i, n, text, at, json.loads(names)) for i, n, text, at, names in rows]
+            return [Entry(*[*row[:-1], json.loads(row[-1])]) for row in rows]
+
+    def sizes(self) -> dict[str, int]:
+        """Return the size of all scenes of each owner [bytes]."""
+        with self._reading() as connection:
+            found = connection.execute("SELECT owner, SUM(size) FROM shelf GROUP BY owner")
+            return dict(found.fetchall())
+
+    @contextmanager
+    def _reading(self) -> Iterator[sqlite3.Connection]:
+        with self.connection("BEGIN", "rw" if self.path.exists() else "memory") as connection:
+            connection.execute(_TABLE)
+            yield connection

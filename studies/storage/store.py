@@ -24,11 +24,11 @@ import tempfile
 import time
 import uuid
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from solver.results.record import Record
 from solver.scenes import Scene
@@ -53,6 +53,8 @@ _BATCH = 500
 _UNFINISHED = 600.0
 """Seconds after which an unfinished file beside a data set counts as abandoned."""
 _LOG = logging.getLogger("studies")
+
+Found = TypeVar("Found")
 
 
 class Store:
@@ -117,37 +119,40 @@ class Store:
         CatalogueDamaged
             if the index is damaged again after it was made again, or cannot be set aside
         """
+        return self._indexed(lambda index: index.page(limit, offset, name))
+
+    def scene_sizes(self) -> dict[str, int]:
+        """Return the size of all scenes that each owner has posted [bytes]; errors as `scenes`."""
+        return self._indexed(shelf.Index.sizes)
+
+    def _indexed(self, ask: Callable[[shelf.Index], Found]) -> Found:
+        """Return what is asked of the index of scenes, which follows the files first."""
         index = shelf.Index(self.directory)
+
+        def asked() -> Found:
+            with suppress(StoreFull):  # then the latest ones are missing
+                index.follow(lambda scene_id: self.scene(scene_id, whole=False))
+            return ask(index)
+
         state = seal.state_of(index.path)
         try:
-            return self._listed(index, limit, offset, name)
+            return asked()
         except CatalogueDamaged as error:
             damaged = FileDamaged(index.path, index.path.name, str(error.__cause__), state)
             self.set_aside(damaged, "it is made again from the scenes")
-        return self._listed(index, limit, offset, name)
-
-    def _listed(
-        self, index: shelf.Index, limit: int, offset: int, name: str | None
-    ) -> list[shelf.Entry]:
-        with suppress(StoreFull):  # then the latest ones are missing
-            index.follow(lambda scene_id: self.scene(scene_id, whole=False))
-        return index.page(limit, offset, name)
+        return asked()
 
     def save_scene(self, scene: Scene) -> None:
         """Store a scene from a file, so that studies can name it by its id."""
         if isinstance(scene, FileScene) and scene.posted:
             self.keep_scene(scene.id, scene.description)
 
-    def keep_scene(self, scene_id: str, description: Description) -> bool:
-        """Store a scene of this content id; return whether it is new."""
-        folder, meshes = self.directory / "scenes" / scene_id, description.meshes or {}
-        wrong = [n for n, m in meshes.items() if seal.digest(folder / n) != seal.digest_of(m.data)]
-        if wrong:
-            self.put_aside(folder, f"{wrong[0]} is missing or has changed", "it is written again")
-        new = self.scene(scene_id, whole=False) is None
+    def keep_scene(self, scene_id: str, description: Description, owner: str = "") -> bool:
+        """Store a scene of this content id for an owner; return whether it is new."""
+        new = self.scene(scene_id) is None  # a damaged one is set aside, and so written again
         if new:
             with self._writable():
-                shelf.keep(self.directory, scene_id, description)
+                shelf.keep(self.directory, scene_id, description, owner)
         return new
 
     def discard_scene(self, scene_id: str) -> None:

@@ -153,6 +153,9 @@ def run_file(path: Path | str, selection: Mapping[str, str | float]) -> Path:
     except FileDamaged as error:
         raise StudyError("path", str(path), f"holds a damaged file: {error}") from None
     study = Study.known(content, store.scene)
+    if study.asks:
+        allowed = "holds what a search found: give the file of a run, such as that of run_high"
+        raise StudyError("path", str(path), allowed)
     if study.id != found.parent.name:  # then the ids of its runs differ too
         allowed = "was computed by another version of the solver: give the file of a run"
         raise StudyError("path", str(path), allowed)

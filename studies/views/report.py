@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
@@ -64,16 +64,18 @@ def report(study: Study, store: Store, outcome: StudyOutcome) -> Report:
 
     with open_study(outcome.dataset) as dataset:
         text = _text(study, outcome, dataset)
-        files = made.write(_NAME, of, {_TEXT: text.encode(), **_drawn(dataset)})
+        drawn = _found(study.asks.parameter, dataset) if study.asks else _drawn(dataset)
+        files = made.write(_NAME, of, {_TEXT: text.encode(), **drawn})
     return Report(text, files, anew=True)
 
 
 def _text(study: Study, outcome: StudyOutcome, dataset: xr.Dataset) -> str:
     from studies.views.tables import messages, runs_table
 
-    table = runs_table(dataset) + "\n" if study.size <= SHOWN else ""
+    size, what = dataset["status"].size, "answers" if study.asks else "runs"
+    table = runs_table(dataset) + "\n" if size <= SHOWN else ""
     counts = ", ".join(f"{number} {status}" for status, number in outcome.counts.items())
-    ended = f"{study.name}: {study.size} runs ({counts}{_warned(dataset)})"
+    ended = f"{study.name}: {size} {what} ({counts}{_warned(dataset)})"
     note = f"\nnote: {study.note}\n" if study.note else ""
     return f"{table}{messages(dataset)}{note}\n{ended}\n"
 
@@ -98,6 +100,20 @@ def _drawn(dataset: xr.Dataset) -> dict[str, bytes]:
         drawn = map_figure(one_run(dataset), field, "xx")
     except StudyError:
         return {}
+    return {f"{field}_xx.png": _png(drawn)}
+
+
+def _found(parameter: str, dataset: xr.Dataset) -> dict[str, bytes]:
+    """Draw what was found over the sweep; nothing if it cannot be drawn."""
+    from studies.views.plots.sweep import sweep_figure
+
+    try:
+        return {f"{parameter}.png": _png(sweep_figure(dataset, parameter))}
+    except StudyError:
+        return {}
+
+
+def _png(drawn: Any) -> bytes:
     picture = io.BytesIO()
     drawn.savefig(picture, format="png")
-    return {f"{field}_xx.png": picture.getvalue()}
+    return picture.getvalue()

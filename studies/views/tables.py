@@ -135,7 +135,8 @@ def _spoiled(dataset: xr.Dataset, name: str) -> xr.DataArray:
 def _own(dataset: xr.Dataset) -> list[str]:
     """Return the outputs that a scene file declares, without the positions of extreme values."""
     rank = dataset["status"].dims
-    names = [str(name) for name, each in dataset.data_vars.items() if each.dims == rank]
+    numbers = {str(n): v for n, v in dataset.data_vars.items() if v.dtype.kind in "fiub"}
+    names = [name for name, each in numbers.items() if each.dims == rank]
     known = QUANTITIES.keys() | LABEL_ATTRIBUTES.keys()
     own = [name for name in names if name not in known and not name.startswith("audit_")]
     ends = {f"_{axis}" for axis in AXES}

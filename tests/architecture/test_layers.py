@@ -14,8 +14,8 @@ from tests.architecture.sources import ROOT, modules
 LAYERS = {
     # from the ground up; a module may import from its own layer and from those before it
     "solver": (
-        "version", "errors", "parameters", "parts", "tensors", "linear", "mesh", "materials",
-        "model", "fem", "contact", "loading", "steady", "prism", "results", "scenes",
+        "version", "errors", "parameters", "parts", "memory", "tensors", "linear", "mesh",
+        "materials", "model", "fem", "contact", "loading", "steady", "prism", "results", "scenes",
     ),
     "studies": (
         "errors", "toml", "appearing", "scratch", "scenes", "definition", "storage", "execution",

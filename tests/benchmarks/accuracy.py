@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import SCENES, Record
+from solver.memory import release
 from solver.scenes.punch import PunchParameters
 from solver.scenes.rolling_parameters import RollingParameters
-from solver.scenes.rolling_steady import _rim
-from solver.steady import track_of
 from tests.benchmarks.measure import Point, timed
 
 Array = NDArray[np.float64]
@@ -124,8 +123,7 @@ def at_level(parameters: Any, level: str) -> Any:
 
 def _run(problem: Problem, parameters: Any) -> Record:
     """Return the record of a run that shares nothing with one before; raise where it failed."""
-    track_of.cache_clear()
-    _rim.cache_clear()
+    release(0)
     scene = SCENES[problem.scene]
     (record,) = scene.path(parameters, [getattr(parameters, scene.branch)], lambda share: None)
     if not record.status.solved:

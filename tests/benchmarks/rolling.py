@@ -44,7 +44,7 @@ def loads(quick: bool) -> tuple[str, ...]:
 
 def plan(quick: bool) -> tuple[Case, tuple[Case, ...]]:
     """Return the reference, and the cases."""
-    h, advance = (1.0, 1.0) if quick else (0.25, 0.125)
+    h, advance = (1.0, 2.0) if quick else (0.25, 0.125)
     finest = Case("reference", "finest", {**graded_by(h), "advance_step": advance})
     return finest, tuple(_cases(quick))
 

@@ -1,6 +1,7 @@
 """What is left out where a scene does not need it: the same problem with and without.
 
-Each pair gives the same numbers, which `tests/solver/test_skips.py` proves; here it is timed.
+Each pair of `SKIPS` gives the same numbers, which `tests/solver/test_skips.py` proves; here it is
+timed.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from numpy.typing import NDArray
 
 from solver import SCENES, Body, ContactPair, Material, Model, PathControl, solve
 from solver.contact import candidates
+from solver.memory import release
 from solver.mesh import grid
 from solver.scenes.punch import PunchParameters, model
 from solver.scenes.rolling_parameters import RollingParameters
-from solver.scenes.rolling_steady import _rim, steady_passes
-from solver.steady import track_of
+from solver.scenes.rolling_steady import steady_passes
 from tests.benchmarks.measure import timed
 
 Array = NDArray[np.float64]
@@ -92,8 +93,7 @@ def _passed() -> Array:
 
 
 def _passed_anew() -> Array:
-    track_of.cache_clear()
-    _rim.cache_clear()
+    release(0)
     return _passed()
 
 
@@ -121,7 +121,8 @@ SKIPS = (
     Skip("kept factor", _passed, _passed_anew, 0.0),
 )
 STEADY = Skip("steady pass", lambda: _rolled("endless"), lambda: _rolled(64.0), 0.1)
-"""Not the same numbers: steps have ends, and errors by increments."""
+"""Not the same numbers: steps have ends, and errors by increments, which
+`tests/verification/test_track_ends.py` proves to vanish."""
 
 
 def measure(repeats: int) -> list[tuple[str, float, float, float]]:

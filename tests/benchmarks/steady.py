@@ -40,7 +40,8 @@ class Case:
 
 def plan(quick: bool) -> tuple[Case, tuple[Case, ...]]:
     """Return the reference, and the cases."""
-    return Case("reference", "finest", graded_by(1.0 if quick else 0.25), 32), tuple(_cases(quick))
+    h, parts = (1.0, 16) if quick else (0.25, 32)
+    return Case("reference", "finest", graded_by(h), parts), tuple(_cases(quick))
 
 
 def graded_by(h: float) -> dict[str, float]:

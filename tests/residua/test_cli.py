@@ -18,6 +18,7 @@ import xarray as xr
 
 from residua.cli import main
 from residua.progress import Progress
+from residua.status import complain
 from solver.results.shakedown import ShakedownState
 from studies import Store, Study, StudyEvent, open_netcdf
 from studies.storage.dataset import attributes_of
@@ -432,3 +433,9 @@ def test_no_number_in_a_table_is_nan(store: Store, capsys: pytest.CaptureFixture
     compute_here(fake_study(trouble="limit"), store)
     assert main(["show", str(store.directory)]) == 0
     assert str(math.nan) not in capsys.readouterr().out
+
+
+def test_a_message_of_the_command_has_an_end(capsys: pytest.CaptureFixture[str]) -> None:
+    assert complain("x" * 2_000_000, 2) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("residua: xxx") and len(told) < 101_000

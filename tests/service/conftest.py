@@ -19,7 +19,8 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """One running service for all tests that leave it running; its worker stays between studies."""
     home = tmp_path_factory.mktemp("service")
     with worker_elsewhere(home) as address:
-        server = Server(home, settings={"RESIDUA_SCHEDULER": address}).start()
+        settings = {"RESIDUA_SCHEDULER": address, "RESIDUA_READER_SECONDS": "60"}
+        server = Server(home, settings=settings).start()
         yield server
         server.close()
 

@@ -23,6 +23,9 @@ PROGRAM = (
     "import sys; from service.app import serve; serve('127.0.0.1', int(sys.argv[1]), sys.argv[2])"
 )
 
+NOWHERE = {"RESIDUA_SCHEDULER": "tcp://127.0.0.1:1"}
+"""Settings of a service that computes nothing: it loads nothing for workers either."""
+
 COARSE_PUNCH = {"smallest_element": 0.05, "growth": 2.5, "half_plane_size": 4}
 """Parameters that make a run of the punch a matter of a second."""
 

@@ -21,7 +21,7 @@ from service.keys import Keys, KeysError, Scope
 from service.settings import Settings, chosen
 from studies import StudyError
 from tests.architecture.sources import ROOT
-from tests.service.servers import Server, environment, fake_study, free_port
+from tests.service.servers import NOWHERE, Server, environment, fake_study, free_port
 from tests.service.test_errors import UNKNOWN, problem
 
 FORM = {"content-type": "application/x-www-form-urlencoded"}
@@ -161,7 +161,7 @@ def test_the_command_makes_lists_and_removes_keys(
     data = ["--data", str(tmp_path / "new")]
     assert main(["keys", "add", "me", "--scope", "submit", *data]) == 0
     text = capsys.readouterr().out.strip()
-    assert Keys(tmp_path / "new").scope_of(text) is Scope.SUBMIT
+    assert Keys(tmp_path / "new").owner(text) == ("me", Scope.SUBMIT)
     assert main(["keys", "list", *data]) == 0
     listed = capsys.readouterr().out
     assert listed.split()[:2] == ["me", "submit"] and text not in listed
@@ -310,9 +310,10 @@ def test_every_answer_tells_browsers_what_they_may_do(tmp_path: Path) -> None:
         assert ("'self'" in policy) is (answer is answers["/docs"])
 
 
-def test_a_root_path_is_part_of_every_address_given_out(mortal: Server) -> None:
+def test_a_root_path_is_part_of_every_address_given_out(mortal: Server, service: Server) -> None:
     Keys(mortal.data).add("me", Scope.READ)
-    mortal.settings = {"RESIDUA_ROOT_PATH": "/lab/residua", "RESIDUA_REQUIRE_KEYS": "true"}
+    own = {"RESIDUA_ROOT_PATH": "/lab/residua", "RESIDUA_REQUIRE_KEYS": "true"}
+    mortal.settings = service.settings | own
     mortal.start()  # which asks for /health, as a proxy does that strips the root path
     assert problem(mortal.client.get("/studies"), 401)["instance"] == "/lab/residua/studies"
     key = {"authorization": f"Bearer {Keys(mortal.data).add('other', Scope.SUBMIT)}"}
@@ -341,13 +342,14 @@ def test_what_studies_would_be_refused_for_is_refused_at_the_start(
 
 
 def test_a_forged_address_does_not_reach_the_log(mortal: Server) -> None:
+    mortal.settings = NOWHERE
     mortal.start()
     forged = {"x-forwarded-for": "203.0.113.9", "x-forwarded-proto": "https"}
     assert mortal.client.get("/scenes", headers=forged).is_success
     mortal.stop()
     log = (mortal.home / "service.log").read_text()
     assert "/scenes" in log and "203.0.113.9" not in log
-    mortal.settings = {"RESIDUA_FORWARDED_ALLOW_IPS": "127.0.0.1"}
+    mortal.settings = NOWHERE | {"RESIDUA_FORWARDED_ALLOW_IPS": "127.0.0.1"}
     mortal.start()
     assert mortal.client.get("/scenes", headers=forged).is_success
     mortal.stop()
@@ -359,7 +361,7 @@ def test_the_client_command_sends_its_key_and_no_error_shows_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     text = Keys(mortal.data).add("me", Scope.READ)
-    mortal.settings = {"RESIDUA_REQUIRE_KEYS": "true"}
+    mortal.settings = NOWHERE | {"RESIDUA_REQUIRE_KEYS": "true"}
     mortal.start()
     url = ["--url", f"http://127.0.0.1:{mortal.port}"]
     assert main(["status", UNKNOWN, *url]) == 2

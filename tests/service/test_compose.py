@@ -283,6 +283,7 @@ class Stage:
         return httpx.Client(
             base_url=f"http://127.0.0.1:{self.ports['8000']}",
             headers={"authorization": f"Bearer {self.key}"},
+            timeout=30.0,
         )
 
 

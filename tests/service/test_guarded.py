@@ -3,16 +3,33 @@
 from __future__ import annotations
 
 import asyncio
+import base64
+import errno
 import os
+import resource
 import signal
+import socket
+import struct
+import tempfile
 import time
+import zlib
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
+from service import guarded
+from service.alone import alone
+from service.app import create_app
 from service.errors import Busy
-from service.guarded import BYTES, Guarded
+from service.guarded import BYTES, Budget, Guarded, memory
+from service.inspector import Inspector
+from service.keys import Keys, Scope
+from service.settings import Settings
 from studies import StudyError
+from studies.scenes.meshfile import MeshFile
+from tests.service.test_access import asking
+from tests.service.test_errors import problem
 
 
 def doubled(number: int) -> int:
@@ -38,7 +55,12 @@ def wrong(number: int) -> None:
 @pytest.mark.parametrize(
     ("function", "seconds", "error", "words"),
     [
-        (too_long, 0.5, StudyError, r"scene = 'a': must be read within 0\.5 s and 8 GiB.*: less"),
+        (
+            too_long,
+            0.5,
+            StudyError,
+            r"scene = 'a': must be read within 0\.5 s and [\d.]+ GiB.*: less",
+        ),
         (too_large, 60.0, StudyError, r"scene = 'a': must be read within 60 s"),
         (killed, 60.0, Busy, "the process that reads a scene has ended: ask again"),
         (wrong, 60.0, StudyError, "scene = 3: must be even"),
@@ -63,8 +85,188 @@ def test_a_queue_that_is_full_takes_no_more() -> None:
             return await process.call(doubled, number, name="a")
 
     async def calls() -> list[object]:
-        return await asyncio.gather(*map(one, range(4)), return_exceptions=True)
+        return await asyncio.gather(*map(one, range(5)), return_exceptions=True)
 
     found = asyncio.run(calls())
-    assert found[:2] == [0, 2]
-    assert {type(each) for each in found[2:]} == {Busy}
+    assert found[:3] == [0, 2, 4], "two are read, one waits"
+    assert {type(each) for each in found[3:]} == {Busy}
+
+
+def test_a_caller_has_its_budget_again_within_a_minute(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 1000.0
+    monkeypatch.setattr(guarded.time, "monotonic", lambda: now)
+    budget = Budget(10.0)
+    for seconds in (4.0, 5.0):
+        budget.check("anna")
+        budget.charge("anna", seconds)
+    budget.check("anna")
+    budget.charge("anna", 10.0)
+    with pytest.raises(
+        Busy, match="10 s of processor time in a minute are used: ask later"
+    ) as told:
+        budget.check("anna")
+    assert told.value.later == {"retry-after": "54"}, "9 s too many, at 10 s a minute"
+    budget.check("bert")
+    now += 54.5
+    budget.check("anna")
+
+
+@pytest.mark.parametrize(
+    ("lines", "files", "limit"),
+    [
+        (
+            "0::/a/b\n",
+            {"memory.max": "max", "a/memory.max": "1000", "a/b/memory.max": "2000"},
+            1000,
+        ),
+        ("0::/of/the/host\n", {"memory.max": "4096"}, 4096),
+        ("9:cpu:/\n4:memory:/a\n0::/\n", {"memory/a/memory.limit_in_bytes": "77"}, 77),
+        ("0::/\n", {"memory.max": "max"}, None),
+        ("", {}, None),
+    ],
+    ids=["2", "container", "1", "no limit", "none"],
+)
+def test_the_memory_is_that_of_the_control_group(
+    tmp_path: Path, lines: str, files: dict[str, str], limit: int | None
+) -> None:
+    (tmp_path / "cgroup").write_text(lines)
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    everything = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    assert memory(tmp_path / "cgroup", tmp_path) == (limit or everything)
+    assert 2**30 <= BYTES <= max(min(memory() / 3, 8 * 2**30), 2**30)
+
+
+def trying(elsewhere: str, own: str) -> str:
+    """Return what a process that reads may do."""
+    may = []
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        try:
+            one.connect(("192.0.2.1", 9))
+            may.append("network")
+        except OSError:
+            pass
+    for name in (f"{elsewhere}/new", f"{elsewhere}/old", f"{own}/new"):
+        try:
+            with Path(name).open("a") as file:
+                file.write("x")
+            may.append(name)
+        except OSError:
+            pass
+    try:
+        Path(f"{elsewhere}/old").unlink()
+    except OSError:
+        may.append("keep")
+    return " ".join([*may, tempfile.gettempdir()])
+
+
+def test_a_process_that_reads_has_no_network_and_writes_in_its_own_folder(tmp_path: Path) -> None:
+    elsewhere, own = tmp_path / "elsewhere", tmp_path / "own"
+    for each in (elsewhere, own):
+        each.mkdir()
+    (elsewhere / "old").write_text("")
+    answer = alone(trying, str(elsewhere), str(own), folder=own, seconds=5.0)
+    assert (answer.failed, answer.seconds < 5.0) == (0, True)
+    if answer.open:
+        pytest.skip(f"this system does not take from a process: {answer.open}")
+    assert answer.text.split() == [f"{own}/new", "keep", str(own)]
+    assert (own / "new").read_text() == "x"
+
+
+def spinning() -> str:
+    while True:
+        pass
+
+
+def no_room() -> str:
+    raise OSError(errno.ENOSPC, "no room")
+
+
+def unpacked(path: str) -> str:
+    """Read a mesh that is a thousand times as large as its file."""
+    now = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    resource.setrlimit(resource.RLIMIT_AS, (now + 2**27, now + 2**27))
+    MeshFile("mesh.vtu", Path(path).read_bytes()).mesh(None)
+    return "read"
+
+
+def bomb(size: int) -> bytes:
+    """Return a mesh of ParaView with packed points, which are all zero."""
+    data = zlib.compress(bytes(size), 9)
+    head = base64.b64encode(struct.pack("4I", 1, size, 0, len(data)))
+    return b"""<?xml version="1.0"?>
+<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian" header_type="UInt32"
+ compressor="vtkZLibDataCompressor"><UnstructuredGrid>
+<Piece NumberOfPoints="%d" NumberOfCells="0"><Points><DataArray type="Float64" format="binary"
+ NumberOfComponents="3">%s%s</DataArray></Points><Cells></Cells></Piece></UnstructuredGrid></VTKFile>
+""" % (size // 24, head, base64.b64encode(data))
+
+
+def test_time_memory_and_room_of_a_process_that_reads_are_limited(tmp_path: Path) -> None:
+    (tmp_path / "bomb.vtu").write_bytes(bomb(24 * 2**24))
+    assert (tmp_path / "bomb.vtu").stat().st_size < 1_000_000
+    cases: list[tuple[Callable[..., str], tuple[str, ...], int]] = [
+        (spinning, (), errno.ETIME),
+        (unpacked, (str(tmp_path / "bomb.vtu"),), errno.ENOMEM),
+        (no_room, (), errno.ENOSPC),
+    ]
+    for function, given, failed in cases:
+        answer = alone(function, *given, folder=tmp_path, seconds=1.0)
+        assert (answer.failed, answer.text) == (failed, "")
+        assert answer.seconds < 2.5
+
+
+def test_a_scene_that_takes_too_long_is_told_and_charged(tmp_path: Path) -> None:
+    """Tables of keys that are as deep as is allowed take time to read."""
+    key = ".".join("a" * 45)
+    text = "\n".join(f"[{key}.b{k}]" for k in range(8000)).encode()
+
+    async def post(inspector: Inspector) -> None:
+        with pytest.raises(StudyError, match=r"within 1 s and [\d.]+ GiB of memory"):
+            await inspector.inspect(text, {}, "anna")
+        with pytest.raises(Busy, match="1 s of processor time in a minute are used"):
+            for _ in range(3):
+                inspector.budget.charge("anna", 0.3)
+                await inspector.inspect(b"", {}, "anna")
+
+    asyncio.run(post(Inspector(1.0)))
+
+
+def test_each_key_has_a_budget_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def read(*_: object, **__: object) -> None:
+        raise StudyError("scene", "a.toml", "was read")
+
+    keys = Keys(tmp_path)
+    texts = {name: keys.add(name, Scope.SUBMIT) for name in ("anna", "bert")}
+    app = create_app(Settings(data=tmp_path, require_keys=True, reader_seconds=20.0))
+    monkeypatch.setattr(app.state.inspector.process, "call", read)
+    app.state.inspector.budget.charge("anna", 30.0)
+    answers = {
+        name: asking(app)(
+            "POST",
+            "/scenes",
+            files=[("scene", ("a.toml", b""))],
+            headers={"authorization": f"Bearer {text}"},
+        )
+        for name, text in texts.items()
+    }
+    found = problem(answers["anna"], 503)
+    assert found["detail"] == "20 s of processor time in a minute are used: ask later"
+    assert 25 <= int(answers["anna"].headers["retry-after"]) <= 30, "10 s too many"
+    assert problem(answers["bert"], 422)["detail"] == "scene: was read"
+
+
+def test_a_full_folder_for_temporary_files_is_507(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> str:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", full)  # of the form, from 1 MB on
+    monkeypatch.setattr(tempfile, "mkdtemp", full)  # of the process that reads
+    ask = asking(create_app(Settings(data=tmp_path)))
+    for mesh in (b"", b"\n" * 1_100_000):
+        files = [("scene", ("scene.toml", b"")), ("meshes", ("a.msh", mesh))]
+        found = problem(ask("POST", "/scenes", files=files), 507)
+        assert found["detail"] == "no room is left for temporary files"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import resource
+import shutil
 import socket
 import threading
 import time
@@ -12,7 +13,9 @@ from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import anyio.to_thread
@@ -24,12 +27,15 @@ from fastapi import FastAPI
 from service import maps, probe
 from service.app import create_app
 from service.connections import limited
-from service.errors import Busy
+from service.errors import Busy, NoRoom, status_of
+from service.examiner import examined
+from service.jobs import Jobs
 from service.maps import Pictures
 from service.schemas import MapQuery
 from service.settings import Settings
-from studies import Store, StoreFull, Study
-from tests.service.servers import Server, fake_study
+from studies import Store, StoreFull, Study, StudyError
+from studies.errors import Unusable
+from tests.service.servers import COARSE_PUNCH, Server, fake_study
 from tests.service.test_errors import problem
 
 CONNECTIONS = 120
@@ -293,9 +299,19 @@ def test_a_directory_that_hangs_is_told(app: FastAPI, monkeypatch: pytest.Monkey
     assert len(asked) == 1
 
 
-def test_a_full_disk_has_a_status_of_its_own(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(self: Store, study: Study) -> Path:
-        raise StoreFull(str(self.directory))
+@pytest.mark.parametrize(
+    ("failed", "status", "detail"),
+    [
+        (StoreFull("/srv/anna"), 507, "no room is left on the disk of the data directory"),
+        (Unusable("directory", "/srv/anna", "must be one"), 503, "directory: must be one"),
+    ],
+    ids=["full", "read-only"],
+)
+def test_a_directory_that_cannot_be_written_in_is_told_without_its_path(
+    app: FastAPI, monkeypatch: pytest.MonkeyPatch, failed: Exception, status: int, detail: str
+) -> None:
+    def save(self: Store, study: Study) -> Path:
+        raise failed
 
     async def post() -> httpx.Response:
         study = {"name": "a", "scene": "punch", "sweep": {"friction": [0.0]}}
@@ -303,7 +319,34 @@ def test_a_full_disk_has_a_status_of_its_own(app: FastAPI, monkeypatch: pytest.M
         async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
             return await client.post("/studies", json=study)
 
-    monkeypatch.setattr(Store, "save_study", full)
+    monkeypatch.setattr(Store, "save_study", save)
     answer = asyncio.run(post())
-    assert answer.status_code == 507
-    assert answer.json()["detail"] == "no room is left on the disk of the data directory"
+    assert (answer.status_code, answer.json()["detail"]) == (status, detail)
+    assert "anna" not in answer.text and int(answer.headers["retry-after"]) > 0
+
+
+def test_a_full_disk_is_not_writable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store, jobs = Store(tmp_path), Jobs(tmp_path / "jobs.sqlite")
+    assert probe.look(store, jobs)["data_writable"]
+    full = Path("/dev/full")
+    monkeypatch.setattr(probe.tempfile, "TemporaryFile", lambda dir: full.open("r+b"))
+    assert "data_writable" not in probe.look(store, jobs)
+
+
+def test_a_study_larger_than_the_free_disk_or_the_default_limits_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    free = 66_000_000_000
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
+    bounds = Settings(data=tmp_path).bounds
+    axes = {"friction": [i / 1000 for i in range(200)], "load_ratio": [0.2, 0.3, 0.4, 0.5]}
+    study = {"name": "a", "scene": "punch", "parameters": COARSE_PUNCH, "sweep": axes}
+    found = examined(study, tmp_path, bounds).estimate
+    free = 1_500_000_000
+    with pytest.raises(NoRoom, match=r"takes about 1\.58 GB, and 1\.5 GB are free on the disk of"):
+        examined(study, tmp_path, bounds)
+    assert status_of(NoRoom("")) == 507
+    with pytest.raises(StudyError, match="cpu_seconds = 61000: at most 50000: use fewer runs"):
+        bounds.check(replace(found, cpu_seconds=(1.0, 61_000.0, 1e9)))
+    with pytest.raises(StudyError, match=r"bytes = 198000000000: at most 5e\+10: use fewer runs"):
+        bounds.check(replace(found, bytes=198_000_000_000))

@@ -112,18 +112,27 @@ def test_a_flipped_byte_in_a_text_hides_only_its_row(jobs: Jobs) -> None:
     assert taken(jobs) == "b"
 
 
-def test_a_study_that_is_no_json_can_be_posted_again(jobs: Jobs) -> None:
+def test_a_study_that_is_not_what_was_posted_can_be_posted_again(jobs: Jobs) -> None:
     jobs.accept("a", STUDY, ["x"])
-    spoil(jobs, "a", study="{")
-    with pytest.raises(Conflict, match="post the study again"):
-        jobs.study("a")
-    assert jobs.accept("a", STUDY, ["x"])[1] is True
-    assert jobs.study("a") == STUDY
+    for other in ("{", json.dumps(STUDY | {"name": "b"})):
+        spoil(jobs, "a", study=other)
+        with pytest.raises(Conflict, match="post the study again"):
+            jobs.study("a")
+        assert jobs.accept("a", STUDY, ["x"])[1] is True
+        assert jobs.study("a") == STUDY
 
 
 @pytest.mark.parametrize(
     "nonsense",
-    [{"size": "many"}, {"progress": b"\xff"}, {"name": b"\xff"}, {"state": "odd"}],
+    [
+        {"size": "many"},
+        {"progress": b"\xff"},
+        {"name": "b"},
+        {"state": "odd"},
+        {"state": "successful"},
+        {"since": 1},
+        {"checksum": 0},
+    ],
 )
 def test_a_bad_row_hides_only_itself(jobs: Jobs, nonsense: dict[str, object]) -> None:
     for name in "abc":
@@ -248,6 +257,17 @@ def test_a_queue_of_the_first_form_is_brought_into_todays(tmp_path: Path) -> Non
     assert (job.name, job.scene, job.size, job.state) == ("a", "fake", 2, StudyState.FAILED)
     assert (jobs.runs("a"), jobs.study("a")) == (["x", "y"], STUDY)
     assert Jobs(path).get("a") == job
+
+
+def test_a_queue_without_checksums_gets_them(tmp_path: Path) -> None:
+    jobs = Jobs(tmp_path / "jobs.sqlite")
+    before, _ = jobs.accept("a", STUDY, ["x", "y"], 3)
+    with closing(sqlite3.connect(jobs.path)) as connection, connection:
+        for column in ("digest", "checksum"):
+            connection.execute(f"ALTER TABLE job DROP COLUMN {column}")
+        connection.execute("PRAGMA user_version = 1")
+    again = Jobs(jobs.path)
+    assert (again.get("a"), again.study("a"), again.runs("a")) == (before, STUDY, ["x", "y"])
 
 
 def test_a_queue_of_a_later_form_is_left_alone(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import shutil
 from collections.abc import Callable, Sequence
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from fastapi.testclient import TestClient
 from service.app import create_app
 from service.errors import Conflict, NotFound
 from service.job import StudyState
-from service.jobs import Jobs
+from service.jobs import Jobs, put
 from service.pool import Pool
 from service.retention import Keeper
 from service.settings import Settings
@@ -178,11 +179,9 @@ def test_a_study_deleted_as_its_turn_comes_is_not_begun(place: Place) -> None:
 
 def aged(place: Place, study: Study, days: int) -> None:
     """Make a study older than it is."""
+    finished = datetime.now(UTC) - timedelta(days=days)
     with place.jobs.transaction() as queue:
-        queue.execute(
-            "UPDATE job SET finished = strftime('%Y-%m-%dT%H:%M:%S+00:00', 'now', ?) WHERE id = ?",
-            (f"-{days} days", study.id),
-        )
+        put(queue, place.jobs.read(queue, study.id), finished=finished.isoformat())
 
 
 def test_studies_beyond_the_age_are_deleted(place: Place) -> None:

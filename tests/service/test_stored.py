@@ -21,7 +21,7 @@ import h5py
 import httpx
 import pytest
 
-from service import access
+from service import access, retention
 from service.app import create_app
 from service.errors import Conflict
 from service.job import StudyState
@@ -32,10 +32,10 @@ from service.recovery import Mender, open_queue
 from service.settings import Settings
 from studies import FileDamaged, Store, Study, StudyError, open_netcdf
 from studies.errors import CatalogueDamaged, SceneError
-from studies.scenes.scene import read_scene
+from studies.scenes.scene import FileScene, read_scene
 from studies.storage import seal, shelf
 from tests.architecture.sources import ROOT
-from tests.service.servers import Server, fake_study, wait_until
+from tests.service.servers import NOWHERE, Server, fake_study, wait_until
 from tests.service.test_access import Ask, asking
 from tests.service.test_errors import UNKNOWN, problem
 from tests.studies.conftest import compute_here
@@ -481,10 +481,10 @@ def test_a_key_that_is_removed_ends_its_streams(mortal: Server) -> None:
     headers = {
         name: {"authorization": f"Bearer {keys.add(name, Scope.SUBMIT)}"} for name in ("a", "b")
     }
-    mortal.settings = {"RESIDUA_REQUIRE_KEYS": "true", "RESIDUA_GRACE_SECONDS": "1"}
+    mortal.settings = NOWHERE | {"RESIDUA_REQUIRE_KEYS": "true", "RESIDUA_GRACE_SECONDS": "1"}
     mortal.start()
     mortal.client.headers.update(headers["a"])
-    study_id = mortal.post(fake_study("watched", behaviour="hang"))
+    study_id = mortal.post(fake_study("watched"))
 
     async def watched() -> list[bool]:
         """Return whether the streams of two keys have ended after the first key is removed."""
@@ -521,15 +521,10 @@ def test_a_key_that_is_removed_ends_its_streams(mortal: Server) -> None:
 def test_scenes_are_read_once_for_lists_and_searches(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store = Store(tmp_path / "data")
-    text = (ROOT / "data/scenes/pin.toml").read_text()
-    shutil.copy(ROOT / "data/scenes/pin.msh", tmp_path)
-    ids = []
-    for number in range(5):
-        path = tmp_path / f"pin{number}.toml"
-        path.write_text(text.replace("clearance", f"play{number}"))
-        store.save_scene(read_scene(path))
-        ids.append(read_scene(path).id)
+    store, ids = Store(tmp_path / "data"), []
+    for scene in scenes(tmp_path / "files", 5):
+        store.save_scene(scene)
+        ids.append(scene.id)
     ask = asking(create_app(Settings(data=store.directory)))
 
     def listed(query: str = "") -> list[str]:
@@ -537,15 +532,17 @@ def test_scenes_are_read_once_for_lists_and_searches(
 
     assert set(listed("?limit=1000")) == set(ids)
     read: list[str] = []
-    described = shelf.described
+    content_of = shelf.content_of
     monkeypatch.setattr(shelf, "kept", None)  # the meshes are not needed
-    monkeypatch.setattr(shelf, "described", lambda d, i: read.append(i) or described(d, i))
+    monkeypatch.setattr(shelf, "content_of", lambda p, n: read.append(n) or content_of(p, n))
+    shelf._described.cache_clear()
     every = ask("GET", "/scenes?limit=1000").json()
     assert every == [each for k in range(len(every)) for each in page(ask, k)]
     assert ask("GET", "/runs?status=ok").json()["total"] == 0
     assert read == []
-    assert ask("GET", "/runs?play3=0.01").json()["total"] == 0
-    assert read == [ids[3]], "only the scene that has the parameter"
+    for _ in range(2):
+        assert ask("GET", "/runs?play3=0.01").json()["total"] == 0
+    assert read == [f"scene {ids[3]}"], "only the scene that has the parameter, and once"
     for wrong in ("play3=-1", "play9=1", "scene=pine", "scene=pin&load=1"):
         problem(ask("GET", f"/runs?{wrong}"), 422)
     (store.directory / "scenes.sqlite").write_text("no index" * 100)
@@ -594,13 +591,70 @@ def test_a_scene_is_deleted_unless_a_study_needs_it(tmp_path: Path) -> None:
     assert pin.id not in {each["id"] for each in ask("GET", "/scenes").json()}
 
 
-def test_all_scenes_together_have_a_largest_size(tmp_path: Path) -> None:
-    pin = read_scene(ROOT / "data/scenes/pin.toml")
-    app = create_app(Settings(data=tmp_path, max_scenes_bytes=1000))
-    with pytest.raises(Conflict, match="at most 1000 are allowed: delete some"):
-        app.state.keeper.keep_scene(pin.id, pin.description)
-    Store(tmp_path).save_scene(pin)
-    assert app.state.keeper.keep_scene(pin.id, pin.description) is False, "it is known"
+def test_scenes_of_a_key_and_of_all_have_a_largest_size(tmp_path: Path) -> None:
+    first, second, third = scenes(tmp_path / "files", 3)
+    taken = sum(len(mesh.data) for mesh in (first.description.meshes or {}).values())
+    most = {"max_scenes_bytes": 29 * taken // 10, "max_key_scenes_bytes": 5 * taken // 2}
+    keep = create_app(Settings(data=tmp_path / "data", **most)).state.keeper.keep_scene
+    assert keep(first.id, first.description, "anna")
+    assert not keep(first.id, first.description, "bert"), "it is known, and counts for the first"
+    assert keep(second.id, second.description, "anna")
+    for owner, whose in (("anna", "your"), ("bert", "the")):
+        with pytest.raises(Conflict, match=f"^{whose} posted scenes would take .* delete some"):
+            keep(third.id, third.description, owner)
+
+
+def test_scenes_that_no_study_needs_are_deleted_before_studies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    used, old, new = scenes(tmp_path / "files", 3)
+    store = Store(tmp_path / "data")
+    study = Study.from_dict({"name": "pins", "sweep": {"friction": [0.0]}}, scene=used)
+    store.save_study(study)
+    for scene in (old, new):
+        store.save_scene(scene)
+    keeper = create_app(Settings(data=store.directory, keep_bytes=0)).state.keeper
+    keeper.sweep()
+    assert len(store.scenes(9)) == 3, "all are of today"
+    monkeypatch.setattr(retention, "FRESH", 0)
+    keeper.jobs.accept(study.id, study.to_dict(), study.run_ids())
+    keeper.sweep()
+    assert [each.id for each in store.scenes(9)] == [used.id]
+    assert keeper.jobs.get(study.id).state is StudyState.ACCEPTED
+
+
+def scenes(folder: Path, count: int) -> list[FileScene]:
+    """Return scenes that differ in the name of a parameter; their meshes are beside them."""
+    folder.mkdir()
+    shutil.copy(ROOT / "data/scenes/pin.msh", folder)
+    text = (ROOT / "data/scenes/pin.toml").read_text()
+    for number in range(count):
+        (folder / f"{number}.toml").write_text(text.replace("clearance", f"play{number}"))
+    return [read_scene(folder / f"{number}.toml") for number in range(count)]
+
+
+def test_a_scene_is_not_deleted_while_a_study_of_it_is_accepted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (pin,) = scenes(tmp_path / "files", 1)
+    study = Study.from_dict({"name": "pins", "sweep": {"friction": [0.0]}}, scene=pin)
+    store = Store(tmp_path / "data")
+    store.save_scene(pin)
+    keeper = create_app(Settings(data=store.directory)).state.keeper
+    saved, deleting = Store.save_study, threading.Thread(target=keeper.delete_scene, args=(pin.id,))
+
+    def save(self: Store, study: Study) -> Path:
+        folder = saved(self, study)
+        shutil.rmtree(folder)  # else the file would tell of the study
+        deleting.start()
+        deleting.join(0.5)
+        return folder
+
+    monkeypatch.setattr(Store, "save_study", save)
+    monkeypatch.setattr(threading, "excepthook", lambda _: None)
+    keeper.accept(study, list(study.run_ids()), 0)
+    deleting.join()
+    assert store.scene(pin.id) is not None
 
 
 def test_a_mesh_that_has_changed_spoils_its_scene_until_it_is_posted_again(tmp_path: Path) -> None:

@@ -256,6 +256,37 @@ def test_a_linked_axis_is_answered_by_its_labels(service: Server, tmp_path: Path
     assert service.post(study) != found["id"], "the order of labels is that of the data set"
 
 
+def test_a_sample_is_answered_by_its_points_and_is_what_a_list_of_them_is(service: Server) -> None:
+    ranges = {"friction": [0.0, 0.5], "hardening": ["none", "isotropic"]}
+    study: dict[str, Any] = fake_study("sampled") | {
+        "sweep": {"load_ratio": [0.25, 0.5]},
+        "sample": {"method": "lhs", "num": 2, "ranges": ranges},
+    }
+    found = service.finished(service.post(study))
+    assert (found["status"], found["counts"]) == ("successful", {"ok": 4})
+    points = found["sweep"]["point"]
+    assert [run["at"] for run in found["runs"]] == [
+        {"point": k, "load_ratio": load_ratio} for k in (0, 1) for load_ratio in (0.25, 0.5)
+    ]
+    for run in found["runs"]:
+        parameters = service.client.get(f"/runs/{run['id']}").json()["parameters"]
+        assert points[run["at"]["point"]].items() <= parameters.items()
+    del study["sample"]
+    assert service.post(study | {"points": points}) == found["id"]
+    refused = service.client.post("/studies", json=study | {"points": [{"friction": 7}]})
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["field"] == "points[0].friction"
+
+
+def test_a_study_with_a_goal_is_refused(service: Server) -> None:
+    goal = {"find": "limit_load", "between": [0.25, 1.0]}
+    study = {"name": "goal", "scene": fake_study("goal")["scene"], "goal": goal}
+    for path in ("/studies", "/estimate"):
+        answer = service.client.post(path, json=study)
+        assert answer.status_code == 422
+        assert "is searched by `residua run`" in answer.json()["errors"][0]["allowed"]
+
+
 def test_studies_are_found_by_a_tag(service: Server) -> None:
     own = {"note": "of the day", "tags": ["today", "rail"]}
     told = service.post(fake_study("tagged") | own)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 from typing import Any
 
 import psutil
 
-from tests.service.servers import Server, fake_study, free_port, wait_until
+from tests.service.servers import NOWHERE, Server, fake_study, wait_until
 
 
 def large_study(name: str, paths: int = 60, seconds: float = 0.5, **more: Any) -> dict[str, Any]:
@@ -43,8 +42,9 @@ def test_what_two_studies_share_is_computed_once(lively: Server) -> None:
     assert len([line for line in lively.computed() if '"seconds": 0.4' in line]) == 6
 
 
-def test_the_greater_priority_goes_first(mortal: Server) -> None:
-    mortal.settings = {"RESIDUA_STUDIES_AT_ONCE": "1"}
+def test_the_greater_priority_goes_first(mortal: Server, service: Server) -> None:
+    """Both services have one worker, which tells what it computes where the first one has it."""
+    mortal.settings = service.settings | {"RESIDUA_STUDIES_AT_ONCE": "1"}
     mortal.start()
     first = mortal.post(large_study("first", paths=3))
     wait_until(lambda: mortal.study(first)["status"] == "running")
@@ -56,7 +56,7 @@ def test_the_greater_priority_goes_first(mortal: Server) -> None:
         assert mortal.study(ids[priority])["priority"] == priority
     for study_id in ids.values():
         mortal.finished(study_id)
-    assert ["0.92" in line for line in mortal.computed()[-2:]] == [True, False]
+    assert ["0.92" in line for line in service.computed()[-2:]] == [True, False]
     for route in ("/studies", "/estimate"):
         refused = mortal.client.post(route, json=study | {"priority": 1000})
         assert refused.status_code == 422
@@ -95,16 +95,12 @@ def test_a_lost_queue_is_made_anew_from_the_studies(lively: Server) -> None:
     assert len(lively.computed()) <= before + 4 + 4 + 30 + 2
 
 
-def test_studies_that_nobody_computes_say_so(mortal: Server, tmp_path: Path) -> None:
-    """A scheduler that nobody answers for, then patience."""
-    mortal.settings = {
-        "RESIDUA_SCHEDULER": f"tcp://127.0.0.1:{free_port()}",
-        "RESIDUA_PATIENCE_SECONDS": "20",
-    }
+def test_a_study_that_nobody_computes_says_so(mortal: Server) -> None:
+    """A scheduler that nobody answers for. `test_runner` shows that patience has an end."""
+    mortal.settings = NOWHERE | {"RESIDUA_GRACE_SECONDS": "1"}
     mortal.start()
     study_id = mortal.post(fake_study("alone"))
     waiting = wait_until(lambda: mortal.client.get("/health").json()["waiting"], 30.0)
     assert "no scheduler answers" in waiting[study_id]
     assert mortal.client.get("/health").json()["status"] == "waiting"
-    end = mortal.finished(study_id)
-    assert end["status"] == "failed" and "no scheduler answers" in end["message"]
+    assert mortal.client.delete(f"/studies/{study_id}").json()["status"] == "dismissed"

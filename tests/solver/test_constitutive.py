@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,8 +15,12 @@ from tests.solver.laws import HARDENING, LAWS, StoredCentre, steel
 every_law = pytest.mark.parametrize(("law", "n_components"), LAWS.values(), ids=LAWS)
 
 
+@cache
 def random_history(law, n_components, n_points=300, seed=1):
-    """A state after two random plastic steps, and a strain that yields it further."""
+    """A state after two random plastic steps, and a strain that yields it further.
+
+    Once for all tests: no law changes what it is given, as one of them proves.
+    """
     rng = np.random.default_rng(seed)
     state = law.initial(n_points, n_components)
     strain = np.zeros((n_components, n_points))
@@ -115,9 +120,10 @@ def test_state_given_is_never_changed(law, n_components):
 
 @every_law
 def test_points_answer_one_by_one_as_together(law, n_components):
-    strain, state = random_history(law, n_components, n_points=30)
+    strain, state = random_history(law, n_components, n_points=12)
     together = law.respond(strain, state)
-    for k in range(30):
+    assert together.yielding.any()
+    for k in range(12):
         alone = law.respond(strain[:, [k]], state.at(np.array([k])))
         assert alone.stress == pytest.approx(together.stress[:, [k]], rel=1e-12, abs=1e-9)
         assert alone.state.accumulated == pytest.approx(together.state.accumulated[k], rel=1e-12)

@@ -15,10 +15,11 @@ from solver.model.friction import LEAST_FRICTION
 from solver.scenes.rolling import ROLLING
 from solver.scenes.rolling_model import model
 from solver.scenes.rolling_parameters import RollingParameters
+from tests.records import kept
 from tests.solver.test_contact_problem import instance
 
 COARSE = RollingParameters(
-    friction=0.0, track=10.0, element_size=4.0, advance_step=1.0, press_steps=4
+    friction=0.0, track=10.0, element_size=4.0, advance_step=2.0, press_steps=4
 )
 
 
@@ -26,7 +27,7 @@ COARSE = RollingParameters(
 def rolled(friction, **fields):
     (record,) = ROLLING.path(replace(COARSE, friction=friction, **fields), [1], lambda *told: None)
     assert record.status is Status.OK, record.message
-    return record
+    return kept(record)
 
 
 def residual(record):

@@ -347,6 +347,27 @@ def test_a_program_of_fewer_laps_is_the_beginning_of_one_with_more():
         assert np.array_equal(ours, theirs)
 
 
+def test_programs_asked_for_one_by_one_go_on_from_where_the_path_was(system):
+    """Increments of 0.1, and two of unloading. Of 0.8 it takes those from 0.4 on: 3 + 1 + 2."""
+    asked, done = [], []
+
+    def programs():
+        for load in (0.5, 0.8, 0.6, 0.55, 0.7):
+            asked.append(load)
+            yield CONTROL.program(load)
+
+    walker = Walker(system, CONTROL, report=lambda: done.append(1))
+    counts = []
+    for number, outcome in enumerate(walker.walk(programs(), CONTROL.program(0.9)), 1):
+        assert len(asked) == number, "the next one may depend on this outcome"
+        alone = outcome_at(system, asked[-1])
+        for stage in ("loaded", "unloaded"):
+            pairs = zip(arrays(outcome.points[stage]), arrays(alone.points[stage]), strict=True)
+            assert all(np.array_equal(ours, theirs) for ours, theirs in pairs)
+        counts.append(len(done))
+    assert np.diff([0, *counts]).tolist() == [7, 6, 4, 3, 4]
+
+
 def test_multiples_of_a_step_end_at_the_target():
     stage = Stage(name="loaded", target=0.25, step=0.1)
     assert stage.times(0.0) == [0.1, 0.2, 0.25]

@@ -135,7 +135,12 @@ def test_no_condition_of_the_oracle_is_idle() -> None:
         ({"traction": 0.9, "friction": 0.5}, False),
         ({"traction": 0.9, "friction": 0.5, "shear_limit": 0.3}, False),
         ({"traction": 0.2, "friction": 1.0, "sequence": ({}, {"traction": 0.9})}, False),
+        # endless-160 and endless-174 of the thousand scenes, which were once taken as certain
+        ({"traction": 0.95, "load_ratio": 2.82, "poisson_ratio": 0.49, "radius": 33.492,
+          "wheel_stiffness": 2.2735}, False),
+        ({"traction": -0.5, "friction": 1.0, "load_ratio": 3.178, "radius": 33.492,
+          "wheel_stiffness": 0.07828, "hardening": "mixed", "hardening_ratio": 0.01}, False),
     ],
-)
+)  # fmt: skip
 def test_what_is_certainly_borne_is_known(fields: dict, certain: bool) -> None:
     assert bearing.bears(RollingParameters(**fields)) is certain

@@ -58,6 +58,8 @@ STACK = stacks.Stack(
 )
 
 WHEEL = rolling.parameters_of(8, np.random.default_rng(0))
+GUIDED = replace(WHEEL, control="creepage", given_creepage=-2e-3, traction=0.0)
+"""Its force follows from its creepage, so that no force is wrong."""
 
 
 @cache
@@ -69,6 +71,7 @@ def solved(kind: str) -> Any:
         "mouth": MOUTH.solve,
         "tip": TIP.solve,
         "wheel": lambda: rolling.roll(WHEEL),
+        "guided wheel": lambda: rolling.roll(GUIDED),
         "stack": STACK.solve,
         "bar": lambda: hardening._pull("kinematic", 1e-3, "quad8"),
         "blocks": lambda: hardening._press("kinematic", 1e-3),
@@ -87,6 +90,7 @@ JUDGES: dict[str, Callable[[Any], Figures]] = {
     "tip": TIP.judge,
     "stack": STACK.judge,
     "wheel": rolling.judge,
+    "guided wheel": rolling.judge,
     "bar": lambda s: hardening.judge_pulled(1e-3, s),
     "blocks": lambda s: hardening.judge_pressed("kinematic", 1e-3, s),
     "limit": lambda s: limits.judge("beam", 0.9, s),

@@ -14,19 +14,26 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from tests.service.servers import Server
+from tests.stress.attacks import attacks
 from tests.stress.crowds import description, half_open, pictures
-from tests.stress.deaths import deaths, full_disk
+from tests.stress.disks import full_disk
 from tests.stress.measure import Figure
+from tests.stress.mixtures import mixed, scenes
 from tests.stress.polling import pollers
 from tests.stress.sizes import large_study, last_page
+from tests.stress.times import clock, retention
 
 SCENARIOS: Mapping[str, Callable[[Server], list[Figure]]] = {
     "large-study": large_study,
     "last-page": last_page,
     "half-open": half_open,
     "pictures": pictures,
-    "deaths": deaths,
+    "attacks": attacks,
     "full-disk": full_disk,
+    "scenes": scenes,
+    "mixed": mixed,
+    "clock": clock,
+    "retention": retention,
     "description": description,
     "pollers": pollers,
 }

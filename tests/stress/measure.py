@@ -58,3 +58,10 @@ def cpu_seconds(process: psutil.Process) -> float:
 def megabytes(process: psutil.Process) -> float:
     """Return the memory of a process that no other one shares [MB]."""
     return process.memory_full_info().uss / 1e6
+
+
+def restarted(server: Server, **settings: str) -> None:
+    """Start a service again with other settings."""
+    server.stop()
+    server.settings |= settings
+    server.start()

@@ -51,7 +51,7 @@ async def crowd(paths: list[str], port: int, answers: Answers, seconds: float) -
             await asyncio.sleep(PAUSE / POLLERS)
 
 
-def pollers(server: Server, seconds: float = 600.0) -> list[Figure]:
+def pollers(server: Server, seconds: float = 120.0) -> list[Figure]:
     """300 pollers ask for a study and its like while it is computed; memory is watched."""
     study = fake_study("polled", seconds=0.2)
     study["sweep"] = {

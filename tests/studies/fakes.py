@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -174,6 +174,22 @@ class Canned(Scene):
         return self.records(parameters, values, monitor)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Followed(Canned):
+    """The same, whose loading paths go on for values that are asked for one by one."""
+
+    @property
+    def goes_on(self) -> bool:
+        return True
+
+    def follow(
+        self, parameters: Any, values: Iterable[float], largest: float, monitor: Monitor
+    ) -> Iterator[Record]:
+        for value in values:
+            assert value <= largest
+            yield from self.records(parameters, [value], monitor)
+
+
 FAKE = Canned(
     name="fake",
     summary="a scene that costs nothing",
@@ -182,3 +198,11 @@ FAKE = Canned(
     records=path,
 )
 SCENES[FAKE.name] = FAKE
+FOLLOWED = Followed(
+    name="followed",
+    summary="a scene that costs nothing, whose paths go on",
+    parameters=FakeParameters,
+    branch="load_ratio",
+    records=path,
+)
+SCENES[FOLLOWED.name] = FOLLOWED

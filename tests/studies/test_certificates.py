@@ -17,6 +17,7 @@ def context(side: int, certificates: Path) -> ssl.SSLContext:
     found = ssl.SSLContext(side)
     found.check_hostname = False
     found.verify_mode = ssl.CERT_REQUIRED
+    found.verify_flags |= ssl.VERIFY_X509_STRICT  # by default from Python 3.13 on
     found.load_verify_locations(certificates / "ca.pem")
     found.load_cert_chain(certificates / "cert.pem", certificates / "key.pem")
     return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +15,7 @@ import pytest
 from residua.cli import main
 from residua.cost import long_run
 from studies import Store, Study, StudyError
-from studies.execution.estimate import Bounds, Estimate, estimate
+from studies.execution.estimate import Bounds, Estimate, estimate, memory_needed
 from tests.studies.conftest import fake_study
 from tests.studies.test_study import many
 
@@ -154,6 +156,49 @@ def test_files_are_as_large_as_those_that_keep_as_much(store: Store) -> None:
     kept = estimate(Study.from_dict(PUNCH | {"keep": "fields"}), store)
     assert plain.bytes < kept.bytes
     assert kept.bytes == pytest.approx(2 * 1.8 * 5e6)
+
+
+MEASURED = """
+import importlib, resource, sys
+from solver import SCENES
+from studies.execution.forking import NEEDED
+for name in NEEDED:
+    importlib.import_module(name)
+scene = SCENES[sys.argv[1]]
+parameters = scene.parameters(accuracy="draft")
+value = getattr(parameters, scene.branch)
+for _ in scene.path(parameters, [value], lambda share: None):
+    pass
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("scene", ["punch", "rolling", "raceway"])
+def test_the_memory_told_is_that_of_a_worker(
+    scene: str, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Libraries are counted whole also for a scene that needs few of them."""
+    monkeypatch.setenv("RESIDUA_KEPT_MEMORY", "0B")
+    content = {"name": "one", "scene": scene, "parameters": {"accuracy": "draft"}}
+    told = estimate(Study.from_dict(content), store).memory
+    command = [sys.executable, "-c", MEASURED, scene]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    assert told is not None
+    assert 0.8 < told / int(done.stdout) < 1.7
+
+
+def test_a_worker_is_told_to_need_what_it_keeps_beside_its_path(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = Study.from_dict(PUNCH)
+    needed = []
+    for kept in ("0B", "10MB", "10GB"):
+        monkeypatch.setenv("RESIDUA_KEPT_MEMORY", kept)
+        needed.append(memory_needed(study))
+        assert needed[-1] == estimate(study, store).memory
+    none, some, all_of_it = needed
+    assert some == none + 10_000_000 < all_of_it < 2 * none
 
 
 def test_20_000_runs_are_estimated_in_a_second(store: Store) -> None:

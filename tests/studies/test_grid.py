@@ -16,6 +16,7 @@ from typing import Any
 import dask
 import psutil
 import pytest
+from distributed.system import MEMORY_LIMIT
 
 from studies import Access, GridLost, Limits, StudyError, own_workers
 from studies.execution.cluster import connect
@@ -103,6 +104,12 @@ def test_workers_of_our_own_get_the_memory_that_is_set() -> None:
     with own_workers(1, "700MB") as access, connect(access) as client:
         (worker,) = client.scheduler_info()["workers"].values()
     assert worker["memory_limit"] == 700_000_000
+
+
+def test_no_more_workers_are_started_than_memory_bears() -> None:
+    with own_workers(3, need=MEMORY_LIMIT * 2 // 3) as access, connect(access) as client:
+        (worker,) = client.scheduler_info()["workers"].values()
+    assert worker["memory_limit"] == MEMORY_LIMIT
 
 
 def test_workers_are_forks_of_one_process_and_have_the_environment_of_their_own_time(
@@ -282,20 +289,20 @@ def test_no_worker_is_told_and_ends_by_a_setting(
     began = time.monotonic()
     told = []
     with Grid(nobody) as grid, pytest.raises(GridLost, match="no worker is connected"):
-        for item in grid.run(nap, [0.0], never, Limits(patience=4.0)):
+        for item in grid.run(nap, [0.0], never, Limits(patience=3.0)):
             told.append((item, time.monotonic() - began))
     (item, after) = told[0]
     assert len(told) == 1
     assert isinstance(item, Waiting)
     assert item.reason.startswith("no worker is connected to the scheduler: start one")
-    assert after < 4.0
+    assert after < 3.0
 
 
 def test_workers_killed_on_sight_are_told_and_the_study_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("studies.execution.watch._QUIET", 4.0)
-    monkeypatch.setattr("studies.execution.cluster._ABSENT", 12.0)
+    monkeypatch.setattr("studies.execution.cluster._ABSENT", 8.0)
     spared = threading.Event()
 
     def killer() -> None:

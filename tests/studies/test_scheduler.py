@@ -176,7 +176,7 @@ def test_a_worker_that_does_not_see_the_directory_computes_nothing(
 
     stage.ready()
     with pytest.raises(GridLost, match="does not see the directory out"):
-        run_study(fake_study(), store, scheduler=stage.address, limits=Limits(patience=8.0))
+        run_study(fake_study(), store, scheduler=stage.address, limits=Limits(patience=4.0))
     assert store.catalogue.runs()[1] == 0
     assert not list(Path("out").rglob("*.nc"))
     outcome = run_study(fake_study(), store, scheduler=stage.address, on_event=hear)

@@ -15,6 +15,7 @@ import numpy as np
 
 from solver import SCENES
 from solver.scenes.rolling_parameters import RollingParameters
+from tests.records import kept
 
 TABLE = Path(__file__).parents[2] / "data" / "studies" / "rolling-table.toml"
 CASES = tomllib.loads(TABLE.read_text(encoding="utf-8"))["sweep"]["case"]
@@ -35,7 +36,7 @@ def passes(case):
     """The records of a case after its first pass, its second, ..."""
     parameters = RollingParameters(**CASES[case], **(LOCKED if case == "T4" else MESH))
     wanted = range(1, parameters.passes + 1)
-    return list(SCENES["rolling"].path(parameters, wanted, lambda share: None))
+    return list(map(kept, SCENES["rolling"].path(parameters, wanted, lambda share: None)))
 
 
 def after(case, number=1):

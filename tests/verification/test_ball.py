@@ -10,6 +10,7 @@ import pytest
 
 from solver.results.record import Record, Status
 from studies.scenes.registry import scene_named
+from tests.records import kept
 from tests.reference.flattening import HertzBall, PlasticBall, first_yield
 
 BALL = scene_named("ball")
@@ -23,7 +24,7 @@ def pressed(**own: Any) -> Record:
     parameters = BALL.parameters(**({"accuracy": "draft"} | own))
     (record,) = BALL.path(parameters, [parameters.cycles], lambda fraction: None)
     assert record.status is Status.OK, record.message
-    return record
+    return kept(record)
 
 
 @pytest.mark.parametrize("yielding", ["half_space", "ball"])
@@ -55,7 +56,7 @@ def test_a_contact_that_yields_all_over_has_the_mean_pressure_of_an_indentation(
     assert 2.8 * RE < found["mean_contact_pressure"] < 3.1 * RE
 
 
-@pytest.mark.parametrize("load_ratio", [1.66, 2.0, 3.0, 4.5, 6.5, 8.5, 10.0])
+@pytest.mark.parametrize("load_ratio", [1.66, 3.0, 4.5, 6.5, 10.0])
 def test_a_ball_is_flattened_as_published(load_ratio: float) -> None:
     own = {"load_ratio": load_ratio, "yielding": "ball", "element_size": 1 / 16} | LOADED
     found = pressed(**own).scalars
@@ -82,7 +83,7 @@ def test_without_hardening_the_crater_is_deepest_and_its_pile_up_highest() -> No
 
 def test_loaded_again_it_returns_to_the_same_point() -> None:
     """Errors of energy add up over cycles, and so does the work that they are compared with."""
-    cycles = 5
+    cycles = 3
     once, often = pressed(), pressed(cycles=cycles)
     # what is left is the tolerance of the increments
     for name, share in (("approach", 1e-4), ("contact_half_width", 1e-4), ("crater_depth", 1e-3)):

@@ -13,7 +13,7 @@ from tests.reference.cattaneo import SlidingCylinders
 from tests.verification.bodies import NU, E, bent, cells
 from tests.verification.closed_forms import plane_strain_modulus
 
-SIZE, FRICTION, PER_HALF_WIDTH = 40.0, 0.3, 50
+SIZE, FRICTION, PER_HALF_WIDTH = 40.0, 0.3, 40
 """Width and height of both cylinders, half their radii [mm]; the half-width is about 1."""
 MODULUS = plane_strain_modulus(E, NU) / 2
 LITTLE, MUCH, BACK = "little", "much", "back"

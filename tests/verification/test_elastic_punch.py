@@ -13,6 +13,7 @@ from solver.errors import ModelError
 from solver.loading.control import PathControl
 from solver.results.singularity import fit_singularity
 from studies.scenes.registry import scene_named
+from tests.records import kept
 from tests.reference.wedge import singular_power, sticking_friction
 
 SCENE = scene_named("elastic_punch")
@@ -26,7 +27,7 @@ MESH = 1e-3
 def run(pressure: float = 100.0, **parameters: Any) -> Record:
     (record,) = SCENE.path(SCENE.parameters(**parameters), [pressure], lambda share: None)
     assert record.status is Status.OK, record.message
-    return record
+    return kept(record)
 
 
 @pytest.fixture(scope="module")

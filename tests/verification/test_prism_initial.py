@@ -105,6 +105,20 @@ def test_an_initial_stress_that_is_not_in_equilibrium_breaks_the_audit() -> None
     assert names == ["audit_history"]
 
 
+def test_residual_stress_beyond_yield_outside_the_zone_breaks_the_audit() -> None:
+    track = block()
+    nothing = np.zeros((track.section.weights.size, 6))
+    found = track.stressed(track.straight.settled(nothing, nothing))
+    with one_thread():
+        left = passing(found, PERFECT, ellipse(found, 1360.0), found.virgin(PERFECT))
+    assert found.initial is not None
+    outside = np.setdiff1d(np.arange(len(nothing)), track.modes.points)[:1]
+    found.initial.strain[outside, 0] = 2 * RE / E
+    told = dict(each.split(" = ") for each in audit_prism(found, PERFECT, left, None).violations)
+    assert told.keys() == {"audit_history", "audit_yield"}
+    assert float(told["audit_yield"].split()[0]) > 0.1
+
+
 def test_a_stress_beyond_yield_is_refused() -> None:
     track = block()
     stress = OverHeight(stress_over_height=((-10.0, -100.0), (0.0, 700.0)))

@@ -20,6 +20,7 @@ from solver.scenes.hertz_ellipse import HertzEllipse
 from solver.scenes.raceway_parameters import RacewayParameters
 from solver.scenes.raceway_track import RolledRaceway, geometry, track_of
 from solver.steady.passing import passing
+from tests.records import kept
 from tests.verification import closed_forms
 
 SCENE = SCENES["raceway"]
@@ -36,7 +37,7 @@ def rolled(passes: int = 1, load_ratio: float = 2.5, **given: Any) -> Record:
     """The record of a ball of 10 mm on a flat raceway, at draft accuracy."""
     parameters = SCENE.parameters(**ball(load_ratio) | given)
     (record,) = SCENE.path(parameters, [passes], lambda share: None)
-    return record
+    return kept(record)
 
 
 def ball(load_ratio: float = 2.5) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from solver.scenes import rolling_endless, rolling_steady
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import load_on, track_for
 from solver.steady import rolling
+from tests.records import kept
 
 COARSE = {"element_size": 2.0, "growth": 1.3}
 CASES = {
@@ -33,7 +34,7 @@ CASES = {
 def records(passes=(1,), **fields):
     """The records after so many passes."""
     parameters = RollingParameters(**COARSE | fields | {"passes": max(passes)})
-    return tuple(SCENES["rolling"].path(parameters, passes, lambda share: None))
+    return tuple(map(kept, SCENES["rolling"].path(parameters, passes, lambda share: None)))
 
 
 def roll(**fields):

@@ -22,6 +22,7 @@ from solver.results.sliding_limits import (
     sliding_contact,
 )
 from solver.scenes.rolling_parameters import RollingParameters
+from tests.records import kept
 
 YIELD_STRAIN = 502.0 / 2e5
 FEW = {"press_steps": 2, "unload_steps": 1}
@@ -51,7 +52,7 @@ def rolled(pressure, passes, *, half_width=8.0, status=None, **fields):
     assert parameters.half_width == pytest.approx(half_width)
     (record,) = SCENES["rolling"].path(parameters, [passes], lambda share: None)
     assert record.status is status if status else record.status.solved, record.message
-    return record
+    return kept(record)
 
 
 def state(record):

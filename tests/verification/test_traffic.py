@@ -16,6 +16,7 @@ from solver.scenes.traffic import CUT, deviations
 from solver.scenes.wheel_rail_contact import expected_contact
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
 from solver.scenes.wheel_rail_track import RolledRail, geometry
+from tests.records import kept
 
 SCENE = SCENES["wheel_rail"]
 USUAL = {
@@ -44,7 +45,7 @@ def rolled(*also: int, **changes: Any) -> tuple[Record, ...]:
     parameters = SCENE.parameters(**USUAL | changes)
     found = tuple(SCENE.path(parameters, [*also, parameters.passes], lambda share: None))
     assert all(record.status is Status.OK for record in found), found[-1].message
-    return found
+    return tuple(map(kept, found))
 
 
 def field(record: Record, name: str) -> np.ndarray:

@@ -20,6 +20,7 @@ from solver.scenes.initial_stress import RollerStraightened
 from solver.scenes.wheel_rail_contact import expected_contact
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
 from solver.scenes.wheel_rail_track import RolledRail, geometry, section_of, track_of
+from tests.records import kept
 from tests.verification.hertz_ellipse import HertzEllipse
 
 SCENE = SCENES["wheel_rail"]
@@ -34,7 +35,9 @@ XX, YY, ZZ = range(3)
 def rolled(*changes: tuple[str, Any], passes: tuple[int, ...] = (1,)) -> tuple[Record, ...]:
     """The records of a wheel at draft accuracy, by numbers of passes."""
     parameters = SCENE.parameters(**PUBLISHED | dict(changes))
-    return tuple(SCENE.path(parameters, passes, lambda share: None))
+    found = SCENE.path(parameters, passes, lambda share: None)
+    # a test looks at the fields at the nodes of `free`
+    return tuple(found if passes == (1, 3) else map(kept, found))
 
 
 def free() -> Record:

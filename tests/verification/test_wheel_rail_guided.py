@@ -12,6 +12,7 @@ from solver import ModelError, Record
 from solver.results.record import Status
 from solver.scenes import SCENES
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
+from tests.records import kept
 
 SCENE = SCENES["wheel_rail"]
 CROWNED = {
@@ -28,7 +29,7 @@ def rolled(*changes: tuple[str, Any]) -> Record:
     parameters = SCENE.parameters(**CROWNED | dict(changes))
     (record,) = SCENE.path(parameters, [1], lambda share: None)
     assert record.status is Status.OK, record.message
-    return record
+    return kept(record)
 
 
 def test_a_given_lateral_force_is_that_of_the_creepage_it_makes() -> None:

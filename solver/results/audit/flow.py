@@ -110,7 +110,7 @@ def difference(material: Law, one: PlasticState, other: PlasticState) -> float:
 
 def largest(values: Array) -> float:
     """Return the largest value, not below zero, or NaN where one is NaN."""
-    return float(np.maximum(values.max(), 0.0))
+    return float(values.max(initial=0.0))
 
 
 def _flat(values: Array) -> Array:

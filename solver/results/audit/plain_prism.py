@@ -253,11 +253,19 @@ class PlainPrism:
         supported = np.where(held, self._whole[0][0] @ u - found.pushed[:, 0] - pulled, 0.0)
         return self.resultants((pulled - sprung + supported)[:, None])
 
+    @cached_property
+    def _throughout(self) -> sparse.csr_array:
+        """Strain at all points of the section (6 n, n) of displacements constant along x."""
+        return self._rows(self._gradients[0], np.arange(len(self._nodes)))
+
     def constant(self, eigenstress: Array) -> tuple[Array, Array]:
-        """Return strain (n_points, 6) and surface (m, 3) by an eigenstress constant along x."""
+        """Return strain (n, 6) and surface (m, 3) by an eigenstress constant along x.
+
+        The eigenstress is that of the points of the zone, the strain that of the whole section.
+        """
         force = self._still.T @ (eigenstress.ravel() * self._zone_area)
         u = self._solved(0, force.astype(complex)).real
-        return (self._still @ u).reshape(-1, 6), self._mean(u)
+        return (self._throughout @ u).reshape(-1, 6), self._mean(u)
 
     def initial_stress(self, given: Array, held: Array) -> Array:
         """Return the stress (n, 6) of the whole section when given stresses come to equilibrium.
@@ -265,8 +273,8 @@ class PlainPrism:
         See `solver.prism.straight.StraightPrism.settled`: what of ``given`` lengthens, bends and
         turns the prism is gone.
         """
-        still = self._rows(self._gradients[0], np.arange(len(self._nodes)))
-        C, area = self.track.elasticity.stiffness(6), self.area.reshape(-1, 1)
+        still, C = self._throughout, self.track.elasticity.stiffness(6)
+        area = self.area.reshape(-1, 1)
 
         def relaxed(stress: Array) -> Array:
             force = still.T @ (-stress * area).ravel()

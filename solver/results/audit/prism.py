@@ -64,9 +64,9 @@ def audit_prism(
     )  # fmt: skip
     # behind of all passes, not of this one: what each leaves over must not add up
     left_strain, left_surface = plain.constant(stiff * after.plastic_strain)
-    left_strain += track.initial_strain[track.modes.points]
+    left_strain += track.initial_strain
     unsteady = deviation(plain.strain(waves) - found.strain)
-    unsteady_behind = deviation(left_strain - after.strain)
+    unsteady_behind = deviation(left_strain[track.modes.points] - after.strain)
     residual = law.stiffness(6) @ (after.strain - after.plastic_strain).T
     flow = AuditedFlow(law, found, before.strain)
     rim = (found.accumulated - before.accumulated[:, None])[track.rim]
@@ -78,7 +78,11 @@ def audit_prism(
         ),
         "audit_law": max(flow.misfit(), flow.retraced(_rows(found)), _released(law, found))
         / law.yield_stress,
-        "audit_yield": max(flow.beyond(), largest(law.yield_value(residual, after.state)))
+        "audit_yield": max(
+            flow.beyond(),
+            largest(law.yield_value(residual, after.state)),
+            _beyond_outside(track, law, left_strain),
+        )
         / law.yield_stress,
         "audit_dissipation": flow.dissipation(),
         "audit_history": max(
@@ -112,6 +116,18 @@ def _rows(found: Pass[PrismState]) -> NDArray[np.int64]:
     count = min(_ROWS, len(added)) // 2
     anywhere = np.linspace(0, len(added) - 1, count).astype(np.int64)
     return np.unique(np.append(np.argsort(-added)[:count], anywhere))
+
+
+def _beyond_outside(track: PrismTrack, law: Law, strain: Array) -> float:
+    """Return the residual stress beyond yield where no point may flow, outside the zone [MPa].
+
+    Parameters
+    ----------
+    strain : (n, 6) behind the pass at all points of the section
+    """
+    elastic = np.delete(strain, track.modes.points, axis=0)
+    virgin = law.initial(len(elastic), 6)
+    return largest(law.yield_value(law.stiffness(6) @ elastic.T, virgin))
 
 
 def _released(law: Law, found: Pass[PrismState]) -> float:

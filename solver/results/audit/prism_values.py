@@ -134,13 +134,13 @@ class OfPrismPass:
     def __init__(
         self, body: PrismBody, found: Pass[PrismState], left: PrismStage, released: str
     ) -> None:
-        self._body, self._found, self._left, self._released = body, found, left, released
-        self.plain = cache(lambda name: PlainSection(body.full(name)))
-        self.fields = cache(self._fields)
+        def fields(name: str, stage: str) -> ZoneFields:
+            u = left.state.u[0] if stage == released else None
+            return ZoneFields(plain(name), body.track, found, u)
 
-    def _fields(self, name: str, stage: str) -> ZoneFields:
-        u = self._left.state.u[0] if stage == self._released else None
-        return ZoneFields(self.plain(name), self._body.track, self._found, u)
+        # a cached method of this object would hold it, and it the prism, in a circle
+        self.plain = plain = cache(lambda name: PlainSection(body.full(name)))
+        self.fields = cache(fields)
 
     def exact(self, stage: str) -> bool:
         """See `Recomputed`."""

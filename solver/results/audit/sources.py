@@ -39,17 +39,19 @@ class OfStates:
     """Recomputed results of a run by increments (see `Recomputed`)."""
 
     def __init__(self, run: FinishedRun) -> None:
-        self._run = run
-        self.system: Any = run.system  # of a run by increments it is a `System`
-        self.plain = cache(lambda name: PlainBody(run.system.full(name)))
-        self.fields = cache(self._fields)
-        self.tractions = cache(self._tractions)
+        system: Any = run.system  # of a run by increments it is a `System`
+        points = run.outcome.points
 
-    def _fields(self, name: str, stage: str) -> BodyFields:
-        state, number = self._run.outcome.points[stage].state, self.system.part(name)
-        plastic = state.plastic[number] if self.system.parts[number].meshed else None
-        u = self.system.displacement(name, state)
-        return StateFields(self.plain(name), u, plastic, state.time)
+        def fields(name: str, stage: str) -> BodyFields:
+            state, number = points[stage].state, system.part(name)
+            plastic = state.plastic[number] if system.parts[number].meshed else None
+            return StateFields(plain(name), system.displacement(name, state), plastic, state.time)
+
+        # cached methods of this object would hold it, and it the system, in a circle
+        self._run, self.system = run, system
+        self.plain = plain = cache(lambda name: PlainBody(system.full(name)))
+        self.fields = cache(fields)
+        self.tractions = cache(lambda pair, stage: Tractions(system, pair, points[stage]))
 
     def exact(self, stage: str) -> bool:
         """See `Recomputed`."""
@@ -74,9 +76,6 @@ class OfStates:
         for (boundary, axis), value in moved.items():
             declared[axis, self.plain(name).part.boundary_nodes(boundary)] = value
         return fields.displacement, declared
-
-    def _tractions(self, pair: int, stage: str) -> Tractions:
-        return Tractions(self.system, pair, self._run.outcome.points[stage])
 
     @property
     def _travelling(self) -> TravellingPressure | None:

@@ -86,7 +86,7 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
     if not numeric:
         names = [counted(each) for each in across.to_numpy()]
         axes.set_xticks(x, names, rotation=90.0 if len("".join(names)) > _ABREAST else 0.0)
-    _scale(axes, dataset[field], values)
+    label_values(axes, dataset[field], values)
     axes.grid(color="0.92")
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
@@ -101,7 +101,7 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
     return sheet
 
 
-def _scale(axes: Axes, field: xr.DataArray, values: xr.DataArray) -> None:
+def label_values(axes: Axes, field: xr.DataArray, values: xr.DataArray) -> None:
     """Label the vertical axis: a number with its unit, or the meanings of flags that occur."""
     meanings: Mapping[int, str] = flags(field)
     if not meanings:

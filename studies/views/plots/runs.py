@@ -15,6 +15,7 @@ from matplotlib.transforms import Transform
 from studies.definition.cases import USUAL_AXES
 from studies.definition.vocabulary import OK, OUTSIDE_THEORY, STATUSES
 from studies.errors import StudyError
+from studies.views.grids import parameters_over, point_axes
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.plots.captions import words
 from studies.views.plots.maps import SIGNED
@@ -72,12 +73,23 @@ def standing(dataset: xr.Dataset) -> tuple[list[xr.DataArray], list[xr.DataArray
     """Return the quantity shown for each axis that varies: numbers, usual ones first; then labels.
 
     A number can be shown for an axis if it distinguishes all its values: the axis itself, or a
-    parameter that a linked axis sets.
+    parameter that a linked axis sets. Two numbers that points set are shown both, before others.
     """
     several = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
-    every = [_standing(dataset, axis) for axis in several]
+    planes = {axis: names for axis in point_axes(dataset) if (names := plane_of(dataset, axis))}
+    every = [_standing(dataset, axis) for axis in several if axis not in planes]
     numbers = sorted((each for each in every if each.dtype.kind in "fiu"), key=_rank)
-    return numbers, [each for each in every if each.dtype.kind not in "fiu"]
+    both = [dataset[name] for names in planes.values() for name in names]
+    return both + numbers, [each for each in every if each.dtype.kind not in "fiu"]
+
+
+def plane_of(dataset: xr.Dataset, axis: str) -> list[str]:
+    """Return the two parameters of an axis of points, if just two vary, and are numbers."""
+    names = parameters_over(dataset, axis)
+    numeric = all(dataset[name].dtype.kind in "fiu" for name in names)
+    return (
+        sorted(names, key=lambda name: _rank(dataset[name])) if numeric and len(names) == 2 else []
+    )
 
 
 def _standing(dataset: xr.Dataset, axis: str) -> xr.DataArray:

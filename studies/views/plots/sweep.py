@@ -14,11 +14,21 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from studies.errors import StudyError
+from studies.views.grids import parameters_over, point_axes, to_grid
 from studies.views.picking import sweep_axes
 from studies.views.plots.captions import capitalised, named, setting, short_label, words, wrapped
+from studies.views.plots.cloud import cloud_figure
 from studies.views.plots.curves import curve_figure
 from studies.views.plots.limits import draw_shakedown_limits
-from studies.views.plots.runs import POINTS, Style, absent, known_values, standing, style_of
+from studies.views.plots.runs import (
+    POINTS,
+    Style,
+    absent,
+    known_values,
+    plane_of,
+    standing,
+    style_of,
+)
 
 MOST_PANELS = 6
 
@@ -39,7 +49,8 @@ _LEGEND = 3.2
 def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     """Return `field` over two swept numbers, in a panel for each combination of the other axes.
 
-    Over one number, or only over labels, it is drawn as curves: see `curve_figure`.
+    Over one number, or only over labels, it is drawn as curves: see `curve_figure`. Points that are
+    a grid are drawn as one; over points of more than two parameters see `cloud_figure`.
 
     The number of an axis is the axis itself, or a parameter of a linked axis that distinguishes all
     its values. The first number is vertical and the second horizontal; load ratio and friction come
@@ -56,6 +67,14 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     StudyError
         if nothing is swept, more than `MOST_PANELS` panels would be drawn, or no run has a value
     """
+    for axis in point_axes(dataset):
+        varied = parameters_over(dataset, axis)
+        if len(varied) < 2:
+            continue
+        if (gridded := _gridded(dataset, axis)) is not None:
+            return sweep_figure(gridded, field)
+        if not plane_of(dataset, axis):
+            return cloud_figure(dataset, field, axis)
     if len(standing(dataset)[0]) < 2:
         return curve_figure(dataset, field)
     up, across, *others = _arrangement(dataset, field)
@@ -97,6 +116,14 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     name = capitalised(dataset[field].attrs.get("long_name", words(field)))
     sheet.suptitle(f"{name}\n{below}", fontsize=10)
     return sheet
+
+
+def _gridded(dataset: xr.Dataset, points: str) -> xr.Dataset | None:
+    """Return a data set in which points are a grid; None if they are no grid."""
+    try:
+        return to_grid(dataset, points)
+    except StudyError:
+        return None
 
 
 def _arrangement(dataset: xr.Dataset, field: str) -> list[xr.DataArray]:
@@ -141,7 +168,13 @@ def _contours(
     """Draw filled contours if the sweep is dense; return whether it is."""
     up, across = (panel[name] for name in places)
     low, high = style.norm.vmin, style.norm.vmax
-    if min(up.size, across.size) < _DENSE or low is None or high is None or low == high:
+    if (
+        up.dims == across.dims
+        or min(up.size, across.size) < _DENSE
+        or low is None
+        or high is None
+        or low == high
+    ):
         return False
     order = {str(each.dims[0]): np.argsort(panel[each.name].to_numpy()) for each in (up, across)}
     values = known_values(panel, field).isel(order).squeeze().transpose(*order).to_numpy()

@@ -143,3 +143,16 @@ def test_text_of_any_kind_has_a_value_or_a_reason() -> None:
             assert isinstance(value, str) or math.isfinite(value)
             ended[True] += 1
     assert min(ended.values()) > 20
+
+
+@pytest.mark.parametrize("text", ["(" * 95 + "$a" + ")" * 95, "1+" * 49 + "$a"])
+def test_parentheses_and_sums_of_usual_length_are_read(text: str) -> None:
+    assert evaluated(text, VALUES) == pytest.approx(3.0 + text.count("+"))
+
+
+@pytest.mark.parametrize(
+    "text", ["-" * 198 + "$a", "1+" * 99 + "$a", "abs(" * 30 + "-" * 40 + "$a" + ")" * 30]
+)
+def test_operations_deep_inside_one_another_are_one_clear_error(text: str) -> None:
+    with pytest.raises(ExpressionError, match="at most 50 operations inside one another: use der"):
+        evaluated(text, VALUES)

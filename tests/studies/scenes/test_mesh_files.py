@@ -11,7 +11,10 @@ import pytest
 from solver.errors import ModelError
 from solver.mesh.check import check_mesh
 from solver.mesh.elements import element_type
+from studies.scenes import scene
+from studies.scenes.description import Description
 from studies.scenes.meshfile import OUTLINE, MeshFile
+from tests.studies.scenes.conftest import blocks
 
 PIN = Path(__file__).parents[3] / "data/scenes/pin.msh"
 SQUARE = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]], dtype=float)
@@ -173,3 +176,14 @@ def test_a_damaged_gmsh_file_is_refused() -> None:
 def test_an_unknown_part_is_refused_with_those_there_are() -> None:
     with pytest.raises(ModelError, match="pin, plate"):
         MeshFile("pin.msh", PIN.read_bytes()).mesh("lug")
+
+
+def test_the_meshes_of_scenes_that_a_process_keeps_have_a_largest_size(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(scene, "_SCENES", {})
+    monkeypatch.setattr(scene, "_MOST_BYTES", 1000)
+    for number in range(5):
+        mesh = MeshFile("a.msh", bytes([number]) * 400)
+        last = scene.file_scene(Description("a.toml", blocks(), {"a.msh": mesh}))
+    assert len(scene._SCENES) == 2 and last in scene._SCENES.values()

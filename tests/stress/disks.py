@@ -1,4 +1,4 @@
-"""Processes that die and disks that are full: nothing lost, nothing untrue."""
+"""A disk that is full: nothing lost, nothing untrue."""
 
 from __future__ import annotations
 
@@ -6,56 +6,8 @@ import contextlib
 import subprocess
 import time
 
-import psutil
-
-from studies import open_netcdf
 from tests.service.servers import Server, fake_study, wait_until
-from tests.stress.measure import Figure, process_of
-
-KILLS = 8
-
-
-def deaths(server: Server) -> list[Figure]:
-    """Service, child, pool and workers killed in turn while a study is computed."""
-    study = fake_study("killed", seconds=0.3)
-    study["sweep"] = {"friction": [i / 200 for i in range(150)]}
-    study_id = server.post(study)
-    wait_until(lambda: server.study(study_id)["counts"].get("ok", 0) >= 2)
-    for number in range(KILLS):
-        family = process_of(server).children(recursive=True)
-        match number % 4:
-            case 0:
-                server.kill()
-                server.start()
-            case 1 | 2 as kind:
-                name = ("service.child", "service.pool")[kind - 1]
-                _kill([each for each in family if name in _command(each)])
-            case 3:
-                _kill([each for each in family if "forkserver" in _command(each)][-1:])
-        time.sleep(2.0)
-    end = server.finished(study_id, 300.0)
-    runs = list((server.data / "runs").glob("*.nc"))
-    with open_netcdf(server.data / "studies" / study_id / "dataset.nc") as dataset:
-        whole = bool(dataset["max_plastic_strain"].notnull().all())
-    return [
-        Figure("kills", KILLS),
-        Figure("runs missing from the study", 150 - end["counts"].get("ok", 0), most=0),
-        Figure("runs without a file", 150 - len(runs), most=0),
-        Figure("data set with gaps", not whole, most=0),
-        Figure("computed more than once", len(server.computed()) - 150, most=3 * KILLS),
-    ]
-
-
-def _command(process: psutil.Process) -> str:
-    with contextlib.suppress(psutil.Error):
-        return " ".join(process.cmdline())
-    return ""
-
-
-def _kill(processes: list[psutil.Process]) -> None:
-    for process in processes:
-        with contextlib.suppress(psutil.Error):
-            process.kill()
+from tests.stress.measure import Figure
 
 
 def full_disk(server: Server) -> list[Figure]:
@@ -67,6 +19,7 @@ def full_disk(server: Server) -> list[Figure]:
         return [Figure("not allowed to mount a small disk here: seen by the tests only", 1)]
     try:
         server.start()
+        server.finished(server.post(fake_study("small")))  # so that the size of a run is known
         study = fake_study("full", seconds=0.1)
         study["sweep"] = {"friction": [i / 200 for i in range(60)]}
         study_id = server.post(study)

@@ -1,0 +1,207 @@
+"""Set-ups that a process keeps for its next runs: the last used ones, up to a number of bytes.
+
+A set-up (mesh, operators, factors) grows while it is used. Therefore kept values are measured, with
+all that they hold, when another one is made and when `release` is called: those used longest ago go
+first. One that is still in use elsewhere is found again until it ends.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import os
+import re
+import sys
+import threading
+import weakref
+from collections import OrderedDict
+from collections.abc import Hashable
+from contextlib import suppress
+from functools import wraps
+from types import FunctionType, ModuleType
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from solver.errors import ModelError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+SETTING, USUAL = "RESIDUA_KEPT_MEMORY", "300MB"
+"""Environment variable with the most that a process keeps, such as ``"2GB"``, and its default."""
+_SIZE = re.compile(r"(\d+(?:\.\d+)?) ?([kMGT]?)(i?)B")
+_GROWN, _FREE = 32_000_000, 128_000_000
+"""Bytes by which a process has grown, above which it is searched for what can be freed; free bytes
+above which memory is given to the system. Below, both would cost more than they gain."""
+
+
+def bytes_in(text: str) -> int | None:
+    """Return the bytes in a size such as ``"500MB"``, ``"2 GiB"``, ``"0B"``; None if it is none."""
+    found = _SIZE.fullmatch(text)
+    if found is None:
+        return None
+    number, prefix, binary = found.groups()
+    return round(float(number) * (1024 if binary else 1000) ** " kMGT".index(prefix or " "))
+
+
+def most_kept() -> int:
+    """Return how many bytes this process may keep.
+
+    Raises
+    ------
+    ModelError
+        if the environment variable is not a size
+    """
+    text = os.environ.get(SETTING, USUAL)
+    if (most := bytes_in(text)) is None:
+        raise ModelError(SETTING, text, "must be a size such as 500MB or 2GB")
+    return most
+
+
+_KEPT: OrderedDict[Hashable, Any] = OrderedDict()
+"""Values by key, the last used one at the end."""
+_PATH = object()
+"""Key in between: values that were used since the last `release` stand behind it."""
+_IN_USE: weakref.WeakValueDictionary[Hashable, Any] = weakref.WeakValueDictionary()
+"""Values that something holds, if weak references to them are possible."""
+_LOCK = threading.RLock()
+
+
+def remembered(key: Hashable, make: Callable[[], R]) -> R:
+    """Return the value of a key, made anew if it is not kept.
+
+    All values together have at most the bytes of `most_kept` when another one is made. None is not
+    kept.
+    """
+    with _LOCK:
+        value: R | None = _KEPT.get(key, _IN_USE.get(key))
+    if value is None:
+        _evict(most_kept())
+        value = make()
+    if value is not None:
+        with _LOCK:
+            _KEPT[key] = value
+            _KEPT.move_to_end(key)
+            with suppress(TypeError):  # nothing refers weakly to some kinds of objects
+                _IN_USE[key] = value
+    return value
+
+
+def kept(function: Callable[P, R]) -> Callable[P, R]:
+    """Remember the results of a function of hashable arguments, see `remembered`.
+
+    It replaces `functools.lru_cache` where a result has megabytes.
+    """
+
+    @wraps(function)
+    def known(*args: P.args, **kwargs: P.kwargs) -> R:
+        key = (function, args, tuple(kwargs.items()))
+        return remembered(key, lambda: function(*args, **kwargs))
+
+    return known
+
+
+def release(most: int | None = None) -> None:
+    """Drop kept values beyond a number of bytes, and give memory that is free to the system.
+
+    To be called between two loading paths: what a path has left in circles of references, with the
+    factors of its matrices, is freed too.
+
+    Parameters
+    ----------
+    most : number of bytes; by default `most_kept`, or more if the path that has ended used more:
+        the next path of a study most often has the same set-up
+    """
+    _evict(most_kept() if most is None else most, spare=most is None)
+    with _LOCK:
+        _KEPT[_PATH] = None
+        _KEPT.move_to_end(_PATH)
+    _HEAP.tidy()
+
+
+def bytes_of(*values: object) -> list[int]:
+    """Return the bytes of values with all that they hold; what several hold counts once."""
+    seen: set[int] = set()
+    return [_measured(value, seen) for value in values]
+
+
+def _evict(most: int, *, spare: bool = False) -> None:
+    """Drop values that do not fit beside those used later; spare those used since `release`."""
+    with _LOCK:
+        keys, total = list(reversed(_KEPT)), 0
+        sizes = bytes_of(*((key, _KEPT[key]) for key in keys))
+        for key, size in zip(keys, sizes, strict=True):
+            if key is _PATH:
+                spare = False
+            elif total + size > most and not spare:
+                del _KEPT[key]
+            else:
+                total += size
+
+
+def _measured(value: object, seen: set[int]) -> int:
+    """Return the bytes of a value and of what it holds, but not of what was seen before."""
+    total, left = 0, [value]
+    while left:
+        each = left.pop()
+        if id(each) in seen or isinstance(each, type | ModuleType):
+            continue
+        seen.add(id(each))
+        total += sys.getsizeof(each)
+        if isinstance(each, np.ndarray):
+            left.append(each.base)  # has the memory of a view
+        elif isinstance(each, FunctionType):
+            left.extend(each.__closure__ or ())  # not the module of the function
+        else:
+            left.extend(gc.get_referents(each))
+    return total
+
+
+class _Usage(ctypes.Structure):
+    """``struct mallinfo2`` of the GNU C library."""
+
+    _fields_ = tuple(
+        (name, ctypes.c_size_t)
+        for name in ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks",
+                     "uordblks", "fordblks", "keepcost")
+    )  # fmt: skip
+
+
+class _Heap:
+    """The memory of this process: collected when it has grown, and given back when it is free."""
+
+    def __init__(self) -> None:
+        self._libc: ctypes.CDLL | None = ctypes.CDLL(None)
+        self._after = 0
+        try:
+            self._libc.mallinfo2.restype = _Usage
+        except AttributeError:  # another C library, which gives memory back by itself
+            self._libc = None
+
+    def tidy(self) -> None:
+        """Free what only circles of references hold, and give free memory to the system.
+
+        Both cost as much as a small run, and are left out where they gain little.
+        """
+        if self._libc is None:
+            gc.collect()
+            return
+        if self._in_use > self._after + _GROWN:
+            gc.collect()
+            self._after = self._in_use
+        if self._libc.mallinfo2().fordblks > _FREE:
+            self._libc.malloc_trim(0)
+
+    @property
+    def _in_use(self) -> int:
+        """Bytes that the C library has given out."""
+        assert self._libc is not None
+        usage = self._libc.mallinfo2()
+        return int(usage.uordblks + usage.hblkhd)
+
+
+_HEAP = _Heap()

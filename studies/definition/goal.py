@@ -1,0 +1,461 @@
+"""Goals: the value of a parameter at which a number of the runs passes a threshold.
+
+A goal asks, at each place of the other axes, for the smallest value of its parameter **beyond**
+the goal: a run is beyond if its number has passed the threshold, or if it found no equilibrium. A
+search brackets this value and narrows the bracket. What it asks for next depends only on the runs
+that it has asked for: a search that begins anew asks for the same runs, which are in the store.
+
+A round is one run: the middle of the bracket, or, for ``at``, the point of the method ITP
+(interpolate, truncate, project), which needs at most one run more than bisection. Where the
+parameter is the branch of its scene, one loading path serves several values: it rises through a few
+values to the first one beyond. Where the path can go on from any of its states, it is one path to
+the end of the search; otherwise each round is a path through a few values in the bracket.
+
+References
+----------
+Oliveira, I. F. D. and Takahashi, R. H. C. (2020), An enhancement of the bisection method average
+performance preserving minmax optimality, ACM Trans. Math. Softw. 47(1), 5: ITP.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from solver.results.quantities import QUANTITIES
+from solver.scenes import Scene
+from studies.definition.expansion import Expansion
+from studies.definition.parameters import Parameter, parameters_of
+from studies.definition.spaced import rounded
+from studies.definition.sweep import Axes
+from studies.definition.vocabulary import KEEP, SOLVED
+from studies.errors import StudyError, nearest, one_of
+
+FOUND: Mapping[str, Mapping[str, Any]] = {
+    "first_yield": {"of": "max_plastic_strain", "first_above": 0.0},
+    "limit_load": {},
+    "shakedown_limit": {"of": "shakedown_state", "first_above": "elastic_shakedown"},
+}
+"""Goals that have a name, ``find``."""
+
+NO_EQUILIBRIUM = ("limit_load", "not_converged")
+"""Statuses of runs that are beyond every goal."""
+
+_EQUILIBRIUM = (*SOLVED, "audit_failed")
+"""Statuses of runs that are before the limit load, also where their numbers are not good enough."""
+
+PASSED, NEVER, ALREADY, FAILED = "passed", "never", "already", "failed"
+"""Reasons for the end of a search, besides `NO_EQUILIBRIUM`: the number passed the threshold; not
+even the last value is beyond; the first value is beyond; a run has no number."""
+
+_KEYS = ("parameter", "find", "of", "at", "first_above", "first_below", "within", "between")
+_KINDS = ("at", "first_above", "first_below")
+_PARTS = 4
+"""Parts into which a round of a loading path divides the bracket."""
+_ROUNDING = 1.0001
+"""Factor on the width of a narrow bracket, whose ends are rounded."""
+_SLACK = 1
+"""Runs that ITP may take beyond those of bisection (n0 of the reference)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Goal:
+    """What is asked for.
+
+    Attributes
+    ----------
+    parameter : the parameter that is varied
+    of : number of the runs; empty if only equilibrium counts
+    kind, threshold : ``at``, ``first_above`` or ``first_below``, and its value; of ``at`` the
+        number may rise or fall
+    within : largest ratio of the last bracket to its upper end; if the parameter may be 0 or
+        negative, to the larger end of `between`
+    between : the ends of the first bracket
+    whole : whether the parameter is an integer
+    branch : whether the parameter is the branch of its scene
+    goes_on : whether a path of the scene goes on from any of its states (`Scene.goes_on`)
+    """
+
+    parameter: str
+    of: str = ""
+    kind: str = ""
+    threshold: float = math.nan
+    within: float = 0.01
+    between: tuple[float, float]
+    whole: bool = False
+    branch: bool = False
+    goes_on: bool = False
+
+    @property
+    def parts(self) -> int:
+        """Parts into which a round divides the bracket."""
+        return _PARTS if self.branch and not self.goes_on else 2
+
+    def seen(self, row: Mapping[str, Any], rising: bool | None) -> Look:
+        """Return what a run says.
+
+        Parameters
+        ----------
+        row : of the run, as the catalogue has it
+        rising : of ``at``, whether the number rises; None if the run is the first, which decides
+        """
+        status = str(row["status"])
+        if status in NO_EQUILIBRIUM:
+            return Look(True, None, status, row["id"])
+        if not self.of:
+            return Look(False if status in _EQUILIBRIUM else None, None, status, row["id"])
+        value = row["scalars"].get(self.of)
+        if status not in SOLVED or value is None:
+            return Look(None, None, status, row["id"])
+        over = value - self.threshold
+        if self.kind == "at":
+            over = 0.0 if rising is None else (over if rising else -over)
+            return Look(over >= 0.0 and rising is not None, value, status, row["id"])
+        return Look(
+            over > 0.0 if self.kind == "first_above" else over < 0.0, value, status, row["id"]
+        )
+
+    @property
+    def most(self) -> tuple[int, int]:
+        """Largest number of rounds of a search, and of its runs."""
+        low, high = self.between
+        first = _PARTS if self.branch else 1
+        width = (self.scaled(high) - self.scaled(low)) / first
+        more = math.ceil(max(0.0, math.log(width / self.tolerance, self.parts) - 1e-9))
+        more += _SLACK if self.kind == "at" and self.parts == 2 else 0
+        return 1 + more, first + 1 + more * (self.parts - 1)
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What `checked_goal` reads."""
+        asked = {"of": self.of, self.kind: self.threshold} if self.of else {}
+        return {
+            "parameter": self.parameter, **asked, "within": self.within,
+            "between": list(self.between),
+        }  # fmt: skip
+
+    def narrow(self, low: float, high: float) -> bool:
+        """Whether a bracket is narrow enough, or cannot be divided."""
+        width = self.scaled(high) - self.scaled(low)
+        return width <= self.tolerance * _ROUNDING or not self.split(low, high, 2)
+
+    def middle(self, low: float, high: float) -> float:
+        """Return the middle of a bracket."""
+        return self._value((self.scaled(low) + self.scaled(high)) / 2.0)
+
+    def split(self, low: float, high: float, parts: int) -> list[float]:
+        """Return the values that divide a bracket into parts, of equal ratios if they can be."""
+        a, b = self.scaled(low), self.scaled(high)
+        return self.inside(low, high, [a + (b - a) * k / parts for k in range(1, parts)])
+
+    def inside(self, low: float, high: float, scaled: list[float]) -> list[float]:
+        """Return the values of the parameter at places on the scale, if between two others."""
+        values = map(self._value, scaled)
+        found = [round(each) if self.whole else rounded(each) for each in values]
+        return sorted({each for each in found if low < each < high})
+
+    @property
+    def tolerance(self) -> float:
+        """Width of a narrow bracket on the scale."""
+        if self._ratios:
+            return -math.log1p(-self.within)
+        return self.within * max(map(abs, self.between))
+
+    def scaled(self, value: float) -> float:
+        """Return the place of a value on the scale on which brackets are divided."""
+        return math.log(value) if self._ratios else value
+
+    def _value(self, scaled: float) -> float:
+        return math.exp(scaled) if self._ratios else scaled
+
+    @property
+    def _ratios(self) -> bool:
+        return self.between[0] > 0.0
+
+
+class Look(NamedTuple):
+    """What a run says: whether it is beyond (None: unknown), its number, its status and id."""
+
+    beyond: bool | None
+    value: float | None
+    status: str
+    run: str
+
+
+@dataclass(slots=True)
+class PathLimit:
+    """Tells, on a loading path, the run behind which no other is needed.
+
+    Attributes
+    ----------
+    goal : what is searched
+    rising : of ``at``, whether the number rises; None if the first run of the path decides
+    """
+
+    goal: Goal
+    rising: bool | None = None
+
+    def __call__(self, row: Mapping[str, Any]) -> bool:
+        """Whether a run is beyond the goal, or has failed; the runs come in increasing order."""
+        look = self.goal.seen(row, self.rising)
+        if self.rising is None and self.goal.kind == "at" and look.value is not None:
+            self.rising = look.value < self.goal.threshold
+        return look.beyond is not False
+
+
+@dataclass(slots=True)
+class Search:
+    """The search for the goal at one place of the other axes.
+
+    Attributes
+    ----------
+    goal : what is searched
+    rows : the rows of the runs that it has asked for, by value of the parameter
+    reason : why the search has ended; empty until then
+    low, high : the bracket; NaN where there is no end yet
+    rounds : number of complete rounds
+    """
+
+    goal: Goal
+    rows: dict[float, Mapping[str, Any]] = field(default_factory=dict)
+    reason: str = ""
+    low: float = math.nan
+    high: float = math.nan
+    rounds: int = 0
+    _rising: bool | None = None
+    _round: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        low, high = self.goal.between
+        inner = self.goal.split(low, high, _PARTS) if self.goal.branch else []
+        self._round = [low, *inner, high]
+
+    @property
+    def wants(self) -> list[float]:
+        """The values whose runs this round lacks, in increasing order; none at the end."""
+        wanted: list[float] = []
+        for value in [] if self.reason else self._round:
+            if value not in self.rows:
+                wanted.append(value)
+            elif self.look(value).beyond:
+                break
+        return wanted
+
+    def tell(self, value: float, row: Mapping[str, Any]) -> None:
+        """Tell the search of a run that it lacked."""
+        self.rows[value] = row
+        while not self.reason and self._round_ends():
+            self.rounds += 1
+
+    @property
+    def found(self) -> float:
+        """The value that was searched; NaN if there is none.
+
+        For ``at`` it is interpolated in the last bracket, else the middle of the bracket.
+        """
+        if self.reason not in (PASSED, *NO_EQUILIBRIUM):
+            return math.nan
+        ends = self._over(self.low), self._over(self.high)
+        if self.goal.kind == "at" and None not in ends:
+            below, above = (float(each) for each in ends if each is not None)
+            return self.low + (self.high - self.low) * below / (below - above)
+        return self.goal.middle(self.low, self.high)
+
+    @property
+    def progress(self) -> float:
+        """Share of the longest possible search that is done."""
+        return 1.0 if self.reason else self.rounds / self.goal.most[0]
+
+    @property
+    def limit(self) -> PathLimit:
+        """What ends a loading path of this round."""
+        return PathLimit(self.goal, self._rising)
+
+    def look(self, value: float) -> Look:
+        """Return what the run of a value says."""
+        return self.goal.seen(self.rows[value], self._rising)
+
+    def _round_ends(self) -> bool:
+        """Move the ends of the bracket; return whether the round is complete."""
+        for value in self._round:
+            if value not in self.rows:
+                return False
+            look = self.look(value)
+            if self._rising is None and self.goal.kind == "at" and look.value is not None:
+                self._rising = look.value < self.goal.threshold
+                look = self.look(value)
+            if look.beyond is None:
+                self.high, self.reason = value, FAILED
+                return True
+            if look.beyond:
+                self.high = value
+                break
+            self.low = value
+        if math.isnan(self.high):
+            self.reason = NEVER
+        elif math.isnan(self.low):
+            self.reason = ALREADY
+        elif self.goal.narrow(self.low, self.high):
+            status = self.look(self.high).status
+            self.reason = status if status in NO_EQUILIBRIUM else PASSED
+        else:
+            split = self.goal.split(self.low, self.high, self.goal.parts)
+            self._round = self._interpolated() or split
+        return True
+
+    def _over(self, value: float) -> float | None:
+        """Return how far the number of a run is from the threshold, positive beyond it."""
+        number = self.look(value).value
+        if number is None:
+            return None
+        over = number - self.goal.threshold
+        return over if self._rising else -over
+
+    def _interpolated(self) -> list[float]:
+        """Return the next value by ITP, with the reference's names; none where it is not used."""
+        if self.goal.parts > 2 or self.goal.kind != "at":
+            return []
+        fa, fb = self._over(self.low), self._over(self.high)
+        if fa is None or fb is None or fb == fa:
+            return []
+        a, b = self.goal.scaled(self.low), self.goal.scaled(self.high)
+        first, last = map(self.goal.scaled, self.goal.between)
+        middle, left = (a + b) / 2, self.goal.most[0] - 1 - self.rounds
+        radius = self.goal.tolerance / 2 * 2.0**left - (b - a) / 2
+        xf = (fb * a - fa * b) / (fb - fa)
+        sigma = math.copysign(1.0, middle - xf)
+        xt = xf + sigma * min(0.2 / (last - first) * (b - a) ** 2, abs(middle - xf))
+        x = xt if abs(xt - middle) <= radius else middle - sigma * max(radius, 0.0)
+        return self.goal.inside(self.low, self.high, [x])
+
+
+@dataclass(slots=True, kw_only=True)
+class Place:
+    """One place of the axes of a study: its search, and the runs that this asks for.
+
+    Attributes
+    ----------
+    scene, fixed : the scene, and the parameters of all runs here, as JSON values
+    search : the search
+    keep : what is kept in addition to the results of the scene
+    resume, since : as in `studies.run_study`: which failed runs are taken as they are
+    """
+
+    scene: Scene
+    fixed: Mapping[str, Any]
+    search: Search
+    keep: str = ""
+    resume: bool = False
+    since: int = 0
+
+    def runs(self, values: list[float]) -> Expansion:
+        """Return the runs of values of the parameter."""
+        axes: Axes = {self.search.goal.parameter: list(values)}
+        return Expansion(self.scene, self.fixed, axes)
+
+    def stands(self, row: Mapping[str, Any]) -> bool:
+        """Whether a run in the store is taken as it is."""
+        if row["status"] in SOLVED:
+            return self.keep in ("", row[KEEP])
+        decided = NO_EQUILIBRIUM if self.search.goal.of else (*NO_EQUILIBRIUM, *_EQUILIBRIUM)
+        failed = self.resume and row["modified"] >= self.since
+        return row["status"] in decided or failed
+
+    def hear(self, row: Mapping[str, Any]) -> bool:
+        """Tell the search of a run; return whether it had asked for it."""
+        value = row["parameters"][self.search.goal.parameter]
+        asked = value in self.search.wants
+        if asked:
+            self.search.tell(value, row)
+        return asked
+
+
+def checked_goal(content: Any, scene: Scene) -> Goal:
+    """Return the goal that a study asks for.
+
+    Raises
+    ------
+    StudyError
+        naming the entry, its value and what is allowed
+    """
+    if not isinstance(content, Mapping):
+        raise StudyError("goal", content, "must be a table")
+    for key in content:
+        if key not in _KEYS:
+            raise StudyError(f"goal.{key}", content[key], one_of(key, _KEYS))
+    known = parameters_of(scene)
+    name = content.get("parameter", scene.branch)
+    if name not in known:
+        raise StudyError("goal.parameter", name, one_of(name, known))
+    given = dict(content)
+    if "find" in given:
+        found = given.pop("find")
+        if found not in FOUND:
+            raise StudyError("goal.find", found, one_of(found, FOUND))
+        for key in given.keys() & {"of", *_KINDS}:
+            raise StudyError(f"goal.{key}", given[key], f"is what find = {found} says: keep one")
+        given |= FOUND[found]
+    kinds = [kind for kind in _KINDS if kind in given]
+    of = given.get("of", "")
+    if len(kinds) > 1 or bool(kinds) != bool(of):
+        allowed = f"needs of and one of {', '.join(_KINDS)}; or neither, for the limit load"
+        raise StudyError("goal", dict(content), allowed)
+    low, high = _ends(given.get("between"), known[name])
+    within = given.get("within", 0.01)
+    if not _is_number(within) or not 1e-6 <= within <= 0.5:
+        raise StudyError("goal.within", within, "must be a number >= 1e-06 and <= 0.5")
+    return Goal(
+        parameter=name,
+        of=of,
+        kind=kinds[0] if kinds else "",
+        threshold=_threshold(f"goal.{kinds[0]}", given[kinds[0]], of, scene) if kinds else math.nan,
+        within=float(within),
+        between=(low, high),
+        whole=isinstance(low, int) and isinstance(high, int) and _is_whole(known[name]),
+        branch=name == scene.branch,
+        goes_on=name == scene.branch and scene.goes_on,
+    )
+
+
+def _ends(content: Any, parameter: Parameter) -> tuple[float, float]:
+    if not isinstance(content, list | tuple) or len(content) != 2:
+        raise StudyError("goal.between", content, "must be [lowest, highest], the first bracket")
+    ends = []
+    for k, value in enumerate(content):
+        normal = parameter.normalise(value, f"goal.between[{k}]")
+        if not _is_number(normal) or not parameter.in_range(parameter.typed(normal)):
+            raise parameter.refusal(f"goal.between[{k}]", value)
+        ends.append(normal)
+    if not ends[0] < ends[1]:
+        raise StudyError("goal.between", content, "must begin with its lowest value")
+    return ends[0], ends[1]
+
+
+def _is_whole(parameter: Parameter) -> bool:
+    kinds = {each.get("type") for each in parameter.schema.get("anyOf", [parameter.schema])}
+    return "integer" in kinds and "number" not in kinds
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _threshold(field_: str, value: Any, of: Any, scene: Scene) -> float:
+    """Return the threshold of a number; of flags it may be a word."""
+    quantities = QUANTITIES | {each.name: each for each in scene.quantities}
+    quantity = quantities.get(of) if isinstance(of, str) else None
+    if quantity is None or quantity.dims:
+        what = "is no variable" if quantity is None else f"is over {', '.join(quantity.dims)}"
+        numbers = [name for name, each in quantities.items() if not each.dims]
+        allowed = f"{what}: must be a variable with one number a run{nearest(of, numbers)}"
+        raise StudyError("goal.of", of, allowed)
+    if isinstance(value, str) and quantity.flags is not None:
+        words = {each.name.lower(): float(each) for each in quantity.flags}
+        if value not in words:
+            raise StudyError(field_, value, one_of(value, words))
+        return words[value]
+    if not _is_number(value) or not math.isfinite(value):
+        raise StudyError(field_, value, "must be a finite number")
+    return float(value)

@@ -1,0 +1,186 @@
+"""An axis of points: each has a number, from 0 on, and sets several parameters.
+
+Points are a list of tables. A file of points and a sample are other ways to write this list. Those
+of the entries ``points`` and ``sample`` of a study are the axis ``point``; an axis of points in the
+sweep has any name that is no parameter.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any, TypeGuard
+
+from studies.definition.identity import canonical
+from studies.definition.parameters import Parameter
+from studies.definition.sampling import METHOD, METHODS, sampled
+from studies.errors import StudyError, nearest
+
+POINT = "point"
+"""Name of the axis of the entries ``points`` and ``sample``."""
+CASE = "case"
+"""Key by which points have names: a coordinate of the data set, never a parameter."""
+MOST_POINTS = 100_000
+"""Largest number of points of an axis."""
+
+Points = list[dict[str, Any]]
+
+ENTRIES = ("points", "sample")
+"""Entries of a study that say what its axis `POINT` is."""
+_HEADING = re.compile(r"(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]*)\]")
+_UNITLESS = ("", "1", "-")
+_LONGEST_CASE = 80
+
+
+SCHEMAS = {
+    "points": {
+        "type": "array",
+        "minItems": 1,
+        "maxItems": MOST_POINTS,
+        "items": {"type": "object"},
+        "description": "points: each a table of parameters; they are the axis `point` of the sweep",
+    },
+    "sample": {
+        "type": "object",
+        "properties": {
+            METHOD: {"enum": list(METHODS)},
+            "num": {"type": "integer", "minimum": 1, "maximum": MOST_POINTS},
+            "seed": {"type": "integer", "minimum": 0, "default": 0},
+            "ranges": {"type": "object", "additionalProperties": {"type": ["array", "object"]}},
+        },
+        "required": [METHOD, "num", "ranges"],
+        "additionalProperties": False,
+        "description": "points that fill ranges of parameters evenly, in place of `points`",
+    },
+}
+"""JSON Schemas of the entries `ENTRIES`."""
+
+
+def described(schema: dict[str, Any]) -> None:
+    """Add the entries of points to the JSON Schema of a study."""
+    schema["properties"] |= SCHEMAS
+
+
+def with_points(content: Mapping[str, Any]) -> Any:
+    """Return the sweep of a study, in which ``points`` or ``sample`` of the study is an axis.
+
+    Raises
+    ------
+    StudyError
+        if both are given, or the sweep has this axis too
+    """
+    sweep = content.get("sweep", {})
+    given = [entry for entry in ENTRIES if entry in content]
+    if not given or not isinstance(sweep, Mapping):
+        return sweep
+    other = next((each for each in given[1:]), f"sweep.{POINT}" if POINT in sweep else "")
+    if other:
+        value = content.get(other, sweep.get(POINT))
+        allowed = f"{given[0]} is given too: keep one, or give one a name, [sweep.NAME]"
+        raise StudyError(other, value, allowed)
+    return {POINT: content[given[0]], **sweep}
+
+
+def is_points(axis: Any) -> TypeGuard[Points]:
+    """Whether a normalised axis has points: no parameter has tables as values."""
+    return isinstance(axis, list) and isinstance(axis[0], dict)
+
+
+def describes_points(name: Any, content: Any) -> bool:
+    """Whether an axis that is no parameter is one of points: a list of tables, a file, a sample."""
+    if isinstance(content, Mapping):
+        return any(isinstance(content.get(key), str) for key in ("file", METHOD))
+    tables = isinstance(content, list | tuple) and any(
+        isinstance(each, Mapping) for each in content
+    )
+    return name == POINT or tables
+
+
+def field_of(axis: str) -> str:
+    """Return the field of a study that has the points of an axis."""
+    return "points" if axis == POINT else f"sweep.{axis}"
+
+
+def checked_points(name: str, content: Any, known: Mapping[str, Parameter]) -> Points:
+    """Return the points of an axis, normalised: all with the same parameters, in their order.
+
+    A parameter that one point sets and another leaves out has the scene's default there. The key of
+    a value may tell its unit, as in ``"radius [mm]"``, which must be that of the parameter. A table
+    may have a `CASE`, if all have one.
+
+    Raises
+    ------
+    StudyError
+        for any mistake except in combinations of parameters, which are checked run by run
+    """
+    field = field_of(name)
+    if isinstance(content, Mapping) and METHOD in content:
+        content = sampled("sample" if name == POINT else field, content, known, MOST_POINTS)
+    if isinstance(content, Mapping) and "file" in content:
+        allowed = "names a file, which only a study file can: give the points themselves"
+        raise StudyError(field, dict(content), allowed)
+    if not isinstance(content, list | tuple) or not content:
+        raise StudyError(field, content, "must be a list of points, each a table of parameters")
+    if len(content) > MOST_POINTS:
+        raise StudyError(field, f"{len(content)} points", f"must be at most {MOST_POINTS}")
+    headings: dict[Any, str] = {}
+    given = [_point(f"{field}[{k}]", each, known, headings) for k, each in enumerate(content)]
+    own = [key for key in known if key != CASE and any(key in point for point in given)]
+    if not own:
+        raise StudyError(field, content[0], f"must set a parameter: one of {', '.join(known)}")
+    named = any(CASE in point for point in given)
+    points: Points = []
+    seen: dict[str, int] = {}
+    cases: dict[Any, int] = {}
+    for k, point in enumerate(given):
+        settings = {key: point.get(key, known[key].default) for key in own}
+        first = seen.setdefault(canonical(settings), k)
+        if first != k:
+            raise StudyError(f"{field}[{k}]", point, f"is the same as point {first}: keep one")
+        if named:
+            first = cases.setdefault(point.get(CASE), k)
+            if CASE not in point or first != k:
+                what = "names point {} too" if CASE in point else "must be given for all points"
+                raise StudyError(f"{field}[{k}].{CASE}", point.get(CASE), what.format(first))
+        points.append(({CASE: point[CASE]} if named else {}) | settings)
+    return points
+
+
+def _point(
+    field: str, content: Any, known: Mapping[str, Parameter], headings: dict[Any, str]
+) -> dict[str, Any]:
+    """Return the parameters that a point sets, normalised, and its case."""
+    if not isinstance(content, Mapping):
+        raise StudyError(field, content, "must be a table of parameters")
+    point: dict[str, Any] = {}
+    for key, value in content.items():
+        name = headings.get(key) or headings.setdefault(key, _parameter(field, key, known))
+        if name in point:
+            raise StudyError(f"{field}.{key}", value, f"{name} is given twice")
+        own = f"{field}.{name}"
+        point[name] = _case(own, value) if name == CASE else known[name].normalise(value, own)
+    return point
+
+
+def _parameter(field: str, key: Any, known: Mapping[str, Parameter]) -> str:
+    """Return the parameter of a key such as ``"radius [mm]"``, if the unit is its own."""
+    heading = _HEADING.fullmatch(key) if isinstance(key, str) else None
+    name = heading["name"] if heading else key
+    if name == CASE and not heading:
+        return CASE
+    if name not in known:
+        allowed = f"the scene has no such parameter; it has {', '.join(known)}"
+        raise StudyError(f"{field}.{name}", key, allowed + nearest(name, known))
+    unit, own = heading["unit"].strip() if heading else "", known[name].unit
+    if heading and unit != own and not (unit in _UNITLESS and own in _UNITLESS):
+        allowed = f"{name} has no unit" if own in _UNITLESS else f"{name} must be in {own}"
+        raise StudyError(f"{field}.{name}", key, allowed)
+    return str(name)
+
+
+def _case(field: str, value: Any) -> str:
+    """Return the name of a point; a number is text."""
+    text = str(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
+    if isinstance(text, str) and text.isprintable() and 0 < len(text) <= _LONGEST_CASE:
+        return text
+    raise StudyError(field, value, f"must be a text of 1 to {_LONGEST_CASE} letters")

@@ -1,0 +1,109 @@
+"""The runs of a study in the order of a number."""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from studies.definition.vocabulary import OK
+from studies.errors import StudyError, one_of
+from studies.views.columns import in_blocks, stacked, value_text
+from studies.views.picking import flags, sweep_axes, sweep_coordinates
+from studies.views.plots.fields import sweep_fields
+
+_COMPARED: Mapping[str, Callable[[Any, Any], Any]] = {
+    "<=": operator.le, ">=": operator.ge, "!=": operator.ne, "<": operator.lt, ">": operator.gt,
+    "=": operator.eq,
+}  # fmt: skip
+_CONDITION = re.compile(r"\s*(?P<name>\w+)\s*(?P<sign><=|>=|!=|<|>|=)\s*(?P<value>.*?)\s*")
+
+
+def best_runs(
+    dataset: xr.Dataset,
+    of: str,
+    where: Sequence[str] = (),
+    *,
+    lowest: bool = False,
+    count: int = 10,
+) -> list[dict[str, Any]]:
+    """Return the successful runs with the highest numbers, the best first: what tells them apart.
+
+    Each has its values on the axes that vary, what labels and points set, and the number.
+
+    Parameters
+    ----------
+    dataset : data set of a study
+    of : a variable with one number a run
+    where : conditions such as ``"friction<0.3"`` or ``"hardening=none"``: on axes, on what labels
+        and points set, or on variables with one value a run
+    lowest : whether the lowest numbers come first
+    count : largest number of runs
+
+    Raises
+    ------
+    StudyError
+        if there is no such variable, a condition has a mistake, or no run is left
+    """
+    known = sweep_fields(dataset)
+    if of not in known or of == "status":
+        raise StudyError("of", of, one_of(of, [name for name in known if name != "status"]))
+    left = (dataset["status"] == OK) & dataset[of].notnull()
+    for text in where:
+        left = left & _meets(dataset, text)
+    left = left.transpose(*dataset["status"].dims)
+    if not left.any():
+        conditions = ", ".join(where) or "any"
+        raise StudyError("where", conditions, "no run that succeeded meets this")
+    places = np.argwhere(left.to_numpy())
+    numbers = dataset[of].to_numpy()[tuple(places.T)]
+    order = np.argsort(numbers if lowest else -numbers, kind="stable")[:count]
+    axes = sweep_axes(dataset)
+    varied = {n: a for n, a in sweep_coordinates(dataset).items() if dataset.sizes[a] > 1}
+    found = []
+    for at in order:
+        place = dict(zip(axes, places[at], strict=True))
+        run = {name: dataset[name].to_numpy()[place[axis]] for name, axis in varied.items()}
+        found.append({name: each.item() for name, each in run.items()} | {of: numbers[at].item()})
+    return found
+
+
+def best_table(dataset: xr.Dataset, of: str, runs: Sequence[Mapping[str, Any]]) -> str:
+    """Return a line for each run that `best_runs` has found."""
+    meaning = flags(dataset[of])
+    units = (dataset[name].attrs.get("units", "") for name in runs[0])
+    lines = [
+        [meaning.get(value, "") or value_text(value) for value in run.values()]
+        if meaning
+        else [value_text(value) for value in run.values()]
+        for run in runs
+    ]
+    second = ["" if unit in {"", "1"} else f"[{unit}]" for unit in units]
+    headings = [name.replace("_", " ") for name in runs[0]]
+    return in_blocks([*stacked(headings), second, *lines], 1, right=len(headings) - 1)
+
+
+def _meets(dataset: xr.Dataset, text: str) -> xr.DataArray:
+    """Return where the runs of a study meet a condition."""
+    match = _CONDITION.fullmatch(text)
+    known = [*sweep_coordinates(dataset), *sweep_fields(dataset)]
+    if match is None:
+        raise StudyError("where", text, "must be NAME<VALUE, with <, <=, >, >=, = or !=")
+    if match["name"] not in known:
+        raise StudyError("where", text, one_of(match["name"], known))
+    values, compared = dataset[match["name"]], _COMPARED[match["sign"]]
+    codes = {name: code for code, name in flags(values).items()}
+    if match["name"] != "status" and match["value"] in codes:
+        return xr.DataArray(compared(values, codes[match["value"]]))
+    if values.dtype.kind not in "fiu":
+        if match["sign"] not in {"=", "!="}:
+            raise StudyError("where", text, f"{match['name']} has words: compare them by = or !=")
+        return xr.DataArray(compared(values, match["value"]))
+    try:
+        return xr.DataArray(compared(values, float(match["value"])))
+    except ValueError:
+        raise StudyError("where", text, f"{match['value']!r} must be a number") from None

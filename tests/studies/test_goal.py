@@ -1,0 +1,377 @@
+"""Studies with a goal: the search, its runs, and the data set of what it finds."""
+
+from __future__ import annotations
+
+import math
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+
+from residua.cli import main
+from studies import Bounds, Store, Study, StudyError, StudyEvent, estimate, open_study, run_study
+from studies.definition.goal import Goal, Search, checked_goal
+from studies.definition.identity import solver_hash
+from studies.execution.goals import Goals, answers
+from studies.execution.task import PathTask, walk
+from tests.studies.conftest import fake_study
+from tests.studies.fakes import FAKE
+
+ROOT = Path(__file__).parents[2]
+PRESSURE = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}
+"""Of the fake scene the pressure is 100 load_ratio (1 + friction) + half_width."""
+SWEEP = {"friction": [0.0, 0.4], "half_width": [20.0, 50.0]}
+
+
+SCENES = ["fake", "followed"]
+"""Scenes of which each round is a path, and of which a path goes on to the end of the search."""
+
+
+def study(goal: dict[str, Any], sweep: Any = None, scene: str = "fake", **fixed: Any) -> Study:
+    content = {"name": "goal", "scene": scene, "parameters": fixed, "goal": goal}
+    return Study.from_dict(content | {"sweep": SWEEP if sweep is None else sweep})
+
+
+def search_here(study: Study, store: Store, most: int = 10**6) -> list[str]:
+    """Search in this process, until there are so many runs; return their ids."""
+    goals, computed = Goals(study, store), []
+
+    def hear(message: dict[str, Any]) -> None:
+        if "row" in message:
+            computed.append(message["row"]["id"])
+            goals.heard(message["path"], message["row"])
+
+    for asked in goals.paths():
+        if asked is None:
+            break
+        task = PathTask(
+            study.problem, (asked.path,), store.directory, solver_hash(), study.keep,
+            limit=asked.limit, place=asked.place,
+        )  # fmt: skip
+        walk(task, hear, lambda: len(computed) >= most)
+        if len(computed) >= most:
+            break
+        goals.closed(asked.path.id)
+    store.reconcile()
+    store.save_study(study)
+    answers(study, store, goals)
+    return computed
+
+
+def searched(goal: Goal, number: Callable[[float], float | None]) -> Search:
+    """Search with a function of the parameter; None stands for a limit load."""
+    search = Search(goal)
+    while wanted := search.wants:
+        value = random.choice(wanted)
+        known = number(value)
+        status = "limit_load" if known is None else "ok"
+        scalars = {"peak_contact_pressure": known}
+        search.tell(value, {"id": str(value), "status": status, "scalars": scalars, "message": ""})
+    return search
+
+
+@pytest.mark.parametrize("kind", ["at", "first_above", "first_below"])
+@pytest.mark.parametrize("parameter", ["load_ratio", "friction"])
+def test_a_search_finds_its_value_with_no_more_runs_than_it_says(parameter: str, kind: str) -> None:
+    random.seed(1)
+    sign, taken = -1.0 if kind == "first_below" else 1.0, []
+    asked = {"parameter": parameter, "of": "peak_contact_pressure", kind: 0.0}
+    goal = checked_goal(asked | {"within": 1e-3, "between": [0.1, 1.0]}, FAKE)
+    for _ in range(60):
+        root, power = math.exp(random.uniform(math.log(0.1), 0.0)), random.choice([0.5, 1.0, 3.0])
+
+        def number(value: float, root: float = root, power: float = power) -> float:
+            return sign * math.copysign(abs(value - root) ** power, value - root)
+
+        found = searched(goal, number)
+        assert found.reason == "passed"
+        assert found.low <= root <= found.high <= found.low / (1.0 - 1.001e-3)
+        assert found.found == pytest.approx(root, rel=1e-3)
+        assert found.rounds <= goal.most[0]
+        assert len(found.rows) <= goal.most[1]
+        taken.append(len(found.rows))
+    if (kind, parameter) == ("at", "friction"):
+        assert np.mean(taken) < goal.most[1] - 2, "interpolation takes fewer runs than bisection"
+
+
+def test_a_search_of_whole_numbers_ends_at_neighbours() -> None:
+    asked = {"parameter": "passes", "of": "peak_contact_pressure", "first_above": 0.0}
+    found = searched(checked_goal(asked | {"between": [1, 10]}, FAKE), lambda value: value - 6.5)
+    assert (found.low, found.high) == (6, 7)
+    assert all(isinstance(value, int) for value in found.rows)
+
+
+def test_a_range_about_zero_is_divided_in_equal_steps() -> None:
+    asked = {"parameter": "friction", "of": "peak_contact_pressure", "at": 0.0}
+    goal = checked_goal(asked | {"between": [0.0, 0.5], "within": 0.01}, FAKE)
+    found = searched(goal, lambda value: value - 1e-3)
+    assert found.high - found.low <= 0.005 * 1.0001
+    assert found.found == pytest.approx(1e-3, abs=1e-9)
+
+
+def test_no_equilibrium_is_beyond_and_told_apart() -> None:
+    goal = checked_goal(PRESSURE, FAKE)
+    found = searched(goal, lambda value: None if value > 0.8 else 100.0 * value)
+    assert found.reason == "limit_load"
+    assert found.low <= 0.8 <= found.high
+    assert searched(goal, lambda value: 100.0 * value).reason == "passed"
+    assert searched(goal, lambda value: 1.0).reason == "never"
+    assert searched(goal, lambda value: None).reason == "already"
+
+
+def test_a_run_that_fails_its_audit_is_before_the_limit_load_and_has_no_number() -> None:
+    limit = checked_goal({"find": "limit_load", "between": [0.1, 4.0]}, FAKE)
+    row = {"id": "a", "status": "audit_failed", "scalars": {"peak_contact_pressure": 1.0}}
+    assert limit.seen(row, None).beyond is False
+    assert checked_goal(PRESSURE, FAKE).seen(row, True).beyond is None
+    assert limit.seen(row | {"status": "error"}, None).beyond is None
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_the_data_set_has_what_was_found_over_the_axes(store: Store, scene: str) -> None:
+    asked = study(PRESSURE, scene=scene, trouble="limit")
+    computed = search_here(asked, store)
+    with open_study(store.directory) as dataset:
+        assert dataset["load_ratio"].dims == ("friction", "hardening", "half_width")
+        assert dataset["load_ratio"].attrs["units"] == "1"
+        for friction in SWEEP["friction"]:
+            for width in SWEEP["half_width"]:
+                one = dataset.sel(friction=friction, half_width=width).squeeze()
+                exact = (120.0 - width) / 100.0 / (1.0 + friction)
+                limit = exact > 0.8
+                assert one["status"].item() == ("limit_load" if limit else "ok")
+                assert one["load_ratio"].item() == pytest.approx(0.8 if limit else exact, rel=0.01)
+                low, high = one["load_ratio_low"].item(), one["load_ratio_high"].item()
+                assert low <= min(exact, 0.8) <= high <= low / (1.0 - 0.01001)
+                tried = one["tried_load_ratio"].to_numpy()
+                tried = tried[np.isfinite(tried)]
+                assert len(tried) == one["runs"].item()
+                assert (np.diff(tried) > 0.0).all()
+                assert {one["run_low"].item(), one["run_high"].item()} <= set(computed)
+                assert ("flows at 0.75" in one["message"].item()) == limit
+    assert len(computed) == len(set(computed))
+
+
+def test_a_path_ends_with_the_first_run_beyond(store: Store) -> None:
+    """Behind it no run is needed: of the first round, which has 5 values, that is the third."""
+    asked = study(PRESSURE | {"between": [0.2, 3.2]}, {}, half_width=20.0)
+    goals = Goals(asked, store)
+    path = next(filter(None, goals.paths())).path
+    assert [case.values["load_ratio"] for case in path.cases] == [0.2, 0.4, 0.8, 1.6, 3.2]
+    computed = search_here(asked, store)
+    assert computed[:4] == [case.id for case in path.cases[:4]]
+    assert path.cases[4].id not in computed
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_an_interrupted_search_goes_on_and_asks_for_the_same_runs(
+    tmp_path: Path, scene: str
+) -> None:
+    asked = study(PRESSURE, scene=scene, trouble="limit")
+    at_once = search_here(asked, Store(tmp_path / "a"))
+    store, parts = Store(tmp_path / "b"), []
+    while some := search_here(asked, store, most=3):
+        parts += some
+    assert sorted(parts) == sorted(at_once), "the same runs, and none twice"
+    with open_study(tmp_path / "a") as one, open_study(tmp_path / "b") as other:
+        assert one.equals(other)
+
+
+def test_runs_are_those_of_any_other_study(store: Store) -> None:
+    search_here(study(PRESSURE, {}), store)
+    same = fake_study(sweep={"load_ratio": [0.1]})
+    assert store.run_path(next(same.run_ids())).exists()
+
+
+def test_a_goal_may_be_the_limit_load_or_multiply_with_points(store: Store) -> None:
+    points = [{"friction": 0.1, "case": "A"}, {"friction": 0.3, "case": "B"}]
+    content = {"name": "goal", "scene": "fake", "parameters": {"trouble": "limit"}}
+    goal = {"find": "limit_load", "between": [0.1, 4.0], "within": 0.02}
+    asked = Study.from_dict(content | {"points": points, "goal": goal})
+    search_here(asked, store)
+    with open_study(store.directory) as dataset:
+        assert dataset["case"].values.tolist() == ["A", "B"]
+        assert dataset["status"].values.ravel().tolist() == ["ok", "ok"]
+        assert dataset["load_ratio"].to_numpy() == pytest.approx(0.8, rel=0.02)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize(
+    ("fixed", "goal", "status", "message"),
+    [
+        ({"trouble": "raise"}, PRESSURE, "error", "the stiffness is gone"),
+        ({"trouble": "bare"}, PRESSURE, "not_converged", "it comes before the goal: increment 3"),
+        ({}, PRESSURE | {"at": 1e4}, "missing", "is not reached: peak_contact_pressure = 420"),
+        ({}, PRESSURE | {"first_above": 1.0}, "missing", "has been passed"),
+        ({}, PRESSURE | {"of": "plastic_work"}, "error", "its run has no plastic_work"),
+    ],
+)
+def test_a_search_without_an_answer_says_why(
+    store: Store, fixed: dict[str, Any], goal: dict[str, Any], status: str, message: str, scene: str
+) -> None:
+    kind = "first_above" if "first_above" in goal else "at"
+    goal = {key: goal[key] for key in ("of", kind, "between")}
+    search_here(study(goal, {}, scene, half_width=20.0, **fixed), store)
+    with open_study(store.directory) as dataset:
+        assert dataset["status"].item() == status
+        assert message in dataset["message"].item()
+
+
+def test_a_study_with_a_goal_has_an_id_and_is_read_again() -> None:
+    one = study(PRESSURE)
+    assert Study.from_dict(one.to_dict()) == one
+    assert Study.from_dict(one.to_dict()).id == one.id
+    assert study(PRESSURE | {"within": 0.02}).id != one.id
+    assert study(PRESSURE | {"within": 0.01, "parameter": "load_ratio"}).id == one.id
+    assert "load_ratio" not in one.fixed
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_the_estimate_is_the_most_that_the_search_may_take(store: Store, scene: str) -> None:
+    asked = study(PRESSURE, scene=scene)
+    assert asked.asks is not None
+    found = estimate(asked, store)
+    assert found.runs == found.to_compute == 4 * asked.asks.most[1]
+    assert found.paths == 4 * asked.asks.most[0]
+    assert len(search_here(asked, store)) <= found.runs
+    with pytest.raises(StudyError, match="at most 10: use fewer values"):
+        Bounds(runs=10).check_size(asked)
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "allowed"),
+    [
+        ({"parameter": "load_ration"}, "goal.parameter", "did you mean load_ratio?"),
+        ({"parameter": "hardening"}, "goal.between[0]", "must be one of none"),
+        ({"parameter": "half_width"}, "goal.parameter", "take it out of sweep.half_width"),
+        ({"parameter": "passes"}, "goal.between[0]", "an integer"),
+        ({"between": [1.0, 0.1]}, "goal.between", "its lowest value"),
+        ({"between": [0.1]}, "goal.between", "[lowest, highest]"),
+        ({"between": [0.1, 11.0]}, "goal.between[1]", "<= 10"),
+        ({"within": 0.0}, "goal.within", ">= 1e-06"),
+        ({"witin": 0.1}, "goal.witin", "did you mean within?"),
+        ({"of": "peak_contact_presure"}, "goal.of", "did you mean peak_contact_pressure?"),
+        ({"of": "contact_pressure"}, "goal.of", "is over stage, s"),
+        ({"of": ["status"]}, "goal.of", "one number a run"),
+        ({"at": "high"}, "goal.at", "a finite number"),
+        ({"first_above": 1.0}, "goal", "one of at, first_above, first_below"),
+        ({"find": "first_yield"}, "goal", "is what find = first_yield says"),
+        ({"find": "yield"}, "goal.find", "did you mean first_yield?"),
+    ],
+)
+def test_a_wrong_goal_is_refused_in_one_line(
+    change: dict[str, Any], field: str, allowed: str
+) -> None:
+    with pytest.raises(StudyError) as caught:
+        study(PRESSURE | change)
+    assert caught.value.field.startswith(field)
+    assert allowed in caught.value.allowed
+    assert "\n" not in str(caught.value)
+
+
+def test_what_the_scene_refuses_at_an_end_is_told_before_anything_runs() -> None:
+    goal = {"parameter": "friction", "find": "limit_load", "between": [0.1, 1.0]}
+    with pytest.raises(StudyError, match=r"goal\.between\[1\] = 1\.0: at most 0\.9 in plane"):
+        study(goal, {}, state="plane_strain")
+
+
+@pytest.mark.processes
+@pytest.mark.usefixtures("one_worker")
+def test_the_command_searches_prints_draws_and_keeps(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = tmp_path / "study.toml", tmp_path / "out"
+    file.write_text(
+        'name = "goal"\nscene = "fake"\n[sweep]\nfriction = [0.0, 0.4]\n'
+        '[goal]\nof = "peak_contact_pressure"\nat = 120\nbetween = [0.1, 4.0]\n'
+    )
+    run = ["run", str(file), "--out", str(out), "--workers", "1"]
+    assert main([*run, "--dry-run"]) == 0
+    assert "at most 34" in capsys.readouterr().out
+    assert main(run) == 0
+    told = capsys.readouterr()
+    assert "friction = 0.4, load_ratio = 0.1 (round 1 of at most 5)" in told.err
+    assert "goal: 2 answers (2 ok)" in told.out
+    lines = [line.split() for line in told.out.splitlines()]
+    assert ["0.4", "ok", "0.5"] in [line[:3] for line in lines]
+    assert (next(out.glob("studies/*/load_ratio.png"))).stat().st_size > 10_000
+    assert main(run) == 0
+    assert "0 computed" in capsys.readouterr().out
+    assert main(["show", str(out)]) == 0
+    plot = ["plot", str(out), "--field", "load_ratio", "--out", str(tmp_path / "a.png")]
+    assert main(plot) == 0
+    assert main(["export", str(out), "--vtu", str(tmp_path / "vtu")]) == 2
+    assert "give the file of a run, such as that of run_high" in capsys.readouterr().err
+
+
+def test_a_new_round_begins_while_other_searches_wait(store: Store) -> None:
+    """The runs of the second place are not known when the first has two rounds."""
+    goals = Goals(study(PRESSURE, {"friction": [0.0, 0.1]}), store)
+    asked = goals.paths()
+    paths = [each.path for each in filter(None, (next(asked), next(asked)))]
+    assert next(asked) is None
+    for case in paths[0].cases[:4]:
+        load_ratio = case.values["load_ratio"]
+        scalars = {"peak_contact_pressure": 100.0 * load_ratio + 50.0}
+        row = {"id": case.id, "status": "ok", "scalars": scalars, "parameters": case.values}
+        goals.heard(paths[0].id, row)
+    again = next(asked)
+    assert again is not None
+    assert again.path.cases[0].values["friction"] == 0.0
+    assert 0.632 < again.path.cases[0].values["load_ratio"] < 1.591
+    assert next(asked) is None
+
+
+@pytest.mark.processes
+@pytest.mark.usefixtures("one_worker")
+def test_progress_grows_to_the_end_and_a_stopped_search_says_so(store: Store) -> None:
+    asked = study(PRESSURE, {"friction": [0.0, 0.1, 0.2]})
+    heard: list[StudyEvent] = []
+    outcome = run_study(asked, store, workers=1, on_event=heard.append)
+    assert outcome.ok
+    shares = [event.progress for event in heard]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    stopped = run_study(study(PRESSURE | {"at": 110.0}), store, workers=1, should_stop=lambda: True)
+    assert stopped.stopped
+    assert set(stopped.counts) == {"missing"}
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_killed_search_is_taken_up_and_computes_no_run_twice(tmp_path: Path, scene: str) -> None:
+    marks, out = tmp_path / "marks", tmp_path / "out"
+    marks.mkdir()
+    file = tmp_path / "study.toml"
+    file.write_text(
+        f'name = "goal"\nscene = "{scene}"\n[parameters]\nseconds = 0.4\nmark = "{marks}"\n'
+        "[sweep]\nfriction = [0.0, 0.1, 0.2, 0.3]\n"
+        '[goal]\nof = "peak_contact_pressure"\nat = 120\nbetween = [0.1, 4.0]\n'
+    )
+    command = ["-m", "tests.residua.command", "run", str(file), "--out", str(out), "--workers", "1"]
+    with subprocess.Popen(
+        [sys.executable, *command], cwd=ROOT, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+        start_new_session=True,
+    ) as parent:  # fmt: skip
+        deadline = time.monotonic() + 60.0
+        while len(list(out.glob("runs/*.nc"))) < 8:
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        family = psutil.Process(parent.pid).children(recursive=True)
+        parent.send_signal(signal.SIGKILL)
+    assert psutil.wait_procs(family, timeout=10)[1] == []
+    before = {path.stem for path in out.glob("runs/*.nc")}
+    outcome = run_study(Study.from_toml(file), Store(out), workers=1)
+    assert outcome.ok
+    assert not before & set(outcome.computed)
+    with open_study(out) as dataset:
+        behind = {each for each in dataset["tried_run"].to_numpy().flat if each}
+        assert behind == before | set(outcome.computed)
