@@ -34,6 +34,9 @@ _CREATE_RULESET, _ADD_RULE, _RESTRICT = 444, 445, 446
 _WRITING = (0x1FF2, 0x3FF2, 0x7FF2)
 """Kinds of access that write, of its first three versions: write, remove, make, link, truncate."""
 
+FAILED, CRASHED = errno.EPERM, errno.EFAULT
+"""What is told of a function that raised an error, and of a library that ended the process."""
+
 
 @dataclass(frozen=True, slots=True)
 class Answer:
@@ -42,7 +45,8 @@ class Answer:
     Attributes
     ----------
     text : the value of the function; empty if it has none
-    failed : error number of the system if it was stopped: time, memory or room did not suffice
+    failed : error number of the system if it was stopped: time, memory or room did not suffice; or
+        `CRASHED`, or `FAILED`, see the log
     seconds : processor time that it took
     open : what this system does not let a process give up: ``network``, ``files``
     """
@@ -62,11 +66,6 @@ def alone(function: Callable[..., str], *given: object, folder: Path, seconds: f
     ----------
     folder : where it may write
     seconds : its processor time
-
-    Raises
-    ------
-    RuntimeError
-        if it failed otherwise, see the log
     """
     out, into = os.pipe()
     process = os.fork()
@@ -79,8 +78,8 @@ def alone(function: Callable[..., str], *given: object, folder: Path, seconds: f
     failed = os.waitstatus_to_exitcode(status)
     if failed in (-signal.SIGXCPU, -signal.SIGKILL):
         failed = errno.ETIME
-    if failed not in (0, errno.ETIME, errno.ENOMEM, errno.ENOSPC):
-        raise RuntimeError(f"the process that reads ended with {failed}")
+    elif failed < 0:
+        failed = CRASHED
     return Answer(text, failed, used.ru_utime + used.ru_stime, left)
 
 
@@ -88,8 +87,9 @@ def _answer(
     into: int, function: Callable[..., str], given: tuple[object, ...], folder: Path, seconds: float
 ) -> NoReturn:
     """Write the answer of the function, and end."""
-    status = 1
+    status = FAILED
     try:
+        _let_go(into)
         resource.setrlimit(resource.RLIMIT_CPU, (ceil(seconds), ceil(seconds) + 1))
         tempfile.tempdir = str(folder)
         with os.fdopen(into, "w", encoding="utf-8") as pipe:
@@ -105,6 +105,15 @@ def _answer(
         traceback.print_exc()
     finally:
         os._exit(status)
+
+
+def _let_go(into: int) -> None:
+    """Close all files but a pipe and the log: the standard output speaks to the service."""
+    nothing = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nothing, 0)
+    os.dup2(nothing, 1)
+    os.closerange(3, into)
+    os.closerange(into + 1, os.sysconf("SC_OPEN_MAX"))
 
 
 def _shut_in(folder: Path) -> str:

@@ -53,8 +53,8 @@ def memory(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path("/sys/
     return min(found)
 
 
-BYTES = min(max(memory() // 3, 2**30), 8 * 2**30)
-"""Address space of a process [bytes]: the service and two of them share the memory."""
+BYTES = min(max(memory() // 5, 2**30), 8 * 2**30)
+"""Address space of a process [bytes]: the service and those of two queues share the memory."""
 
 
 class Guarded:
@@ -130,7 +130,10 @@ class Budget:
         self.even: dict[str, float] = {}
 
     def check(self, caller: str) -> None:
-        """Raise `Busy` if a caller has used its budget, with the time to wait."""
+        """Raise `Busy` if a caller has used its budget, with the time to wait.
+
+        A call that begins within the budget may end beyond it; what is beyond is waited for later.
+        """
         wait = self.even.get(caller, 0.0) - time.monotonic() - MINUTE
         if wait >= 0.0:
             used = f"{self.seconds:g} s of processor time in a minute are used"

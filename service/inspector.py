@@ -17,7 +17,7 @@ from typing import Any
 from anyio import CancelScope
 from anyio.to_thread import run_sync as run_in_thread
 
-from service.alone import Answer, alone
+from service.alone import CRASHED, FAILED, Answer, alone
 from service.guarded import Budget, Guarded, beyond
 from service.schemas import KeptScene
 from studies import StudyError
@@ -81,8 +81,12 @@ class Inspector:
         async with self.process.turn():
             self.budget.check(caller)  # others of this caller may have been read meanwhile
             async with _written({**meshes, _FILE: text}) as folder:
-                answer = await self.process.call(inspected, folder, self.seconds, name=_FILE)
-        self.budget.charge(caller, answer.seconds)
+                spent = self.seconds  # if it gives no answer
+                try:
+                    answer = await self.process.call(inspected, folder, spent, name=_FILE)
+                    spent = answer.seconds
+                finally:
+                    self.budget.charge(caller, spent)
         found = self._read(answer)
         if mistakes := found.get("mistakes"):
             raise SceneError(_FILE, [StudyError(*each) for each in mistakes], found["count"])
@@ -95,6 +99,11 @@ class Inspector:
             log.warning("this system does not take from a process that reads: %s", answer.open)
         if answer.failed == errno.ENOSPC:
             raise OSError(errno.ENOSPC, "no room is left for temporary files")
+        if answer.failed == FAILED:
+            raise RuntimeError("a scene could not be read")
+        if answer.failed == CRASHED:
+            allowed = "cannot be read: a library that reads its meshes fails with them"
+            raise StudyError("scene", _FILE, allowed)
         if answer.failed:
             raise beyond("scene", _FILE, self.seconds)
         found: dict[str, Any] = json.loads(answer.text)

@@ -58,7 +58,9 @@ def prepare(settings: Mapping[str, object]) -> str:
     with variables({**settings, **found}):
         try:
             ensure_running()
-        except OSError:  # the name of a socket has at most 107 bytes
+        except OSError as error:
+            if "too long" not in str(error):  # the name of a socket has at most 107 bytes
+                raise
             return "spawn"
     return "forkserver"
 

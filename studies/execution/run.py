@@ -232,8 +232,8 @@ class _Work:
             tasks = self._tasks(proof, lambda: grid.workers if grid else workers)
             if access is None:
                 first = list(islice(tasks, workers))
-                need = 0 if wanted else memory_needed(self.study)
                 count = sum(task is not None for task in first)
+                need = 0 if wanted or count < 2 else memory_needed(self.study)
                 own = own_workers(count, self.limits.memory, need)
                 access = opening.enter_context(own)
                 tasks = chain(first, tasks)

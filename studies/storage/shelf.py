@@ -94,7 +94,7 @@ def kept(directory: Path, scene_id: str) -> Scene | None:
     return _made(directory / "scenes" / scene_id, whole=True)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=16)
 def _described(folder: Path, *states: State | None) -> Scene | None:
     """Return a scene without its meshes, read again when its folder or file has another state."""
     return _made(folder, whole=False) if all(states) else None
@@ -135,11 +135,7 @@ class Index(Database):
             connection.execute(_TABLE)
             known = dict(connection.execute("SELECT id, state FROM shelf").fetchall())
         fresh = [name for name, (state, _) in there.items() if known.get(name) != state]
-        rows = [
-            (name, scene.name, scene.summary, scene.branch, *self._kept(name), there[name][1],
-             json.dumps([*parameters_of(scene)]), there[name][0])
-            for name in fresh if (scene := read(name))
-        ]  # fmt: skip
+        rows = [row for name in fresh if (row := self._row(name, read, *there[name]))]
         gone = known.keys() - there.keys()
         if rows or gone:
             with self.connection("BEGIN IMMEDIATE", "rw") as connection:
@@ -147,6 +143,19 @@ class Index(Database):
                 connection.executemany(
                     f"INSERT OR REPLACE INTO shelf VALUES ({', '.join('?' * 9)})", rows
                 )
+
+    def _row(
+        self, name: str, read: Callable[[str], Scene | None], state: str, added: int
+    ) -> tuple[object, ...] | None:
+        """Return the row of a scene, or None where it is deleted or set aside meanwhile."""
+        try:
+            if (scene := read(name)) is None:
+                return None
+            size, owner = self._kept(name)
+        except (OSError, FileDamaged):
+            return None
+        names = json.dumps([*parameters_of(scene)])
+        return name, scene.name, scene.summary, scene.branch, size, owner, added, names, state
 
     def _kept(self, scene_id: str) -> tuple[int, str]:
         """Return the size of the files of a scene, and its owner."""
