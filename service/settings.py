@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, FilePath, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+from solver.memory import most_kept
 from studies.errors import StudyError
 from studies.execution.cluster import Access
 from studies.execution.estimate import Bounds
@@ -180,7 +181,7 @@ class Settings(BaseSettings):
 def chosen(**given: Any) -> Settings:
     """Return the settings: arguments that are not None, the rest from the environment.
 
-    A `StudyError` names the wrong variable.
+    A `StudyError` or `ModelError` names the wrong variable.
     """
     try:
         settings = Settings(**{name: each for name, each in given.items() if each is not None})
@@ -192,6 +193,7 @@ def chosen(**given: Any) -> Settings:
         raise StudyError(name, first["input"], first["msg"]) from None
     for part in ("limits", "outside_access", "bounds"):
         getattr(settings, part)  # raises errors now, not when a study needs it
+    most_kept()
     return settings
 
 

@@ -13,6 +13,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from solver.memory import most_kept
 from solver.scenes import Scene
 from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
@@ -139,6 +140,8 @@ def run_study(
     ------
     StoreBusy
         when another process computes into the same store
+    ModelError
+        if the environment variable `RESIDUA_KEPT_MEMORY` is not a size
     StudyError
         if the store cannot be written to, the certificates cannot be used, or a script calls this
         outside of ``if __name__ == "__main__":``, so that its workers would call it too
@@ -151,6 +154,7 @@ def run_study(
         computes the rest
     """
     started = time.monotonic()
+    most_kept()
     if not isinstance(study, Study):
         study = Study.from_dict(study, scene)
     stop_requested = False

@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 
 from service import guarded
-from service.alone import alone
+from service.alone import CRASHED, FAILED, alone
 from service.app import create_app
 from service.errors import Busy
 from service.guarded import BYTES, Budget, Guarded, memory
@@ -179,6 +179,21 @@ def spinning() -> str:
         pass
 
 
+def crashing() -> str:
+    os.kill(os.getpid(), signal.SIGSEGV)
+    return ""
+
+
+def failing() -> str:
+    raise ValueError("a fault of this project")
+
+
+def speaking() -> str:
+    """Speak to whoever reads the standard output of the process that was copied."""
+    os.write(1, b"a pickle")
+    return " ".join(str(Path(f"/proc/self/fd/{each}").readlink()) for each in (0, 1))
+
+
 def no_room() -> str:
     raise OSError(errno.ENOSPC, "no room")
 
@@ -210,11 +225,42 @@ def test_time_memory_and_room_of_a_process_that_reads_are_limited(tmp_path: Path
         (spinning, (), errno.ETIME),
         (unpacked, (str(tmp_path / "bomb.vtu"),), errno.ENOMEM),
         (no_room, (), errno.ENOSPC),
+        (crashing, (), CRASHED),
+        (failing, (), FAILED),
     ]
     for function, given, failed in cases:
         answer = alone(function, *given, folder=tmp_path, seconds=1.0)
         assert (answer.failed, answer.text) == (failed, "")
         assert answer.seconds < 2.5
+
+
+def test_a_process_that_reads_has_no_way_to_the_service(tmp_path: Path) -> None:
+    """Its parent answers the service on its standard output."""
+    out, into = os.pipe()
+    before = os.dup(1)
+    os.dup2(into, 1)
+    try:
+        answer = alone(speaking, folder=tmp_path, seconds=5.0)
+    finally:
+        os.dup2(before, 1)
+    for each in (into, before):
+        os.close(each)
+    assert os.read(out, 10) == b""
+    os.close(out)
+    assert answer.text == f"{os.devnull} {os.devnull}"
+
+
+def test_a_reader_that_gives_no_answer_is_charged(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def lost(*_: object, **__: object) -> None:
+        raise Busy("the process that reads a scene has ended: ask again")
+
+    async def post(inspector: Inspector) -> None:
+        monkeypatch.setattr(inspector.process, "call", lost)
+        for words in ("has ended", "has ended|are used", "are used"):
+            with pytest.raises(Busy, match=words):
+                await inspector.inspect(b"", {}, "anna")
+
+    asyncio.run(post(Inspector(1.0)))
 
 
 def test_a_scene_that_takes_too_long_is_told_and_charged(tmp_path: Path) -> None:
