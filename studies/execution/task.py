@@ -189,16 +189,20 @@ def _follow(
         place.hear(row)
         keep(row)
 
-    def values() -> Iterator[float]:
+    def lacking() -> Case | None:
         while wanted := search.wants:
             (case,) = place.runs(wanted[:1]).cases()
             row = store.found(case.id) if store.run_path(case.id).exists() else None
-            if row is not None and place.stands(row):
-                known(row)
-                continue
+            if row is None or not place.stands(row):
+                return case
+            known(row)
+        return None
+
+    def values() -> Iterator[float]:
+        while case := lacking():
             monitor(0.0)
             owed.append(case)
-            yield wanted[0]
+            yield search.wants[0]
 
     reason = NO_RECORD
     try:
@@ -209,8 +213,9 @@ def _follow(
         raise
     except Exception as error:
         reason = _reason(error)
-    if owed:
-        known(store.write_run(owed.popleft(), reason))
+    # a scene may fail before it asks for a value
+    if case := owed.popleft() if owed else lacking():
+        known(store.write_run(case, reason))
 
 
 def _written(store: Store, task: PathTask, case: Case, record: Record) -> dict[str, Any]:

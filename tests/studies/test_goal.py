@@ -8,7 +8,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,14 @@ import psutil
 import pytest
 
 from residua.cli import main
+from solver.results.record import Record
 from studies import Bounds, Store, Study, StudyError, StudyEvent, estimate, open_study, run_study
 from studies.definition.goal import Goal, Search, checked_goal
 from studies.definition.identity import solver_hash
 from studies.execution.goals import Goals, answers
 from studies.execution.task import PathTask, walk
 from tests.studies.conftest import fake_study
-from tests.studies.fakes import FAKE
+from tests.studies.fakes import FAKE, FakeParameters, Followed
 
 ROOT = Path(__file__).parents[2]
 PRESSURE = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}
@@ -33,6 +35,14 @@ SWEEP = {"friction": [0.0, 0.4], "half_width": [20.0, 50.0]}
 
 SCENES = ["fake", "followed"]
 """Scenes of which each round is a path, and of which a path goes on to the end of the search."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unmeshed(Followed):
+    """A scene whose model cannot be built."""
+
+    def follow(self, *_: Any) -> Iterator[Record]:
+        raise ZeroDivisionError("no mesh")
 
 
 def study(goal: dict[str, Any], sweep: Any = None, scene: str = "fake", **fixed: Any) -> Study:
@@ -223,6 +233,19 @@ def test_a_search_without_an_answer_says_why(
     with open_study(store.directory) as dataset:
         assert dataset["status"].item() == status
         assert message in dataset["message"].item()
+
+
+def test_a_path_that_fails_before_its_first_value_ends_its_search(store: Store) -> None:
+    scene = Unmeshed(
+        name="unmeshed", summary="a scene without a mesh", parameters=FakeParameters,
+        branch="load_ratio",
+    )  # fmt: skip
+    content = {"name": "goal", "goal": PRESSURE}
+    computed = search_here(Study.from_dict(content, scene), store)
+    assert len(computed) == 1
+    with open_study(store.directory) as dataset:
+        assert dataset["status"].item() == "error"
+        assert "at load_ratio = 0.1: ZeroDivisionError: no mesh" in dataset["message"].item()
 
 
 def test_a_study_with_a_goal_has_an_id_and_is_read_again() -> None:
