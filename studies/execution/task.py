@@ -155,6 +155,17 @@ def _walk(
     branch = task.scene.branch  # of a scene without one there is a single run
     cases = (case for case in path.cases if case.id not in stored)
     owed: dict[Any, Case] = {case.values.get(branch): case for case in cases}
+    rows, behind = dict(stored), deque(path.cases)
+
+    def ended() -> bool:
+        """Tell the limit of the next runs that are known, in order; return whether one is last."""
+        while task.limit is not None and behind and behind[0].id in rows:
+            if task.limit(rows[behind.popleft().id]):
+                return True
+        return False
+
+    if ended():
+        return
     reason = NO_RECORD
     try:
         if owed:
@@ -164,7 +175,8 @@ def _walk(
                 row = _written(store, task, owed[value], record)
                 del owed[value]
                 keep(row)
-                if task.limit is not None and task.limit(row):
+                rows[row["id"]] = row
+                if ended():
                     return
     except (StopAsked, StoreFull, StudyError):
         raise

@@ -9,7 +9,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ from studies import Bounds, Store, Study, StudyError, StudyEvent, estimate, open
 from studies.definition.goal import Goal, Search, checked_goal
 from studies.definition.identity import solver_hash
 from studies.execution.goals import Goals, answers
+from studies.execution.limits import Limits
+from studies.execution.run import _Work
 from studies.execution.task import PathTask, walk
 from tests.studies.conftest import fake_study
 from tests.studies.fakes import FAKE, FakeParameters, Followed
@@ -246,6 +249,57 @@ def test_a_path_that_fails_before_its_first_value_ends_its_search(store: Store) 
     with open_study(store.directory) as dataset:
         assert dataset["status"].item() == "error"
         assert "at load_ratio = 0.1: ZeroDivisionError: no mesh" in dataset["message"].item()
+
+
+def test_a_run_that_a_dead_worker_wrote_and_did_not_tell_is_kept(store: Store) -> None:
+    """The death is the fault of the run after it."""
+    asked = study(PRESSURE, {}, "followed")
+    goals = Goals(asked, store)
+    first = next(filter(None, goals.paths()))
+    begun = PathTask(
+        asked.problem, (first.path,), store.directory, solver_hash(), place=first.place
+    )
+    silent: list[Any] = []
+    walk(begun, silent.append, lambda: sum("row" in each for each in silent) > 0)
+    low, *others = (each["row"] for each in silent if "row" in each)
+    assert (low["parameters"]["load_ratio"], others) == (0.1, [])
+    work = _Work(asked, store, set(), Limits(), 0, lambda event: None, goals)
+    work._walking[first.path.id] = 0, 0.0
+    work._close(begun, RuntimeError("the worker died"))
+    assert store.run(low["id"]) == low
+    (search,) = goals.searches
+    assert [row["status"] for row in search.rows.values()] == ["ok", "error"]
+    assert search.reason == "failed"
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_run_of_which_a_path_told_nothing_is_asked_for_again(store: Store, scene: str) -> None:
+    goals = Goals(study(PRESSURE, {}, scene), store)
+    paths = goals.paths()
+    lost = next(filter(None, paths)).path
+    assert next(paths) is None
+    goals.closed(lost.id)
+    again = next(paths)
+    assert again is not None
+    assert again.path == lost
+
+
+def test_a_stored_run_beyond_ends_its_path(store: Store) -> None:
+    """So does the first stored run tell whether the number of ``at`` rises."""
+    asked = study(PRESSURE | {"between": [0.2, 3.2]}, {}, half_width=20.0)
+    first = next(filter(None, Goals(asked, store).paths()))
+    cases, whole = first.path.cases, (first.path,)
+    task = PathTask(asked.problem, whole, store.directory, solver_hash(), limit=first.limit)
+    for stored, computed in [({0, 3}, [1, 2]), ({0, 1}, [2, 3]), ({3}, [0, 1, 2])]:
+        for number in stored:
+            some = replace(first.path, cases=(cases[number],))
+            walk(replace(task, paths=(some,), limit=None), lambda row: None, lambda: False)
+        heard: list[Any] = []
+        walk(replace(task, limit=copy(first.limit)), heard.append, lambda: False)
+        rows = [each["row"]["id"] for each in heard if "row" in each]
+        assert rows == [cases[number].id for number in [*sorted(stored), *computed]]
+        for path in store.directory.glob("runs/*.nc"):
+            path.unlink()
 
 
 def test_a_study_with_a_goal_has_an_id_and_is_read_again() -> None:
