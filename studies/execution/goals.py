@@ -11,6 +11,7 @@ from collections import Counter, deque
 from collections.abc import Collection, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
+from itertools import takewhile
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from studies.definition.goal import (
     NEVER,
     NO_EQUILIBRIUM,
     PASSED,
+    REFUSED,
     PathLimit,
     Place,
     Search,
@@ -111,7 +113,9 @@ class Goals:
         number = self._paths[path][0]
         place = self.places[number]
         wanted = self._lacking(number, ()) if place.search.goal.goes_on else []
-        return next(place.runs(wanted[:1]).cases()) if wanted else None
+        if not wanted or place.refusal(wanted[0]):
+            return None
+        return next(place.runs(wanted[:1]).cases())
 
     def closed(self, path: str) -> None:
         """Ask again for runs of which a path that has ended told nothing."""
@@ -131,7 +135,9 @@ class Goals:
     def _go_on(self, number: int) -> None:
         """Take the runs of a search that are in the store, and ask for those that are not."""
         place, waits = self.places[number], self._waits[number]
-        if wanted := self._lacking(number, waits):
+        lacking = self._lacking(number, waits)
+        wanted = list(takewhile(lambda value: not place.refusal(value), lacking))
+        if wanted:
             waits.update(wanted)
             for path in place.runs(wanted).paths():
                 # rounds share the id of a path, and one may begin before the last has ended
@@ -139,6 +145,8 @@ class Goals:
                 name = place.search.goal.parameter
                 self._paths[own.id] = number, [case.values[name] for case in own.cases]
                 self._ready.append(_asked(own, place))
+        elif lacking and lacking[0] == place.search.wants[0]:
+            place.search.refuse(lacking[0], place.refusal(lacking[0]))
 
     def _lacking(self, number: int, waits: Collection[float]) -> list[float]:
         """Take the runs of a search that are in the store; return the values of the others."""
@@ -205,6 +213,11 @@ def _outcome(study: Study, search: Search) -> tuple[str, str]:
         )
     if reason == NEVER:
         return MISSING, f"at {name} = {last:.6g} the goal is not reached{_number(search, last)}"
+    if reason == ALREADY and search.look(first).status in NO_EQUILIBRIUM:
+        row = search.rows[first]
+        return MISSING, f"at {name} = {first:.6g} there is no equilibrium: {_told(row)}"
+    if reason == REFUSED:
+        return ERROR, f"at {name} = {search.high:.6g}: {search.refusal}"
     if reason == ALREADY:
         return MISSING, f"at {name} = {first:.6g} the goal has been passed{_number(search, first)}"
     if reason == FAILED:
@@ -213,6 +226,10 @@ def _outcome(study: Study, search: Search) -> tuple[str, str]:
         lacks = f"its run has no {goal.of}" if status == OK else row["message"]
         return ERROR if status == OK else status, f"at {name} = {search.high:.6g}: {lacks}"
     return MISSING, "stopped before its end"
+
+
+def _told(row: Mapping[str, Any]) -> str:
+    return ": ".join(filter(None, (row["status"], row["message"])))
 
 
 def _number(search: Search, value: float) -> str:

@@ -205,9 +205,12 @@ def _follow(
         while wanted := search.wants:
             (case,) = place.runs(wanted[:1]).cases()
             row = store.found(case.id) if store.run_path(case.id).exists() else None
-            if row is None or not place.stands(row):
+            if row is not None and place.stands(row):
+                known(row)
+            elif refusal := place.refusal(wanted[0]):
+                search.refuse(wanted[0], refusal)  # the study's own search finds the same
+            else:
                 return case
-            known(row)
         return None
 
     def values() -> Iterator[float]:
