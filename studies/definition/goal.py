@@ -24,10 +24,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from solver.errors import ModelError
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.definition.expansion import Expansion
-from studies.definition.parameters import Parameter, parameters_of
+from studies.definition.parameters import Parameter, build, parameters_of
 from studies.definition.spaced import rounded
 from studies.definition.sweep import Axes
 from studies.definition.vocabulary import KEEP, SOLVED
@@ -46,9 +47,11 @@ NO_EQUILIBRIUM = ("limit_load", "not_converged")
 _EQUILIBRIUM = (*SOLVED, "audit_failed")
 """Statuses of runs that are before the limit load, also where their numbers are not good enough."""
 
-PASSED, NEVER, ALREADY, FAILED = "passed", "never", "already", "failed"
+PASSED, NEVER, ALREADY = "passed", "never", "already"
+FAILED, REFUSED = "failed", "refused"
 """Reasons for the end of a search, besides `NO_EQUILIBRIUM`: the number passed the threshold; not
-even the last value is beyond; the first value is beyond; a run has no number."""
+even the last value is beyond; the first value is beyond; a run has no number; the scene refuses a
+value inside the bracket."""
 
 _KEYS = ("parameter", "find", "of", "at", "first_above", "first_below", "within", "between")
 _KINDS = ("at", "first_above", "first_below")
@@ -126,6 +129,16 @@ class Goal:
         more = math.ceil(max(0.0, math.log(width / self.tolerance, self.parts) - 1e-9))
         more += _SLACK if self.kind == "at" and self.parts == 2 else 0
         return 1 + more, first + 1 + more * (self.parts - 1)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names that the data set of the answers has besides those of a run."""
+        own, ends = self.parameter, ("low", "high")
+        tried = (own, self.of or "number", "status", "run")
+        return (
+            own, *(f"{own}_{end}" for end in ends), "runs", *(f"run_{end}" for end in ends),
+            "tried", *(f"tried_{each}" for each in tried),
+        )  # fmt: skip
 
     @property
     def content(self) -> dict[str, Any]:
@@ -216,6 +229,7 @@ class Search:
     reason : why the search has ended; empty until then
     low, high : the bracket; NaN where there is no end yet
     rounds : number of complete rounds
+    refusal : what the scene says of a value that it refuses, which is `high`
     """
 
     goal: Goal
@@ -224,6 +238,7 @@ class Search:
     low: float = math.nan
     high: float = math.nan
     rounds: int = 0
+    refusal: str = ""
     _rising: bool | None = None
     _round: list[float] = field(default_factory=list)
 
@@ -248,6 +263,10 @@ class Search:
         self.rows[value] = row
         while not self.reason and self._round_ends():
             self.rounds += 1
+
+    def refuse(self, value: float, refusal: str) -> None:
+        """End the search, because the scene refuses a value that it wants."""
+        self.high, self.reason, self.refusal = value, REFUSED, refusal
 
     @property
     def found(self) -> float:
@@ -355,6 +374,15 @@ class Place:
         axes: Axes = {self.search.goal.parameter: list(values)}
         return Expansion(self.scene, self.fixed, axes)
 
+    def refusal(self, value: float) -> str:
+        """Return what the scene says of a value that it refuses; empty if it accepts it."""
+        (case,) = self.runs([value]).cases()
+        try:
+            build(case.scene, case.values)
+        except ModelError as error:
+            return str(error)
+        return ""
+
     def stands(self, row: Mapping[str, Any]) -> bool:
         """Whether a run in the store is taken as it is."""
         if row["status"] in SOLVED:
@@ -382,17 +410,20 @@ def checked_goal(content: Any, scene: Scene) -> Goal:
     """
     if not isinstance(content, Mapping):
         raise StudyError("goal", content, "must be a table")
+    if not content:
+        allowed = "is empty: needs between, and find or of with a threshold; or take it out"
+        raise StudyError("goal", {}, allowed)
     for key in content:
         if key not in _KEYS:
             raise StudyError(f"goal.{key}", content[key], one_of(key, _KEYS))
     known = parameters_of(scene)
     name = content.get("parameter", scene.branch)
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         raise StudyError("goal.parameter", name, one_of(name, known))
     given = dict(content)
     if "find" in given:
         found = given.pop("find")
-        if found not in FOUND:
+        if not isinstance(found, str) or found not in FOUND:
             raise StudyError("goal.find", found, one_of(found, FOUND))
         for key in given.keys() & {"of", *_KINDS}:
             raise StudyError(f"goal.{key}", given[key], f"is what find = {found} says: keep one")

@@ -169,13 +169,17 @@ class Study(BaseModel):
         }
         labels = checked_labels(content) | ({"allow": [*scene.allow]} if scene.allow else {})
         own = {"name": name, "scene": name_of(scene), "parameters": parameters, "sweep": axes}
-        if content.get("goal"):
+        if "goal" in content:
             goal = checked_goal(content["goal"], scene)
             other = "parameters" if goal.parameter in fixed else owners(axes).get(goal.parameter)
             if other is not None:
                 where = "parameters" if goal.parameter in fixed else f"sweep.{other}"
                 allowed = f"is what the goal searches: take it out of {where}"
                 raise StudyError("goal.parameter", goal.parameter, allowed)
+            for name, axis in (owners(axes) | {axis: axis for axis in axes}).items():
+                if name in goal.names:
+                    allowed = f"{name} is a variable of the answers of a goal: use another name"
+                    raise StudyError(f"sweep.{axis}", f"{len(axes[axis])} values", allowed)
             own["goal"] = goal.content
         return own | labels
 

@@ -8,9 +8,10 @@ task of one worker, which asks for its runs itself.
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
+from itertools import takewhile
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from studies.definition.goal import (
     NEVER,
     NO_EQUILIBRIUM,
     PASSED,
+    REFUSED,
     PathLimit,
     Place,
     Search,
@@ -69,7 +71,7 @@ class Goals:
             )
             for case in self.cases
         ]
-        self._numbers: dict[str, int] = {}
+        self._paths: dict[str, tuple[int, list[float]]] = {}
         self._waits: list[set[float]] = [set() for _ in self.places]
         self._ready: deque[Asked] = deque()
         for number in range(len(self.places)):
@@ -97,28 +99,33 @@ class Goals:
 
     def heard(self, path: str, row: Mapping[str, Any]) -> None:
         """Tell the search of a loading path of the row of a run."""
-        number = self._numbers[path]
+        number = self._paths[path][0]
         place = self.places[number]
         self._waits[number].discard(row["parameters"][place.search.goal.parameter])
         if place.hear(row) and not place.search.goal.goes_on:
             self._go_on(number)
 
     def owed(self, path: str) -> Case | None:
-        """Return the run that a path which goes on has to compute next; None if it owes none."""
-        place = self.places[self._numbers[path]]
-        wanted = place.search.wants if place.search.goal.goes_on else []
-        return next(place.runs(wanted[:1]).cases()) if wanted else None
+        """Return the run that a path which goes on has to compute next; None if it owes none.
+
+        Runs that it has stored are taken, also those of which it told nothing.
+        """
+        number = self._paths[path][0]
+        place = self.places[number]
+        wanted = self._lacking(number, ()) if place.search.goal.goes_on else []
+        if not wanted or place.refusal(wanted[0]):
+            return None
+        return next(place.runs(wanted[:1]).cases())
 
     def closed(self, path: str) -> None:
         """Ask again for runs of which a path that has ended told nothing."""
-        number = self._numbers[path]
-        if self.places[number].search.goal.goes_on:
-            self._waits[number].clear()
+        number, values = self._paths[path]
+        self._waits[number].difference_update(values)
         self._go_on(number)
 
     def about(self, path: str, row: Mapping[str, Any]) -> str:
         """Return where a run is, and the round of its search, as text."""
-        number = self._numbers[path]
+        number = self._paths[path][0]
         search = self.places[number].search
         name, value = search.goal.parameter, row["parameters"][search.goal.parameter]
         at = [f"{axis} = {each}" for axis, each in self._study.place(self.cases[number]).items()]
@@ -128,18 +135,29 @@ class Goals:
     def _go_on(self, number: int) -> None:
         """Take the runs of a search that are in the store, and ask for those that are not."""
         place, waits = self.places[number], self._waits[number]
+        lacking = self._lacking(number, waits)
+        wanted = list(takewhile(lambda value: not place.refusal(value), lacking))
+        if wanted:
+            waits.update(wanted)
+            for path in place.runs(wanted).paths():
+                # rounds share the id of a path, and one may begin before the last has ended
+                own = replace(path, id=path.cases[0].id)
+                name = place.search.goal.parameter
+                self._paths[own.id] = number, [case.values[name] for case in own.cases]
+                self._ready.append(_asked(own, place))
+        elif lacking and lacking[0] == place.search.wants[0]:
+            place.search.refuse(lacking[0], place.refusal(lacking[0]))
+
+    def _lacking(self, number: int, waits: Collection[float]) -> list[float]:
+        """Take the runs of a search that are in the store; return the values of the others."""
+        place = self.places[number]
         while wanted := [value for value in place.search.wants if value not in waits]:
             runs = place.runs(wanted)
             rows = self._store.sound([case.id for case in runs.cases()])
             stand = [rows[case.id] for case in runs.cases() if case.id in rows]
             if not sum(place.hear(row) for row in stand if place.stands(row)):
-                waits.update(wanted)
-                for path in runs.paths():
-                    # rounds share the id of a path, and one may begin before the last has ended
-                    own = replace(path, id=path.cases[0].id)
-                    self._numbers[own.id] = number
-                    self._ready.append(_asked(own, place))
-                return
+                return wanted
+        return []
 
 
 class Asked(NamedTuple):
@@ -195,6 +213,11 @@ def _outcome(study: Study, search: Search) -> tuple[str, str]:
         )
     if reason == NEVER:
         return MISSING, f"at {name} = {last:.6g} the goal is not reached{_number(search, last)}"
+    if reason == ALREADY and search.look(first).status in NO_EQUILIBRIUM:
+        row = search.rows[first]
+        return MISSING, f"at {name} = {first:.6g} there is no equilibrium: {_told(row)}"
+    if reason == REFUSED:
+        return ERROR, f"at {name} = {search.high:.6g}: {search.refusal}"
     if reason == ALREADY:
         return MISSING, f"at {name} = {first:.6g} the goal has been passed{_number(search, first)}"
     if reason == FAILED:
@@ -203,6 +226,10 @@ def _outcome(study: Study, search: Search) -> tuple[str, str]:
         lacks = f"its run has no {goal.of}" if status == OK else row["message"]
         return ERROR if status == OK else status, f"at {name} = {search.high:.6g}: {lacks}"
     return MISSING, "stopped before its end"
+
+
+def _told(row: Mapping[str, Any]) -> str:
+    return ": ".join(filter(None, (row["status"], row["message"])))
 
 
 def _number(search: Search, value: float) -> str:

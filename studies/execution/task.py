@@ -155,6 +155,17 @@ def _walk(
     branch = task.scene.branch  # of a scene without one there is a single run
     cases = (case for case in path.cases if case.id not in stored)
     owed: dict[Any, Case] = {case.values.get(branch): case for case in cases}
+    rows, behind = dict(stored), deque(path.cases)
+
+    def ended() -> bool:
+        """Tell the limit of the next runs that are known, in order; return whether one is last."""
+        while task.limit is not None and behind and behind[0].id in rows:
+            if task.limit(rows[behind.popleft().id]):
+                return True
+        return False
+
+    if ended():
+        return
     reason = NO_RECORD
     try:
         if owed:
@@ -164,7 +175,8 @@ def _walk(
                 row = _written(store, task, owed[value], record)
                 del owed[value]
                 keep(row)
-                if task.limit is not None and task.limit(row):
+                rows[row["id"]] = row
+                if ended():
                     return
     except (StopAsked, StoreFull, StudyError):
         raise
@@ -189,16 +201,23 @@ def _follow(
         place.hear(row)
         keep(row)
 
-    def values() -> Iterator[float]:
+    def lacking() -> Case | None:
         while wanted := search.wants:
             (case,) = place.runs(wanted[:1]).cases()
             row = store.found(case.id) if store.run_path(case.id).exists() else None
             if row is not None and place.stands(row):
                 known(row)
-                continue
+            elif refusal := place.refusal(wanted[0]):
+                search.refuse(wanted[0], refusal)  # the study's own search finds the same
+            else:
+                return case
+        return None
+
+    def values() -> Iterator[float]:
+        while case := lacking():
             monitor(0.0)
             owed.append(case)
-            yield wanted[0]
+            yield search.wants[0]
 
     reason = NO_RECORD
     try:
@@ -209,8 +228,9 @@ def _follow(
         raise
     except Exception as error:
         reason = _reason(error)
-    if owed:
-        known(store.write_run(owed.popleft(), reason))
+    # a scene may fail before it asks for a value
+    if case := owed.popleft() if owed else lacking():
+        known(store.write_run(case, reason))
 
 
 def _written(store: Store, task: PathTask, case: Case, record: Record) -> dict[str, Any]:

@@ -8,7 +8,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from copy import copy
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +19,17 @@ import psutil
 import pytest
 
 from residua.cli import main
+from solver.errors import ModelError
+from solver.results.record import Record
 from studies import Bounds, Store, Study, StudyError, StudyEvent, estimate, open_study, run_study
 from studies.definition.goal import Goal, Search, checked_goal
 from studies.definition.identity import solver_hash
 from studies.execution.goals import Goals, answers
+from studies.execution.limits import Limits
+from studies.execution.run import _Work
 from studies.execution.task import PathTask, walk
 from tests.studies.conftest import fake_study
-from tests.studies.fakes import FAKE
+from tests.studies.fakes import FAKE, Canned, FakeParameters, Followed, path
 
 ROOT = Path(__file__).parents[2]
 PRESSURE = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}
@@ -33,6 +39,28 @@ SWEEP = {"friction": [0.0, 0.4], "half_width": [20.0, 50.0]}
 
 SCENES = ["fake", "followed"]
 """Scenes of which each round is a path, and of which a path goes on to the end of the search."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gapped(FakeParameters):
+    """Parameters of which some values between others are refused, at one friction."""
+
+    def __post_init__(self) -> None:
+        if self.friction > 0.0 and 1.0 < self.load_ratio < 3.0:
+            raise ModelError("load_ratio", self.load_ratio, "not between 1 and 3")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unmeshed(Followed):
+    """A scene whose model cannot be built."""
+
+    def follow(self, *_: Any) -> Iterator[Record]:
+        raise ZeroDivisionError("no mesh")
+
+
+def alone(parameters: Any, values: Any, monitor: Any) -> Iterator[Record]:
+    """Yield the record of a scene without a branch."""
+    return path(parameters, [parameters.load_ratio], monitor)
 
 
 def study(goal: dict[str, Any], sweep: Any = None, scene: str = "fake", **fixed: Any) -> Study:
@@ -211,6 +239,12 @@ def test_a_goal_may_be_the_limit_load_or_multiply_with_points(store: Store) -> N
         ({"trouble": "bare"}, PRESSURE, "not_converged", "it comes before the goal: increment 3"),
         ({}, PRESSURE | {"at": 1e4}, "missing", "is not reached: peak_contact_pressure = 420"),
         ({}, PRESSURE | {"first_above": 1.0}, "missing", "has been passed"),
+        (
+            {"trouble": "limit"},
+            PRESSURE | {"between": [0.8, 4.0]},
+            "missing",
+            "at load_ratio = 0.8 there is no equilibrium: limit_load: flows at 0.75",
+        ),
         ({}, PRESSURE | {"of": "plastic_work"}, "error", "its run has no plastic_work"),
     ],
 )
@@ -223,6 +257,90 @@ def test_a_search_without_an_answer_says_why(
     with open_study(store.directory) as dataset:
         assert dataset["status"].item() == status
         assert message in dataset["message"].item()
+
+
+def test_a_path_that_fails_before_its_first_value_ends_its_search(store: Store) -> None:
+    scene = Unmeshed(
+        name="unmeshed", summary="a scene without a mesh", parameters=FakeParameters,
+        branch="load_ratio",
+    )  # fmt: skip
+    content = {"name": "goal", "goal": PRESSURE}
+    computed = search_here(Study.from_dict(content, scene), store)
+    assert len(computed) == 1
+    with open_study(store.directory) as dataset:
+        assert dataset["status"].item() == "error"
+        assert "at load_ratio = 0.1: ZeroDivisionError: no mesh" in dataset["message"].item()
+
+
+@pytest.mark.parametrize(
+    ("kind", "branch"),
+    [(Canned, "load_ratio"), (Followed, "load_ratio"), (Canned, "")],
+)
+def test_a_value_that_the_scene_refuses_ends_its_search_alone(
+    store: Store, kind: type[Canned], branch: str
+) -> None:
+    scene = kind(
+        name="gapped", summary="a scene that refuses", parameters=Gapped, branch=branch,
+        records=path if branch else alone,
+    )  # fmt: skip
+    goal = PRESSURE | {"at": 250.0, "parameter": "load_ratio"}
+    sweep = {"friction": [0.0, 0.1]}
+    asked = Study.from_dict({"name": "goal", "goal": goal, "sweep": sweep}, scene)
+    search_here(asked, store)
+    with open_study(store.directory) as dataset:
+        assert dataset["status"].to_numpy().ravel().tolist() == ["ok", "error"]
+        assert "not between 1 and 3" in dataset["message"].to_numpy().ravel()[1]
+
+
+def test_a_run_that_a_dead_worker_wrote_and_did_not_tell_is_kept(store: Store) -> None:
+    """The death is the fault of the run after it."""
+    asked = study(PRESSURE, {}, "followed")
+    goals = Goals(asked, store)
+    first = next(filter(None, goals.paths()))
+    begun = PathTask(
+        asked.problem, (first.path,), store.directory, solver_hash(), place=first.place
+    )
+    silent: list[Any] = []
+    walk(begun, silent.append, lambda: sum("row" in each for each in silent) > 0)
+    low, *others = (each["row"] for each in silent if "row" in each)
+    assert (low["parameters"]["load_ratio"], others) == (0.1, [])
+    work = _Work(asked, store, set(), Limits(), 0, lambda event: None, goals)
+    work._walking[first.path.id] = 0, 0.0
+    work._close(begun, RuntimeError("the worker died"))
+    assert store.run(low["id"]) == low
+    (search,) = goals.searches
+    assert [row["status"] for row in search.rows.values()] == ["ok", "error"]
+    assert search.reason == "failed"
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_run_of_which_a_path_told_nothing_is_asked_for_again(store: Store, scene: str) -> None:
+    goals = Goals(study(PRESSURE, {}, scene), store)
+    paths = goals.paths()
+    lost = next(filter(None, paths)).path
+    assert next(paths) is None
+    goals.closed(lost.id)
+    again = next(paths)
+    assert again is not None
+    assert again.path == lost
+
+
+def test_a_stored_run_beyond_ends_its_path(store: Store) -> None:
+    """So does the first stored run tell whether the number of ``at`` rises."""
+    asked = study(PRESSURE | {"between": [0.2, 3.2]}, {}, half_width=20.0)
+    first = next(filter(None, Goals(asked, store).paths()))
+    cases, whole = first.path.cases, (first.path,)
+    task = PathTask(asked.problem, whole, store.directory, solver_hash(), limit=first.limit)
+    for stored, computed in [({0, 3}, [1, 2]), ({0, 1}, [2, 3]), ({3}, [0, 1, 2])]:
+        for number in stored:
+            some = replace(first.path, cases=(cases[number],))
+            walk(replace(task, paths=(some,), limit=None), lambda row: None, lambda: False)
+        heard: list[Any] = []
+        walk(replace(task, limit=copy(first.limit)), heard.append, lambda: False)
+        rows = [each["row"]["id"] for each in heard if "row" in each]
+        assert rows == [cases[number].id for number in [*sorted(stored), *computed]]
+        for file in store.directory.glob("runs/*.nc"):
+            file.unlink()
 
 
 def test_a_study_with_a_goal_has_an_id_and_is_read_again() -> None:
@@ -265,6 +383,8 @@ def test_the_estimate_is_the_most_that_the_search_may_take(store: Store, scene: 
         ({"first_above": 1.0}, "goal", "one of at, first_above, first_below"),
         ({"find": "first_yield"}, "goal", "is what find = first_yield says"),
         ({"find": "yield"}, "goal.find", "did you mean first_yield?"),
+        ({"find": []}, "goal.find", "must be one of first_yield"),
+        ({"parameter": []}, "goal.parameter", "must be one of load_ratio"),
     ],
 )
 def test_a_wrong_goal_is_refused_in_one_line(
@@ -275,6 +395,25 @@ def test_a_wrong_goal_is_refused_in_one_line(
     assert caught.value.field.startswith(field)
     assert allowed in caught.value.allowed
     assert "\n" not in str(caught.value)
+
+
+def test_an_empty_goal_is_refused() -> None:
+    with pytest.raises(StudyError, match=r"goal = \{\}: is empty: needs between"):
+        study({})
+
+
+def test_an_axis_may_not_have_the_name_of_an_answer(store: Store) -> None:
+    asked = study(PRESSURE, {"friction": [0.0]})
+    search_here(asked, store)
+    assert asked.asks is not None
+    with open_study(store.directory) as dataset:
+        beside = {"status", "message", "friction", "hardening", "half_width"}
+        assert set(dataset.variables) - beside == set(asked.asks.names)
+    axis = {"a": {"friction": 0.0}, "b": {"friction": 0.1}}
+    for name in set(asked.asks.names) - {"load_ratio"}:
+        with pytest.raises(StudyError, match=rf"sweep\.{name} = .* use another name"):
+            study(PRESSURE, {name: axis})
+    study(PRESSURE, {"tribe": axis})
 
 
 def test_what_the_scene_refuses_at_an_end_is_told_before_anything_runs() -> None:
