@@ -7,7 +7,6 @@ import json
 import re
 import stat
 import tomllib
-from contextlib import suppress
 from itertools import accumulate, chain
 from pathlib import Path
 from typing import Any
@@ -21,12 +20,16 @@ LARGEST = 50_000_000
 DEEPEST = 50
 """Largest number of tables and lists inside one another."""
 
+CASE = "case"
+"""Key by which points have names: a coordinate of the data set, never a parameter."""
+
 _TEXT = re.compile(
     r""""{3}(?:\\.|[^\\])*?(?:"{3,5}|\Z)|'{3}.*?(?:'{3,5}|\Z)"""
     r"""|"(?:\\.|[^"\\\n])*+"?|'[^'\n]*+'?|\#[^\n]*+""",
     re.DOTALL,
 )
 _KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
+_DECIMAL_COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _STEP = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
@@ -122,12 +125,13 @@ def _with_table(axis: Any, field: str, folder: Path) -> Any:
     return read_table(folder / axis["file"], f"{field}.file")
 
 
-def read_table(path: Path | str, field: str) -> list[dict[str, Any]]:
+def read_table(path: Path | str, field: str) -> list[dict[str, str]]:
     """Return the rows of a table of text, each by the heading of its columns.
 
     The first line has the headings. Columns are separated by comma, semicolon or tab; after a
     semicolon numbers may have a decimal comma. Lines that begin with ``#`` and empty ones are left
-    out, and so is an empty cell: its row does not have this heading.
+    out, and so is an empty cell: its row does not have this heading. A cell is text: whether it is
+    a number, its parameter decides (`studies.definition.points`).
 
     Raises
     ------
@@ -154,18 +158,15 @@ def read_table(path: Path | str, field: str) -> list[dict[str, Any]]:
             allowed = f"has {len(row)} cells in line {number}, and {len(headings)} headings"
             raise StudyError(field, name, allowed)
     return [
-        {key: _cell(text, delimiter) for key, text in zip(headings, row, strict=True) if text}
+        {key: _cell(key, text, delimiter) for key, text in zip(headings, row, strict=True) if text}
         for row in cells
     ]
 
 
-def _cell(text: str, delimiter: str) -> Any:
-    """Return a cell as a number or truth value, if it is one, or as text."""
-    plain = text.replace(",", ".") if delimiter == ";" else text
-    for read in (int, float, {"true": True, "false": False}.__getitem__):
-        with suppress(ValueError, KeyError):
-            return read(plain)
-    return text
+def _cell(heading: str, text: str, delimiter: str) -> str:
+    """Return a cell; the decimal comma of a number becomes a point, that of a name stays."""
+    number = delimiter == ";" and heading != CASE and _DECIMAL_COMMA.fullmatch(text)
+    return text.replace(",", ".") if number else text
 
 
 def _with_points(value: Any, field: str, folder: Path) -> Any:

@@ -96,6 +96,27 @@ def test_a_file_of_points_may_name_curves(tmp_path: Path) -> None:
     assert worn.values["wheel_profile"][0] == [-40.0, 2.7]
 
 
+def test_words_and_names_in_a_file_of_points_stay_as_they_are_written(tmp_path: Path) -> None:
+    names = ["007", "7", "1.10", "1.1", "1_2", "1e5", "true", "nan"]
+    rows = "".join(f"{name},0.{k + 1}\n" for k, name in enumerate(names))
+    points: Any = from_file(tmp_path, f"case,friction\n{rows}").sweep["point"]
+    assert [each["case"] for each in points] == names
+    points = from_file(tmp_path, "case;friction\n1,10;0,1\n1,1;,2\n").sweep["point"]
+    assert [list(each.values()) for each in points] == [["1,10", 0.1], ["1,1", 0.2]]
+    path = tmp_path / "rail.toml"
+    path.write_text('name = "p"\nscene = "wheel_rail"\n[points]\nfile = "tests.csv"\n')
+    (tmp_path / "tests.csv").write_text("rail_profile,lateral_position\n60e1,-1e0\n60e1,1\n")
+    found: Any = Study.from_toml(path).sweep["point"]
+    words = [(each["rail_profile"], each["lateral_position"]) for each in found]
+    assert words == [("60e1", -1.0), ("60e1", 1.0)]
+
+
+@pytest.mark.parametrize("text", ["1_2", "nan", "0x1", "1e999", "true", "\u0661", "0.1.2"])
+def test_what_is_no_number_in_a_file_is_none(tmp_path: Path, text: str) -> None:
+    with pytest.raises(StudyError, match=rf"points\[0\]\.friction = '{text}': must be .* >= 0"):
+        from_file(tmp_path, f"friction\n{text}\n0.1\n")
+
+
 def test_the_data_set_has_numbers_for_a_dimension_and_parameters_for_coordinates(
     computed: tuple[Study, Store],
 ) -> None:
