@@ -50,6 +50,9 @@ PASSED, NEVER, ALREADY, FAILED = "passed", "never", "already", "failed"
 """Reasons for the end of a search, besides `NO_EQUILIBRIUM`: the number passed the threshold; not
 even the last value is beyond; the first value is beyond; a run has no number."""
 
+STOPPED = "stopped before its end"
+"""Message of a search that has not ended."""
+
 _KEYS = ("parameter", "find", "of", "at", "first_above", "first_below", "within", "between")
 _KINDS = ("at", "first_above", "first_below")
 _PARTS = 4
