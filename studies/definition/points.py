@@ -67,13 +67,14 @@ def described(schema: dict[str, Any]) -> None:
     schema["properties"] |= SCHEMAS
 
 
-def with_points(content: Mapping[str, Any]) -> Any:
+def with_points(content: Mapping[str, Any], known: Mapping[str, Parameter]) -> Any:
     """Return the sweep of a study, in which ``points`` or ``sample`` of the study is an axis.
 
     Raises
     ------
     StudyError
-        if both are given, or the sweep has this axis too
+        if both are given, or the sweep has this axis too; if the sample is wrong, or ``points`` is
+        a table of something else
     """
     sweep = content.get("sweep", {})
     given = [entry for entry in ENTRIES if entry in content]
@@ -84,7 +85,13 @@ def with_points(content: Mapping[str, Any]) -> Any:
         value = content.get(other, sweep.get(POINT))
         allowed = f"{given[0]} is given too: keep one, or give one a name, [sweep.NAME]"
         raise StudyError(other, value, allowed)
-    return {POINT: content[given[0]], **sweep}
+    points = content[given[0]]
+    if given[0] == "sample":
+        points = sampled("sample", points, known, MOST_POINTS)
+    elif isinstance(points, Mapping) and "file" not in points:
+        allowed = "must be a list of points; a sample is [sample], labels are [sweep.NAME]"
+        raise StudyError("points", dict(points), allowed)
+    return {POINT: points, **sweep}
 
 
 def is_points(axis: Any) -> TypeGuard[Points]:
@@ -121,7 +128,7 @@ def checked_points(name: str, content: Any, known: Mapping[str, Parameter]) -> P
     """
     field = field_of(name)
     if isinstance(content, Mapping) and METHOD in content:
-        content = sampled("sample" if name == POINT else field, content, known, MOST_POINTS)
+        content = sampled(f"sweep.{name}", content, known, MOST_POINTS)
     if isinstance(content, Mapping) and "file" in content:
         allowed = "names a file, which only a study file can: give the points themselves"
         raise StudyError(field, dict(content), allowed)

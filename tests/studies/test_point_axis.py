@@ -117,6 +117,15 @@ def test_what_is_no_number_in_a_file_is_none(tmp_path: Path, text: str) -> None:
         from_file(tmp_path, f"friction\n{text}\n0.1\n")
 
 
+def test_lines_without_text_and_indented_remarks_are_no_points(tmp_path: Path) -> None:
+    table = "  # a\n,,\ncase,friction,passes\n , ,\nA.csv,0.1,\n\t# b\nx.txt,0.2,2\n,,\n\n"
+    points = from_file(tmp_path, table).sweep["point"]
+    assert [list(each.values()) for each in points] == [["A.csv", 0.1, 1], ["x.txt", 0.2, 2]]
+    tabs = "case\tfriction\tpasses\nA.csv\t0.1\t\nx.txt\t0.2\t2\n\t0.3\t\n"
+    with pytest.raises(StudyError, match=r"points\[2\]\.case = None: must be given"):
+        from_file(tmp_path, tabs)
+
+
 def test_the_data_set_has_numbers_for_a_dimension_and_parameters_for_coordinates(
     computed: tuple[Study, Store],
 ) -> None:
@@ -204,7 +213,8 @@ def test_points_without_a_value_are_marked_at_the_foot_of_every_panel(store: Sto
     [
         ([], "points", "must be a list of points"),
         ("tests", "points", "must be a list of points"),
-        ({"A": {"friction": 0.1}}, "sweep.point", "give the axis another one"),
+        ({"A": {"friction": 0.1}}, "points", "labels are [sweep.NAME]"),
+        ({"method": "lhs", "num": 2}, "points", "a sample is [sample]"),
         ([{"friction": 0.1}] * 100_001, "points", "must be at most 100000"),
         ([{"friction": 0.1}, 3], "points[1]", "must be a table of parameters"),
         ([{}], "points", "must set a parameter"),
@@ -262,6 +272,10 @@ def test_a_scene_with_named_points_needs_another_name(tmp_path: Path) -> None:
         ("friction\n", "a line for each point"),
         ("friction,friction\n0.1,0.2\n", "has the heading 'friction' twice"),
         ("friction,\n0.1,0.2\n", "a column without heading"),
+        ("", "a line for each point"),
+        (",\n,\n", "a line for each point"),
+        ('friction\n0.1\n"' + "1" * 200_000, "must have cells in line 3: field larger"),
+        ('case,friction\n"A,0.1\nB,0.2\n', "has 1 cells in line 2, and 2 headings"),
         ("# a\nfriction\n\n0.1\n0.1,0.2\n", "has 2 cells in line 5, and 1 headings"),
     ],
 )
