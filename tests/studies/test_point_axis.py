@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 from residua.cli import main
+from solver.scenes import SCENES
 from studies import Store, Study, StudyError, estimate, open_study, to_grid
+from studies.definition.parameters import parameters_of
+from studies.toml import CASE
 from studies.views.picking import one_run
 from studies.views.plots.picture import picture
 from studies.views.tables import runs_table
@@ -235,6 +238,17 @@ def test_points_without_a_value_are_marked_at_the_foot_of_every_panel(store: Sto
 def test_wrong_points_are_refused_with_their_place(points: Any, field: str, allowed: str) -> None:
     error = refused(points)
     assert (error.field, allowed in error.allowed) == (field, True), str(error)
+
+
+@pytest.mark.parametrize("scene", [*SCENES])
+def test_no_parameter_takes_a_table_so_that_a_list_of_tables_is_points(scene: str) -> None:
+    for parameter in parameters_of(SCENES[scene]).values():
+        assert parameter.name != CASE
+        options = parameter.schema.get("anyOf", [parameter.schema])
+        assert all(each.keys() & {"type", "enum", "const"} for each in options), parameter.schema
+        assert "object" not in [each.get("type") for each in options], parameter.name
+        with pytest.raises(StudyError):
+            parameter.normalise({}, parameter.name)
 
 
 def test_a_parameter_is_set_in_one_place() -> None:
