@@ -7,10 +7,11 @@ import time
 from typing import TextIO
 
 from studies.definition.cases import Case
-from studies.definition.points import CASE, is_points
+from studies.definition.points import is_points
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
 from studies.execution.run import StudyEvent
+from studies.toml import CASE
 from studies.views.columns import counted, value_text
 
 _WIDTH = 28

@@ -239,14 +239,14 @@ class Keeper:
         """Return the runs of studies that are not in the queue: those of the command line.
 
         A study that cannot be read, or whose id has changed, cannot be computed again, and needs no
-        run.
+        run. One with a goal needs the runs that its search has asked for (`Store.runs_of`).
         """
         with self.jobs.transaction("BEGIN") as queue:
             known = {row["id"] for row in queue.execute("SELECT id FROM job")}
         needed: set[str] = set()
         for study_id in set(self.store.study_ids()) - known:
             with suppress(FileDamaged, ValueError):
-                needed.update(self.store.study(study_id).run_ids())
+                needed.update(self.store.runs_of(self.store.study(study_id)))
         return needed
 
 

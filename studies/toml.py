@@ -7,7 +7,6 @@ import json
 import re
 import stat
 import tomllib
-from contextlib import suppress
 from itertools import accumulate, chain
 from pathlib import Path
 from typing import Any
@@ -21,12 +20,16 @@ LARGEST = 50_000_000
 DEEPEST = 50
 """Largest number of tables and lists inside one another."""
 
+CASE = "case"
+"""Key by which points have names: a coordinate of the data set, never a parameter."""
+
 _TEXT = re.compile(
     r""""{3}(?:\\.|[^\\])*?(?:"{3,5}|\Z)|'{3}.*?(?:'{3,5}|\Z)"""
     r"""|"(?:\\.|[^"\\\n])*+"?|'[^'\n]*+'?|\#[^\n]*+""",
     re.DOTALL,
 )
 _KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
+_DECIMAL_COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _STEP = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
@@ -122,12 +125,13 @@ def _with_table(axis: Any, field: str, folder: Path) -> Any:
     return read_table(folder / axis["file"], f"{field}.file")
 
 
-def read_table(path: Path | str, field: str) -> list[dict[str, Any]]:
+def read_table(path: Path | str, field: str) -> list[dict[str, str]]:
     """Return the rows of a table of text, each by the heading of its columns.
 
     The first line has the headings. Columns are separated by comma, semicolon or tab; after a
-    semicolon numbers may have a decimal comma. Lines that begin with ``#`` and empty ones are left
-    out, and so is an empty cell: its row does not have this heading.
+    semicolon numbers may have a decimal comma. Lines that begin with ``#`` and those without any
+    text are left out, and so is an empty cell: its row does not have this heading. A cell is text:
+    whether it is a number, its parameter decides (`studies.definition.points`).
 
     Raises
     ------
@@ -139,39 +143,50 @@ def read_table(path: Path | str, field: str) -> list[dict[str, Any]]:
         lines = read_bytes(path, field).decode("utf-8-sig").splitlines()
     except UnicodeDecodeError:
         raise StudyError(field, name, "must be text in UTF-8") from None
-    numbered = [(k, each) for k, each in enumerate(lines, 1) if each.strip() and each[0] != "#"]
-    if len(numbered) < 2:
+    text = [(k, each) for k, each in enumerate(lines, 1) if each.strip() and each.strip()[0] != "#"]
+    delimiter = next((each for each in ";\t" if text and each in text[0][1]), ",")
+    rows = [(k, _cells(each, delimiter, k, field, name)) for k, each in text]
+    (_, headings), *filled = [each for each in rows if any(each[1])] or [(0, [])]
+    if not filled:
         raise StudyError(field, name, "must have a line of headings, and a line for each point")
-    delimiter = next((each for each in ";\t" if each in numbered[0][1]), ",")
-    rows = csv.reader((each for _, each in numbered), delimiter=delimiter, skipinitialspace=True)
-    headings, *cells = ([cell.strip() for cell in row] for row in rows)
     twice = [heading for k, heading in enumerate(headings) if heading in headings[:k]]
     if twice or "" in headings:
         allowed = f"has the heading {twice[0]!r} twice" if twice else "has a column without heading"
         raise StudyError(field, name, allowed)
-    for (number, _), row in zip(numbered[1:], cells, strict=False):
+    for number, row in filled:
         if len(row) != len(headings):
             allowed = f"has {len(row)} cells in line {number}, and {len(headings)} headings"
             raise StudyError(field, name, allowed)
     return [
-        {key: _cell(text, delimiter) for key, text in zip(headings, row, strict=True) if text}
-        for row in cells
+        {key: _cell(key, text, delimiter) for key, text in zip(headings, row, strict=True) if text}
+        for _, row in filled
     ]
 
 
-def _cell(text: str, delimiter: str) -> Any:
-    """Return a cell as a number or truth value, if it is one, or as text."""
-    plain = text.replace(",", ".") if delimiter == ";" else text
-    for read in (int, float, {"true": True, "false": False}.__getitem__):
-        with suppress(ValueError, KeyError):
-            return read(plain)
-    return text
+def _cells(line: str, delimiter: str, number: int, field: str, name: str) -> list[str]:
+    """Return the cells of a line of a table: a cell does not go on in the next line."""
+    try:
+        row = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+    except csv.Error as error:
+        raise StudyError(field, name, f"must have cells in line {number}: {error}") from None
+    return [cell.strip() for cell in row]
+
+
+def _cell(heading: str, text: str, delimiter: str) -> str:
+    """Return a cell; the decimal comma of a number becomes a point, that of a name stays."""
+    number = delimiter == ";" and heading != CASE and _DECIMAL_COMMA.fullmatch(text)
+    return text.replace(",", ".") if number else text
 
 
 def _with_points(value: Any, field: str, folder: Path) -> Any:
-    """Return a value with points in place of names of files."""
+    """Return a value with points in place of names of files; the name of a case is none."""
     if isinstance(value, dict):
-        return {key: _with_points(each, f"{field}.{key}", folder) for key, each in value.items()}
+        return {
+            key: each
+            if key == CASE and isinstance(each, str)
+            else _with_points(each, f"{field}.{key}", folder)
+            for key, each in value.items()
+        }
     if isinstance(value, list):
         return [_with_points(each, f"{field}[{k}]", folder) for k, each in enumerate(value)]
     if not isinstance(value, str) or not value.endswith(_OF_POINTS):

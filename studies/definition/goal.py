@@ -53,6 +53,9 @@ FAILED, REFUSED = "failed", "refused"
 even the last value is beyond; the first value is beyond; a run has no number; the scene refuses a
 value inside the bracket."""
 
+STOPPED = "stopped before its end"
+"""Message of a search that has not ended."""
+
 _KEYS = ("parameter", "find", "of", "at", "first_above", "first_below", "within", "between")
 _KINDS = ("at", "first_above", "first_below")
 _PARTS = 4

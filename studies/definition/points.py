@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, TypeGuard
 
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
 from studies.definition.sampling import METHOD, METHODS, sampled
 from studies.errors import StudyError, nearest
+from studies.toml import CASE
 
 POINT = "point"
 """Name of the axis of the entries ``points`` and ``sample``."""
-CASE = "case"
-"""Key by which points have names: a coordinate of the data set, never a parameter."""
 MOST_POINTS = 100_000
 """Largest number of points of an axis."""
 
@@ -29,7 +29,13 @@ ENTRIES = ("points", "sample")
 """Entries of a study that say what its axis `POINT` is."""
 _HEADING = re.compile(r"(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]*)\]")
 _UNITLESS = ("", "1", "-")
+_NUMBER = re.compile(
+    r"[+-]?(?:[0-9]+(?P<part>\.[0-9]*)?|(?P<dot>\.[0-9]+))(?P<power>[eE][+-]?[0-9]+)?"
+)
 _LONGEST_CASE = 80
+_TRUTH = {"true": True, "false": False}
+_LONGEST_NUMBER = 1000
+"""Largest length of a text that is an integer: Python takes none of many thousand digits."""
 
 
 SCHEMAS = {
@@ -61,13 +67,14 @@ def described(schema: dict[str, Any]) -> None:
     schema["properties"] |= SCHEMAS
 
 
-def with_points(content: Mapping[str, Any]) -> Any:
+def with_points(content: Mapping[str, Any], known: Mapping[str, Parameter]) -> Any:
     """Return the sweep of a study, in which ``points`` or ``sample`` of the study is an axis.
 
     Raises
     ------
     StudyError
-        if both are given, or the sweep has this axis too
+        if both are given, or the sweep has this axis too; if the sample is wrong, or ``points`` is
+        a table of something else
     """
     sweep = content.get("sweep", {})
     given = [entry for entry in ENTRIES if entry in content]
@@ -78,7 +85,13 @@ def with_points(content: Mapping[str, Any]) -> Any:
         value = content.get(other, sweep.get(POINT))
         allowed = f"{given[0]} is given too: keep one, or give one a name, [sweep.NAME]"
         raise StudyError(other, value, allowed)
-    return {POINT: content[given[0]], **sweep}
+    points = content[given[0]]
+    if given[0] == "sample":
+        points = sampled("sample", points, known, MOST_POINTS)
+    elif isinstance(points, Mapping) and "file" not in points:
+        allowed = "must be a list of points; a sample is [sample], labels are [sweep.NAME]"
+        raise StudyError("points", dict(points), allowed)
+    return {POINT: points, **sweep}
 
 
 def is_points(axis: Any) -> TypeGuard[Points]:
@@ -115,7 +128,7 @@ def checked_points(name: str, content: Any, known: Mapping[str, Parameter]) -> P
     """
     field = field_of(name)
     if isinstance(content, Mapping) and METHOD in content:
-        content = sampled("sample" if name == POINT else field, content, known, MOST_POINTS)
+        content = sampled(f"sweep.{name}", content, known, MOST_POINTS)
     if isinstance(content, Mapping) and "file" in content:
         allowed = "names a file, which only a study file can: give the points themselves"
         raise StudyError(field, dict(content), allowed)
@@ -158,8 +171,30 @@ def _point(
         if name in point:
             raise StudyError(f"{field}.{key}", value, f"{name} is given twice")
         own = f"{field}.{name}"
-        point[name] = _case(own, value) if name == CASE else known[name].normalise(value, own)
+        point[name] = _case(own, value) if name == CASE else _value(own, value, known[name])
     return point
+
+
+def _value(field: str, value: Any, parameter: Parameter) -> Any:
+    """Return the value of a parameter, normalised; a cell of a file is a text.
+
+    A text is a number or a truth value if it is written so and the parameter takes it. Other texts
+    are words: ``60e1`` is one of ``rail_profile``, and no number.
+    """
+    if isinstance(value, str) and (plain := _plain(value)) is not None:
+        with suppress(StudyError):
+            return parameter.normalise(plain, field)
+    return parameter.normalise(value, field)
+
+
+def _plain(text: str) -> float | bool | None:
+    """Return the number or truth value that a text is; None if it is a word."""
+    if text in _TRUTH:
+        return _TRUTH[text]
+    if not (number := _NUMBER.fullmatch(text)):
+        return None
+    whole = not any(number.groups()) and len(text) <= _LONGEST_NUMBER
+    return int(text) if whole else float(text)
 
 
 def _parameter(field: str, key: Any, known: Mapping[str, Parameter]) -> str:

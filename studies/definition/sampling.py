@@ -50,7 +50,7 @@ class _Range(NamedTuple):
 
 
 def sampled(
-    field: str, content: Mapping[str, Any], known: Mapping[str, Parameter], most: int
+    field: str, content: Any, known: Mapping[str, Parameter], most: int
 ) -> list[dict[str, Any]]:
     """Return the points of a sample ``{method, num, ranges, seed}``, no two of them equal.
 
@@ -67,11 +67,14 @@ def sampled(
     StudyError
         naming the entry, its value and what is allowed
     """
+    if not isinstance(content, Mapping):
+        allowed = "must be a table {method, num, ranges, seed}; a list of points is `points`"
+        raise StudyError(field, content, allowed)
     for key in content:
         if key not in _KEYS:
             raise StudyError(f"{field}.{key}", content[key], one_of(key, _KEYS))
-    method, seed = content[METHOD], content.get("seed", 0)
-    if method not in METHODS:
+    method, seed = content.get(METHOD), content.get("seed", 0)
+    if not isinstance(method, str) or method not in METHODS:
         raise StudyError(f"{field}.{METHOD}", method, one_of(method, METHODS))
     num = _whole(f"{field}.num", content.get("num"), 1, most)
     _whole(f"{field}.seed", seed, 0, _MOST_SEED)

@@ -151,7 +151,7 @@ class Study(BaseModel):
         context["found"] = scene
         known = parameters_of(scene)
         fixed = checked_table("parameters", content.get("parameters", {}), known)
-        axes = checked_axes(with_points(content), known)
+        axes = checked_axes(with_points(content, known), known)
         if POINT in axes and scene.places and scene.places(build(scene, {})).points:
             allowed = (
                 "the runs of this scene have a dimension of this name, the points of the scene "

@@ -17,7 +17,6 @@ from solver.results.quantities import QUANTITIES
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
 from studies.definition.points import (
-    CASE,
     POINT,
     checked_points,
     describes_points,
@@ -26,6 +25,7 @@ from studies.definition.points import (
 )
 from studies.definition.spaced import spaced
 from studies.errors import StudyError, nearest
+from studies.toml import CASE
 
 MAXIMUM_RUNS = 100_000
 """Largest number of points a sweep may have."""

@@ -25,6 +25,7 @@ from studies.definition.goal import (
     NO_EQUILIBRIUM,
     PASSED,
     REFUSED,
+    STOPPED,
     PathLimit,
     Place,
     Search,
@@ -225,7 +226,7 @@ def _outcome(study: Study, search: Search) -> tuple[str, str]:
         status = study.taken(row["status"])
         lacks = f"its run has no {goal.of}" if status == OK else row["message"]
         return ERROR if status == OK else status, f"at {name} = {search.high:.6g}: {lacks}"
-    return MISSING, "stopped before its end"
+    return MISSING, STOPPED
 
 
 def _told(row: Mapping[str, Any]) -> str:

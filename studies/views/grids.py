@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from studies.definition.points import CASE, POINT
+from studies.definition.points import POINT
 from studies.errors import StudyError, one_of
 from studies.storage.frame import SETS
+from studies.toml import CASE
 
 
 def point_axes(dataset: xr.Dataset) -> list[str]:

@@ -21,6 +21,8 @@ from service.retention import Keeper
 from service.settings import Settings
 from studies import Store, Study
 from tests.service.test_runner import Scripted
+from tests.studies.conftest import compute_here
+from tests.studies.test_goal import search_here
 
 
 class PowerCut(BaseException):
@@ -92,6 +94,25 @@ def test_a_purged_study_takes_only_the_runs_no_other_study_needs(place: Place) -
     assert place.store.dataset_path(by_hand.id).is_file()
     with pytest.raises(NotFound):
         place.keeper().purge(shared.id)
+
+
+@pytest.mark.parametrize("most", [3, 10**6])
+def test_runs_of_a_search_by_the_command_line_are_kept(place: Place, most: int) -> None:
+    """Of a search that has not ended every run of its scene may be one."""
+    goal = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}
+    search = Study.from_dict({"name": "goal", "scene": "fake", "goal": goal})
+    tried = search_here(search, place.store, most)
+    sweep = {"load_ratio": [place.store.run(each)["parameters"]["load_ratio"] for each in tried]}
+    shared = Study.from_dict({"name": "shared", "scene": "fake", "sweep": sweep})
+    assert {*ids(shared)} == {*tried}
+    other = Study.from_dict({"name": "other", "scene": "fake", "sweep": {"load_ratio": [3.9]}})
+    compute_here(other, place.store)
+    for study in (shared, other):
+        place.jobs.accept(study.id, study.to_dict(), ids(study))
+        place.jobs.take()
+        place.jobs.finish(study.id, StudyState.SUCCESSFUL, "")
+        place.keeper().purge(study.id)
+    assert place.runs() == {*tried, *(ids(other) if most == 3 else [])}
 
 
 @pytest.mark.parametrize("end", ["accepted", "running", "stopping"])

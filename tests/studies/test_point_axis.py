@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 from residua.cli import main
+from solver.scenes import SCENES
 from studies import Store, Study, StudyError, estimate, open_study, to_grid
+from studies.definition.parameters import parameters_of
+from studies.toml import CASE
 from studies.views.picking import one_run
 from studies.views.plots.picture import picture
 from studies.views.tables import runs_table
@@ -94,6 +97,36 @@ def test_a_file_of_points_may_name_curves(tmp_path: Path) -> None:
     path.write_text('name = "p"\nscene = "wheel_rail"\n[points]\nfile = "tests.csv"\n')
     _, worn = Study.from_toml(path).cases()
     assert worn.values["wheel_profile"][0] == [-40.0, 2.7]
+
+
+def test_words_and_names_in_a_file_of_points_stay_as_they_are_written(tmp_path: Path) -> None:
+    names = ["007", "7", "1.10", "1.1", "1_2", "1e5", "true", "nan"]
+    rows = "".join(f"{name},0.{k + 1}\n" for k, name in enumerate(names))
+    points: Any = from_file(tmp_path, f"case,friction\n{rows}").sweep["point"]
+    assert [each["case"] for each in points] == names
+    points = from_file(tmp_path, "case;friction\n1,10;0,1\n1,1;,2\n").sweep["point"]
+    assert [list(each.values()) for each in points] == [["1,10", 0.1], ["1,1", 0.2]]
+    path = tmp_path / "rail.toml"
+    path.write_text('name = "p"\nscene = "wheel_rail"\n[points]\nfile = "tests.csv"\n')
+    (tmp_path / "tests.csv").write_text("rail_profile,lateral_position\n60e1,-1e0\n60e1,1\n")
+    found: Any = Study.from_toml(path).sweep["point"]
+    words = [(each["rail_profile"], each["lateral_position"]) for each in found]
+    assert words == [("60e1", -1.0), ("60e1", 1.0)]
+
+
+@pytest.mark.parametrize("text", ["1_2", "nan", "0x1", "1e999", "true", "\u0661", "0.1.2"])
+def test_what_is_no_number_in_a_file_is_none(tmp_path: Path, text: str) -> None:
+    with pytest.raises(StudyError, match=rf"points\[0\]\.friction = '{text}': must be .* >= 0"):
+        from_file(tmp_path, f"friction\n{text}\n0.1\n")
+
+
+def test_lines_without_text_and_indented_remarks_are_no_points(tmp_path: Path) -> None:
+    table = "  # a\n,,\ncase,friction,passes\n , ,\nA.csv,0.1,\n\t# b\nx.txt,0.2,2\n,,\n\n"
+    points = from_file(tmp_path, table).sweep["point"]
+    assert [list(each.values()) for each in points] == [["A.csv", 0.1, 1], ["x.txt", 0.2, 2]]
+    tabs = "case\tfriction\tpasses\nA.csv\t0.1\t\nx.txt\t0.2\t2\n\t0.3\t\n"
+    with pytest.raises(StudyError, match=r"points\[2\]\.case = None: must be given"):
+        from_file(tmp_path, tabs)
 
 
 def test_the_data_set_has_numbers_for_a_dimension_and_parameters_for_coordinates(
@@ -183,7 +216,8 @@ def test_points_without_a_value_are_marked_at_the_foot_of_every_panel(store: Sto
     [
         ([], "points", "must be a list of points"),
         ("tests", "points", "must be a list of points"),
-        ({"A": {"friction": 0.1}}, "sweep.point", "give the axis another one"),
+        ({"A": {"friction": 0.1}}, "points", "labels are [sweep.NAME]"),
+        ({"method": "lhs", "num": 2}, "points", "a sample is [sample]"),
         ([{"friction": 0.1}] * 100_001, "points", "must be at most 100000"),
         ([{"friction": 0.1}, 3], "points[1]", "must be a table of parameters"),
         ([{}], "points", "must set a parameter"),
@@ -204,6 +238,17 @@ def test_points_without_a_value_are_marked_at_the_foot_of_every_panel(store: Sto
 def test_wrong_points_are_refused_with_their_place(points: Any, field: str, allowed: str) -> None:
     error = refused(points)
     assert (error.field, allowed in error.allowed) == (field, True), str(error)
+
+
+@pytest.mark.parametrize("scene", [*SCENES])
+def test_no_parameter_takes_a_table_so_that_a_list_of_tables_is_points(scene: str) -> None:
+    for parameter in parameters_of(SCENES[scene]).values():
+        assert parameter.name != CASE
+        options = parameter.schema.get("anyOf", [parameter.schema])
+        assert all(each.keys() & {"type", "enum", "const"} for each in options), parameter.schema
+        assert "object" not in [each.get("type") for each in options], parameter.name
+        with pytest.raises(StudyError):
+            parameter.normalise({}, parameter.name)
 
 
 def test_a_parameter_is_set_in_one_place() -> None:
@@ -241,6 +286,10 @@ def test_a_scene_with_named_points_needs_another_name(tmp_path: Path) -> None:
         ("friction\n", "a line for each point"),
         ("friction,friction\n0.1,0.2\n", "has the heading 'friction' twice"),
         ("friction,\n0.1,0.2\n", "a column without heading"),
+        ("", "a line for each point"),
+        (",\n,\n", "a line for each point"),
+        ('friction\n0.1\n"' + "1" * 200_000, "must have cells in line 3: field larger"),
+        ('case,friction\n"A,0.1\nB,0.2\n', "has 1 cells in line 2, and 2 headings"),
         ("# a\nfriction\n\n0.1\n0.1,0.2\n", "has 2 cells in line 5, and 1 headings"),
     ],
 )

@@ -109,6 +109,8 @@ def test_a_sample_is_stored_as_its_points_and_has_their_id() -> None:
     [
         ({"method": "latin"}, "sample.method", "must be one of sobol, lhs, halton"),
         ({"method": "sobel"}, "sample.method", "did you mean sobol?"),
+        ({"method": None}, "sample.method", "must be one of sobol, lhs, halton"),
+        ({"method": []}, "sample.method", "must be one of sobol, lhs, halton"),
         ({"num": 0}, "sample.num", "must be an integer >= 1"),
         ({"num": True}, "sample.num", "must be an integer"),
         ({"num": 100_001}, "sample.num", "<= 100000"),
@@ -146,3 +148,11 @@ def test_a_wrong_sample_is_refused_in_one_line(
     assert caught.value.field == field
     assert allowed in caught.value.allowed
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("sample", [[{"friction": 0.1}], "lhs", None])
+def test_what_is_no_table_is_no_sample(sample: Any) -> None:
+    with pytest.raises(StudyError, match=r"sample = .*a list of points is `points`"):
+        study(sample)
+    with pytest.raises(StudyError, match=r"sample\.method = None: must be one of"):
+        study({"num": 4, "ranges": {"friction": [0.0, 0.5]}})
