@@ -114,8 +114,8 @@ def turned(of: np.ndarray) -> np.ndarray:
 
 def cut_short(patch: Patch) -> None:
     """Half of the file is lost, and its checksum vouches for what is left."""
-    packed = runfile._packed
-    patch.setattr(runfile, "_packed", lambda run: packed(run)[: len(packed(run)) // 2])
+    packed = runfile.packed
+    patch.setattr(runfile, "packed", lambda run: packed(run)[: len(packed(run)) // 2])
 
 
 def not_listed(patch: Patch) -> None:
@@ -230,10 +230,10 @@ FILE_FAULTS: dict[str, FileFault] = {
 
 def every_run_is_ok(patch: Patch) -> None:
     """The status word is wrong in each file, that of a broken run too."""
-    packed = runfile._packed
+    packed = runfile.packed
 
     def fault(run: layout.RunContent) -> bytes:
         status = run.variables["status"]._replace(values=np.full((1, 1, 1), "ok"))
         return packed(replace(run, variables={**run.variables, "status": status}))
 
-    patch.setattr(runfile, "_packed", fault)
+    patch.setattr(runfile, "packed", fault)
