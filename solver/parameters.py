@@ -9,7 +9,7 @@ import typing
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import lru_cache
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeGuard
 
 from annotated_types import Ge, Gt, Interval, Le, Lt, Unit
 
@@ -130,8 +130,13 @@ def pairs(name: str, value: Pairs) -> Pairs:
     return value
 
 
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether a value is an integer or a float; true and false are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def _finite(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return is_number(value) and math.isfinite(value)
 
 
 _Bound = tuple[Callable[[float, float], bool], float, str]

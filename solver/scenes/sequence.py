@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from solver.errors import ModelError
+from solver.parameters import is_number
 
 _TIMES = "times"
 _MOST = 1000
@@ -52,7 +53,6 @@ def block_of(
 
 def _times(value: Any) -> int:
     """Return the number of passes of an entry."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or not 1 <= value <= _MOST or value != int(value):
+    if not is_number(value) or not 1 <= value <= _MOST or value != int(value):
         raise ModelError(_TIMES, value, f"must be an integer from 1 to {_MOST}")
     return int(value)

@@ -25,6 +25,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from solver.errors import ModelError
+from solver.parameters import is_number
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.definition.expansion import Expansion
@@ -438,7 +439,7 @@ def checked_goal(content: Any, scene: Scene) -> Goal:
         raise StudyError("goal", dict(content), allowed)
     low, high = _ends(given.get("between"), known[name])
     within = given.get("within", 0.01)
-    if not _is_number(within) or not 1e-6 <= within <= 0.5:
+    if not is_number(within) or not 1e-6 <= within <= 0.5:
         raise StudyError("goal.within", within, "must be a number >= 1e-06 and <= 0.5")
     return Goal(
         parameter=name,
@@ -447,7 +448,7 @@ def checked_goal(content: Any, scene: Scene) -> Goal:
         threshold=_threshold(f"goal.{kinds[0]}", given[kinds[0]], of, scene) if kinds else math.nan,
         within=float(within),
         between=(low, high),
-        whole=isinstance(low, int) and isinstance(high, int) and _is_whole(known[name]),
+        whole=isinstance(low, int) and isinstance(high, int) and known[name].whole,
         branch=name == scene.branch,
         goes_on=name == scene.branch and scene.goes_on,
     )
@@ -456,24 +457,10 @@ def checked_goal(content: Any, scene: Scene) -> Goal:
 def _ends(content: Any, parameter: Parameter) -> tuple[float, float]:
     if not isinstance(content, list | tuple) or len(content) != 2:
         raise StudyError("goal.between", content, "must be [lowest, highest], the first bracket")
-    ends = []
-    for k, value in enumerate(content):
-        normal = parameter.normalise(value, f"goal.between[{k}]")
-        if not _is_number(normal) or not parameter.in_range(parameter.typed(normal)):
-            raise parameter.refusal(f"goal.between[{k}]", value)
-        ends.append(normal)
-    if not ends[0] < ends[1]:
+    low, high = (parameter.number(each, f"goal.between[{k}]") for k, each in enumerate(content))
+    if not low < high:
         raise StudyError("goal.between", content, "must begin with its lowest value")
-    return ends[0], ends[1]
-
-
-def _is_whole(parameter: Parameter) -> bool:
-    kinds = {each.get("type") for each in parameter.schema.get("anyOf", [parameter.schema])}
-    return "integer" in kinds and "number" not in kinds
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return low, high
 
 
 def _threshold(field_: str, value: Any, of: Any, scene: Scene) -> float:
@@ -490,6 +477,6 @@ def _threshold(field_: str, value: Any, of: Any, scene: Scene) -> float:
         if value not in words:
             raise StudyError(field_, value, one_of(value, words))
         return words[value]
-    if not _is_number(value) or not math.isfinite(value):
+    if not is_number(value) or not math.isfinite(value):
         raise StudyError(field_, value, "must be a finite number")
     return float(value)

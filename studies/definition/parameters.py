@@ -18,6 +18,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 from annotated_types import Unit
 from pydantic import TypeAdapter, ValidationError
 
+from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.errors import StudyError
 from studies.scenes.registry import scene_named
@@ -85,6 +86,25 @@ class Parameter:
         except ValidationError:
             return False
         return True
+
+    @property
+    def whole(self) -> bool:
+        """Whether its numbers are integers."""
+        options = self.schema.get("anyOf", [self.schema])
+        return "number" not in {each.get("type") for each in options}
+
+    def number(self, value: Any, field: str) -> float:
+        """Return `value` as a number that is in the declared range.
+
+        Raises
+        ------
+        StudyError
+            naming `field`, when it is none
+        """
+        number = self.normalise(value, field)
+        if not is_number(number) or not self.in_range(self.typed(number)):
+            raise self.refusal(field, value)
+        return number
 
     def refusal(self, field: str, value: Any) -> StudyError:
         """Return the error for a value that is not allowed: it says what is."""

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, TypeGuard
 
+from solver.parameters import is_number
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
 from studies.definition.sampling import METHOD, METHODS, sampled
@@ -215,7 +216,7 @@ def _parameter(field: str, key: Any, known: Mapping[str, Parameter]) -> str:
 
 def _case(field: str, value: Any) -> str:
     """Return the name of a point; a number is text."""
-    text = str(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
+    text = str(value) if is_number(value) else value
     if isinstance(text, str) and text.isprintable() and 0 < len(text) <= _LONGEST_CASE:
         return text
     raise StudyError(field, value, f"must be a text of 1 to {_LONGEST_CASE} letters")

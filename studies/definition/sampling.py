@@ -21,9 +21,10 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from solver.parameters import is_number
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
-from studies.definition.spaced import SPACINGS, rounded
+from studies.definition.spaced import SPACINGS, between, rounded
 from studies.errors import StudyError, nearest, one_of
 
 if TYPE_CHECKING:
@@ -107,7 +108,7 @@ def sampled(
 def _range(field: str, content: Any, parameter: Parameter) -> _Range:
     """Return the range of a parameter."""
     listed = isinstance(content, list | tuple)
-    if listed and content and not any(map(_is_number, content)):
+    if listed and content and not any(map(is_number, content)):
         values = [parameter.normalise(value, f"{field}[{k}]") for k, value in enumerate(content)]
         for k, value in enumerate(values):
             if not parameter.in_range(value):
@@ -130,17 +131,13 @@ def _range(field: str, content: Any, parameter: Parameter) -> _Range:
         raise StudyError(f"{field}.spacing", spacing, one_of(spacing, SPACINGS))
     for key, value in ends.items():
         own = f"{field}.{key}" if isinstance(content, Mapping) else field
-        normal = parameter.normalise(value, own)
-        if not _is_number(normal) or not parameter.in_range(parameter.typed(normal)):
-            raise parameter.refusal(own, value)
-        if spacing == "log" and not normal > 0:
+        ends[key] = parameter.number(value, own)
+        if spacing == "log" and not ends[key] > 0:
             raise StudyError(own, value, "must be > 0 for spacing = log")
-        ends[key] = normal
     start, stop = ends["start"], ends["stop"]
     if not start < stop:
         raise StudyError(field, content, "must begin with its lowest value")
-    kinds = {each.get("type") for each in parameter.schema.get("anyOf", [parameter.schema])}
-    if "number" in kinds:
+    if not parameter.whole:
         return _Range(_spread(start, stop, spacing))
     whole = _spread(start, stop + 1, spacing)  # all integers have the same share, or ratio
     return _Range(lambda share: min(int(whole(share)), stop), stop - start + 1)
@@ -150,15 +147,9 @@ def _spread(start: float, stop: float, spacing: str) -> Callable[[float], float]
     """Return what makes a number between the ends of a share of the way."""
 
     def value(share: float) -> float:
-        log = spacing == "log"
-        found = start * (stop / start) ** share if log else start + (stop - start) * share
-        return min(max(rounded(found), start), stop)
+        return min(max(rounded(between(start, stop, spacing, share)), start), stop)
 
     return value
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _whole(field: str, value: Any, least: int, most: int) -> int:

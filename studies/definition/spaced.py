@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from solver.parameters import is_number
 from studies.errors import StudyError
 
 _KEYS = ("start", "stop", "num")
@@ -41,12 +42,16 @@ def spaced(name: str, content: Mapping[str, Any]) -> list[float]:
         raise StudyError(f"{field}.num", num, f"must be an integer >= 2 and <= {_MOST}")
     start, stop = (_number(f"{field}.{key}", content[key], spacing) for key in ("start", "stop"))
     shares = [k / (num - 1) for k in range(num)]
-    if spacing == "log":
-        found = [start * (stop / start) ** share for share in shares]
-    else:
-        found = [start + (stop - start) * share for share in shares]
+    found = [between(start, stop, spacing, share) for share in shares]
     values = map(rounded, (start, *found[1:-1], stop))
     return [int(value) if value.is_integer() else value for value in values]
+
+
+def between(start: float, stop: float, spacing: str, share: float) -> float:
+    """Return the value at a share of the way, of the difference or (``log``) of the ratio."""
+    if spacing == "log":
+        return float(start * (stop / start) ** share)
+    return start + (stop - start) * share
 
 
 def rounded(value: float) -> float:
@@ -56,7 +61,7 @@ def rounded(value: float) -> float:
 
 def _number(field: str, value: Any, spacing: str) -> float:
     least = "> 0" if spacing == "log" else ""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not is_number(value) or not math.isfinite(value):
         raise StudyError(field, value, f"must be a finite number {least}".strip())
     if spacing == "log" and not value > 0:
         raise StudyError(field, value, "must be > 0 for spacing = log")

@@ -15,7 +15,9 @@ import operator
 import re
 from collections.abc import Callable, Mapping
 from functools import lru_cache
-from typing import Any, TypeGuard
+from typing import Any
+
+from solver.parameters import is_number
 
 LONGEST = 200
 """Largest number of characters of an expression."""
@@ -101,7 +103,7 @@ def evaluated(text: str, values: Mapping[str, Any]) -> Any:
         return _known(whole[1], values)
     try:
         value = _value(_read(text), values)
-        if _is_number(value) and not math.isfinite(value):
+        if is_number(value) and not math.isfinite(value):
             raise ExpressionError("must be a finite number")
     except ExpressionError:
         raise
@@ -175,7 +177,7 @@ def _compared(node: ast.Compare, values: Mapping[str, Any]) -> bool:
     one, other = (_value(each, values) for each in (node.left, node.comparators[0]))
     alike = isinstance(node.ops[0], _EQUALITY) and type(one) is type(other)
     for each in () if alike else (one, other):
-        if not _is_number(each):
+        if not is_number(each):
             raise ExpressionError(f"cannot compare {_shown(one)} and {_shown(other)}")
     return _COMPARISONS[type(node.ops[0])](one, other)
 
@@ -213,13 +215,9 @@ def _number(node: ast.expr, values: Mapping[str, Any]) -> float:
 def _operand(node: ast.expr, values: Mapping[str, Any]) -> float:
     """Return the value of an operand, which must be a number."""
     value = _value(node, values)
-    if _is_number(value):
+    if is_number(value):
         return value
     raise ExpressionError(f"{_text(node)} is {_shown(value)}: only numbers can be computed with")
-
-
-def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _shown(value: object) -> str:

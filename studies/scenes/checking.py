@@ -11,7 +11,7 @@ from typing import Any, get_args
 import numpy as np
 
 from solver.errors import ModelError
-from solver.parameters import Accuracy
+from solver.parameters import Accuracy, is_number
 from solver.results.outputs import Need, outputs
 from solver.results.quantities import QUANTITIES
 from solver.results.requested import of_body
@@ -61,12 +61,11 @@ def wrong_parameters(scene: tables.SceneFile, used: set[str]) -> Iterator[StudyE
         field, default = f"parameters.{name}", each.default
         if default is None:  # see `wrong_accuracies`
             continue
-        number = isinstance(default, int | float) and not isinstance(default, bool)
         if name in QUANTITIES or name in RESERVED:
             yield StudyError(field, name, "a data set has a variable of this name: choose another")
         if iskeyword(name):
             yield StudyError(field, name, "is a word of the language Python: choose another")
-        if number and not -LARGEST <= default <= LARGEST:  # type: ignore[operator]
+        if is_number(default) and not -LARGEST <= default <= LARGEST:
             allowed = f"must be at most {LARGEST:g} in absolute value"
             yield StudyError(f"{field}.default", default, allowed)
         if name not in used and not (scene.accuracy and name == tables.ACCURACY):
@@ -75,7 +74,7 @@ def wrong_parameters(scene: tables.SceneFile, used: set[str]) -> Iterator[StudyE
             allowed = "must be a value; [derived] may have expressions"
             yield StudyError(f"{field}.default", default, allowed)
             continue
-        if each.range is not None and not number:
+        if each.range is not None and not is_number(default):
             yield StudyError(f"{field}.range", each.range, "needs a number as default")
         elif each.range is not None and not each.range[0] <= default <= each.range[1]:  # type: ignore[operator]
             low, high = each.range

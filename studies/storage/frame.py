@@ -12,6 +12,7 @@ import h5netcdf
 import h5py
 import numpy as np
 
+from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.definition.vocabulary import MISSING
@@ -256,6 +257,6 @@ def _absent(name: str, kind: np.dtype[Any]) -> Any:
 def _axis_array(values: Sequence[Any]) -> np.ndarray:
     """Return numbers as numbers, None as NaN, and anything else as text."""
     values = [np.nan if value is None else value for value in values]
-    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+    if all(map(is_number, values)):
         return np.asarray(values)
     return np.array([v if isinstance(v, str) else json.dumps(v) for v in values], dtype=object)
