@@ -198,7 +198,7 @@ class Increment:
                 raise
             if iteration >= _LATE:
                 softest = softer(softest, self.system.parts, step.u, responses)
-            before, found = u, self._search(u, residuals, candidates, step)
+            before, found = u, self._search(u, residuals, candidates, step, error * scale)
             share, u, responses, residuals = found
             crawled = crawled + 1 if share < _SHORT else 0
             moving = share * largest(step.u) > _MOVING * largest(u, self.start.u)
@@ -348,8 +348,12 @@ class Increment:
     # -- 5: line search ------------------------------------------------------------------------
 
     def _search(
-        self, u: Vectors, residuals: Vectors, candidates: Candidates, step: NewtonStep
+        self, u: Vectors, residuals: Vectors, candidates: Candidates, step: NewtonStep, out: float
     ) -> tuple[float, Vectors, tuple[Response, ...], Vectors]:
+        """Return a share of the step, and displacements, responses and residuals after it.
+
+        ``out`` is the norm of the out-of-balance forces before the step [N].
+        """
         trial: tuple[Vectors, tuple[Response, ...], Vectors]
 
         def left(share: float) -> Vectors:
@@ -361,7 +365,6 @@ class Increment:
             return trial[-1]
 
         whole = left(1.0)
-        out = self._unbalanced(residuals, candidates, candidates.forces)
         if self._unbalanced(whole, candidates, step.forces) < _LESS * out:
             return 1.0, *trial
         # if vertices change status, the slope with the contact forces before the step may be

@@ -263,22 +263,26 @@ class PrismField:
         return modes.nodal(self.eigenstress)
 
     @cached_property
+    def forces(self) -> Array:
+        """Forces (n_rows, window) of the tractions, as of `PrismTrack.on_rows` [N/mm]."""
+        assert self.traction is not None
+        return self.prism.on_rows(self.traction)
+
+    @cached_property
     def amplitudes(self) -> Array:
         """Amplitudes (waves, 2, m) of the zone, as of `Modes.solved` [mm]."""
         modes = self.prism.modes
         if self.traction is None:
             return modes.solved(self.nodal)
-        forces = self.prism.on_rows(self.traction)
         if self.eigenstress is None:
-            return modes.moved_by(forces)
-        return modes.solved(self.nodal + modes.pushed(forces))
+            return modes.moved_by(self.forces)
+        return modes.solved(self.nodal + modes.pushed(self.forces))
 
     @property
     def resultants(self) -> Array:
         """Resultants (4,) of the tractions, as of `FarField.resultants`."""
         assert self.prism.far is not None
-        assert self.traction is not None
-        return self.prism.far.resultants(self.prism.on_rows(self.traction))
+        return self.prism.far.resultants(self.forces)
 
     @cached_property
     def displacement(self) -> Array:

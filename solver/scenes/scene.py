@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import tee
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from solver.errors import LimitLoad
@@ -222,23 +222,20 @@ def by_increments(
     from solver.results.samples import Samples
     from solver.results.tractions import tractions_of
 
-    if largest is None:
-        runs = list(runs)
-    last = runs[-1] if isinstance(runs, list) else largest
+    given = list(runs) if largest is None else None
+    last = given[-1] if given is not None else largest
     system = System(scene.model(last))
     samples = Samples(system, scene.view(last))
     tractions = tractions_of(system, symmetric=samples.view.symmetric, axis=samples.view.axis)
-    begun: deque[Any] = deque()
-    if isinstance(runs, list):
-        report = _counted([scene.program(run) for run in runs], monitor)
+    programs: Iterable[Program]
+    if given is not None:
+        runs, bound = given, None
+        programs = listed = [scene.program(run) for run in given]
+        report = _counted(listed, monitor)
     else:
+        runs, asked = tee(runs)
+        bound, programs = scene.program(largest), map(scene.program, asked)
         report = partial(monitor, 0.0)  # how much is still to be asked for is not known
-
-    def programs() -> Iterator[Program]:
-        for run in runs:
-            begun.append(run)
-            yield scene.program(run)
-
     walker = Walker(
         system,
         Control(),
@@ -248,9 +245,7 @@ def by_increments(
         watch=partial(scene.watch, last, samples) if scene.watch else None,
     )
     view = samples.view
-    bound = None if largest is None else scene.program(largest)
-    for outcome in walker.walk(programs(), bound):
-        run = begun.popleft()
+    for outcome, run in zip(walker.walk(programs, bound), runs, strict=True):
 
         def check(outcome: Outcome = outcome) -> Audit:
             loaded, unloaded = outcome.points[view.loaded], outcome.points.get(view.unloaded)
