@@ -128,6 +128,23 @@ def best(options: argparse.Namespace) -> int:
     return OK
 
 
+def sensitivity(options: argparse.Namespace) -> int:
+    """Tell which parameter of a sample matters for a number of its runs, and draw it."""
+    from studies.views import sensitivity as indices
+    from studies.views.reading import open_study
+
+    selection = _selection(options.select)
+    with open_study(options.path) as dataset:
+        found = indices.sensitivity(dataset, options.of, selection, method=options.method)
+        print(indices.sensitivity_table(found))
+        if options.out:
+            from studies.views.plots.sensitivity import sensitivity_figure
+
+            _save(sensitivity_figure(dataset, found, selection), options.out)
+            print(f"wrote {options.out}")
+    return OK
+
+
 def export(options: argparse.Namespace) -> int:
     """Write the fields at the nodes of a run (keep = "fields") as files for ParaView."""
     from solver.errors import ModelError

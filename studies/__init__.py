@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from studies.storage.store import Store
     from studies.views.grids import to_grid
     from studies.views.reading import open_netcdf, open_study
+    from studies.views.sensitivity import sensitivity
     from studies.views.solution import to_xarray
 
 _HOMES = {
@@ -48,6 +49,7 @@ _HOMES = {
     "own_workers": "execution.cluster",
     "run_study": "execution.run",
     "scene_schema": "definition.parameters",
+    "sensitivity": "views.sensitivity",
     "sweep": "execution.function",
     "to_grid": "views.grids",
     "to_xarray": "views.solution",
@@ -76,6 +78,7 @@ __all__ = [
     "own_workers",
     "run_study",
     "scene_schema",
+    "sensitivity",
     "sweep",
     "to_grid",
     "to_xarray",
