@@ -81,16 +81,6 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--lowest", action="store_true", help="the lowest numbers first")
     one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
 
-    one = add("sensitivity", commands.sensitivity)
-    one.add_argument("path", type=_path, metavar="DIR")
-    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
-    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
-    one.add_argument(
-        "--method", default="chaos",
-        help="chaos (default); delta, pawn or rbd_fast, with the library SALib",
-    )  # fmt: skip
-    one.add_argument("--out", type=_path, metavar="PNG", help="draw indices, tornado and runs")
-
     one = add("export", commands.export)
     one.add_argument("path", type=_path, metavar="RUN|DIR")
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
@@ -102,8 +92,8 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
 
-    _add_access(add)
-    _add_remote(add)
+    for more in (_add_inference, _add_access, _add_remote):
+        more(add)
     return whole
 
 
@@ -112,6 +102,18 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
+
+
+def _add_inference(add: Callable[..., argparse.ArgumentParser]) -> None:
+    one = add("sensitivity", commands.sensitivity)
+    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
+    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
+    one.add_argument(
+        "--method", default="chaos",
+        help="chaos (default); delta, pawn or rbd_fast, with the library SALib",
+    )  # fmt: skip
+    one.add_argument("--out", type=_path, metavar="PNG", help="draw indices, tornado and runs")
 
 
 def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:

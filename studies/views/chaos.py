@@ -13,7 +13,8 @@ coefficients.
 References
 ----------
 Blatman, G. and Sudret, B. (2011), Adaptive sparse polynomial chaos expansion based on least angle
-regression, J. Comput. Phys. 230: the hyperbolic set, and the corrected error (eqs. 17, 33).
+regression, J. Comput. Phys. 230: the hyperbolic set, and the corrected error, here for columns
+that are orthogonal.
 Sudret, B. (2008), Global sensitivity analysis using polynomial chaos expansions, Reliab. Eng. Syst.
 Saf. 93: indices from coefficients.
 """
@@ -93,9 +94,7 @@ def _pursued(columns: Numbers, values: Numbers) -> list[int]:
     left, pool = values - values.mean(), columns - columns.mean(axis=0)
     chosen, best, smallest, lever = [0], 1, np.inf, np.full(runs, 1.0 / runs)
     while (count := len(chosen)) < runs - 1:
-        own = columns[:, chosen]
-        more = float(np.trace(np.linalg.pinv(own.T @ own)))
-        error = np.mean((left / (1.0 - lever)) ** 2) * runs / (runs - count) * (1.0 + more)
+        error = np.mean((left / (1.0 - lever)) ** 2) * (runs + count) / (runs - count)
         if error < smallest * (1.0 - 1e-9):
             smallest, best = error, count
         elif count >= best + _PATIENCE:

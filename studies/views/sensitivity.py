@@ -157,7 +157,7 @@ def _sampled(dataset: xr.Dataset, of: str) -> tuple[list[_Scale], Numbers, Numbe
             some = ", ".join(map(str, own[:4]))
             raise StudyError("parameters", name, f"has words: select one of them ({some})")
         if len(own) < _VALUES:
-            allowed = f"has {len(own)} values, too few to tell a line from a curve: {_VALUES} at least"
+            allowed = f"has {len(own)} values: {_VALUES} at least tell a line from a curve"
             raise StudyError("parameters", name, allowed)
     if not varied:
         raise StudyError("parameters", "none", "varies in these runs: a sample is needed")
@@ -249,12 +249,14 @@ def _of_library(method: str, places: Numbers, values: Numbers) -> xr.Dataset:
         "num_vars": count, "names": [str(k) for k in range(count)], "bounds": [[-1.0, 1.0]] * count
     }  # fmt: skip
     analyze = {"delta": delta, "pawn": pawn, "rbd_fast": rbd_fast}[method].analyze
+    more = {"method": "raw"} if method == "delta" else {}
     state = np.random.get_state()  # noqa: NPY002  # the library seeds the generator of all
     try:
-        found = analyze(problem, places, values, seed=0)
+        found = analyze(problem, places, values, seed=1, **more)  # it takes 0 for none
     finally:
         np.random.set_state(state)  # noqa: NPY002
-    numbers = {key: np.asarray(each) for key, each in found.items() if key != "names"}
+    numbers = {key: np.asarray(each) for key, each in found.items()}
+    numbers = {key: each for key, each in numbers.items() if each.dtype.kind == "f"}
     return xr.Dataset({key: ("parameter", each) for key, each in numbers.items()})
 
 
@@ -288,7 +290,8 @@ def sensitivity_table(found: xr.Dataset) -> str:
     if found.attrs["failed"]:
         about += f", and {found.attrs['failed']} without a number"
     if chaos:
-        about += f"; the fit has {found.attrs['terms']} terms and predicts Q2 = {found.attrs['q2']:.3f}"
+        terms, q2 = found.attrs["terms"], found.attrs["q2"]
+        about += f"; the fit has {terms} terms and predicts Q2 = {q2:.3f}"
     return f"{aligned(lines, 1)}\n\n{about}"
 
 

@@ -99,6 +99,7 @@ def _tornado(axes: Axes, found: xr.Dataset, values: xr.DataArray, names: list[st
             axes.text(end[k].item(), k, text, ha=side, va="center", fontsize=7)
     axes.set_yticks(range(len(names)), [""] * len(names))
     axes.invert_yaxis()
+    axes.use_sticky_edges = False
     axes.margins(x=0.2)
     axes.set_xlabel(f"Mean of {short_label(values)}")
     axes.axvline(float(values.mean()), color="0.2", linewidth=0.8)
