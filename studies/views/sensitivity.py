@@ -188,10 +188,9 @@ def _indices(places: Numbers, values: Numbers, unsure: Numbers, of: str) -> xr.D
 
     The ends of the range of each parameter are known to a share of it, ``unsure``.
     """
-    q2, degree, parts = max(
-        (_predicted(places, values, degree) for degree in DEGREES if bears(*places.shape, degree)),
-        key=lambda each: each[0],
-    )
+    borne = [each for each in DEGREES if bears(len(values), places.shape[1], each)]
+    tried = (_predicted(places, values, degree) for degree in borne)
+    q2, degree, parts = max(tried, key=lambda each: each[0])
     if q2 < _PREDICTED:
         allowed = (
             f"is the share of the variance of {of} that a fit to {len(values)} runs predicts, and "
@@ -249,7 +248,7 @@ def _of_library(method: str, places: Numbers, values: Numbers) -> xr.Dataset:
         "num_vars": count, "names": [str(k) for k in range(count)], "bounds": [[-1.0, 1.0]] * count
     }  # fmt: skip
     analyze = {"delta": delta, "pawn": pawn, "rbd_fast": rbd_fast}[method].analyze
-    more = {"method": "raw"} if method == "delta" else {}
+    more = {"method": "delta"} if method == "delta" else {}
     state = np.random.get_state()  # noqa: NPY002  # the library seeds the generator of all
     try:
         found = analyze(problem, places, values, seed=1, **more)  # it takes 0 for none

@@ -42,7 +42,9 @@ def sensitivity_figure(
     bars = 0.32 * len(names) + 1.5
     size = _PANEL[0] * _ABREAST, bars + _PANEL[1] * rows + 0.5
     sheet = Figure(figsize=size, dpi=130, layout="constrained")
-    above, below = sheet.subfigures(2, 1, height_ratios=(bars, _PANEL[1] * rows))
+    above, below = sheet.subfigures(2, 1, squeeze=False, height_ratios=(bars, _PANEL[1] * rows))[
+        :, 0
+    ]
     left, *right = above.subplots(1, 2 if chaos else 1, squeeze=False)[0]
     _indices(left, found, names)
     values = known_values(select(dataset, selection or {}), found.attrs["of"])
