@@ -78,8 +78,9 @@ def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examin
     store = Store(directory)
     study = Study.known(content, partial(_posted, store))
     if study.asks:
-        allowed = "is searched by `residua run`, not by a service: submit the runs themselves"
-        raise StudyError("goal", study.goal, allowed)
+        field, what = ("goal", "searched") if study.goal else ("refine", "refined")
+        allowed = f"is {what} by `residua run`, not by a service: submit the runs themselves"
+        raise StudyError(field, getattr(study, field), allowed)
     bounds.check_size(study)
     runs = list(study.checked().run_ids())
     cost = estimate(study, store)

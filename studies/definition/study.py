@@ -24,7 +24,8 @@ from studies.definition.goal import Goal, checked_goal
 from studies.definition.identity import content_id
 from studies.definition.labels import checked_labels
 from studies.definition.parameters import build, parameters_of
-from studies.definition.points import ENTRIES, POINT, described, with_points
+from studies.definition.points import ENTRIES, POINT, Points, described, with_points
+from studies.definition.refine import Refine, checked_refine
 from studies.definition.sweep import (
     Axes,
     checked_axes,
@@ -59,6 +60,8 @@ class Study(BaseModel):
         includes what the scene allows
     goal : parameter, threshold and bracket of a value that is searched at each place of the axes
         (`studies.definition.goal`); empty if the runs are those of the axes
+    refine : numbers by which runs are chosen within the ranges of the axes, and how closely
+        (`studies.definition.refine`); empty if the runs are those of the axes
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=described)
@@ -72,6 +75,7 @@ class Study(BaseModel):
     keep: Literal["", "fields"] = ""
     allow: list[Literal["large_strain"]] = Field(default_factory=list)
     goal: dict[str, Any] = Field(default_factory=dict)
+    refine: dict[str, Any] = Field(default_factory=dict)
     _problem: Scene = PrivateAttr()
 
     @classmethod
@@ -129,7 +133,7 @@ class Study(BaseModel):
         StudyError
             for the first combination that the scene refuses
         """
-        if self.asks is None:
+        if not isinstance(self.asks, Goal):
             self.expansion.check()
             return self
         ends: Axes = {self.asks.parameter: list(self.asks.between)}
@@ -152,7 +156,11 @@ class Study(BaseModel):
         known = parameters_of(scene)
         fixed = checked_table("parameters", content.get("parameters", {}), known)
         axes = checked_axes(with_points(content, known), known)
-        if POINT in axes and scene.places and scene.places(build(scene, {})).points:
+        own_points = scene.places and scene.places(build(scene, {})).points
+        if "refine" in content and own_points:
+            allowed = "the runs of this scene have a dimension `point`, that of a refinement"
+            raise StudyError("refine", content["refine"], allowed)
+        if POINT in axes and own_points:
             allowed = (
                 "the runs of this scene have a dimension of this name, the points of the scene "
                 "file: give the points of the study another one, [sweep.NAME]"
@@ -181,6 +189,11 @@ class Study(BaseModel):
                     allowed = f"{name} is a variable of the answers of a goal: use another name"
                     raise StudyError(f"sweep.{axis}", f"{len(axes[axis])} values", allowed)
             own["goal"] = goal.content
+        if "refine" in content:
+            if "goal" in content:
+                allowed = "chooses the runs, and so does the goal: keep one"
+                raise StudyError("refine", content["refine"], allowed)
+            own["refine"] = checked_refine(content["refine"], scene, axes).content
         return own | labels
 
     def model_post_init(self, context: Any) -> None:
@@ -193,13 +206,18 @@ class Study(BaseModel):
         return self._problem
 
     @cached_property
-    def asks(self) -> Goal | None:
-        """What is searched at each place of the axes, if the study has a goal."""
+    def asks(self) -> Goal | Refine | None:
+        """What chooses the runs by the outcomes of others: a goal at each place, or a refinement."""
+        if self.refine:
+            return checked_refine(self.refine, self.problem, self.sweep)
         return checked_goal(self.goal, self.problem) if self.goal else None
 
     @cached_property
     def expansion(self) -> Expansion:
-        """The runs, built when they are requested; of a goal the places of the axes."""
+        """The runs, built when they are requested; of a goal the places of the axes.
+
+        Of a refinement they are corners of its cells.
+        """
         return Expansion(self.problem, self.parameters, self.sweep)
 
     @cached_property
@@ -216,14 +234,17 @@ class Study(BaseModel):
         }
         source = self.expansion.source
         labels = checked_labels(self.model_dump(include={"note", "tags", "keep", "allow"}))
-        beside = [each for each in (labels, self.goal) if each]
+        beside = [each for each in (labels, self.goal, self.refine) if each]
         return content_id("study", self.name, self.scene, self.fixed, axes, source, *beside)
 
     @property
     def fixed(self) -> dict[str, Any]:
         """All parameters that are not swept, the scene's defaults included."""
         known = parameters_of(self.problem)
-        swept = owners(self.sweep) | ({self.asks.parameter: ""} if self.asks else {})
+        swept = {
+            *owners(self.sweep),
+            *([self.asks.parameter] if isinstance(self.asks, Goal) else []),
+        }
         defaults = {name: p.default for name, p in known.items() if name not in swept}
         return defaults | self.parameters
 
@@ -239,20 +260,23 @@ class Study(BaseModel):
 
     @property
     def size(self) -> int:
-        """Number of runs; of a study with a goal the largest possible one."""
+        """Number of runs; of a study that chooses them the largest possible one."""
+        if isinstance(self.asks, Refine):
+            return self.asks.most
         return self.expansion.size * (self.asks.most[1] if self.asks else 1)
 
     def run_ids(self) -> Iterator[str]:
         """Yield the ids of the runs, in the order of `cases`, without building the cases.
 
-        Those of a study with a goal are not known: there are none.
+        Those of a study that chooses its runs are not known: there are none.
         """
         return iter(()) if self.asks else self.expansion.run_ids()
 
     def cases(self) -> Iterator[Case]:
         """Yield the runs of the study, the last axis fastest; none is kept in memory.
 
-        Those of a study with a goal have the default of its parameter: they tell the places.
+        Those of a study with a goal have the default of its parameter: they tell the places. Those
+        of a refinement are corners of its cells.
         """
         return self.expansion.cases()
 
@@ -268,6 +292,14 @@ class Study(BaseModel):
     def paths(self) -> Iterator[LoadingPath]:
         """Yield the loading paths of the study: the cases that one task computes together."""
         return self.expansion.paths()
+
+    def with_points(self, points: Points) -> Self:
+        """Return this study with other runs under its id: those that it has chosen."""
+        content = self.to_dict() | {"sweep": {POINT: points}}
+        del content["refine"]
+        chosen = self.known(content, lambda name: self.problem)
+        chosen.__dict__["id"] = self.id
+        return chosen
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `from_dict` reads."""

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from studies.definition.goal import Goal
+from studies.definition.refine import Refine
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError
@@ -64,7 +66,8 @@ def report(study: Study, store: Store, outcome: StudyOutcome) -> Report:
 
     with open_study(outcome.dataset) as dataset:
         text = _text(study, outcome, dataset)
-        drawn = _found(study.asks.parameter, dataset) if study.asks else _drawn(dataset)
+        field = _one_value(study.asks)
+        drawn = _found(field, dataset) if field else _drawn(dataset)
         files = made.write(_NAME, of, {_TEXT: text.encode(), **drawn})
     return Report(text, files, anew=True)
 
@@ -72,7 +75,7 @@ def report(study: Study, store: Store, outcome: StudyOutcome) -> Report:
 def _text(study: Study, outcome: StudyOutcome, dataset: xr.Dataset) -> str:
     from studies.views.tables import messages, runs_table
 
-    size, what = dataset["status"].size, "answers" if study.asks else "runs"
+    size, what = dataset["status"].size, "answers" if study.goal else "runs"
     table = runs_table(dataset) + "\n" if size <= SHOWN else ""
     counts = ", ".join(f"{number} {status}" for status, number in outcome.counts.items())
     ended = f"{study.name}: {size} {what} ({counts}{_warned(dataset)})"
@@ -101,6 +104,13 @@ def _drawn(dataset: xr.Dataset) -> dict[str, bytes]:
     except StudyError:
         return {}
     return {f"{field}_xx.png": _png(drawn)}
+
+
+def _one_value(asks: Goal | Refine | None) -> str:
+    """Return what a study is asked for that has one value a place; empty if it is nothing."""
+    if asks is None:
+        return ""
+    return asks.parameter if isinstance(asks, Goal) else asks.of[0]
 
 
 def _found(parameter: str, dataset: xr.Dataset) -> dict[str, bytes]:
