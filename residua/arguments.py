@@ -24,25 +24,13 @@ def parser() -> argparse.ArgumentParser:
         one.set_defaults(command=command, **defaults)
         return one
 
-    one = add("run", commands.run)
-    one.add_argument("study", type=_path, metavar="STUDY.toml")
-    one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
-    one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one per core)")
-    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
-    for name, what in (("ca", "authority"), ("cert", "own certificate"), ("key", "own key")):
-        one.add_argument(f"--tls-{name}", metavar="PEM", help=f"{what} for a tls:// scheduler")
+    _add_run(add("run", commands.run))
+    one = add("fit", commands.fit)
     one.add_argument(
-        "--stall-seconds", type=float, metavar="S", default=Limits().stall_seconds,
-        help="end a path after this time without progress (default: %(default)g)",
+        "--measured", type=_path, nargs="+", default=[], metavar="CSV",
+        help="measured lines: columns PLACE and VALUE, named as variables of the runs, and sigma",
     )  # fmt: skip
-    one.add_argument("--path-seconds", type=float, metavar="S", help="end a path after this time")
-    one.add_argument("--memory", metavar="SIZE", help="largest memory of a process, such as 2GB")
-    one.add_argument(
-        "--patience", type=float, metavar="S",
-        help="end after this time without a worker that accepts tasks (default: wait)",
-    )  # fmt: skip
-    one.add_argument("--resume", action="store_true", help="do not try failed runs again")
-    one.add_argument("--dry-run", action="store_true", help="print the estimated cost, and end")
+    _add_run(one)
 
     one = add("scenes", commands.scenes)
     one.add_argument("name", nargs="?")
@@ -102,6 +90,27 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
+
+
+def _add_run(one: argparse.ArgumentParser) -> None:
+    one.add_argument("study", type=_path, metavar="STUDY.toml")
+    one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
+    one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one per core)")
+    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
+    for name, what in (("ca", "authority"), ("cert", "own certificate"), ("key", "own key")):
+        one.add_argument(f"--tls-{name}", metavar="PEM", help=f"{what} for a tls:// scheduler")
+    one.add_argument(
+        "--stall-seconds", type=float, metavar="S", default=Limits().stall_seconds,
+        help="end a path after this time without progress (default: %(default)g)",
+    )  # fmt: skip
+    one.add_argument("--path-seconds", type=float, metavar="S", help="end a path after this time")
+    one.add_argument("--memory", metavar="SIZE", help="largest memory of a process, such as 2GB")
+    one.add_argument(
+        "--patience", type=float, metavar="S",
+        help="end after this time without a worker that accepts tasks (default: wait)",
+    )  # fmt: skip
+    one.add_argument("--resume", action="store_true", help="do not try failed runs again")
+    one.add_argument("--dry-run", action="store_true", help="print the estimated cost, and end")
 
 
 def _add_inference(add: Callable[..., argparse.ArgumentParser]) -> None:

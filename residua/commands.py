@@ -34,7 +34,8 @@ def run(options: argparse.Namespace) -> int:
     access = options.scheduler and Access(
         options.scheduler, options.tls_ca, options.tls_cert, options.tls_key
     )
-    study, store = Study.from_toml(options.study), Store(options.out)
+    measured = getattr(options, "measured", ())
+    study, store = Study.from_toml(options.study, measured), Store(options.out)
     if options.dry_run:
         print(dry_run(study, store))
         return OK
@@ -69,6 +70,11 @@ def run(options: argparse.Namespace) -> int:
     if outcome.stopped:
         return INTERRUPTED
     return OK if outcome.ok else FAILED
+
+
+def fit(options: argparse.Namespace) -> int:
+    """Find the parameters with which runs come closest to what was measured."""
+    return run(options)
 
 
 def scenes(options: argparse.Namespace) -> int:

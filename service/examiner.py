@@ -78,7 +78,8 @@ def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examin
     store = Store(directory)
     study = Study.known(content, partial(_posted, store))
     if study.asks:
-        field, what = ("goal", "searched") if study.goal else ("refine", "refined")
+        fields = {"goal": "searched", "refine": "refined", "fit": "fitted"}
+        field, what = next(each for each in fields.items() if getattr(study, each[0]))
         allowed = f"is {what} by `residua run`, not by a service: submit the runs themselves"
         raise StudyError(field, getattr(study, field), allowed)
     bounds.check_size(study)

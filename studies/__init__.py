@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
     from studies.storage.store import Store
+    from studies.views.fits import fit
     from studies.views.grids import to_grid
     from studies.views.reading import open_netcdf, open_study
     from studies.views.sensitivity import sensitivity
@@ -44,6 +45,7 @@ _HOMES = {
     "StudyEvent": "execution.run",
     "StudyOutcome": "execution.run",
     "estimate": "execution.estimate",
+    "fit": "views.fits",
     "open_netcdf": "views.reading",
     "open_study": "views.reading",
     "own_workers": "execution.cluster",
@@ -73,6 +75,7 @@ __all__ = [
     "StudyEvent",
     "StudyOutcome",
     "estimate",
+    "fit",
     "open_netcdf",
     "open_study",
     "own_workers",

@@ -84,7 +84,7 @@ def fitted(places: Numbers, values: Numbers, degree: int) -> Chaos:
     degrees = candidates(places.shape[1], degree)
     columns = _products(places, degrees)
     chosen = _pursued(columns, values)
-    coefficients: Numbers = np.linalg.lstsq(columns[:, chosen], values, rcond=None)[0]
+    coefficients = np.linalg.lstsq(columns[:, chosen], values, rcond=None)[0].astype(np.float64)
     return Chaos(degrees[chosen], coefficients)
 
 

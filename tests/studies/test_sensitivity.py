@@ -219,7 +219,7 @@ def test_one_value_of_words_may_be_selected() -> None:
 @pytest.mark.parametrize("method", ["delta", "pawn", "rbd_fast"])
 def test_methods_of_the_library_order_the_parameters_too(method: str) -> None:
     pytest.importorskip("SALib", reason="the extra `sensitivity` is not installed")
-    dataset = runs_of(sample(128))
+    dataset = runs_of(sample(256))
     before = np.random.get_state()[2]  # noqa: NPY002
     found = sensitivity(dataset, OF, method=method)
     assert np.random.get_state()[2] == before  # noqa: NPY002
