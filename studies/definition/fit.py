@@ -95,7 +95,7 @@ class Fit:
 
     free: Mapping[str, Free]
     measured: list[Measured]
-    step: float = 0.01
+    step: float = 0.04
     most: int = 100
 
     @property
