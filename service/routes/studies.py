@@ -45,6 +45,8 @@ EXAMPLE = {
 }
 
 PRIORITIES = range(-100, 101)
+MOST_FITTED = 1000
+"""Largest number of runs to which a request may fit polynomials, which takes seconds."""
 
 SUBMISSION = Study.model_json_schema() | {"examples": [EXAMPLE]}
 SUBMISSION["properties"]["priority"] = {
@@ -150,6 +152,28 @@ async def events(
         if now and now.status.final:
             return
         await asyncio.sleep(settings.poll_seconds)
+
+
+@router.get("/{study_id}/sensitivity", responses=REFUSED)
+def tell_sensitivity(job: TheJob, store: TheStore, of: str) -> dict[str, Any]:
+    """Tell which parameter matters for a number of the runs: indices of sensitivity.
+
+    Of `parameters` each has `first` and `total`, the share of the variance of `of` that it makes
+    alone, and with others, and how well they are known. A sample that does not bear it is refused
+    with the reason.
+    """
+    from studies import open_netcdf, sensitivity  # xarray takes half a second to import
+    from studies.views.sensitivity import told
+
+    try:
+        path = store.dataset(job.id)
+    except FileDamaged:
+        raise NotFound(f"no data set yet: the study is {job.state}") from None
+    with open_netcdf(path) as dataset:
+        if (size := dataset["status"].size) > MOST_FITTED:
+            allowed = f"at most {MOST_FITTED} are fitted here: fetch the data set, and fit it there"
+            raise StudyError("runs", size, allowed)
+        return told(sensitivity(dataset, of))
 
 
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)

@@ -43,7 +43,7 @@ FOUND, MOST, FAILED = "found", "most", "failed"
 _KEYS = ("measured", "ranges", "first", "step", "most")
 _DIGITS = 6
 """Digits of a share of the range: runs are asked for at these places."""
-_TOLERANCE = 1e-4
+_TOLERANCE = 1e-3
 """Least change of the sum of squares, as a share of it, and of the shares of the ranges."""
 _CONDITION = 30.0
 """Condition index from which parameters cannot be told apart (reference, section 3.2)."""
