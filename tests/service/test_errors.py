@@ -213,7 +213,7 @@ def test_an_id_of_another_form_is_refused(service: Server, kind: str, name: str)
         f"/studies/{UNKNOWN}",
         f"/studies/{UNKNOWN}/dataset.nc",
         f"/studies/{UNKNOWN}/events",
-        f"/studies/{UNKNOWN}/sensitivity?of=runs",
+        f"/studies/{UNKNOWN}/sensitivity",
         f"/runs/{UNKNOWN}",
         f"/runs/{UNKNOWN}.nc",
         f"/runs/{UNKNOWN}/map.png",
