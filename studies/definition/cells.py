@@ -105,8 +105,8 @@ def edges(low: Point, high: Point) -> Iterator[Edge]:
             continue
         sides = [*zip(low, high, strict=True)]
         for at in itertools.product(*sides[:axis], (half,), *sides[axis + 1 :]):
-            ends = ((*at[:axis], end, *at[axis + 1 :]) for end in (first, last))
-            yield Edge(axis, *ends, at)
+            start, end = ((*at[:axis], each, *at[axis + 1 :]) for each in (first, last))
+            yield Edge(axis, start, end, at)
 
 
 def weights(low: Point, high: Point, at: Point) -> dict[Point, float]:

@@ -3,8 +3,8 @@
 The values of the axes that are numbers divide their ranges into cells; each combination of values
 on the other axes is a branch, which has cells of its own. In the first round the runs at the
 corners of all cells, at the middles of their edges and at their centres are computed. A cell is
-halved along each axis on whose edges a run in the middle missed what the two ends predict by more
-than is allowed; a cell of the sweep along all axes if the run at its centre missed so much. Where
+halved along the axis on whose edges a run in the middle missed most what the two ends predict, if
+by more than is allowed; a cell of the sweep along all axes if the run at its centre did so. Where
 some runs of a cell failed and others did not, it is halved along the axes on whose edges this
 changes. The parts ask for the runs at the middles of their edges, and so on. A cell is halved along
 an axis only so often: kinks, jumps and edges of regions of failed runs are resolved to this size.
@@ -38,6 +38,8 @@ STATES = SETTLED, FAILED, SMALLEST, MOST, OPEN = "settled", "failed", "smallest"
 as is allowed; or no runs were left; or the refinement was stopped."""
 
 _KEYS = ("of", "until", "most", "halvings")
+_UNTIL, _MOST, _HALVINGS = 0.02, 200, 5
+"""Entries that are left out."""
 _MOST_AXES, _MOST_HALVINGS = 4, 20
 _LEAST, _USUAL = 0.25, 0.5
 """Part of the miss on an edge that is left when it is halved: of smooth numbers; of a kink, and if
@@ -59,9 +61,9 @@ class Refine:
     """
 
     of: tuple[str, ...]
-    until: float | Mapping[str, float] = 0.02
-    most: int = 200
-    halvings: int = 5
+    until: float | Mapping[str, float]
+    most: int
+    halvings: int
     axes: Mapping[str, Sequence[float]]
 
     @property
@@ -296,7 +298,9 @@ class Refinement:
         else:
             misses = _misses(cell, there)
             ratios = [self._ratio(each) for each in misses]
-            miss, axes = max(ratios), {axis for axis in every if ratios[axis] > 1.0}
+            worst = sorted(every, key=lambda axis: -ratios[axis])
+            free = [k for k in worst if ratios[k] > 1.0 and cell.divisible(k, self.refine.halvings)]
+            miss, axes = max(ratios), set(free[:1]) or {k for k in worst if ratios[k] > 1.0}
             if not any(cell.halved) and not axes:
                 miss = self._ratio(_off(cell, there, cell.centre, there[cell.centre]))
                 axes = every if miss > 1.0 else axes
@@ -452,9 +456,9 @@ def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
     if not 1 <= len(numbers) <= _MOST_AXES or any(len(each) < 2 for each in numbers.values()):
         allowed = f"needs 1 to {_MOST_AXES} axes of two numbers or more: the ends of their ranges"
         raise StudyError("refine", dict(content), allowed)
-    until = _until(content.get("until", Refine.until), list(names))
-    most = _whole("most", content.get("most", Refine.most), MAXIMUM_RUNS)
-    halvings = _whole("halvings", content.get("halvings", Refine.halvings), _MOST_HALVINGS)
+    until = _until(content.get("until", _UNTIL), list(names))
+    most = _whole("most", content.get("most", _MOST), MAXIMUM_RUNS)
+    halvings = _whole("halvings", content.get("halvings", _HALVINGS), _MOST_HALVINGS)
     found = Refine(of=tuple(names), until=until, most=most, halvings=halvings, axes=numbers)
     others = math.prod(len(values) for name, values in axes.items() if name not in numbers)
     if found.first(others) > most:

@@ -207,7 +207,7 @@ class Study(BaseModel):
 
     @cached_property
     def asks(self) -> Goal | Refine | None:
-        """What chooses the runs by the outcomes of others: a goal at each place, or a refinement."""
+        """What chooses the runs by the outcomes of others: a goal, or a refinement."""
         if self.refine:
             return checked_refine(self.refine, self.problem, self.sweep)
         return checked_goal(self.goal, self.problem) if self.goal else None
