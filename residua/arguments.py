@@ -81,6 +81,16 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--lowest", action="store_true", help="the lowest numbers first")
     one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
 
+    one = add("predict", commands.predict)
+    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("at", nargs="+", metavar="NAME=VALUE", help="each parameter that varies")
+    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
+    one.add_argument("--by", choices=["cells", "gaussian"], help="default: cells, if it has any")
+    one.add_argument("--within", type=float, metavar="E", help="largest error that is enough")
+    one.add_argument(
+        "--compute", action="store_true", help="compute the run there if the error is larger"
+    )
+
     one = add("export", commands.export)
     one.add_argument("path", type=_path, metavar="RUN|DIR")
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")

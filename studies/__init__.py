@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
     from studies.storage.store import Store
     from studies.views.grids import to_grid
+    from studies.views.predict import predict
     from studies.views.reading import open_netcdf, open_study
     from studies.views.solution import to_xarray
 
@@ -46,6 +47,7 @@ _HOMES = {
     "open_netcdf": "views.reading",
     "open_study": "views.reading",
     "own_workers": "execution.cluster",
+    "predict": "views.predict",
     "run_study": "execution.run",
     "scene_schema": "definition.parameters",
     "sweep": "execution.function",
@@ -74,6 +76,7 @@ __all__ = [
     "open_netcdf",
     "open_study",
     "own_workers",
+    "predict",
     "run_study",
     "scene_schema",
     "sweep",

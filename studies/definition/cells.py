@@ -26,6 +26,11 @@ Point = tuple[float, ...]
 """A value for each axis that is a number."""
 
 
+KINK = 0.5
+"""Part of a miss in the middle of an edge that may be left once the middle is known, as at a kink;
+of smooth numbers it is a quarter. The error in a cell is the sum of these over its axes."""
+
+
 class Edge(NamedTuple):
     """An edge of a cell: its direction, its ends, and its middle."""
 

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 from solver.parameters import is_number
 from solver.scenes import Scene
-from studies.definition.cells import Cell, Point, weights
+from studies.definition.cells import KINK, Cell, Point, weights
 from studies.definition.parameters import parameters_of
 from studies.definition.quantity import number_of_a_run
 from studies.definition.sweep import MAXIMUM_RUNS, Axes
@@ -41,9 +41,6 @@ _KEYS = ("of", "until", "most", "halvings")
 _UNTIL, _MOST, _HALVINGS = 0.02, 200, 5
 """Entries that are left out."""
 _MOST_AXES, _MOST_HALVINGS = 4, 20
-_LEAST, _USUAL = 0.25, 0.5
-"""Part of the miss on an edge that is left when it is halved: of smooth numbers; of a kink, and if
-nothing is known of the edge before."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,14 +113,12 @@ class _Halving(NamedTuple):
     ----------
     cell, axes, left : the cell, the axes, and the errors that are left if it is not divided
     miss : how far it missed what is allowed
-    before : of each axis the misses before it was halved the last time
     """
 
     cell: Cell
     axes: list[int]
     miss: float
     left: tuple[float, ...]
-    before: Sequence[tuple[float, ...] | None]
 
     @property
     def order(self) -> tuple[Any, ...]:
@@ -159,7 +154,6 @@ class Refinement:
     _waits: dict[Wanted, list[Cell]] = field(default_factory=dict)
     _known: list[Cell] = field(default_factory=list)
     _halvings: list[_Halving] = field(default_factory=list)
-    _before: dict[Cell, Sequence[tuple[float, ...] | None]] = field(default_factory=dict)
     _allowed: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -283,7 +277,6 @@ class Refinement:
     def _decide(self, cell: Cell) -> None:
         """Settle a cell whose runs are known, or keep it to be divided."""
         del self._lacks[cell]
-        before = self._before.pop(cell, (None,) * len(cell.low))
         known = {at: self.number(Wanted(cell.branch, at)) for at in points_of(cell)}
         there = {at: each for at, each in known.items() if each is not None}
         every, left = set(range(len(cell.low))), ()
@@ -304,11 +297,10 @@ class Refinement:
             if not any(cell.halved) and not axes:
                 miss = self._ratio(_off(cell, there, cell.centre, there[cell.centre]))
                 axes = every if miss > 1.0 else axes
-            left = _left(misses, before)
-            before = tuple(misses[k] if k in axes else each for k, each in enumerate(before))
+            left = tuple(KINK * sum(each) for each in zip(*misses, strict=True))
         can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
         if can:
-            self._halvings.append(_Halving(cell, can, miss, left, before))
+            self._halvings.append(_Halving(cell, can, miss, left))
         else:
             self.settled.append(Settled(cell, SMALLEST if axes else SETTLED, left))
 
@@ -332,8 +324,7 @@ class Refinement:
             most = tuple(map(max, zip(*misses, strict=True)))
             can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
             if can and state == SETTLED:
-                before = (None,) * len(cell.low)
-                self._halvings.append(_Halving(cell, can, self._ratio(most), most, before))
+                self._halvings.append(_Halving(cell, can, self._ratio(most), most))
             else:
                 small = axes and state == SETTLED
                 self.settled.append(Settled(cell, SMALLEST if small else state, most))
@@ -354,7 +345,7 @@ class Refinement:
                 return
             self._halvings = [each for each in self._halvings if each not in own]
             full = False
-            for cell, axes, _, left, before in sorted(own, key=lambda each: each.order):
+            for cell, axes, _, left in sorted(own, key=lambda each: each.order):
                 parts = cell.parts(axes)
                 new = {Wanted(part.branch, at) for part in parts for at in points_of(part)}
                 full = full or len(self.asked.keys() | new) > self.refine.most
@@ -362,7 +353,6 @@ class Refinement:
                     self.settled.append(Settled(cell, MOST, left))
                     continue
                 for part in parts:
-                    self._before[part] = before
                     self._open(part)
 
     def _at_most(self, stage: int) -> int:
@@ -410,21 +400,6 @@ def _off(
         abs(number - sum(weight * known[each][k] for each, weight in parts))
         for k, number in enumerate(there)
     )
-
-
-def _left(misses: Misses, before: Sequence[tuple[float, ...] | None]) -> tuple[float, ...]:
-    """Return the errors that are left in a cell with these misses.
-
-    Between the runs of an edge a part of its miss is left: as much as its halving left before, of
-    the miss on edges twice as long.
-    """
-    left = [0.0] * len(misses[0])
-    for own, earlier in zip(misses, before, strict=True):
-        for k, miss in enumerate(own):
-            known = earlier is not None and earlier[k] > 0.0
-            part = miss / earlier[k] if earlier is not None and known else _USUAL
-            left[k] += miss * min(max(part, _LEAST), 1.0)
-    return tuple(left)
 
 
 def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:

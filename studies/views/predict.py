@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from studies.definition.cells import edges, weights
+from studies.definition.cells import KINK, edges, weights
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError, one_of
 from studies.storage.frame import SETS
@@ -21,8 +21,6 @@ WAYS = CELLS, GAUSSIAN = "cells", "gaussian"
 MOST = 1000
 """Largest number of runs of a Gaussian process: its cost grows with their cube."""
 _RUN = "run_between"
-_KINK = 0.5
-"""Part of a miss in the middle of an edge that is left by a kink, once the middle is known."""
 
 
 def predict(
@@ -177,7 +175,7 @@ def _in_cells(dataset: xr.Dataset, between: _Between, names: Sequence[str]) -> x
                 share = (mid[axis] - low[axis]) / (high[axis] - low[axis])
                 miss = abs(values[mid] - values[low] * (1.0 - share) - values[high] * share)
                 worst[axis] = np.maximum(worst.get(axis, 0.0), miss)
-            error = xr.zeros_like(value) + _KINK * sum(worst.values())
+            error = xr.zeros_like(value) + KINK * sum(worst.values())
         found[name] = value.assign_attrs(each.attrs)
         found[f"{name}_error"] = error.assign_attrs(_error_of(each))
     return xr.Dataset(found)
