@@ -71,6 +71,31 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--resolution", type=float, metavar="DPI", help="dots per inch, 50 to 600")
     one.add_argument("--out", type=_path, required=True, metavar="PNG")
 
+    one = add("export", commands.export)
+    one.add_argument("path", type=_path, metavar="RUN|DIR")
+    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
+    one.add_argument("--vtu", type=_path, required=True, metavar="FOLDER", help="where they go")
+
+    one = add("serve", commands.serve)
+    one.add_argument("--host", help="default: 127.0.0.1; with another one callers need API keys")
+    one.add_argument("--port", type=_integer(0, 65535), help="default: 8000")
+    one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
+    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
+
+    _add_numbers(add)
+    _add_access(add)
+    _add_remote(add)
+    return whole
+
+
+class _Parser(argparse.ArgumentParser):
+    """Tells a mistake in one line, as the commands do."""
+
+    def error(self, message: str) -> NoReturn:
+        sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
+
+
+def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
     one = add("best", commands.best)
     one.add_argument("path", type=_path, metavar="DIR")
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
@@ -90,28 +115,6 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument(
         "--compute", action="store_true", help="compute the run there if the error is larger"
     )
-
-    one = add("export", commands.export)
-    one.add_argument("path", type=_path, metavar="RUN|DIR")
-    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
-    one.add_argument("--vtu", type=_path, required=True, metavar="FOLDER", help="where they go")
-
-    one = add("serve", commands.serve)
-    one.add_argument("--host", help="default: 127.0.0.1; with another one callers need API keys")
-    one.add_argument("--port", type=_integer(0, 65535), help="default: 8000")
-    one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
-    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
-
-    _add_access(add)
-    _add_remote(add)
-    return whole
-
-
-class _Parser(argparse.ArgumentParser):
-    """Tells a mistake in one line, as the commands do."""
-
-    def error(self, message: str) -> NoReturn:
-        sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
 
 
 def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:

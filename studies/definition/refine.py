@@ -163,7 +163,7 @@ class Refinement:
     @property
     def wants(self) -> list[Wanted]:
         """The runs that it lacks."""
-        return [each for each in self.asked if each not in self.rows]
+        return list(self._waits)
 
     @property
     def reason(self) -> str:
