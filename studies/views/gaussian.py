@@ -46,31 +46,32 @@ class Gaussian:
 
     Attributes
     ----------
+    lengths, roughness : of the covariance: (d,), and the variance of what no smooth function
+        explains, as a multiple of ``s^2``
     misses : (k, m) by how much all others miss each run that is not at a corner of their hull
     """
 
     def __init__(self, places: Array, values: Array) -> None:
-        self._places = places
-        spread = values.std(axis=0)
-        self._scale = np.where(spread > 0.0, spread, 1.0)
-        y = values / self._scale
         some = np.unique(np.linspace(0, len(places) - 1, min(len(places), _FITTED)).astype(int))
-        self._lengths, self._roughness = _most_likely(places[some], y[some])
-        K = _covariance(places, places, self._lengths)
-        K[np.diag_indices_from(K)] += self._roughness
+        self.fit(places, values, *_most_likely(places[some], values[some]))
+
+    def fit(self, places: Array, values: Array, lengths: Array, roughness: float) -> None:
+        """Take values, with lengths (d,) and a roughness that are known."""
+        self.lengths, self.roughness, self._places = lengths, roughness, places
+        K = _covariance(places, places, lengths)
+        K[np.diag_indices_from(K)] += roughness
         inverse = np.linalg.inv(K)
         ones = inverse.sum(axis=1)
         Q = inverse - np.outer(ones, ones) / ones.sum()
         self._inverse, self._ones = inverse, ones
         inside = ~_corners(places)
         diagonal = np.diag(Q)[inside, None]
-        misses = (Q @ y)[inside] / diagonal
-        self._variance = np.mean(misses**2 * diagonal, axis=0)
-        self.misses = misses * self._scale
+        self.misses = (Q @ values)[inside] / diagonal
+        self._deviation = np.sqrt(np.mean(self.misses**2 * diagonal, axis=0))
 
     def weights(self, place: Array) -> tuple[Array, float]:
         """Return the weights (n,) of the runs at a place (d,), and the variance over ``s^2``."""
-        k = _covariance(place[None, :], self._places, self._lengths)[0]
+        k = _covariance(place[None, :], self._places, self.lengths)[0]
         rest = 1.0 - self._ones @ k
         weights = self._inverse @ k + self._ones * rest / self._ones.sum()
         variance = 1.0 - k @ self._inverse @ k + rest**2 / self._ones.sum()
@@ -78,7 +79,7 @@ class Gaussian:
 
     def error(self, variance: float) -> Array:
         """Return the standard deviations (m,) of the prediction with this variance over ``s^2``."""
-        return np.asarray(np.sqrt(variance * self._variance) * self._scale)
+        return np.asarray(np.sqrt(variance) * self._deviation)
 
 
 def in_hull(places: Array, place: Array) -> bool:
@@ -111,6 +112,8 @@ def _covariance(a: Array, b: Array, lengths: Array) -> Array:
 def _most_likely(places: Array, y: Array) -> tuple[Array, float]:
     """Return the most likely lengths (d,) and roughness, the best of a few searches."""
     count, dimensions = places.shape
+    spread = y.std(axis=0)
+    y = y / np.where(spread > 0.0, spread, 1.0)
     bounds = [(np.log(_SHORTEST), np.log(_LONGEST))] * dimensions + [tuple(np.log(_ROUGHNESS))]
 
     def unlikely(logs: Array) -> float:
