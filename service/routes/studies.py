@@ -7,6 +7,7 @@ import logging
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from http import HTTPStatus
+from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query, Request, Response
@@ -28,7 +29,16 @@ from service.dependencies import (
 from service.errors import REFUSED, Busy, Conflict, NotFound, QueueLost
 from service.files import NETCDF, netcdf
 from service.job import StudyState
-from service.schemas import ContentId, StudyDetail, StudyFilter, StudyPage, StudySummary, Window
+from service.schemas import (
+    ContentId,
+    Prediction,
+    PredictQuery,
+    StudyDetail,
+    StudyFilter,
+    StudyPage,
+    StudySummary,
+    Window,
+)
 from service.strict import StrictRoute
 from studies import Study, StudyError
 from studies.errors import FileDamaged, StoreFull
@@ -154,8 +164,31 @@ async def events(
         await asyncio.sleep(settings.poll_seconds)
 
 
+@router.get("/{study_id}/predict", responses=REFUSED)
+def predict(
+    job: TheJob, query: Annotated[PredictQuery, Query()], jobs: TheJobs, store: TheStore
+) -> Prediction:
+    """Tell a number between the runs of a study, with its error.
+
+    Beside the queries named below, every parameter that the study varies is one:
+    `?of=peak_residual_tension&load_ratio=0.62&friction=0.21`. A place outside of the runs, or
+    across failed ones, is refused.
+    """
+    from studies import open_netcdf  # xarray takes half a second to import
+    from studies.views.answers import answer
+
+    path, asked = dataset(job, jobs, store).path, query.model_dump()
+    at = {name: asked.pop(name) for name in query.model_extra or {}}
+    study = Study.known(jobs.study(job.id), store.scene)
+    with open_netcdf(path) as runs:
+        found = answer(runs, study, store, at=at, **asked)
+    add = None if found.enough else found.run.to_dict()
+    told = {name: getattr(found, name) for name in Prediction.model_fields.keys() - {"add"}}
+    return Prediction(**told, add=add)
+
+
 @router.get("/{study_id}/sensitivity", responses=REFUSED)
-def tell_sensitivity(job: TheJob, store: TheStore, of: str) -> dict[str, Any]:
+def tell_sensitivity(job: TheJob, jobs: TheJobs, store: TheStore, of: str) -> dict[str, Any]:
     """Tell which parameter matters for a number of the runs: indices of sensitivity.
 
     Of `parameters` each has `first` and `total`, the share of the variance of `of` that it makes
@@ -165,15 +198,11 @@ def tell_sensitivity(job: TheJob, store: TheStore, of: str) -> dict[str, Any]:
     from studies import open_netcdf, sensitivity  # xarray takes half a second to import
     from studies.views.sensitivity import told
 
-    try:
-        path = store.dataset(job.id)
-    except FileDamaged:
-        raise NotFound(f"no data set yet: the study is {job.state}") from None
-    with open_netcdf(path) as dataset:
-        if (size := dataset["status"].size) > MOST_FITTED:
+    with open_netcdf(Path(dataset(job, jobs, store).path)) as runs:
+        if (size := runs["status"].size) > MOST_FITTED:
             allowed = f"at most {MOST_FITTED} are fitted here: fetch the data set, and fit it there"
             raise StudyError("runs", size, allowed)
-        return told(sensitivity(dataset, of))
+        return told(sensitivity(runs, of))
 
 
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)
