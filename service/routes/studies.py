@@ -7,6 +7,7 @@ import logging
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from http import HTTPStatus
+from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query, Request, Response
@@ -174,7 +175,7 @@ def predict(
     from studies import open_netcdf  # xarray takes half a second to import
     from studies.views.answers import answer
 
-    path, asked = dataset(job, jobs, store).path, query.model_dump()
+    path, asked = Path(dataset(job, jobs, store).path), query.model_dump()
     at = {name: asked.pop(name) for name in query.model_extra or {}}
     study = Study.known(jobs.study(job.id), store.scene)
     with open_netcdf(path) as runs:
