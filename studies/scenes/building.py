@@ -284,7 +284,7 @@ def friction_of(table: tables.PairTable) -> FrictionLaw:
 def load_of(table: Any, amplitude: Amplitude | None = None) -> Load:
     """Return the load of a table."""
     kind = LOADS[table.kind]
-    given = table.model_dump(exclude={"kind", "body", "amplitude"}, exclude_unset=True)
+    given = {n: getattr(table, n) for n in table.model_fields_set - {"kind", "body", "amplitude"}}
     return kind(**given, **{"amplitude": amplitude} if kind.varies else {})
 
 

@@ -30,7 +30,7 @@ from solver.results.outputs import outputs
 from solver.results.requested import OF_CONTACT, RequestedNumber, of_body
 from solver.scenes.material_parameters import ContactParameters, MaterialParameters
 from studies.scenes.shape_tables import ArcTable, GradedTable, LineTable, Shape
-from studies.scenes.table import Count, FileName, Label, Place, SceneTable, Side, Span
+from studies.scenes.table import Count, FieldText, FileName, Label, Place, SceneTable, Side, Span
 
 # -- bodies ------------------------------------------------------------------------------------
 
@@ -141,7 +141,7 @@ def _load(word: str, kind: type[Load]) -> type[LoadTable]:
     known: dict[str, Any] = {"amplitude": (Amplitude | None, None)} if kind.varies else {}
     known["kind"] = (Literal[word], ...)
     for name, (hint, field) in declared(kind).items():
-        kept = _without_functions(hint)
+        kept = _in_file(hint)
         if kept is not None and name != "amplitude":
             known[name] = (kept, ... if field.default is dataclasses.MISSING else field.default)
     made: type[LoadTable] = create_model(f"{kind.__name__}Table", __base__=LoadTable, **known)
@@ -149,11 +149,16 @@ def _load(word: str, kind: type[Load]) -> type[LoadTable]:
     return made
 
 
-def _without_functions(hint: Any) -> Any:
-    """Return the type of a parameter in a file, which holds no functions; None if none is left."""
+def _in_file(hint: Any) -> Any:
+    """Return the type of a parameter in a file; None if it is a function of another kind.
+
+    A number that may be a function of position is an expression there.
+    """
     if get_origin(hint) not in (Union, UnionType):
         return None if get_origin(hint) is Callable else hint
     kept = tuple(each for each in get_args(hint) if get_origin(each) is not Callable)
+    if len(kept) < len(get_args(hint)) and float in kept:
+        kept += (FieldText,)
     return None if kept == (NoneType,) else Union[kept]  # noqa: UP007
 
 
