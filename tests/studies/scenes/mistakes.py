@@ -59,6 +59,18 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "contacts[0].frictoin",
         "did you mean friction?",
     ),
+    "a stage repeated that is none": (
+        put("repeat", {"stages": ["pres"], "times": 3}),
+        "repeat.stages",
+        "must be one of",
+    ),
+    "an output minus no stage": (
+        put(
+            "outputs", {"high": {"of": "mises", "body": "upper", "stage": "pressed", "minus": "x"}}
+        ),
+        "outputs.high.minus",
+        "must be one of",
+    ),
     "no function of position": (
         put("loads", 0, "value", "1 - q*x"),
         "loads[0].value",
