@@ -23,7 +23,7 @@ from service.schemas import KeptScene
 from studies import StudyError
 from studies.errors import SceneError
 from studies.scenes.description import Description, mesh_names
-from studies.scenes.meshfile import MeshFile
+from studies.scenes.meshfile import FORMATS, MeshFile
 from studies.scenes.scene import FileScene, read_scene
 from studies.scenes.table import FILE_NAME
 from studies.scratch import scratch
@@ -34,8 +34,6 @@ SLOW = 10.0
 """Longest time of reading a scene, as a multiple of its processor time: others compute too."""
 WAITING = 20
 """Number of scenes that may wait to be read."""
-FORMATS = (".msh", ".vtk", ".vtu", ".mesh", ".bdf", ".nas")
-"""Permitted endings of mesh files: formats that do not refer to other files."""
 LONGEST = 1_000_000
 """Largest size of a scene file, without its meshes [bytes]."""
 _FILE = "scene.toml"

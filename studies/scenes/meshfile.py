@@ -11,6 +11,8 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.memory import kept
+from solver.mesh.cells import facets_of, mesh_of_cells
+from solver.mesh.section_mesh import FOOT, RUNNING, SectionMesh
 from studies.scratch import scratch
 
 if TYPE_CHECKING:
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
 
 OUTLINE = "outline"
 """Boundary of every mesh: all edges with an element on one side only."""
+
+FORMATS = (".msh", ".vtk", ".vtu", ".mesh", ".bdf", ".nas")
+"""Endings of mesh files in formats that do not refer to other files."""
 
 MOST_POINTS = 1_000_000
 """Largest number of points of a mesh file."""
@@ -52,6 +57,24 @@ class MeshFile:
             if the file cannot be read, has no such part, or is no plane mesh
         """
         return _mesh(self.name, self.data, part)
+
+    def section(self) -> SectionMesh:
+        """Return the section of a rail: all cells, and the lines `running` and `foot`.
+
+        Raises
+        ------
+        ModelError
+            if the file is no mesh of quadrilaterals, or has no such lines
+        """
+        mesh = self.mesh(None)
+        if mesh.elem.refdom.nnodes != 4:
+            raise ModelError("mesh", self.name, "must have quadrilaterals")
+        known = mesh.boundaries or {}
+        for name in (RUNNING, FOOT):
+            if name not in known:
+                allowed = f"must name the lines {RUNNING} and {FOOT}; it has {', '.join(known)}"
+                raise ModelError("mesh", self.name, allowed)
+        return SectionMesh.of(mesh)
 
 
 @kept
@@ -91,7 +114,7 @@ def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
         raise ModelError(
             "mesh", name, f"a body must have cells of one kind, not {', '.join((kind, *others))}"
         )
-    mesh, number = _made(points[:, :2], np.vstack(list(chosen.values())), kind)
+    mesh, number = mesh_of_cells(points[:, :2], np.vstack(list(chosen.values())), _CELLS[kind])
     lines = {k: cells[:, :2] for k, (kind, cells) in enumerate(blocks) if kind in _LINES}
     return mesh.with_boundaries(_boundaries(mesh, number, lines, sets, found.point_sets))
 
@@ -136,31 +159,6 @@ def _rows(own: dict[int, Any], block: int) -> NDArray[np.int64]:
     return np.asarray([] if rows is None else rows, dtype=np.int64)
 
 
-def _made(points: NDArray[np.float64], cells: NDArray[np.int64], kind: str) -> tuple[Mesh, Any]:
-    """Return the mesh, and the index of its corner at each point, -1 at other points."""
-    from skfem import MeshQuad, MeshQuad2, MeshTri, MeshTri2
-
-    corners = _CELLS[kind]
-    straight, curved = (MeshQuad, MeshQuad2) if corners == 4 else (MeshTri, MeshTri2)
-    used, local = np.unique(cells[:, :corners], return_inverse=True)
-    number = np.full(len(points), -1)
-    number[used] = np.arange(len(used))
-    nodes = np.ascontiguousarray(points[used].T)
-    mesh = straight(nodes, np.ascontiguousarray(local.reshape(-1, corners).T), sort_t=False)
-    if cells.shape[1] == corners:
-        return mesh, number
-    bent = curved.from_mesh(mesh)
-    at = bent.doflocs.copy()
-    dofs = bent.dofs.element_dofs
-    for k in range(corners, 2 * corners):  # both number the sides from the first corner
-        at[:, dofs[k]] = points[cells[:, k]].T
-    if corners == 4:
-        X = points[cells].transpose(2, 1, 0)
-        middle = X[:, 8] if cells.shape[1] == 9 else X[:, 4:8].sum(1) / 2 - X[:, :4].sum(1) / 4
-        at[:, dofs[8]] = middle
-    return curved(doflocs=at, t=bent.t, sort_t=False, validate=False), number
-
-
 def _boundaries(
     mesh: Mesh,
     number: NDArray[np.int64],
@@ -169,7 +167,6 @@ def _boundaries(
     nodes: dict[str, Any],
 ) -> dict[str, NDArray[np.int64]]:
     """Return the outline, and the facets of each set of lines or nodes that lies on the mesh."""
-    facets = {ends: k for k, ends in enumerate(map(tuple, np.sort(mesh.facets, axis=0).T.tolist()))}
     outline = np.asarray(mesh.boundary_facets())
     found = {OUTLINE: outline}
     for name, own in nodes.items():  # the edges of the outline with both ends in the set
@@ -178,8 +175,7 @@ def _boundaries(
             found[name] = outline[inside.all(0)]
     for name, own in sets.items():
         pairs = [number[cells[_rows(own, k)]] for k, cells in lines.items()]
-        ends = np.sort(np.vstack([np.zeros((0, 2), dtype=int), *pairs]), axis=1)
-        known = [facets[pair] for pair in map(tuple, ends.tolist()) if pair in facets]
-        if known:
-            found[name] = np.unique(known)
+        facets = facets_of(mesh, np.vstack([np.zeros((0, 2), dtype=int), *pairs]))
+        if (facets >= 0).any():
+            found[name] = np.unique(facets[facets >= 0])
     return found

@@ -32,6 +32,9 @@ _SAMPLED = (0, 1, 5)
 """Waves of which the whole section is solved: the mean along x, where springs and supports carry
 most, the longest wave, and one about as long as the contact."""
 _EDGE_POINTS = 4
+_LEFT_OUT = 1e-3
+"""Share of the stress at the rim of the zone, of all waves together, that waves may have which are
+left out outside it."""
 
 
 class Waves(NamedTuple):
@@ -64,11 +67,11 @@ class PlainPrism:
         self.area = np.asarray(basis.dx)
         inside = np.unique(modes.points // self.area.shape[1])
         self._still, self._waving = (self._rows(each, inside) for each in self._gradients)
+        self._outside = np.setdiff1d(np.arange(len(self._nodes)), inside)
         self._zone_area = np.repeat(self.area[inside].ravel(), 6)
         self._k = -2 * np.pi / modes.length * np.arange(modes.stations // 2 + 1)
         self.sampled = tuple(wave for wave in _SAMPLED if wave < len(self._k))
-        outside = np.setdiff1d(np.arange(len(self._nodes)), inside)
-        self._own = np.setdiff1d(modes.unknowns, self._dofs[outside])
+        self._own = np.setdiff1d(modes.unknowns, self._dofs[self._outside])
 
     # -- operators -----------------------------------------------------------------------------
 
@@ -214,6 +217,42 @@ class PlainPrism:
         own = np.fft.irfft(found.strain, stations, axis=1)[:, : len(self.track.modes.x)]
         far = self.track.far
         return own if far is None else own + far.strain @ self.resultants(found.pulled)
+
+    def beside(self, found: Waves) -> Array:
+        """Return the strain (n, 6) at the load, at all points of the section outside the zone.
+
+        It is that of the pass, without what is constant along x. Waves of which little reaches the
+        rim of the zone are left out.
+        """
+        track, C = self.track, self.track.elasticity.stiffness(6)
+        modes, stations = track.modes, track.modes.stations
+        share = np.full(len(self._k), 2.0 / stations)
+        share[[0, -1]] /= 2.0
+        at_rim = share * np.abs(found.strain[track.rim] @ C).max(axis=(0, 2))
+        lowest = np.argsort(at_rim)
+        few = np.cumsum(at_rim[lowest]) > _LEFT_OUT * at_rim.sum()
+        still, waving = (self._rows(each, self._outside) for each in self._gradients)
+        area = self.area[self._outside].reshape(-1, 1)
+        rest = np.setdiff1d(track.section.free, modes.unknowns)
+        stiffness = track.section.stiffness(rest)
+        factors = linear.analyse(stiffness.pattern)
+        turn, strain = self._turn[rest], np.zeros((len(area), 6))
+        for wave in lowest[few]:
+            ik = 1j * self._k[wave]
+            u = found.u[:, wave].copy()
+            if wave not in self.sampled:  # there the whole section is known
+                own = (still @ u + ik * (waving @ u)).reshape(-1, 6) @ C * area
+                force = (still.T @ own.ravel() - ik * (waving.T @ own.ravel()))[rest] / turn
+                factors.factorise(stiffness.at(self._k[wave]))
+                both = factors.solve(-np.stack([force.real, force.imag], axis=1))
+                u[rest] = (both[:, 0] + 1j * both[:, 1]) * turn
+            amplitude = still @ u + ik * (waving @ u)
+            phase = np.exp(2j * np.pi * wave * track.before / stations)
+            strain += share[wave] * (amplitude * phase).real.reshape(-1, 6)
+        if track.far is not None:
+            around = np.delete(track.far.around, modes.points, axis=0)
+            strain += around @ self.resultants(found.pulled)
+        return strain
 
     def resultants(self, pulled: Complex) -> Array:
         """Return forces along x, y, z [N] and the moment about x [N mm] of nodal forces."""
