@@ -28,7 +28,7 @@ _CONNECT = 10.0
 _ABSENT = 30.0
 """Seconds without a sign of life of a worker started here until it is replaced."""
 
-_FROM_THE_START: Mapping[str, int] = {
+FROM_THE_START: Mapping[str, int] = {
     # Runs share the cores: several threads of one would wait for each other.
     "OMP_NUM_THREADS": 1,
     "MKL_NUM_THREADS": 1,
@@ -45,7 +45,7 @@ CONFIGURATION: Mapping[str, Any] = {
     "distributed.scheduler.allowed-failures": 1,
     # A task waits at the scheduler until a worker is free, so that cancelling reaches it.
     "distributed.scheduler.worker-saturation": 1.0,
-    "distributed.nanny.pre-spawn-environ": _FROM_THE_START,
+    "distributed.nanny.pre-spawn-environ": FROM_THE_START,
     # Every study has its own topic of events, and dask keeps the messages of each topic.
     "distributed.admin.low-level-log-length": 1,
     # dask's pages are closed. Without the statistics for them processes that wait take a quarter of
@@ -108,8 +108,18 @@ class Access:
 
 def prepare_workers() -> None:
     """Begin to load what the workers of `own_workers` need, and dask in this process."""
-    prepare(_FROM_THE_START)
+    _prepare()
     import distributed  # noqa: F401
+
+
+def _prepare() -> str:
+    """Return the method of `multiprocessing` for the workers, see `prepare`."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    _ignore_interrupts()
+    try:
+        return prepare(FROM_THE_START)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _ignore_interrupts() -> None:
@@ -147,8 +157,8 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
         if the running script would start workers in each worker again
     """
     check_script()
+    method = _prepare()
     with ThreadPoolExecutor(1, initializer=_ignore_interrupts) as starter:
-        method = starter.submit(prepare, _FROM_THE_START).result()
         import dask  # takes half a second to import, while the workers' process loads the solver
         import distributed.utils
         from distributed import LocalCluster, Security
@@ -171,7 +181,7 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
                     dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
                     scheduler_kwargs={"dashboard": False},
                     local_directory=str(folder),
-                    env={**os.environ, **_FROM_THE_START},  # through a pipe
+                    env={**os.environ, **FROM_THE_START},  # through a pipe
                     silence_logs=logging.CRITICAL,
                     memory_limit=memory or MEMORY_LIMIT // max(workers, 1),
                 ).result()
