@@ -28,7 +28,7 @@ _CONNECT = 10.0
 _ABSENT = 30.0
 """Seconds without a sign of life of a worker started here until it is replaced."""
 
-FROM_THE_START: Mapping[str, int] = {
+_FROM_THE_START: Mapping[str, int] = {
     # Runs share the cores: several threads of one would wait for each other.
     "OMP_NUM_THREADS": 1,
     "MKL_NUM_THREADS": 1,
@@ -45,7 +45,7 @@ CONFIGURATION: Mapping[str, Any] = {
     "distributed.scheduler.allowed-failures": 1,
     # A task waits at the scheduler until a worker is free, so that cancelling reaches it.
     "distributed.scheduler.worker-saturation": 1.0,
-    "distributed.nanny.pre-spawn-environ": FROM_THE_START,
+    "distributed.nanny.pre-spawn-environ": _FROM_THE_START,
     # Every study has its own topic of events, and dask keeps the messages of each topic.
     "distributed.admin.low-level-log-length": 1,
     # dask's pages are closed. Without the statistics for them processes that wait take a quarter of
@@ -106,18 +106,15 @@ class Access:
         return cls(**content)  # type: ignore[arg-type]
 
 
-def prepare_workers() -> None:
-    """Begin to load what the workers of `own_workers` need, and dask in this process."""
-    _prepare()
-    import distributed  # noqa: F401
+def prepare_workers(more: Sequence[str] = ()) -> str:
+    """Begin to load what the workers of `own_workers` need, in the process that is forked for them.
 
-
-def _prepare() -> str:
-    """Return the method of `multiprocessing` for the workers, see `prepare`."""
+    Return the method of `multiprocessing` to start them. ``more`` are modules to load in addition.
+    """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [])
     _ignore_interrupts()
     try:
-        return prepare(FROM_THE_START)
+        return prepare(_FROM_THE_START, more)
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
@@ -157,7 +154,7 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
         if the running script would start workers in each worker again
     """
     check_script()
-    method = _prepare()
+    method = prepare_workers()
     with ThreadPoolExecutor(1, initializer=_ignore_interrupts) as starter:
         import dask  # takes half a second to import, while the workers' process loads the solver
         import distributed.utils
@@ -181,7 +178,7 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
                     dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
                     scheduler_kwargs={"dashboard": False},
                     local_directory=str(folder),
-                    env={**os.environ, **FROM_THE_START},  # through a pipe
+                    env={**os.environ, **_FROM_THE_START},  # through a pipe
                     silence_logs=logging.CRITICAL,
                     memory_limit=memory or MEMORY_LIMIT // max(workers, 1),
                 ).result()

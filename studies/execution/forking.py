@@ -71,7 +71,8 @@ def prepare(settings: Mapping[str, object], more: Sequence[str] = ()) -> str:
         "PYTHONSAFEPATH": "1",
         FORK_SERVER: "1",
     }
-    begin: Any = util.spawnv_passfds
+    patched: Any = util
+    begin = patched.spawnv_passfds
 
     def begun(path: Any, arguments: Sequence[Any], passed: Sequence[int]) -> int:
         """Start the process as `multiprocessing` does, or as a fork; return its id."""
@@ -85,7 +86,7 @@ def prepare(settings: Mapping[str, object], more: Sequence[str] = ()) -> str:
         return begin(path, [*options, f"import os; os.chdir('/'); {code}"], passed)
 
     with variables({**settings, **found}):
-        util.spawnv_passfds = begun
+        patched.spawnv_passfds = begun
         try:
             forkserver.ensure_running()
         except OSError as error:
@@ -93,7 +94,7 @@ def prepare(settings: Mapping[str, object], more: Sequence[str] = ()) -> str:
                 raise
             return "spawn"
         finally:
-            util.spawnv_passfds = begin
+            patched.spawnv_passfds = begin
     return "forkserver"
 
 
