@@ -18,9 +18,6 @@ from service.processes import Process, Starter
 from service.settings import Settings
 from studies.errors import StoreBusy, StoreFull, StudyError
 
-START_SECONDS = 60.0
-"""Longest time for the start of the workers [s]."""
-
 
 class PoolAway(RuntimeError):
     """There is no pool, for the reason given; waiting may help."""
@@ -86,7 +83,7 @@ class Pool:
             raise PoolAway(f"the workers cannot be started: {error.strerror}") from error
         said: dict[str, Any] = {}
         with contextlib.suppress(TimeoutError, ValueError):
-            async with asyncio.timeout(START_SECONDS):
+            async with asyncio.timeout(processes.START_SECONDS):
                 said = json.loads(await self._process.stdout.readline())
         if said.get("kind") == "access":
             return said["content"]

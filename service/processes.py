@@ -11,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ctypes
+import errno
 import json
 import multiprocessing
 import os
@@ -37,6 +38,9 @@ BEAT_SECONDS = 5.0
 
 LOADED = ("service.child", "service.pool", "studies.storage.combine")
 """Modules that are loaded before a process is forked, beside those that workers need."""
+
+START_SECONDS = 60.0
+"""Longest time for the start of a process, with what is loaded for it [s]."""
 
 STDIN, STDOUT = 0, 1
 
@@ -116,18 +120,27 @@ class Starter:
         Raises
         ------
         OSError
-            If the system cannot start a process.
+            If the system cannot start a process, or not in time.
         """
         context = multiprocessing.get_context(await self.prepare())
         theirs, stdin = context.Pipe(duplex=False)
         stdout, out = context.Pipe(duplex=False)
+        held = Connection(os.dup(self.lock))
         process: BaseProcess = context.Process(  # type: ignore[attr-defined]
             target=_begin,
-            args=(module, theirs, out, Connection(os.dup(self.lock)), dict(os.environ)),
+            args=(module, theirs, out, held, dict(os.environ)),
             daemon=True,  # if this process must end at once, it shall not wait for the other
         )
-        with theirs, out:
-            await asyncio.to_thread(process.start)
+
+        def begin() -> None:
+            with theirs, out, held:
+                process.start()
+
+        try:
+            async with asyncio.timeout(START_SECONDS):
+                await asyncio.to_thread(begin)
+        except TimeoutError:
+            raise OSError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT)) from None
         loop, reader = asyncio.get_running_loop(), asyncio.StreamReader(LONGEST_LINE)
         await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), stdout)
         writer, _ = await loop.connect_write_pipe(asyncio.BaseProtocol, stdin)
