@@ -21,7 +21,7 @@ def run(options: argparse.Namespace) -> int:
     from residua.progress import Progress
     from studies.definition.study import Study
     from studies.execution.cluster import Access
-    from studies.execution.forking import variables
+    from studies.execution.forking import FORK_HERE, variables
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, run_study
     from studies.storage.store import Store
@@ -48,7 +48,8 @@ def run(options: argparse.Namespace) -> int:
         progress(event)
 
     # Before a worker knows the module path of this process, it would look in the current directory.
-    with _interruption() as interrupted, variables({"PYTHONSAFEPATH": "1"}):
+    for_workers = {"PYTHONSAFEPATH": "1", FORK_HERE: "1"}
+    with _interruption() as interrupted, variables(for_workers):
         outcome = run_study(
             study,
             store,

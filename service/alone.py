@@ -22,6 +22,7 @@ from math import ceil
 from pathlib import Path
 from typing import NoReturn
 
+from studies.execution.forking import close_files
 from studies.storage.room import FULL
 
 _LIBC = ctypes.CDLL(None, use_errno=True)
@@ -112,8 +113,7 @@ def _let_go(into: int) -> None:
     nothing = os.open(os.devnull, os.O_RDWR)
     os.dup2(nothing, 0)
     os.dup2(nothing, 1)
-    os.closerange(3, into)
-    os.closerange(into + 1, os.sysconf("SC_OPEN_MAX"))
+    close_files(but=[into])
 
 
 def _shut_in(folder: Path) -> str:
