@@ -77,16 +77,17 @@ class Inspector:
             if not (FILE_NAME.fullmatch(name) and name.lower().endswith(FORMATS)):
                 allowed = f"must be the name of a file and end in one of {', '.join(FORMATS)}"
                 raise StudyError("meshes", name, allowed)
-        self.budget.check(caller)
-        async with self.process.turn():
-            self.budget.check(caller)  # others of this caller may have been read meanwhile
+        self.budget.left(caller)
+        async with self.process.turn(caller):
+            spent = left = self.budget.left(caller)  # all of it if there is no answer
             async with _written({**meshes, _FILE: text}) as folder:
-                spent = self.seconds  # if it gives no answer
                 try:
-                    answer = await self.process.call(inspected, folder, spent, name=_FILE)
+                    answer = await self.process.call(inspected, folder, left, name=_FILE)
                     spent = answer.seconds
                 finally:
                     self.budget.charge(caller, spent)
+        if answer.failed == errno.ETIME and left < self.seconds:
+            self.budget.left(caller)
         found = self._read(answer)
         if mistakes := found.get("mistakes"):
             raise SceneError(_FILE, [StudyError(*each) for each in mistakes], found["count"])
