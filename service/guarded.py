@@ -12,10 +12,10 @@ import signal
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
-from weakref import WeakValueDictionary
 from math import ceil
 from pathlib import Path
 from typing import TypeVar
+from weakref import WeakValueDictionary
 
 from anyio import BrokenWorkerProcess, CapacityLimiter, Lock, fail_after
 from anyio.to_process import run_sync

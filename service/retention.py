@@ -20,10 +20,11 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from service.errors import Conflict, NotFound
+from service.errors import Conflict, NoRoom, NotFound
+from service.examiner import Examined
 from service.job import Job, StudyState
 from service.jobs import Jobs, put
-from studies import FileDamaged, Store, Study
+from studies import FileDamaged, Store
 from studies.scenes.description import Description
 from studies.storage.seal import content_of
 
@@ -76,11 +77,29 @@ class Keeper:
                     raise Conflict(f"{needed}: dismiss it first, or wait for its end")
             self.store.discard([run_id])
 
-    def accept(self, study: Study, runs: list[str], priority: int) -> tuple[Job, bool]:
-        """Store a study, and put it into the queue; its scene is not deleted in between."""
+    def accept(self, found: Examined, priority: int) -> tuple[Job, bool]:
+        """Store a study, and put it into the queue; its scene is not deleted in between.
+
+        Raises
+        ------
+        NoRoom
+            as `check_room`
+        """
+        study, size = found.study, found.estimate.bytes
         with self._one:
+            self.check_room(found)
             self.store.save_study(study)
-            return self.jobs.accept(study.id, study.to_dict(), runs, priority)
+            return self.jobs.accept(study.id, study.to_dict(), found.runs, priority, size)
+
+    def check_room(self, found: Examined) -> None:
+        """Raise `NoRoom` if a study does not fit on the disk beside those that have not ended."""
+        size, promised = found.estimate.bytes, self.jobs.promised(but=found.study.id)
+        free = shutil.disk_usage(self.store.directory).free
+        if size and size + promised > free:
+            takes, has, others = (f"{each / 1e9:.3g} GB" for each in (size, free, promised))
+            told = f"the study takes about {takes}, and {has} are free on the disk of the data"
+            before = f", of which studies before it take {others}" if promised else ""
+            raise NoRoom(f"{told} directory{before}: use fewer runs, or make room")
 
     def keep_scene(self, scene_id: str, description: Description, owner: str) -> bool:
         """Store a posted scene for a key; return whether it is new.

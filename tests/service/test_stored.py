@@ -24,13 +24,14 @@ import pytest
 from service import access, retention
 from service.app import create_app
 from service.errors import Conflict
+from service.examiner import Examined
 from service.job import StudyState
 from service.jobs import Jobs
 from service.keys import Keys, KeysError, Scope
 from service.probe import look
 from service.recovery import Mender, open_queue
 from service.settings import Settings
-from studies import FileDamaged, Store, Study, StudyError, open_netcdf
+from studies import FileDamaged, Store, Study, StudyError, estimate, open_netcdf
 from studies.errors import CatalogueDamaged, SceneError
 from studies.scenes.scene import FileScene, read_scene
 from studies.storage import seal, shelf
@@ -652,7 +653,7 @@ def test_a_scene_is_not_deleted_while_a_study_of_it_is_accepted(
 
     monkeypatch.setattr(Store, "save_study", save)
     monkeypatch.setattr(threading, "excepthook", lambda _: None)
-    keeper.accept(study, list(study.run_ids()), 0)
+    keeper.accept(Examined(study, list(study.run_ids()), estimate(study, store)), 0)
     deleting.join()
     assert store.scene(pin.id) is not None
 
