@@ -112,8 +112,9 @@ class Keeper:
         with self._one:
             if self.store.scene(scene_id, whole=False) is None:
                 given = sum(len(mesh.data) for mesh in (description.meshes or {}).values())
-                there = self.store.scene_sizes()
-                own, every = there.get(owner, 0), sum(there.values())
+                there = self.store.scene_files()
+                own = sum(scene.size for scene in there if scene.owner == owner)
+                every = sum(scene.size for scene in there)
                 for whose, taken, most in (("your", own, self.own), ("the", every, self.scenes)):
                     if most is not None and taken + given > most:
                         would = f"{whose} posted scenes would take {taken + given} bytes"
@@ -194,7 +195,7 @@ class Keeper:
         excess = 0
         if self.size is not None:
             used = sum(size(self.store.directory / name) for name in ("runs", "studies"))
-            excess = used + sum(self.store.scene_sizes().values()) - self.size
+            excess = used + sum(scene.size for scene in self.store.scene_files()) - self.size
         if excess > 0:
             excess -= self._sweep_scenes(excess)
         for job in self.jobs.ended():
@@ -208,16 +209,16 @@ class Keeper:
 
     def _sweep_scenes(self, excess: int) -> int:
         """Delete scenes that no study needs, the oldest first; return the bytes freed."""
-        freed, before, users = 0, time.time_ns() - FRESH, self._users()
-        for scene in reversed(self.store.scenes(limit=-1)):
-            if freed >= excess or scene.added > before:
-                break
-            if scene.id in users:
-                continue
-            with suppress(Conflict, NotFound):
-                self.delete_scene(scene.id)
-                freed += scene.size
-                log.info("deleted a posted scene: above %s bytes", self.size)
+        freed, before = 0, time.time_ns() - FRESH
+        with self._one:
+            users = self._users()
+            for scene in self.store.scene_files():
+                if freed >= excess or scene.added > before:
+                    break
+                if scene.id not in users:
+                    self.store.discard_scene(scene.id)
+                    freed += scene.size
+                    log.info("deleted a posted scene: above %s bytes", self.size)
         return freed
 
     @asynccontextmanager

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 from solver.scenes import Scene
 from studies.appearing import appearing
@@ -26,8 +27,9 @@ from studies.storage.database import Database
 from studies.storage.seal import State, bytes_of, content_of, sealed_json, state_of
 
 _FILE = "scene.json"
-_COLUMNS = "id, name, summary, branch, size, owner, added, parameters"
-_TABLE = f"CREATE TABLE IF NOT EXISTS shelf ({_COLUMNS}, state, PRIMARY KEY (id))"
+_COLUMNS = "id, name, summary, branch, size, owner, added, parameters, state"
+_TABLE = f"CREATE TABLE IF NOT EXISTS shelf ({_COLUMNS}, PRIMARY KEY (id))"
+"""A scene that this version does not allow has no name: its size counts, and no list has it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +39,6 @@ class Entry:
     Attributes
     ----------
     id, name, summary, branch : content id, and as in `Scene`
-    size : of its files [bytes]
-    owner : who posted it first; empty if nobody did
-    added : time at which it was stored [ns since 1970]
     parameters : names of its parameters
     """
 
@@ -47,10 +46,16 @@ class Entry:
     name: str
     summary: str
     branch: str
-    size: int
-    owner: str
-    added: int
     parameters: list[str]
+
+
+class Kept(NamedTuple):
+    """The files of a scene: id, who posted it first, size [bytes], time [ns since 1970]."""
+
+    id: str
+    owner: str
+    size: int
+    added: int
 
 
 def keep(directory: Path, scene_id: str, description: Description, owner: str) -> None:
@@ -126,17 +131,24 @@ class Index(Database):
         super().__init__(directory / "scenes.sqlite", CatalogueDamaged, StoreBusy)
         self.scenes = directory / "scenes"
 
-    def follow(self, read: Callable[[str], Scene | None]) -> None:
-        """Bring the index to the files; ``read`` gives a new scene, or None for one without."""
+    def follow(self, read: Callable[[str], Scene | None], refused: Collection[str]) -> None:
+        """Bring the index to the files.
+
+        Parameters
+        ----------
+        read : gives a new scene; None for one that is not there or not allowed
+        refused : scenes that are known not to be allowed: another version may have refused others
+        """
         paths = {path.parent.name: state_of(path) for path in self.scenes.glob(f"*/{_FILE}")}
         there = {name: (repr(state), state[2]) for name, state in paths.items() if state}
         mode = "rwc" if self.path.exists() or there else "memory"
         with self.connection("BEGIN", mode) as connection:
             connection.execute(_TABLE)
-            known = dict(connection.execute("SELECT id, state FROM shelf").fetchall())
+            rows = connection.execute("SELECT id, state, name FROM shelf").fetchall()
+        known = {key: state for key, state, name in rows if name is not None or key in refused}
+        gone = {key for key, *_ in rows} - there.keys()
         fresh = [name for name, (state, _) in there.items() if known.get(name) != state]
         rows = [row for name in fresh if (row := self._row(name, read, *there[name]))]
-        gone = known.keys() - there.keys()
         if rows or gone:
             with self.connection("BEGIN IMMEDIATE", "rw") as connection:
                 connection.executemany("DELETE FROM shelf WHERE id = ?", [[each] for each in gone])
@@ -149,13 +161,13 @@ class Index(Database):
     ) -> tuple[object, ...] | None:
         """Return the row of a scene, or None where it is deleted or set aside meanwhile."""
         try:
-            if (scene := read(name)) is None:
-                return None
+            scene = read(name)
             size, owner = self._kept(name)
         except (OSError, FileDamaged):
             return None
-        names = json.dumps([*parameters_of(scene)])
-        return name, scene.name, scene.summary, scene.branch, size, owner, added, names, state
+        about = (scene.name, scene.summary, scene.branch) if scene else (None, "", "")
+        names = json.dumps([*parameters_of(scene)] if scene else [])
+        return name, *about, size, owner, added, names, state
 
     def _kept(self, scene_id: str) -> tuple[int, str]:
         """Return the size of the files of a scene, and its owner."""
@@ -167,17 +179,17 @@ class Index(Database):
         """Return a page of the scenes, or of those of a name, the latest first."""
         with self._reading() as connection:
             rows = connection.execute(
-                f"SELECT {_COLUMNS} FROM shelf WHERE ? IN (name, '') "
-                "ORDER BY added DESC, id LIMIT ? OFFSET ?",
+                "SELECT id, name, summary, branch, parameters FROM shelf WHERE name IS NOT NULL "
+                "AND ? IN (name, '') ORDER BY added DESC, id LIMIT ? OFFSET ?",
                 [name or "", limit, offset],
             )
             return [Entry(*[*row[:-1], json.loads(row[-1])]) for row in rows]
 
-    def sizes(self) -> dict[str, int]:
-        """Return the size of all scenes of each owner [bytes]."""
+    def files(self) -> list[Kept]:
+        """Return the files of all scenes, the oldest first."""
         with self._reading() as connection:
-            found = connection.execute("SELECT owner, SUM(size) FROM shelf GROUP BY owner")
-            return dict(found.fetchall())
+            rows = connection.execute("SELECT id, owner, size, added FROM shelf ORDER BY added, id")
+            return [Kept(*row) for row in rows]
 
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:

@@ -30,6 +30,7 @@ from service.jobs import Jobs
 from service.keys import Keys, KeysError, Scope
 from service.probe import look
 from service.recovery import Mender, open_queue
+from service.retention import Keeper
 from service.settings import Settings
 from studies import FileDamaged, Store, Study, StudyError, estimate, open_netcdf
 from studies.errors import CatalogueDamaged, SceneError
@@ -316,9 +317,14 @@ def test_a_scene_that_a_later_version_refuses_stays_and_is_not_listed(
             assert [store.scenes(9), store.scenes(9), store.scene(pin.id)] == [[], [], None]
     assert len(warned(caplog, f"scenes/{pin.id} is not allowed in this version: ")) == 1
     assert not (tmp_path / "unreadable").exists()
-    assert [each.id for each in store.scenes(9)] == [pin.id]
+    (kept,) = store.scene_files()
+    assert kept.size > len(pin.description.meshes["pin.msh"].data), "its files count"
+    assert [each.id for each in Store(tmp_path).scenes(9)] == [pin.id], "this version allows it"
     monkeypatch.setattr(shelf, "file_scene", lambda description: raised(wrong))
-    ask = asking(create_app(Settings(data=tmp_path)))
+    app = create_app(Settings(data=tmp_path, max_scenes_bytes=kept.size))
+    with pytest.raises(Conflict, match="the posted scenes would take"):
+        app.state.keeper.keep_scene("0" * 32, pin.description, "anna")
+    ask = asking(app)
     assert ask("DELETE", f"/scenes/{pin.id}").status_code == 204
     assert not (tmp_path / "scenes" / pin.id).exists()
 
@@ -619,7 +625,11 @@ def test_scenes_that_no_study_needs_are_deleted_before_studies(
     assert len(store.scenes(9)) == 3, "all are of today"
     monkeypatch.setattr(retention, "FRESH", 0)
     keeper.jobs.accept(study.id, study.to_dict(), study.run_ids())
+    looked: list[object] = []
+    users = Keeper._users
+    monkeypatch.setattr(Keeper, "_users", lambda self: looked.append(self) or users(self))
     keeper.sweep()
+    assert len(looked) == 1, "the studies are read once for all scenes"
     assert [each.id for each in store.scenes(9)] == [used.id]
     assert keeper.jobs.get(study.id).state is StudyState.ACCEPTED
 
