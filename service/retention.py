@@ -111,7 +111,8 @@ class Keeper:
         """
         with self._one:
             if self.store.scene(scene_id, whole=False) is None:
-                given = sum(len(mesh.data) for mesh in (description.meshes or {}).values())
+                meshes = (description.meshes or {}).values()
+                given = sum(len(mesh.data) + len(mesh.arrays) for mesh in meshes)
                 there = self.store.scene_files()
                 own = sum(scene.size for scene in there if scene.owner == owner)
                 every = sum(scene.size for scene in there)

@@ -24,9 +24,9 @@ from studies.scenes.description import Description, mesh_names
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.scene import FileScene, file_scene
 from studies.storage.database import Database
-from studies.storage.seal import State, bytes_of, content_of, sealed_json, state_of
+from studies.storage.seal import State, bytes_of, check, content_of, sealed, sealed_json, state_of
 
-_FILE = "scene.json"
+_FILE, _ARRAYS = "scene.json", ".arrays"
 _COLUMNS = "id, name, summary, branch, size, owner, added, parameters, state"
 _TABLE = f"CREATE TABLE IF NOT EXISTS shelf ({_COLUMNS}, PRIMARY KEY (id))"
 """A scene that this version does not allow has no name: its size counts, and no list has it."""
@@ -62,9 +62,13 @@ def keep(directory: Path, scene_id: str, description: Description, owner: str) -
     """Store a scene of this content id."""
     folder = directory / "scenes" / scene_id
     folder.mkdir(parents=True, exist_ok=True)
-    written = {name: mesh.data for name, mesh in (description.meshes or {}).items()}
+    seal, written = f"scene {scene_id}", {}
+    for name, mesh in (description.meshes or {}).items():
+        written[name] = mesh.data
+        if mesh.arrays:
+            written[f"{name}{_ARRAYS}"] = sealed(seal, mesh.arrays)
     content = {"file": description.file, "content": description.content, "owner": owner}
-    written |= {_FILE: sealed_json(f"scene {scene_id}", content)}  # last: then all is there
+    written |= {_FILE: sealed_json(seal, content)}  # last: then all is there
     for name, data in written.items():
         with appearing(folder / name) as part:
             part.write_bytes(data)
@@ -114,7 +118,7 @@ def _made(folder: Path, whole: bool) -> FileScene | None:
     try:
         saved = content_of(folder / _FILE, name)
         names = mesh_names(saved["content"]) if whole else []
-        meshes = {each: MeshFile(each, bytes_of(folder / each, name)[0]) for each in names}
+        meshes = {each: _mesh(folder / each, name) for each in names}
         found = Description(saved["file"], saved["content"], meshes if whole else None)
         if whole and found.digest != scene_id:
             raise FileDamaged(folder, name, "its content has changed", state)
@@ -122,6 +126,15 @@ def _made(folder: Path, whole: bool) -> FileScene | None:
     except (FileDamaged, AttributeError, LookupError, TypeError) as error:
         reason = error.reason if isinstance(error, FileDamaged) else f"{error}".partition("\n")[0]
         raise FileDamaged(folder, name, reason, state) from None
+
+
+def _mesh(path: Path, name: str) -> MeshFile:
+    """Return a mesh of a scene, with its arrays if it was posted."""
+    arrays, data = path.with_name(f"{path.name}{_ARRAYS}"), bytes_of(path, name)[0]
+    if state_of(arrays) is None:
+        return MeshFile(path.name, data)
+    check(arrays, name)
+    return MeshFile(path.name, data, bytes_of(arrays, name)[0])
 
 
 class Index(Database):

@@ -2,7 +2,7 @@
 
 ```
 runs/<run id>.nc              one file a run, shared by all studies
-scenes/<scene id>/             scenes of files: scene.json and the meshes
+scenes/<scene id>/             scenes of files: scene.json, the meshes and their arrays
 studies/<study id>/study.json
 studies/<study id>/dataset.nc the runs of a study combined
 studies/<study id>/made.json  digests of its inputs, and of files made from it

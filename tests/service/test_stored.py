@@ -10,6 +10,7 @@ import os
 import random
 import shutil
 import sqlite3
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -25,6 +26,7 @@ from service import access, retention
 from service.app import create_app
 from service.errors import Conflict
 from service.examiner import Examined
+from service.inspector import Inspector
 from service.job import StudyState
 from service.jobs import Jobs
 from service.keys import Keys, KeysError, Scope
@@ -666,6 +668,24 @@ def test_a_scene_is_not_deleted_while_a_study_of_it_is_accepted(
     keeper.accept(Examined(study, list(study.run_ids()), estimate(study, store)), 0)
     deleting.join()
     assert store.scene(pin.id) is not None
+
+
+def test_the_meshes_of_a_posted_scene_are_read_once_for_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever uses them later reads arrays: the library of meshes stays in a process shut in."""
+    text, mesh = ((ROOT / "data/scenes" / name).read_bytes() for name in ("pin.toml", "pin.msh"))
+    text = text.replace(b"0.01", b"0.011")  # no other test has made this scene
+    found, content = asyncio.run(Inspector(60.0).inspect(text, {"pin.msh": mesh}, "anna"))
+    store = Store(tmp_path)
+    assert store.keep_scene(found.id, content, "anna")
+    monkeypatch.setitem(sys.modules, "meshio", None)
+    scene = store.scene(found.id)
+    assert scene is not None and len(scene.model(scene.parameters()).bodies) == 2
+    arrays = tmp_path / "scenes" / found.id / "pin.msh.arrays"
+    flip(arrays)
+    assert store.scene(found.id) is None
+    assert store.keep_scene(found.id, content, "anna") and store.scene(found.id) is not None
 
 
 def test_a_mesh_that_has_changed_spoils_its_scene_until_it_is_posted_again(tmp_path: Path) -> None:
