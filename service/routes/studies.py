@@ -84,7 +84,7 @@ async def submit(
     """Accept a study; 200 when it is known already, whatever became of it."""
     priority = taken_priority(content)
     found = await examiner.examine(content)
-    job, new = await asyncio.to_thread(keeper.accept, found.study, found.runs, priority)
+    job, new = await asyncio.to_thread(keeper.accept, found, priority)
     if not new:
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_study", study_id=job.id).path
