@@ -34,7 +34,8 @@ def run(options: argparse.Namespace) -> int:
     access = options.scheduler and Access(
         options.scheduler, options.tls_ca, options.tls_cert, options.tls_key
     )
-    study, store = Study.from_toml(options.study), Store(options.out)
+    measured = getattr(options, "measured", ())
+    study, store = Study.from_toml(options.study, measured), Store(options.out)
     if options.dry_run:
         print(dry_run(study, store))
         return OK
@@ -70,6 +71,11 @@ def run(options: argparse.Namespace) -> int:
     if outcome.stopped:
         return INTERRUPTED
     return OK if outcome.ok else FAILED
+
+
+def fit(options: argparse.Namespace) -> int:
+    """Find the parameters with which runs come closest to what was measured."""
+    return run(options)
 
 
 def scenes(options: argparse.Namespace) -> int:
@@ -126,6 +132,23 @@ def best(options: argparse.Namespace) -> int:
             dataset, options.of, options.where, lowest=options.lowest, count=options.count
         )
         print(best_table(dataset, options.of, runs))
+    return OK
+
+
+def sensitivity(options: argparse.Namespace) -> int:
+    """Tell which parameter of a sample matters for a number of its runs, and draw it."""
+    from studies.views import sensitivity as indices
+    from studies.views.reading import open_study
+
+    selection = _selection(options.select)
+    with open_study(options.path) as dataset:
+        found = indices.sensitivity(dataset, options.of, selection, method=options.method)
+        print(indices.sensitivity_table(found))
+        if options.out:
+            from studies.views.plots.sensitivity import sensitivity_figure
+
+            _save(sensitivity_figure(dataset, found, selection), options.out)
+            print(f"wrote {options.out}")
     return OK
 
 

@@ -74,8 +74,10 @@ def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examin
     store = Store(directory)
     study = Study.known(content, partial(_posted, store))
     if study.asks:
-        allowed = "is searched by `residua run`, not by a service: submit the runs themselves"
-        raise StudyError("goal", study.goal, allowed)
+        fields = {"goal": "searched", "refine": "refined", "fit": "fitted"}
+        field, what = next(each for each in fields.items() if getattr(study, each[0]))
+        allowed = f"is {what} by `residua run`, not by a service: submit the runs themselves"
+        raise StudyError(field, getattr(study, field), allowed)
     bounds.check_size(study)
     runs = list(study.checked().run_ids())
     cost = estimate(study, store)

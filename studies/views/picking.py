@@ -153,7 +153,7 @@ def run_file(path: Path | str, selection: Mapping[str, str | float]) -> Path:
     except FileDamaged as error:
         raise StudyError("path", str(path), f"holds a damaged file: {error}") from None
     study = Study.known(content, store.scene)
-    if study.asks:
+    if study.goal:
         allowed = "holds what a search found: give the file of a run, such as that of run_high"
         raise StudyError("path", str(path), allowed)
     if study.id != found.parent.name:  # then the ids of its runs differ too
@@ -161,6 +161,8 @@ def run_file(path: Path | str, selection: Mapping[str, str | float]) -> Path:
         raise StudyError("path", str(path), allowed)
     with open_netcdf(found) as dataset:
         run = one_run(dataset, selection)
+        if "run" in run:  # of a refinement, which chose its runs
+            return store.run_path(str(run["run"].item()))
         index = tuple(int(positions(dataset[axis], run[axis].item())[0]) for axis in study.axes)
     return store.run_path(next(case.id for case in study.cases() if case.index == index))
 
