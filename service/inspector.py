@@ -10,13 +10,9 @@ import errno
 import json
 import logging
 from base64 import b64decode, b64encode
-from collections.abc import AsyncIterator, Mapping
-from contextlib import ExitStack, asynccontextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-
-from anyio import CancelScope
-from anyio.to_thread import run_sync as run_in_thread
 
 from service.alone import CRASHED, FAILED, Answer, alone
 from service.guarded import Budget, Guarded, beyond
@@ -80,12 +76,15 @@ class Inspector:
         self.budget.left(caller)
         async with self.process.turn(caller):
             spent = left = self.budget.left(caller)  # all of it if there is no answer
-            async with _written({**meshes, _FILE: text}) as folder:
-                try:
-                    answer = await self.process.call(inspected, folder, left, name=_FILE)
-                    spent = answer.seconds
-                finally:
-                    self.budget.charge(caller, spent)
+            try:
+                files = {**meshes, _FILE: text}
+                answer = await self.process.call(inspected, files, left, name=_FILE)
+                spent = answer.seconds
+            except OSError:  # no room for temporary files
+                spent = 0.0
+                raise
+            finally:
+                self.budget.charge(caller, spent)
         if answer.failed == errno.ETIME and left < self.seconds:
             self.budget.left(caller)
         found = self._read(answer)
@@ -112,33 +111,18 @@ class Inspector:
         return found
 
 
-@asynccontextmanager
-async def _written(files: Mapping[str, bytes]) -> AsyncIterator[Path]:
-    """Give a temporary folder with these files; a disk may be slow, so threads work on it."""
-    kept = ExitStack()
-
-    def write() -> Path:
-        folder = kept.enter_context(scratch())
-        for name, data in files.items():
-            (folder / name).write_bytes(data)
-        return folder
-
-    try:
-        yield await run_in_thread(write)
-    finally:
-        with CancelScope(shield=True):
-            await run_in_thread(kept.close)
-
-
-def inspected(folder: Path, seconds: float) -> Answer:
-    """Return what a copy of this process answers, which has loaded what a scene needs."""
+def inspected(files: Mapping[str, bytes], seconds: float) -> Answer:
+    """Return what a copy of this process, which has loaded what a scene needs, finds in files."""
     import meshio  # noqa: F401
 
     import solver.contact.system
     import solver.results.samples  # noqa: F401
     import studies.scenes.building  # noqa: F401
 
-    return alone(_told, folder, folder=folder, seconds=seconds)
+    with scratch() as folder:
+        for name, data in files.items():
+            (folder / name).write_bytes(data)
+        return alone(_told, folder, folder=folder, seconds=seconds)
 
 
 def _told(folder: Path) -> str:

@@ -112,11 +112,11 @@ def test_a_caller_has_its_budget_again_within_a_minute(monkeypatch: pytest.Monke
 
 
 def test_simultaneous_posts_of_a_caller_share_its_budget(monkeypatch: pytest.MonkeyPatch) -> None:
-    given: list[tuple[str, float]] = []
+    given: list[float] = []
     inspector = Inspector(10.0)
 
-    async def spent(_: object, folder: Path, seconds: float, name: str) -> Answer:
-        given.append((folder.name, seconds))
+    async def spent(_: object, files: object, seconds: float, name: str) -> Answer:
+        given.append(seconds)
         await asyncio.sleep(0.0)
         return Answer("", errno.ETIME if seconds < 4.0 else errno.EFAULT, min(seconds, 4.0), "")
 
@@ -132,8 +132,7 @@ def test_simultaneous_posts_of_a_caller_share_its_budget(monkeypatch: pytest.Mon
 
     monkeypatch.setattr(inspector.process, "call", spent)
     *anna, bert = asyncio.run(posts())
-    ours = sorted(round(seconds) for _, seconds in given)
-    assert ours == [2, 6, 10, 10], "4 s of 10 each, the rest, and those of another caller"
+    assert sorted(map(round, given)) == [2, 6, 10, 10], "4 s of 10 each, the rest, another one"
     assert ["library" in each for each in (*anna, bert)] == [True, True, False, False, False, True]
     assert all("10 s of processor time in a minute are used" in each for each in anna[2:])
 
@@ -337,9 +336,15 @@ def test_a_full_folder_for_temporary_files_is_507(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(tempfile, "TemporaryFile", full)  # of the form, from 1 MB on
-    monkeypatch.setattr(tempfile, "mkdtemp", full)  # of the process that reads
-    ask = asking(create_app(Settings(data=tmp_path)))
-    for mesh in (b"", b"\n" * 1_100_000):
-        files = [("scene", ("scene.toml", b"")), ("meshes", ("a.msh", mesh))]
-        found = problem(ask("POST", "/scenes", files=files), 507)
-        assert found["detail"] == "no room is left for temporary files"
+    app = create_app(Settings(data=tmp_path))
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))  # of the process that reads, too
+    try:
+        for size in (100_000, 1_100_000):
+            files = [("scene", ("scene.toml", b"")), ("meshes", ("a.msh", b"\n" * size))]
+            found = problem(asking(app)("POST", "/scenes", files=files), 507)
+            assert found["detail"] == "no room is left for temporary files"
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    left = app.state.inspector.budget.left("address 127.0.0.1")
+    assert left == pytest.approx(10.0), "it is not charged for that"
