@@ -59,16 +59,6 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--resolution", type=float, metavar="DPI", help="dots per inch, 50 to 600")
     one.add_argument("--out", type=_path, required=True, metavar="PNG")
 
-    one = add("best", commands.best)
-    one.add_argument("path", type=_path, metavar="DIR")
-    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
-    one.add_argument(
-        "--where", nargs="+", action="extend", default=[], metavar="CONDITION",
-        help='such as "friction<0.3" or "hardening=none"; runs must meet all',
-    )  # fmt: skip
-    one.add_argument("--lowest", action="store_true", help="the lowest numbers first")
-    one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
-
     one = add("export", commands.export)
     one.add_argument("path", type=_path, metavar="RUN|DIR")
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
@@ -80,7 +70,7 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
 
-    for more in (_add_inference, _add_access, _add_remote):
+    for more in (_add_numbers, _add_inference, _add_access, _add_remote):
         more(add)
     return whole
 
@@ -123,6 +113,28 @@ def _add_inference(add: Callable[..., argparse.ArgumentParser]) -> None:
         help="chaos (default); delta, pawn or rbd_fast, with the library SALib",
     )  # fmt: skip
     one.add_argument("--out", type=_path, metavar="PNG", help="draw indices, tornado and runs")
+
+
+def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
+    one = add("best", commands.best)
+    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
+    one.add_argument(
+        "--where", nargs="+", action="extend", default=[], metavar="CONDITION",
+        help='such as "friction<0.3" or "hardening=none"; runs must meet all',
+    )  # fmt: skip
+    one.add_argument("--lowest", action="store_true", help="the lowest numbers first")
+    one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
+
+    one = add("predict", commands.predict)
+    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("at", nargs="+", metavar="NAME=VALUE", help="each parameter that varies")
+    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
+    one.add_argument("--by", choices=["cells", "gaussian"], help="default: cells, if it has any")
+    one.add_argument("--within", type=float, metavar="E", help="largest error that is enough")
+    one.add_argument(
+        "--compute", action="store_true", help="compute the run there if the error is larger"
+    )
 
 
 def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:

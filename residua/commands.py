@@ -152,6 +152,32 @@ def sensitivity(options: argparse.Namespace) -> int:
     return OK
 
 
+def predict(options: argparse.Namespace) -> int:
+    """Tell a number between the runs of a study, with its error."""
+    from studies.execution.run import run_study
+    from studies.views.answers import answer
+    from studies.views.picking import study_of
+    from studies.views.reading import find_study, open_netcdf
+
+    at, path = _selection(options.at, "NAME=VALUE"), find_study(options.path)
+    study, store = study_of(path)
+    asked: dict[str, Any] = {"of": options.of, "at": at, "by": options.by, "within": options.within}
+    with open_netcdf(path) as dataset:
+        found = answer(dataset, study, store, **asked)
+        if not found.enough and options.compute:
+            run_study(found.run, store, workers=1)
+            found = answer(dataset, study, store, **asked)
+    unit = f" {found.unit}" if found.unit not in {"", "1"} else ""
+    print(f"{found.of} = {found.value:.6g}{unit}, error {found.error:.2g}{unit} (by {found.by})")
+    if found.enough:
+        return OK
+    place = ", ".join(f"{name} = {value}" for name, value in found.at.items())
+    failed = store.run(next(found.run.run_ids())) if options.compute else None
+    told = f"its run ended as {failed['status']}" if failed else "--compute adds this run"
+    print(f"the error is above {options.within:g} at {place}: {told}")
+    return FAILED
+
+
 def export(options: argparse.Namespace) -> int:
     """Write the fields at the nodes of a run (keep = "fields") as files for ParaView."""
     from solver.errors import ModelError
@@ -261,14 +287,14 @@ def _written(option: str, path: Path) -> Iterator[Path]:
         raise StudyError(option, str(path), f"cannot be written: {error.strerror}") from None
 
 
-def _selection(texts: Sequence[str]) -> dict[str, str]:
-    """Return the names and values of ``--select``, each name once."""
+def _selection(texts: Sequence[str], option: str = "--select") -> dict[str, str]:
+    """Return the names and values of an option, each name once."""
     chosen: dict[str, str] = {}
     for text in texts:
         name, sign, value = (part.strip() for part in text.partition("="))
         if not sign:
-            raise StudyError("--select", text, "must be NAME=VALUE")
+            raise StudyError(option, text, "must be NAME=VALUE")
         if name in chosen:
-            raise StudyError("--select", text, f"{name} is selected already, as {chosen[name]}")
+            raise StudyError(option, text, f"{name} is given already, as {chosen[name]}")
         chosen[name] = value
     return chosen

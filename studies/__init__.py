@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from studies.storage.store import Store
     from studies.views.fits import fit
     from studies.views.grids import to_grid
+    from studies.views.predict import predict
     from studies.views.reading import open_netcdf, open_study
     from studies.views.sensitivity import sensitivity
     from studies.views.solution import to_xarray
@@ -49,6 +50,7 @@ _HOMES = {
     "open_netcdf": "views.reading",
     "open_study": "views.reading",
     "own_workers": "execution.cluster",
+    "predict": "views.predict",
     "run_study": "execution.run",
     "scene_schema": "definition.parameters",
     "sensitivity": "views.sensitivity",
@@ -79,6 +81,7 @@ __all__ = [
     "open_netcdf",
     "open_study",
     "own_workers",
+    "predict",
     "run_study",
     "scene_schema",
     "sensitivity",

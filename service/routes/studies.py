@@ -28,7 +28,16 @@ from service.dependencies import (
 from service.errors import REFUSED, Busy, Conflict, NotFound, QueueLost
 from service.files import NETCDF, netcdf
 from service.job import StudyState
-from service.schemas import ContentId, StudyDetail, StudyFilter, StudyPage, StudySummary, Window
+from service.schemas import (
+    ContentId,
+    Prediction,
+    PredictQuery,
+    StudyDetail,
+    StudyFilter,
+    StudyPage,
+    StudySummary,
+    Window,
+)
 from service.strict import StrictRoute
 from studies import Study, StudyError
 from studies.errors import FileDamaged, StoreFull
@@ -150,6 +159,29 @@ async def events(
         if now and now.status.final:
             return
         await asyncio.sleep(settings.poll_seconds)
+
+
+@router.get("/{study_id}/predict", responses=REFUSED)
+def predict(
+    job: TheJob, query: Annotated[PredictQuery, Query()], jobs: TheJobs, store: TheStore
+) -> Prediction:
+    """Tell a number between the runs of a study, with its error.
+
+    Beside the queries named below, every parameter that the study varies is one:
+    `?of=peak_residual_tension&load_ratio=0.62&friction=0.21`. A place outside of the runs, or
+    across failed ones, is refused.
+    """
+    from studies import open_netcdf  # xarray takes half a second to import
+    from studies.views.answers import answer
+
+    path, asked = dataset(job, jobs, store).path, query.model_dump()
+    at = {name: asked.pop(name) for name in query.model_extra or {}}
+    study = Study.known(jobs.study(job.id), store.scene)
+    with open_netcdf(path) as runs:
+        found = answer(runs, study, store, at=at, **asked)
+    add = None if found.enough else found.run.to_dict()
+    told = {name: getattr(found, name) for name in Prediction.model_fields.keys() - {"add"}}
+    return Prediction(**told, add=add)
 
 
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)

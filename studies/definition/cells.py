@@ -26,6 +26,11 @@ Point = tuple[float, ...]
 """A value for each axis that is a number."""
 
 
+KINK = 0.5
+"""Part of a miss in the middle of an edge that may be left once the middle is known, as at a kink;
+of smooth numbers it is a quarter. The error in a cell is the sum of these over its axes."""
+
+
 class Edge(NamedTuple):
     """An edge of a cell: its direction, its ends, and its middle."""
 
@@ -105,8 +110,8 @@ def edges(low: Point, high: Point) -> Iterator[Edge]:
             continue
         sides = [*zip(low, high, strict=True)]
         for at in itertools.product(*sides[:axis], (half,), *sides[axis + 1 :]):
-            ends = ((*at[:axis], end, *at[axis + 1 :]) for end in (first, last))
-            yield Edge(axis, *ends, at)
+            start, end = ((*at[:axis], each, *at[axis + 1 :]) for each in (first, last))
+            yield Edge(axis, start, end, at)
 
 
 def weights(low: Point, high: Point, at: Point) -> dict[Point, float]:

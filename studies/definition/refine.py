@@ -3,8 +3,8 @@
 The values of the axes that are numbers divide their ranges into cells; each combination of values
 on the other axes is a branch, which has cells of its own. In the first round the runs at the
 corners of all cells, at the middles of their edges and at their centres are computed. A cell is
-halved along each axis on whose edges a run in the middle missed what the two ends predict by more
-than is allowed; a cell of the sweep along all axes if the run at its centre missed so much. Where
+halved along the axis on whose edges a run in the middle missed most what the two ends predict, if
+by more than is allowed; a cell of the sweep along all axes if the run at its centre did so. Where
 some runs of a cell failed and others did not, it is halved along the axes on whose edges this
 changes. The parts ask for the runs at the middles of their edges, and so on. A cell is halved along
 an axis only so often: kinks, jumps and edges of regions of failed runs are resolved to this size.
@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 from solver.parameters import is_number
 from solver.scenes import Scene
-from studies.definition.cells import Cell, Point, weights
+from studies.definition.cells import KINK, Cell, Point, weights
 from studies.definition.parameters import parameters_of
 from studies.definition.quantity import number_of_a_run
 from studies.definition.sweep import MAXIMUM_RUNS, Axes
@@ -38,10 +38,9 @@ STATES = SETTLED, FAILED, SMALLEST, MOST, OPEN = "settled", "failed", "smallest"
 as is allowed; or no runs were left; or the refinement was stopped."""
 
 _KEYS = ("of", "until", "most", "halvings")
+_UNTIL, _MOST, _HALVINGS = 0.02, 200, 5
+"""Entries that are left out."""
 _MOST_AXES, _MOST_HALVINGS = 4, 20
-_LEAST, _USUAL = 0.25, 0.5
-"""Part of the miss on an edge that is left when it is halved: of smooth numbers; of a kink, and if
-nothing is known of the edge before."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,9 +58,9 @@ class Refine:
     """
 
     of: tuple[str, ...]
-    until: float | Mapping[str, float] = 0.02
-    most: int = 200
-    halvings: int = 5
+    until: float | Mapping[str, float]
+    most: int
+    halvings: int
     axes: Mapping[str, Sequence[float]]
 
     @property
@@ -114,14 +113,12 @@ class _Halving(NamedTuple):
     ----------
     cell, axes, left : the cell, the axes, and the errors that are left if it is not divided
     miss : how far it missed what is allowed
-    before : of each axis the misses before it was halved the last time
     """
 
     cell: Cell
     axes: list[int]
     miss: float
     left: tuple[float, ...]
-    before: Sequence[tuple[float, ...] | None]
 
     @property
     def order(self) -> tuple[Any, ...]:
@@ -157,7 +154,6 @@ class Refinement:
     _waits: dict[Wanted, list[Cell]] = field(default_factory=dict)
     _known: list[Cell] = field(default_factory=list)
     _halvings: list[_Halving] = field(default_factory=list)
-    _before: dict[Cell, Sequence[tuple[float, ...] | None]] = field(default_factory=dict)
     _allowed: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -167,7 +163,7 @@ class Refinement:
     @property
     def wants(self) -> list[Wanted]:
         """The runs that it lacks."""
-        return [each for each in self.asked if each not in self.rows]
+        return list(self._waits)
 
     @property
     def reason(self) -> str:
@@ -281,7 +277,6 @@ class Refinement:
     def _decide(self, cell: Cell) -> None:
         """Settle a cell whose runs are known, or keep it to be divided."""
         del self._lacks[cell]
-        before = self._before.pop(cell, (None,) * len(cell.low))
         known = {at: self.number(Wanted(cell.branch, at)) for at in points_of(cell)}
         there = {at: each for at, each in known.items() if each is not None}
         every, left = set(range(len(cell.low))), ()
@@ -296,15 +291,16 @@ class Refinement:
         else:
             misses = _misses(cell, there)
             ratios = [self._ratio(each) for each in misses]
-            miss, axes = max(ratios), {axis for axis in every if ratios[axis] > 1.0}
+            worst = sorted(every, key=lambda axis: -ratios[axis])
+            free = [k for k in worst if ratios[k] > 1.0 and cell.divisible(k, self.refine.halvings)]
+            miss, axes = max(ratios), set(free[:1]) or {k for k in worst if ratios[k] > 1.0}
             if not any(cell.halved) and not axes:
                 miss = self._ratio(_off(cell, there, cell.centre, there[cell.centre]))
                 axes = every if miss > 1.0 else axes
-            left = _left(misses, before)
-            before = tuple(misses[k] if k in axes else each for k, each in enumerate(before))
+            left = tuple(KINK * sum(each) for each in zip(*misses, strict=True))
         can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
         if can:
-            self._halvings.append(_Halving(cell, can, miss, left, before))
+            self._halvings.append(_Halving(cell, can, miss, left))
         else:
             self.settled.append(Settled(cell, SMALLEST if axes else SETTLED, left))
 
@@ -328,8 +324,7 @@ class Refinement:
             most = tuple(map(max, zip(*misses, strict=True)))
             can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
             if can and state == SETTLED:
-                before = (None,) * len(cell.low)
-                self._halvings.append(_Halving(cell, can, self._ratio(most), most, before))
+                self._halvings.append(_Halving(cell, can, self._ratio(most), most))
             else:
                 small = axes and state == SETTLED
                 self.settled.append(Settled(cell, SMALLEST if small else state, most))
@@ -350,7 +345,7 @@ class Refinement:
                 return
             self._halvings = [each for each in self._halvings if each not in own]
             full = False
-            for cell, axes, _, left, before in sorted(own, key=lambda each: each.order):
+            for cell, axes, _, left in sorted(own, key=lambda each: each.order):
                 parts = cell.parts(axes)
                 new = {Wanted(part.branch, at) for part in parts for at in points_of(part)}
                 full = full or len(self.asked.keys() | new) > self.refine.most
@@ -358,7 +353,6 @@ class Refinement:
                     self.settled.append(Settled(cell, MOST, left))
                     continue
                 for part in parts:
-                    self._before[part] = before
                     self._open(part)
 
     def _at_most(self, stage: int) -> int:
@@ -408,21 +402,6 @@ def _off(
     )
 
 
-def _left(misses: Misses, before: Sequence[tuple[float, ...] | None]) -> tuple[float, ...]:
-    """Return the errors that are left in a cell with these misses.
-
-    Between the runs of an edge a part of its miss is left: as much as its halving left before, of
-    the miss on edges twice as long.
-    """
-    left = [0.0] * len(misses[0])
-    for own, earlier in zip(misses, before, strict=True):
-        for k, miss in enumerate(own):
-            known = earlier is not None and earlier[k] > 0.0
-            part = miss / earlier[k] if earlier is not None and known else _USUAL
-            left[k] += miss * min(max(part, _LEAST), 1.0)
-    return tuple(left)
-
-
 def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
     """Return the refinement that a study asks for.
 
@@ -452,9 +431,9 @@ def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
     if not 1 <= len(numbers) <= _MOST_AXES or any(len(each) < 2 for each in numbers.values()):
         allowed = f"needs 1 to {_MOST_AXES} axes of two numbers or more: the ends of their ranges"
         raise StudyError("refine", dict(content), allowed)
-    until = _until(content.get("until", Refine.until), list(names))
-    most = _whole("most", content.get("most", Refine.most), MAXIMUM_RUNS)
-    halvings = _whole("halvings", content.get("halvings", Refine.halvings), _MOST_HALVINGS)
+    until = _until(content.get("until", _UNTIL), list(names))
+    most = _whole("most", content.get("most", _MOST), MAXIMUM_RUNS)
+    halvings = _whole("halvings", content.get("halvings", _HALVINGS), _MOST_HALVINGS)
     found = Refine(of=tuple(names), until=until, most=most, halvings=halvings, axes=numbers)
     others = math.prod(len(values) for name, values in axes.items() if name not in numbers)
     if found.first(others) > most:

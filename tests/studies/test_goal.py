@@ -27,6 +27,7 @@ from studies.definition.identity import solver_hash
 from studies.execution.asking import Asking
 from studies.execution.goals import answers
 from studies.execution.limits import Limits
+from studies.execution.refined import refined
 from studies.execution.run import _Work
 from studies.execution.task import PathTask, walk
 from tests.studies.conftest import fake_study
@@ -70,7 +71,7 @@ def study(goal: dict[str, Any], sweep: Any = None, scene: str = "fake", **fixed:
 
 
 def search_here(study: Study, store: Store, most: int = 10**6) -> list[str]:
-    """Search in this process, until there are so many runs; return their ids."""
+    """Search, or refine, in this process, until there are so many runs; return their ids."""
     goals, computed = Asking(study, store), []
 
     def hear(message: dict[str, Any]) -> None:
@@ -91,7 +92,10 @@ def search_here(study: Study, store: Store, most: int = 10**6) -> list[str]:
         goals.closed(asked.path.id)
     store.reconcile()
     store.save_study(study)
-    answers(study, store, goals)
+    if study.goal:
+        answers(study, store, goals)
+    else:
+        refined(study, store, goals, anew=True)
     return computed
 
 
