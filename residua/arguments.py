@@ -70,7 +70,7 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
 
-    for more in (_add_numbers, _add_inference, _add_access, _add_remote):
+    for more in (_add_numbers, _add_access, _add_remote):
         more(add)
     return whole
 
@@ -103,18 +103,6 @@ def _add_run(one: argparse.ArgumentParser) -> None:
     one.add_argument("--dry-run", action="store_true", help="print the estimated cost, and end")
 
 
-def _add_inference(add: Callable[..., argparse.ArgumentParser]) -> None:
-    one = add("sensitivity", commands.sensitivity)
-    one.add_argument("path", type=_path, metavar="DIR")
-    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
-    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
-    one.add_argument(
-        "--method", default="chaos",
-        help="chaos (default); delta, pawn or rbd_fast, with the library SALib",
-    )  # fmt: skip
-    one.add_argument("--out", type=_path, metavar="PNG", help="draw indices, tornado and runs")
-
-
 def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
     one = add("best", commands.best)
     one.add_argument("path", type=_path, metavar="DIR")
@@ -135,6 +123,16 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
     one.add_argument(
         "--compute", action="store_true", help="compute the run there if the error is larger"
     )
+
+    one = add("sensitivity", commands.sensitivity)
+    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
+    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
+    one.add_argument(
+        "--method", default="chaos",
+        help="chaos (default); delta, pawn or rbd_fast, with the library SALib",
+    )  # fmt: skip
+    one.add_argument("--out", type=_path, metavar="PNG", help="draw indices, tornado and runs")
 
 
 def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:

@@ -135,23 +135,6 @@ def best(options: argparse.Namespace) -> int:
     return OK
 
 
-def sensitivity(options: argparse.Namespace) -> int:
-    """Tell which parameter of a sample matters for a number of its runs, and draw it."""
-    from studies.views import sensitivity as indices
-    from studies.views.reading import open_study
-
-    selection = _selection(options.select)
-    with open_study(options.path) as dataset:
-        found = indices.sensitivity(dataset, options.of, selection, method=options.method)
-        print(indices.sensitivity_table(found))
-        if options.out:
-            from studies.views.plots.sensitivity import sensitivity_figure
-
-            _save(sensitivity_figure(dataset, found, selection), options.out)
-            print(f"wrote {options.out}")
-    return OK
-
-
 def predict(options: argparse.Namespace) -> int:
     """Tell a number between the runs of a study, with its error."""
     from studies.execution.run import run_study
@@ -176,6 +159,23 @@ def predict(options: argparse.Namespace) -> int:
     told = f"its run ended as {failed['status']}" if failed else "--compute adds this run"
     print(f"the error is above {options.within:g} at {place}: {told}")
     return FAILED
+
+
+def sensitivity(options: argparse.Namespace) -> int:
+    """Tell which parameter of a sample matters for a number of its runs, and draw it."""
+    from studies.views import sensitivity as indices
+    from studies.views.reading import open_study
+
+    selection = _selection(options.select)
+    with open_study(options.path) as dataset:
+        found = indices.sensitivity(dataset, options.of, selection, method=options.method)
+        print(indices.sensitivity_table(found))
+        if options.out:
+            from studies.views.plots.sensitivity import sensitivity_figure
+
+            _save(sensitivity_figure(dataset, found, selection), options.out)
+            print(f"wrote {options.out}")
+    return OK
 
 
 def export(options: argparse.Namespace) -> int:

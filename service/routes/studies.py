@@ -7,6 +7,7 @@ import logging
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from http import HTTPStatus
+from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query, Request, Response
@@ -54,6 +55,8 @@ EXAMPLE = {
 }
 
 PRIORITIES = range(-100, 101)
+MOST_FITTED = 1000
+"""Largest number of runs to which a request may fit polynomials, which takes seconds."""
 
 SUBMISSION = Study.model_json_schema() | {"examples": [EXAMPLE]}
 SUBMISSION["properties"]["priority"] = {
@@ -182,6 +185,24 @@ def predict(
     add = None if found.enough else found.run.to_dict()
     told = {name: getattr(found, name) for name in Prediction.model_fields.keys() - {"add"}}
     return Prediction(**told, add=add)
+
+
+@router.get("/{study_id}/sensitivity", responses=REFUSED)
+def tell_sensitivity(job: TheJob, jobs: TheJobs, store: TheStore, of: str) -> dict[str, Any]:
+    """Tell which parameter matters for a number of the runs: indices of sensitivity.
+
+    Of `parameters` each has `first` and `total`, the share of the variance of `of` that it makes
+    alone, and with others, and how well they are known. A sample that does not bear it is refused
+    with the reason.
+    """
+    from studies import open_netcdf, sensitivity  # xarray takes half a second to import
+    from studies.views.sensitivity import told
+
+    with open_netcdf(Path(dataset(job, jobs, store).path)) as runs:
+        if (size := runs["status"].size) > MOST_FITTED:
+            allowed = f"at most {MOST_FITTED} are fitted here: fetch the data set, and fit it there"
+            raise StudyError("runs", size, allowed)
+        return told(sensitivity(runs, of))
 
 
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)

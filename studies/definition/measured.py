@@ -48,7 +48,7 @@ Read = Callable[[str], Line | None]
 """Gives a variable of a run by its name; None if the run has none."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Measured:
     """A measured line.
 
