@@ -54,6 +54,7 @@ class MapQuery(BaseModel):
         "the bodies are not released",
     )
     component: str | None = Field(default=None, description="of a stress; the first by default")
+    stage: str | None = Field(default=None, description="of several stages; the last by default")
     zoom: float | None = Field(
         default=None,
         gt=0,
