@@ -36,6 +36,7 @@ from service.retention import Keeper
 from service.routes.manual import ASSETS
 from service.runner import Runner
 from service.settings import Settings, chosen
+from service.table import Tables
 from studies import Store, StoreBusy, StudyError
 from studies.errors import CatalogueDamaged, StoreFull
 from studies.scratch import remove_left
@@ -110,6 +111,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.examiner = examiner
     app.state.inspector = Inspector(settings.reader_seconds)
     app.state.details = Details(jobs, store)
+    app.state.tables = Tables(jobs, store)
     app.state.keeper = keeper
     app.state.metrics = metrics
     app.state.pictures = Pictures(settings.map_queue, settings.map_bytes)

@@ -20,6 +20,7 @@ from service.retention import Keeper
 from service.runner import Runner
 from service.schemas import ContentId
 from service.settings import Settings
+from service.table import Tables
 from studies import Store
 
 
@@ -47,6 +48,7 @@ TheProbe = Annotated[Probe, held("probe")]
 TheRunner = Annotated[Runner, held("runner")]
 TheSettings = Annotated[Settings, held("settings")]
 TheStore = Annotated[Store, held("store")]
+TheTables = Annotated[Tables, held("tables")]
 
 
 def get_job(study_id: ContentId, jobs: TheJobs) -> Job:

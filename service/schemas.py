@@ -43,6 +43,20 @@ class RunFilter(Window):
     hardening: str | None = None
 
 
+class TableFilter(BaseModel):
+    """The runs of a study that are requested, by any column of its table."""
+
+    model_config = ConfigDict(extra="allow")
+
+    sort: str = Field(default="", description="a column; with a minus, the largest first")
+    columns: str = Field(default="", description="names with commas between; all by default")
+
+    @property
+    def conditions(self) -> dict[str, str]:
+        """The conditions by column."""
+        return {name: str(value) for name, value in (self.model_extra or {}).items() if value != ""}
+
+
 class MapQuery(BaseModel):
     """Which field of a run is drawn."""
 
