@@ -28,6 +28,7 @@ from service.maps import Pictures
 from service.methods import head_is_get
 from service.metrics import Metrics
 from service.overview import Details
+from service.pages import routes as pages
 from service.pool import Pool
 from service.probe import Probe
 from service.processes import Starter, find_modules_at_home
@@ -113,6 +114,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.details = Details(jobs, store)
     app.state.tables = Tables(jobs, store)
     app.state.keeper = keeper
+    app.state.keys = keys
     app.state.metrics = metrics
     app.state.pictures = Pictures(settings.map_queue, settings.map_bytes)
     app.state.probe = Probe()
@@ -127,6 +129,8 @@ def create_app(settings: Settings) -> FastAPI:
     for router in routes.ROUTERS:
         needs_key = settings.keys_required and "health" not in router.tags
         app.include_router(router, dependencies=[Security(BEARER)] if needs_key else [])
+    app.include_router(pages.home)
+    app.include_router(pages.router)
     app.mount("/docs", ASSETS, name="docs")
     return app
 

@@ -11,7 +11,7 @@ from service.examiner import Examiner
 from service.inspector import Inspector
 from service.job import Job
 from service.jobs import Jobs
-from service.keys import Scope
+from service.keys import Keys, Scope
 from service.maps import Pictures
 from service.metrics import Metrics
 from service.overview import Details
@@ -42,6 +42,7 @@ TheExaminer = Annotated[Examiner, held("examiner")]
 TheInspector = Annotated[Inspector, held("inspector")]
 TheJobs = Annotated[Jobs, held("jobs")]
 TheKeeper = Annotated[Keeper, held("keeper")]
+TheKeys = Annotated[Keys, held("keys")]
 TheMetrics = Annotated[Metrics, held("metrics")]
 ThePictures = Annotated[Pictures, held("pictures")]
 TheProbe = Annotated[Probe, held("probe")]
