@@ -42,6 +42,15 @@ RANGE = re.compile(r"(?P<low>[^.]*(?:\.\d[^.]*)?)\.\.(?P<high>.*)", re.DOTALL)
 OUTCOMES = (*STATUSES[:-1], PENDING)
 """Statuses of runs in a table, by their number in the column ``status`` of octets."""
 
+EFFORT = (
+    "increments", "cut_increments", "iterations", "median_iterations", "inner_fallbacks",
+    "blended_tangents", "cpu_seconds", "degrees_of_freedom",
+)  # fmt: skip
+"""Numbers that say how hard a run was to solve."""
+
+NUMBERS = ("result", "effort", "audit")
+"""Groups of columns with the numbers of runs, the main ones first."""
+
 STATUS, RUN, MESSAGE = "status", "run", "message"
 
 
@@ -52,7 +61,7 @@ class Column:
     Attributes
     ----------
     name, words, unit : name, meaning and unit
-    group : ``sweep``, ``result``, ``audit`` or ``run``
+    group : ``sweep``, ``run``, or one of `NUMBERS`
     flags : meanings of its numbers, if they stand for words
     values : numbers, NaN where there is none, or texts, for each run
     """
@@ -99,7 +108,7 @@ class Table:
     def numbers(self) -> list[Column]:
         """The columns of results that are numbers."""
         every = self.columns.values()
-        return [each for each in every if each.number and each.group in ("result", "audit")]
+        return [each for each in every if each.number and each.group in NUMBERS]
 
     def column(self, name: str, field: str = "columns") -> Column:
         """Return a column; raise `StudyError` if there is none of this name."""
@@ -177,12 +186,19 @@ class Tables:
         scalars = [row["scalars"] if row else {} for row in found]
         for name in dict.fromkeys(name for each in scalars for name in each if name not in known):
             values = np.array([each.get(name, math.nan) for each in scalars], dtype=float)
-            group = "audit" if name in AUDIT or name.startswith("audit_") else "result"
+            group = group_of(name)
             columns.append(_column(name, values, group, scene))
         columns.append(_column(RUN, np.array(runs, dtype=object), "run"))
         said = [row["message"] if row else "" for row in found]
         columns.append(_column(MESSAGE, np.array(said, dtype=object), "run"))
         return Table(axes=axes, columns={each.name: each for each in columns})
+
+
+def group_of(name: str) -> str:
+    """Return what a number of a run tells: ``result``, ``effort`` or ``audit``."""
+    if name in AUDIT or name.startswith("audit_"):
+        return "audit"
+    return "effort" if name in EFFORT else "result"
 
 
 def scene_of_study(store: Store, name: str) -> Scene | None:

@@ -98,6 +98,10 @@ def told(request: Request, answer: Response) -> Response:
     return found
 
 
+REFUSALS: tuple[type[Exception], ...] = (HTTPException, RequestValidationError, *STATUS)
+"""Errors that have a page; any other is answered as everywhere."""
+
+
 class PageRoute(APIRoute):
     """A route whose errors are pages."""
 
@@ -108,7 +112,7 @@ class PageRoute(APIRoute):
         async def shown(request: Request) -> Response:
             try:
                 return await handle(request)
-            except (HTTPException, RequestValidationError, *STATUS) as error:
+            except REFUSALS as error:
                 return told(request, answer_to(request, error))
 
         return shown

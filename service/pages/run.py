@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from solver.results.audit.figures import AUDIT, LIMITS
+from service.pages.study import rank
+from service.table import group_of
+from solver.results.audit.figures import LIMITS
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
@@ -55,7 +57,7 @@ def audited(run: Mapping[str, Any], scene: Scene | None) -> dict[str, list[Figur
             limit=LIMITS.get(name),
         )
         for name, value in run["scalars"].items()
-        if name in AUDIT or name.startswith("audit_")
+        if group_of(name) == "audit"
     ]
     return {
         "limited": [each for each in found if each.limit is not None],
@@ -67,14 +69,13 @@ def numbers_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str,
     """Return name, meaning, unit and value of the numbers of a run that are not of the audit."""
     found = []
     for name, value in run["scalars"].items():
-        if name in AUDIT or name.startswith("audit_"):
+        if group_of(name) == "audit":
             continue
-        quantity = QUANTITIES.get(name)
-        if quantity and quantity.flags and value is not None:
-            value = quantity.flags(int(value)).name.lower().replace("_", " ")
+        meanings = QUANTITIES[name].flags if name in QUANTITIES else None
+        word = meanings(int(value)).name.lower() if meanings and value is not None else value
         each = {"name": name, "words": words_of(name, scene), "unit": unit_of(name, scene)}
-        found.append(each | {"value": value})
-    return found
+        found.append(each | {"value": word})
+    return sorted(found, key=lambda each: rank(each["name"]))
 
 
 def parameters_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from service.table import MESSAGE, RUN, STATUS, Column, Table
+from service.table import MESSAGE, NUMBERS, RUN, STATUS, Column, Table, group_of
 from studies.definition.vocabulary import OK
 from studies.views.tables import FIGURES
 
@@ -51,12 +51,17 @@ def varied(table: Table) -> list[Column]:
 
 
 def usual(table: Table) -> list[Column]:
-    """Return the columns of numbers, the main ones first."""
-    rank = {name: place for place, name in enumerate(FIGURES)}
+    """Return the columns of numbers that some run has, the main ones first."""
     return sorted(
         (each for each in table.numbers if not np.isnan(each.values).all()),
-        key=lambda each: (each.group == "audit", rank.get(each.name, len(rank))),
+        key=lambda each: rank(each.name),
     )
+
+
+def rank(name: str) -> tuple[int, int]:
+    """Return the place of a number among others: by its group, the main ones first."""
+    main = list(FIGURES)
+    return NUMBERS.index(group_of(name)), main.index(name) if name in main else len(main)
 
 
 def part(table: Table, query: Mapping[str, str]) -> Part:

@@ -6,21 +6,24 @@ import csv
 import hashlib
 import io
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
 from starlette.staticfiles import NotModifiedResponse
 
-from service.dependencies import TheRun, TheStore, TheTables
+import solver
+from service.dependencies import ThePictures, TheRun, TheStore, TheTables
 from service.errors import REFUSED
 from service.files import TAGS, UNCHANGED
 from service.octets import MEDIA_TYPE, octets
 from service.schemas import ContentId, TableFilter
 from service.table import OUTCOMES, STATUS
-from studies import Store, StudyError
+from studies import StudyError
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
 
@@ -78,18 +81,18 @@ def numbers(
 
 
 @router.get("/runs/{run_id}/fields", tags=["runs"])
-def fields(run: TheRun, store: TheStore) -> dict[str, list[dict[str, Any]]]:
+async def fields(
+    run: TheRun, store: TheStore, pictures: ThePictures
+) -> dict[str, list[dict[str, Any]]]:
     """Return the variables of a run that are drawn: `maps` and `lines`, with their labels."""
-    from studies.views.shown import outline
-
-    with opened(store, run["id"]) as dataset:
-        return outline(dataset)
+    return await pictures.alone(outlined, store.run_path(run["id"]))
 
 
 @router.get("/runs/{run_id}/values", tags=["runs"], responses={**OCTETS, **UNCHANGED, **REFUSED})
-def values(
+async def values(
     run: TheRun,
     store: TheStore,
+    pictures: ThePictures,
     request: Request,
     field: str,
     component: str | None = None,
@@ -100,32 +103,49 @@ def values(
 
     With `minus`, the map of another run is subtracted at the points of this one.
     """
-    from studies.views.shown import shown
-
-    files = [store.run_path(each) for each in (run["id"], minus) if each]
-    if minus and store.run(minus) is None:
+    if minus and await run_in_threadpool(store.run, minus) is None:
         raise StudyError("minus", minus, "must be the id of a run")
-    content = " ".join([*map(digest, files), field, component or "", stage or ""])
+    files = [store.run_path(each) for each in (run["id"], minus) if each]
+    digests = await run_in_threadpool(lambda: [*map(digest, files)])
+    content = repr((solver.__version__, digests, field, component, stage))
     tag = f'"{hashlib.sha256(content.encode("utf-8", "surrogatepass")).hexdigest()[:32]}"'
     headers = Headers({"etag": tag, "cache-control": "no-cache"})
     if TAGS.is_not_modified(headers, request.headers):
         return NotModifiedResponse(headers)
-    with opened(store, run["id"]) as dataset:
-        if minus is None:
-            found = shown(dataset, field, component, stage)
-        else:
-            with opened(store, minus) as other:
-                found = shown(dataset, field, component, stage, other)
-    return Response(octets(*found, kind="<f4"), media_type=MEDIA_TYPE, headers=dict(headers))
+    found = await pictures.alone(read, files, field, component, stage)
+    return Response(found, media_type=MEDIA_TYPE, headers=dict(headers))
+
+
+def outlined(path: Path) -> dict[str, list[dict[str, Any]]]:
+    """Return the variables of a run's file that are drawn."""
+    from studies.views.shown import outline
+
+    with opened(path) as dataset:
+        return outline(dataset)
+
+
+def read(files: list[Path], field: str, component: str | None, stage: str | None) -> bytes:
+    """Return a map or lines of the first run as octets, less those of the second if there is one.
+
+    Raises
+    ------
+    StudyError
+        if the run has no such field, component or stage
+    """
+    from studies.views.shown import shown
+
+    with ExitStack() as stack:
+        runs = [stack.enter_context(opened(path)) for path in files]
+        found = shown(runs[0], field, component, stage, *runs[1:])
+        return octets(*found, kind="<f4")
 
 
 @contextmanager
-def opened(store: Store, run_id: str) -> Iterator[Any]:
+def opened(path: Path) -> Iterator[Any]:
     """Give the data set of a run, without the dimensions of a sweep."""
     from studies import open_netcdf  # xarray takes half a second to import
     from studies.views.picking import sweep_axes
 
-    path = store.run_path(run_id)
     verify(path)
     with open_netcdf(path) as dataset:
         yield dataset.isel(dict.fromkeys(sweep_axes(dataset), 0))

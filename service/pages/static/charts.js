@@ -18,7 +18,7 @@ const drawn = new Map();
 function axis() {
   return {
     gridcolor: colour("grid"), zerolinecolor: colour("zero"), linecolor: colour("line"),
-    tickcolor: colour("line"), ticks: "outside", ticklen: 4, automargin: true,
+    tickcolor: colour("line"), ticks: "outside", ticklen: 4, automargin: true, exponentformat: "power",
     title: { standoff: 8, font: { size: 13 } },
   };
 }

@@ -9,9 +9,9 @@ const GREEK = "σ";
 const DASHES = ["solid", "dash", "dot", "dashdot"];
 const FIRST = {
   map: () => true,
-  depth: (each) => each.name === "residual_profile" || each.name.includes("profile"),
+  depth: (each) => each.name === "residual_profile",
   contact: (each) => each.name === "contact_pressure",
-  line: () => true,
+  line: (each) => each.name === "surface_residual",
 };
 
 const query = (given) => new URLSearchParams(Object.entries(given).filter(([, value]) => value)).toString();
@@ -157,7 +157,7 @@ export function drawLines(chart, found, names = []) {
       traces,
       layout: {
         xaxis: { title: { text: named(along.words, along.unit) }, zeroline: false, showgrid: false },
-        yaxis: { title: { text: head.unit ? named("", head.unit).trim() : head.words } },
+        yaxis: { title: { text: head.unit ? named("", head.unit).trim() : "" } },
         showlegend: traces.length > 1,
         legend: { title: { text: names.length ? "" : over.filter(({ labels }) => labels.length > 1).map(({ name }) => words(name)).join(", ") + "&nbsp;" } },
       },

@@ -192,7 +192,7 @@ function controls(what, x, y, kind) {
     keep(changes);
     drawSweep();
   };
-  const groups = { result: "Results", audit: "Audit" };
+  const groups = { result: "Results", effort: "Effort", audit: "Audit" };
   const numbers = study.numbers.map(({ name, words: said, group }) => ({ name, words: said.length > 60 ? words(name) : said, group: groups[group] }));
   const options = several.map(({ name }) => ({ name, words: words(name) }));
   const parts = [select("Number", numbers, what.name, (name) => { again({ number: name }); if (chosen !== null) figures(); })];
