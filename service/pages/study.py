@@ -58,6 +58,12 @@ def usual(table: Table) -> list[Column]:
     )
 
 
+def varies(column: Column) -> bool:
+    """Whether the numbers of a column are not all the same."""
+    known = column.values[~np.isnan(column.values)]
+    return bool(known.size) and bool((known != known[0]).any())
+
+
 def rank(name: str) -> tuple[int, int]:
     """Return the place of a number among others: by its group, the main ones first."""
     main = list(FIGURES)
@@ -82,7 +88,8 @@ def part(table: Table, query: Mapping[str, str]) -> Part:
     pages = max(1, -(-len(found) // ROWS))
     number = query.get("page", "1")
     page = min(max(int(number), 1), pages) if number.isdecimal() else 1
-    named = [each.name for each in usual(table)[:SHOWN]]
+    differ = [each.name for each in usual(table) if varies(each)]
+    named = differ[:SHOWN]
     extra = [sort.removeprefix("-"), query.get("number", ""), *where]
     fresh = [n for n in dict.fromkeys(extra) if n in table.columns and n not in (RUN, MESSAGE)]
     first = [*(each.name for each in varied(table)), STATUS]
@@ -132,6 +139,7 @@ def described(table: Table) -> dict[str, Any]:
                 "words": each.words,
                 "unit": each.unit,
                 "group": each.group,
+                "varies": varies(each),
                 "flags": {str(code): word for code, word in each.flags.items()},
             }
             for each in usual(table)

@@ -69,6 +69,30 @@ export function bar(title) {
   };
 }
 
+// The title of an axis, in lines that fit the chart.
+export function titled(chart, words, unit) {
+  const most = Math.max(16, Math.floor((chart.clientWidth - 90) / 6.8));
+  const lines = [""];
+  for (const word of named(words, unit).split(" ")) {
+    const last = lines.length - 1;
+    if (lines[last] && lines[last].length + word.length >= most) lines.push(word);
+    else lines[last] += (lines[last] ? " " : "") + word;
+  }
+  return { text: lines.join("<br>") };
+}
+
+// Colours in an order, such as those of rising loads; all stand out from the page.
+export function ordered(count) {
+  const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+  const [first, last] = dark ? [3, 9] : [0, 7.4];
+  return Array.from({ length: count }, (_, k) => {
+    const at = first + ((last - first) * k) / Math.max(count - 1, 1);
+    const low = Math.floor(at), share = at - low;
+    const [a, b] = [VIRIDIS[low], VIRIDIS[Math.min(low + 1, 9)]].map((each) => [1, 3, 5].map((i) => parseInt(each.slice(i, i + 2), 16)));
+    return `rgb(${a.map((each, i) => Math.round(each + (b[i] - each) * share)).join(",")})`;
+  });
+}
+
 export const named = (words, unit) => (unit ? `${words} [${unit}]` : words);
 
 const redraw = () => [...drawn].forEach(([chart, make]) => draw(chart, make));

@@ -2,8 +2,8 @@
 
 import { json, octets } from "./octets.js";
 import { fail } from "./charts.js";
-import { choice, data, keep, root, select, state } from "./page.js";
-import { drawLines, drawMap, valuesOf } from "./pictures.js";
+import { choice, data, keep, root, select, state, words } from "./page.js";
+import { combinations, drawLines, drawMap, valuesOf } from "./pictures.js";
 
 const { runs } = data();
 const NAMES = "ABCDEF";
@@ -22,12 +22,16 @@ async function showLine(known) {
   const components = field.components ?? [];
   const component = components.includes(state.get("line.component")) ? state.get("line.component") : components[0];
   const again = (changes) => { keep(changes); showLine(known); };
+  const found = await Promise.all(runs.map((run) => octets(valuesOf(run, { field: field.name, component }))));
+  const labels = combinations(found[0].head.over);
+  const label = labels.includes(state.get("line.at")) ? state.get("line.at") : labels[0];
+  const over = found[0].head.over.filter((each) => each.labels.length > 1).map(({ name }) => words(name)).join(", ");
   spot("line").replaceChildren(
     select("Line", known, field.name, (name) => again({ line: name })),
     ...(components.length ? [choice("Component", components.map((name) => ({ name, words: name })), component, (name) => again({ "line.component": name }))] : []),
+    ...(labels.length > 1 ? [select(over, labels.map((name) => ({ name, words: name })), label, (name) => again({ "line.at": name }))] : []),
   );
-  const found = await Promise.all(runs.map((run) => octets(valuesOf(run, { field: field.name, component }))));
-  await drawLines(charts.line, found, runs.map((_, k) => NAMES[k]));
+  await drawLines(charts.line, found, runs.map((_, k) => NAMES[k]), label);
 }
 
 async function showDifference(known) {

@@ -1,7 +1,7 @@
 // The pictures of a run: a map, depth profiles, contact pressure, any other line.
 
 import { octets, json, rows } from "./octets.js";
-import { bar, colour, draw, fail, KEYS, named, SEQUENTIAL, SIGNED } from "./charts.js";
+import { bar, colour, draw, fail, KEYS, named, SEQUENTIAL, SIGNED, titled } from "./charts.js";
 import { choice, element, keep, root, select, state, text, words } from "./page.js";
 
 const MOST_LINES = 8;
@@ -36,7 +36,9 @@ export class Pictures {
       if (!signal.aborted) this.#each((part, chart) => fail(chart, error.message));
       return;
     }
-    await Promise.all(["map", "depth", "contact", "line"].map((part) => this.#part(part)));
+    const empty = !this.fields.maps.length && !this.fields.lines.length;
+    for (const each of document.querySelectorAll("[data-pictures], [data-pictures] ~ figure")) each.hidden = empty;
+    if (!empty) await Promise.all(["map", "depth", "contact", "line"].map((part) => this.#part(part)));
   }
 
   #each(act) {
@@ -130,7 +132,7 @@ export function drawMap(chart, { head, arrays }, high) {
 }
 
 // Lines of one run, or of several: each run then has its colour, else each label.
-export function drawLines(chart, found, names = []) {
+export function drawLines(chart, found, names = [], label = null) {
   const { head } = found[0];
   const { along, over } = head;
   return draw(chart, () => {
@@ -142,10 +144,9 @@ export function drawLines(chart, found, names = []) {
       const all = rows(arrays[own.name]);
       const labels = combinations(own.over);
       const few = all.length > MOST_LINES ? spread(all.length, MOST_LINES) : all.map((_, i) => i);
-      const shown = names.length ? few.slice(-1) : few;
+      const shown = names.length ? [Math.max(labels.indexOf(label), 0)] : few;
       shown.forEach((i, k) => {
-        const label = labels[i] ?? "";
-        const name = names.length ? names[run] : label;
+        const name = names.length ? names[run] : labels[i] ?? "";
         traces.push({
           type: "scatter", mode: "lines", x: xs.length === all.length ? xs[i] : xs[0], y: all[i], name,
           line: { color: keys[(names.length ? run : k) % keys.length], width: 2, dash: DASHES[names.length ? 0 : Math.floor(k / keys.length)] },
@@ -156,7 +157,7 @@ export function drawLines(chart, found, names = []) {
     return {
       traces,
       layout: {
-        xaxis: { title: { text: named(along.words, along.unit) }, zeroline: false, showgrid: false },
+        xaxis: { title: titled(chart, along.words, along.unit), zeroline: false, showgrid: false },
         yaxis: { title: { text: head.unit ? named("", head.unit).trim() : "" } },
         showlegend: traces.length > 1,
         legend: { title: { text: names.length ? "" : over.filter(({ labels }) => labels.length > 1).map(({ name }) => words(name)).join(", ") + "&nbsp;" } },
@@ -165,7 +166,7 @@ export function drawLines(chart, found, names = []) {
   });
 }
 
-function combinations(over) {
+export function combinations(over) {
   let found = [""];
   for (const { labels, unit } of over) {
     const own = labels.length ? labels : [""];

@@ -1,7 +1,7 @@
 // The page of a study: a number over the sweep, the chosen run, the table.
 
 import { octets, json } from "./octets.js";
-import { bar, colour, draw, fail, KEYS, named, NUMBERS, SIGNED } from "./charts.js";
+import { bar, colour, draw, fail, KEYS, named, NUMBERS, ordered, SIGNED } from "./charts.js";
 import { choice, data, element, keep, renew, root, select, state, text, words } from "./page.js";
 import { Pictures } from "./pictures.js";
 
@@ -164,12 +164,12 @@ function cells(shown) {
 
 function lines(shown) {
   const { what, x, y, xs, grid, value, told } = shown;
-  const keys = KEYS();
   const some = grid.length > 12 ? grid.filter((_, j) => j % Math.ceil(grid.length / 12) === 0) : grid;
+  const keys = y?.number ? ordered(some.length) : KEYS();
   const traces = some.map((row, k) => ({
     type: "scatter", mode: "lines+markers", x: xs, y: row.map(value), customdata: row, text: row.map(told),
     name: y ? label(y, grid.indexOf(row)) : "", hovertemplate: "%{text}<extra></extra>", showlegend: Boolean(y),
-    line: { color: keys[k % keys.length], width: 2, dash: k < 6 ? "solid" : "dash" }, marker: { size: row.length > 60 ? 3 : 7 },
+    line: { color: keys[k % keys.length], width: 2, dash: k < keys.length ? "solid" : "dash" }, marker: { size: row.length > 60 ? 3 : 7 },
   }));
   const known = grid.flat().map(value).filter((each) => !Number.isNaN(each));
   const low = Math.min(...known, 0);
@@ -268,7 +268,7 @@ async function figures() {
   const main = number();
   const place = document.querySelector("[data-run-figures]");
   if (!main || chosen === null) return;
-  const shown = [main, ...study.numbers.filter((each) => each !== main && each.group === "result").slice(0, 6)];
+  const shown = [main, ...study.numbers.filter((each) => each !== main && each.group === "result" && each.varies).slice(0, 6)];
   const values = await columnsOf(shown.map(({ name }) => name));
   place.replaceChildren(...shown.map((each, k) => {
     const value = values[k][chosen];
