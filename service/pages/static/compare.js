@@ -45,7 +45,7 @@ async function showDifference(known) {
   spot("difference").replaceChildren(
     select("Map", known, field.name, (name) => again({ map: name })),
     ...(components.length ? [choice("Component", components.map((name) => ({ name, words: name })), component, (name) => again({ "map.component": name }))] : []),
-    select("", letters, String(pair[0]), (name) => again({ first: name })),
+    select("run", letters, String(pair[0]), (name) => again({ first: name })),
     select("minus", letters, String(pair[1]), (name) => again({ second: name })),
   );
   try {
