@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import gzip
 import json
 from http import HTTPStatus
@@ -10,13 +11,15 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Form, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import RedirectResponse
+from fastapi.responses import JSONResponse, RedirectResponse
 
 from service import overview
 from service.dependencies import (
     TheCaller,
     TheDetails,
+    TheExaminer,
     TheJobs,
+    TheKeeper,
     TheKeys,
     TheProbe,
     TheRun,
@@ -25,8 +28,10 @@ from service.dependencies import (
     TheStore,
     TheTables,
 )
-from service.errors import NotFound
+from service.errors import NoRoom, NotFound
+from service.examiner import Examined
 from service.job import StudyState
+from service.pages import form
 from service.pages import study as chosen
 from service.pages.assets import asset
 from service.pages.compare import MOST, compared
@@ -35,7 +40,9 @@ from service.pages.run import audited, numbers_shown, parameters_shown
 from service.routes.health import health
 from service.schemas import ContentId, StudyFilter, Window
 from service.table import MESSAGE, RUN, STATUS, scene_of_study
-from studies import StudyError
+from solver.scenes import Scene
+from studies import Store, StudyError
+from studies.scenes.registry import known_names, known_scenes
 from studies.views.columns import value_text
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
@@ -211,6 +218,93 @@ async def health_page(
         queue += [overview.summary(job) for job in found]
     return page(
         request, "health", health=state, states=states, runs=runs, queue=queue, settings=settings
+    )
+
+
+@router.get("/new")
+def new_page(request: Request, store: TheStore, scene: str = "punch") -> Response:
+    """Show the form of a new study; parameters in the address fill it."""
+    given: dict[str, list[str]] = {}
+    for name, value in request.query_params.multi_items():
+        given.setdefault(name, []).append(value)
+    return _form(request, store, scene, given, {}, None)
+
+
+@router.post("/new")
+async def make(
+    request: Request, store: TheStore, examiner: TheExaminer, keeper: TheKeeper
+) -> Response:
+    """Tell what a study costs and what is wrong in the form, or accept the study and show it."""
+    given: dict[str, list[str]] = {}
+    for name, value in (await request.form()).multi_items():
+        given.setdefault(name, []).append(str(value))
+    scene_name = given.get("scene", [""])[0]
+    scene = await run_in_threadpool(known_scene, store, scene_name)
+    content, wrong = form.study_of(scene_name, scene, given)
+    found: Examined | None = None
+    if not wrong:
+        try:
+            found = await examiner.examine(content)
+        except StudyError as error:
+            name, allowed = form.beside(error, scene)
+            wrong[name] = allowed
+        except NoRoom as error:
+            wrong[""] = str(error)
+    if "submit" in given and found is not None:
+        job, _ = await run_in_threadpool(keeper.accept, found.study, found.runs, 0)
+        return _back(request, job.id)
+    if "application/json" in request.headers.get("accept", ""):
+        costs = None if found is None else dataclasses.asdict(found.estimate)
+        return JSONResponse({"wrong": wrong, "estimate": costs, **_copies(request, content)})
+    return await run_in_threadpool(_form, request, store, scene_name, given, wrong, found)
+
+
+def known_scene(store: Store, name: str) -> Scene:
+    """Return a scene of the service; raise `NotFound` if there is none of this name."""
+    scene = scene_of_study(store, name)
+    if scene is None:
+        raise NotFound(f"no scene has this name; there are {', '.join(known_names())}")
+    return scene
+
+
+def _copies(request: Request, content: dict[str, Any]) -> dict[str, str]:
+    """Return a study as texts to copy."""
+    address = str(request.url_for("submit"))
+    return {
+        "toml": form.as_toml(content),
+        "curl": form.as_curl(content, address),
+        "python": form.as_python(content, address),
+    }
+
+
+def _form(
+    request: Request,
+    store: Store,
+    name: str,
+    given: dict[str, list[str]],
+    wrong: dict[str, str],
+    found: Examined | None,
+) -> Response:
+    scene = known_scene(store, name)
+    content, early = form.study_of(name, scene, given)
+    mistakes = {**early, **wrong}
+    fields = form.entries(scene, given, mistakes)
+    posted = [(each.id, f"{each.name} (posted)") for each in store.scenes(LISTED)]
+    own = {each.parameter.name for each in fields} | {"name"}
+    return page(
+        request,
+        "new",
+        HTTPStatus.UNPROCESSABLE_ENTITY if wrong else HTTPStatus.OK,
+        scene=scene,
+        scene_name=name,
+        scenes=[*((each.name, each.name) for each in known_scenes()), *posted],
+        given={key: values[0] for key, values in given.items()},
+        first=[each for each in fields if each.first],
+        rest=[each for each in fields if not each.first],
+        wrong=mistakes,
+        general=[text for key, text in mistakes.items() if key not in own],
+        estimate=found.estimate if found else None,
+        **_copies(request, content),
     )
 
 
