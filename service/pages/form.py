@@ -86,7 +86,10 @@ def study_of(
 
     A field with its default, or with nothing, is left out; one with several values is swept.
     """
-    study: dict[str, Any] = {"name": _one(given, "name") or "study", "scene": scene_name}
+    study: dict[str, Any] = {
+        "name": _one(given, "name") or f"{scene.name}-study",
+        "scene": scene_name,
+    }
     if note := _one(given, "note"):
         study["note"] = note
     if tags := [each.strip() for each in _one(given, "tags").split(",") if each.strip()]:

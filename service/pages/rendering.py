@@ -49,7 +49,9 @@ def _data(content: Any) -> str:
     return json.dumps(content).replace("<", "\\u003c").replace("&", "\\u0026")
 
 
-def page(request: Request, name: str, status: int = HTTPStatus.OK, **content: Any) -> HTMLResponse:
+def page(
+    request: Request, template: str, status: int = HTTPStatus.OK, **content: Any
+) -> HTMLResponse:
     """Return a page made from a template."""
 
     def link(route: str, **values: Any) -> str:
@@ -58,7 +60,7 @@ def page(request: Request, name: str, status: int = HTTPStatus.OK, **content: An
     caller: Scope | None = getattr(request.state, "caller", None)
     text = (
         templates()
-        .get_template(f"{name}.html")
+        .get_template(f"{template}.html")
         .render(
             link=link,
             asset=lambda file: link("get_asset", version=assets.version(), name=file),

@@ -297,6 +297,7 @@ def _form(
         HTTPStatus.UNPROCESSABLE_ENTITY if wrong else HTTPStatus.OK,
         scene=scene,
         scene_name=name,
+        name=content["name"],
         scenes=[*((each.name, each.name) for each in known_scenes()), *posted],
         given={key: values[0] for key, values in given.items()},
         first=[each for each in fields if each.first],

@@ -77,6 +77,7 @@ def test_no_page_has_a_serious_barrier(
         f"/ui/studies/{study}": DRAWN.format("map"),
         f"/ui/runs/{both[0]}": DRAWN.format("map"),
         f"/ui/compare?run={both[0]}&run={both[1]}": DRAWN.format("difference"),
+        "/ui/new?scene=punch": "[data-estimate] dd",
         "/ui/health": ".tiles",
         "/ui/sign-in": "form.stack",
     }
@@ -184,6 +185,24 @@ def test_a_study_is_watched_to_its_end(browser: Any, service: Server) -> None:
         page.wait_for_selector(".counts .ok + b, .counts li:has(.ok) b")
         assert page.locator(".counts li:has(.ok) b").inner_text() == "4"
         assert page.locator(".runs tbody .status.ok").count() == 4
+
+
+def test_a_study_is_made_by_the_form(browser: Any, service: Server) -> None:
+    with opened(browser, base(service), "/ui/new?scene=fake") as page:
+        page.fill("[name=name]", "by-form")
+        page.fill("[name='p.friction']", "0, 0.3")
+        page.fill("[name='p.load_ratio']", "much")
+        page.wait_for_selector("[data-wrong=load_ratio]:has-text('finite number')")
+        assert page.get_attribute("[name='p.load_ratio']", "aria-invalid") == "true"
+        page.fill("[name='p.load_ratio']", "0.1 .. 0.5 in 3")
+        page.wait_for_selector("[data-estimate] dd:has-text('6')")
+        assert page.locator("[data-wrong=load_ratio]").inner_text() == ""
+        assert "load_ratio = {start = 0.1, stop = 0.5, num = 3}" in page.inner_text(
+            ".code >> nth=0"
+        )
+        page.click("button[name=submit]")
+        page.wait_for_selector("[data-live=status] .successful", timeout=60_000)
+        assert page.locator(".runs tbody tr").count() == 6
 
 
 def test_a_page_without_scripts_has_table_and_picture(
