@@ -34,18 +34,23 @@ def chromium() -> Iterator[Any]:
 
 
 @contextmanager
-def opened(browser: Any, base: str, path: str, **settings: Any) -> Iterator[Any]:
-    """Give a page; at the end nothing on it has failed, and it has asked no other host."""
-    size = {"width": 1280, "height": 900}
-    context = browser.new_context(base_url=base, **{"viewport": size, **settings})
+def opened(context: Any, address: str, scheme: str = "light", width: int = 1280) -> Iterator[Any]:
+    """Give a page; at the end nothing on it has failed, and it has asked no other host.
+
+    Pages of one context share what the browser keeps, such as the compiled scripts.
+    """
     page = context.new_page()
+    page.emulate_media(color_scheme=scheme)
+    page.set_viewport_size({"width": width, "height": 900})
     failed: list[str] = []
     page.on("pageerror", lambda error: failed.append(f"error: {error}"))
     page.on("console", lambda said: failed.append(said.text) if said.type == "error" else None)
-    page.on("request", lambda asked: failed.append(asked.url) if _outside(asked.url, base) else 0)
-    page.goto(path)
+    page.on(
+        "request", lambda asked: failed.append(asked.url) if _outside(asked.url, address) else 0
+    )
+    page.goto(address)
     yield page
-    context.close()
+    page.close()
     assert not failed
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,6 +31,12 @@ DRAWN = "[data-chart={}] .plot-container"
 def browser() -> Iterator[Any]:
     with chromium() as found:
         yield found
+
+
+@pytest.fixture(scope="module")
+def context(browser: Any) -> Any:
+    """Give what the pages of most tests share; a page has a session of its own."""
+    return browser.new_context()
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +74,7 @@ def cell(page: Any, x: float, y: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_no_page_has_a_serious_barrier(
-    browser: Any, service: Server, study: str, scheme: str
+    context: Any, service: Server, study: str, scheme: str
 ) -> None:
     both = runs(service, study)[:2]
     waited = {
@@ -84,23 +89,22 @@ def test_no_page_has_a_serious_barrier(
     for path, there in waited.items():
         if scheme == "dark" and path.startswith(("/ui/runs", "/ui/compare")):
             continue  # they have the colours of the page of a study
-        with opened(browser, base(service), path, color_scheme=scheme) as page:
+        with opened(context, base(service) + path, scheme) as page:
             page.wait_for_selector(there)
             assert not barriers(page), path
 
 
-def test_no_page_is_wider_than_a_phone(browser: Any, service: Server, study: str) -> None:
-    phone = {"width": 390, "height": 844}
+def test_no_page_is_wider_than_a_phone(context: Any, service: Server, study: str) -> None:
     for path in ("/ui", f"/ui/studies/{study}", f"/ui/runs/{runs(service, study)[0]}"):
-        with opened(browser, base(service), path, viewport=phone) as page:
+        with opened(context, base(service) + path, width=390) as page:
             page.wait_for_timeout(300)
             assert page.evaluate("document.documentElement.scrollWidth") == 390, path
 
 
 def test_the_value_under_the_pointer_is_that_of_the_data_set(
-    browser: Any, service: Server, study: str, dataset: xr.Dataset
+    context: Any, service: Server, study: str, dataset: xr.Dataset
 ) -> None:
-    with opened(browser, base(service), f"/ui/studies/{study}?number={NUMBER}") as page:
+    with opened(context, base(service) + f"/ui/studies/{study}?number={NUMBER}") as page:
         page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
         shown = page.evaluate("document.querySelector('[data-chart=sweep]').data[0].z")
         stored = dataset[NUMBER].isel(hardening=0).transpose("load_ratio", "friction")
@@ -112,9 +116,9 @@ def test_the_value_under_the_pointer_is_that_of_the_data_set(
 
 
 def test_a_click_on_a_cell_shows_that_run(
-    browser: Any, service: Server, study: str, dataset: xr.Dataset
+    context: Any, service: Server, study: str, dataset: xr.Dataset
 ) -> None:
-    with opened(browser, base(service), f"/ui/studies/{study}?number={NUMBER}") as page:
+    with opened(context, base(service) + f"/ui/studies/{study}?number={NUMBER}") as page:
         page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
         page.wait_for_selector(DRAWN.format("map"))
         run = chosen_id(service, study, 0.4, 0.0)
@@ -141,9 +145,9 @@ def chosen_id(server: Server, study: str, load: float, friction: float) -> str:
     return run
 
 
-def test_the_arrow_keys_move_to_the_next_run(browser: Any, service: Server, study: str) -> None:
+def test_the_arrow_keys_move_to_the_next_run(context: Any, service: Server, study: str) -> None:
     first = chosen_id(service, study, 0.4, 0.0)
-    with opened(browser, base(service), f"/ui/studies/{study}?run={first}") as page:
+    with opened(context, base(service) + f"/ui/studies/{study}?run={first}") as page:
         page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
         page.focus("[data-chart=sweep]")
         page.keyboard.press("ArrowUp")
@@ -152,8 +156,8 @@ def test_the_arrow_keys_move_to_the_next_run(browser: Any, service: Server, stud
         page.wait_for_url(f"**run={chosen_id(service, study, 0.8, 0.3)}**")
 
 
-def test_the_table_is_sorted_and_filtered(browser: Any, service: Server, study: str) -> None:
-    with opened(browser, base(service), f"/ui/studies/{study}") as page:
+def test_the_table_is_sorted_and_filtered(context: Any, service: Server, study: str) -> None:
+    with opened(context, base(service) + f"/ui/studies/{study}") as page:
         page.fill("[name='where.friction']", "0.1..0.4")
         page.click("text=Filter")
         page.wait_for_function("document.querySelectorAll('.runs tbody tr').length === 2")
@@ -164,8 +168,8 @@ def test_the_table_is_sorted_and_filtered(browser: Any, service: Server, study: 
         assert "sort=-load_ratio" in page.url and "where.friction=0.1..0.4" in page.url
 
 
-def test_runs_are_added_to_a_comparison(browser: Any, service: Server, study: str) -> None:
-    with opened(browser, base(service), f"/ui/studies/{study}") as page:
+def test_runs_are_added_to_a_comparison(context: Any, service: Server, study: str) -> None:
+    with opened(context, base(service) + f"/ui/studies/{study}") as page:
         page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
         page.click("[data-compare]")
         page.click("a[data-choose='0']")
@@ -177,9 +181,9 @@ def test_runs_are_added_to_a_comparison(browser: Any, service: Server, study: st
         assert {"friction", "load ratio"} <= {*rows} and "yield stress" not in rows
 
 
-def test_a_study_is_watched_to_its_end(browser: Any, service: Server) -> None:
+def test_a_study_is_watched_to_its_end(context: Any, service: Server) -> None:
     study_id = service.post(fake_study("watched", seconds=0.5))
-    with opened(browser, base(service), f"/ui/studies/{study_id}") as page:
+    with opened(context, base(service) + f"/ui/studies/{study_id}") as page:
         page.evaluate("window.same = true")
         page.wait_for_selector("[data-live=status] .successful", timeout=60_000)
         page.wait_for_selector(".counts .ok + b, .counts li:has(.ok) b")
@@ -187,8 +191,8 @@ def test_a_study_is_watched_to_its_end(browser: Any, service: Server) -> None:
         assert page.locator(".runs tbody .status.ok").count() == 4
 
 
-def test_a_study_is_made_by_the_form(browser: Any, service: Server) -> None:
-    with opened(browser, base(service), "/ui/new?scene=fake") as page:
+def test_a_study_is_made_by_the_form(context: Any, service: Server) -> None:
+    with opened(context, base(service) + "/ui/new?scene=fake") as page:
         page.fill("[name=name]", "by-form")
         page.fill("[name='p.friction']", "0, 0.3")
         page.fill("[name='p.load_ratio']", "much")
@@ -208,8 +212,8 @@ def test_a_study_is_made_by_the_form(browser: Any, service: Server) -> None:
 def test_a_page_without_scripts_has_table_and_picture(
     browser: Any, service: Server, study: str
 ) -> None:
-    path = f"/ui/studies/{study}"
-    with opened(browser, base(service), path, java_script_enabled=False) as page:
+    plain = browser.new_context(java_script_enabled=False)
+    with opened(plain, f"{base(service)}/ui/studies/{study}") as page:
         assert page.locator(".runs tbody tr").count() == 4
         size = page.locator("[data-chart=map] img").evaluate("image => image.naturalWidth")
         assert size > 300
@@ -226,15 +230,13 @@ def locked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, d
     server.close()
 
 
-def test_a_caller_signs_in_and_out(
-    browser: Any, locked: tuple[Server, dict[Scope, str]], tmp_path: Path
-) -> None:
+def test_a_caller_signs_in_and_out(browser: Any, locked: tuple[Server, dict[Scope, str]]) -> None:
     server, keys = locked
     answer = server.client.post(
         "/studies", json=fake_study("kept"), headers={"authorization": f"Bearer {keys['submit']}"}
     )
     page_of = f"/ui/studies/{answer.json()['id']}"
-    with opened(browser, base(server), page_of) as page:
+    with opened(browser.new_context(), base(server) + page_of) as page:
         assert "/ui/sign-in" in page.url
         page.fill("[name=key]", keys[Scope.SUBMIT])
         page.click("text=Sign in >> nth=-1")

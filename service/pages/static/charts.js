@@ -14,6 +14,9 @@ export const colour = (name) => own().getPropertyValue(`--${name}`).trim();
 export const KEYS = () => [1, 2, 3, 4, 5, 6].map((k) => colour(`k${k}`));
 
 const drawn = new Map();
+const sizes = new ResizeObserver((changes) => {
+  for (const { target } of changes) if (drawn.has(target) && target.data) Plotly.Plots.resize(target);
+});
 
 function axis() {
   return {
@@ -35,7 +38,10 @@ function merged(base, more) {
 export async function draw(chart, make) {
   const again = drawn.has(chart);
   drawn.set(chart, make);
-  if (!again) chart.replaceChildren();
+  if (!again) {
+    chart.replaceChildren();
+    sizes.observe(chart);
+  }
   const { traces, layout } = make();
   const base = {
     font: { family: own().getPropertyValue("--sans"), size: 12.5, color: colour("soft") },
@@ -43,11 +49,12 @@ export async function draw(chart, make) {
     margin: { l: 62, r: 16, t: 10, b: 48 }, xaxis: axis(), yaxis: axis(), showlegend: false,
     legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 12 } },
     hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { family: own().getPropertyValue("--sans"), size: 13, color: colour("ink") }, align: "left" },
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("zero"), activecolor: colour("accent") },
     hovermode: "closest", dragmode: "zoom", separators: ".",
   };
   const buttons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]];
   await Plotly.react(chart, traces, merged(base, layout), {
-    responsive: true, displaylogo: false, modeBarButtons: buttons, displayModeBar: "hover",
+    displaylogo: false, modeBarButtons: buttons, displayModeBar: "hover",
   });
   chart.classList.remove("busy");
 }

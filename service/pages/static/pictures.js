@@ -37,7 +37,7 @@ export class Pictures {
       return;
     }
     const empty = !this.fields.maps.length && !this.fields.lines.length;
-    for (const each of document.querySelectorAll("[data-pictures], [data-pictures] ~ figure")) each.hidden = empty;
+    for (const each of document.querySelectorAll("[data-picture]")) each.hidden = empty;
     if (!empty) await Promise.all(["map", "depth", "contact", "line"].map((part) => this.#part(part)));
   }
 

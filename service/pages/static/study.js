@@ -268,7 +268,7 @@ async function figures() {
   const main = number();
   const place = document.querySelector("[data-run-figures]");
   if (!main || chosen === null) return;
-  const shown = [main, ...study.numbers.filter((each) => each !== main && each.group === "result" && each.varies).slice(0, 6)];
+  const shown = [main, ...study.numbers.filter((each) => each !== main && each.group === "result" && each.varies).slice(0, 3)];
   const values = await columnsOf(shown.map(({ name }) => name));
   place.replaceChildren(...shown.map((each, k) => {
     const value = values[k][chosen];
@@ -357,7 +357,7 @@ function watch() {
     if (fresh) study.numbers = JSON.parse(fresh.getElementById("data").textContent).numbers;
     const begun = chosen === null && fresh ? JSON.parse(fresh.getElementById("data").textContent).at : null;
     if (begun !== null) {
-      if (!document.querySelector("[data-pictures]")) document.location.reload();
+      if (!document.querySelector("[data-picture]")) document.location.reload();
       else choose(begun);
     } else drawSweep().then(figures);
   });
