@@ -277,6 +277,11 @@ HANDLERS: dict[type[Exception], Callable[[Request, Any], Response]] = {
 }
 
 
+def answer_to(request: Request, exc: Exception) -> Response:
+    """Return the answer to an exception: that of its nearest ancestor in the table."""
+    return next(HANDLERS[kind] for kind in type(exc).__mro__ if kind in HANDLERS)(request, exc)
+
+
 def install(app: FastAPI) -> None:
     """Register the handlers on ``app``."""
     for kind, handler in HANDLERS.items():

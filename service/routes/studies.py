@@ -107,8 +107,9 @@ async def submit(
 def list_studies(which: Annotated[StudyFilter, Query()], jobs: TheJobs) -> StudyPage:
     """List studies, the latest first."""
     page, total = jobs.page(
-        limit=which.limit, offset=which.offset, state=which.status, tag=which.tag
-    )
+        limit=which.limit, offset=which.offset, state=which.status, tag=which.tag,
+        scene=which.scene, text=which.text,
+    )  # fmt: skip
     return StudyPage(total=total, items=[overview.summary(job) for job in page])
 
 
