@@ -21,7 +21,7 @@ def run(options: argparse.Namespace) -> int:
     from residua.progress import Progress
     from studies.definition.study import Study
     from studies.execution.cluster import Access
-    from studies.execution.forking import variables
+    from studies.execution.forking import FORK_HERE, variables
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, run_study
     from studies.storage.store import Store
@@ -34,7 +34,8 @@ def run(options: argparse.Namespace) -> int:
     access = options.scheduler and Access(
         options.scheduler, options.tls_ca, options.tls_cert, options.tls_key
     )
-    study, store = Study.from_toml(options.study), Store(options.out)
+    measured = getattr(options, "measured", ())
+    study, store = Study.from_toml(options.study, measured), Store(options.out)
     if options.dry_run:
         print(dry_run(study, store))
         return OK
@@ -48,7 +49,8 @@ def run(options: argparse.Namespace) -> int:
         progress(event)
 
     # Before a worker knows the module path of this process, it would look in the current directory.
-    with _interruption() as interrupted, variables({"PYTHONSAFEPATH": "1"}):
+    for_workers = {"PYTHONSAFEPATH": "1", FORK_HERE: "1"}
+    with _interruption() as interrupted, variables(for_workers):
         outcome = run_study(
             study,
             store,
@@ -69,6 +71,11 @@ def run(options: argparse.Namespace) -> int:
     if outcome.stopped:
         return INTERRUPTED
     return OK if outcome.ok else FAILED
+
+
+def fit(options: argparse.Namespace) -> int:
+    """Find the parameters with which runs come closest to what was measured."""
+    return run(options)
 
 
 def scenes(options: argparse.Namespace) -> int:
@@ -152,6 +159,23 @@ def predict(options: argparse.Namespace) -> int:
     told = f"its run ended as {failed['status']}" if failed else "--compute adds this run"
     print(f"the error is above {options.within:g} at {place}: {told}")
     return FAILED
+
+
+def sensitivity(options: argparse.Namespace) -> int:
+    """Tell which parameter of a sample matters for a number of its runs, and draw it."""
+    from studies.views import sensitivity as indices
+    from studies.views.reading import open_study
+
+    selection = _selection(options.select)
+    with open_study(options.path) as dataset:
+        found = indices.sensitivity(dataset, options.of, selection, method=options.method)
+        print(indices.sensitivity_table(found))
+        if options.out:
+            from studies.views.plots.sensitivity import sensitivity_figure
+
+            _save(sensitivity_figure(dataset, found, selection), options.out)
+            print(f"wrote {options.out}")
+    return OK
 
 
 def export(options: argparse.Namespace) -> int:

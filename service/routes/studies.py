@@ -55,6 +55,8 @@ EXAMPLE = {
 }
 
 PRIORITIES = range(-100, 101)
+MOST_FITTED = 1000
+"""Largest number of runs to which a request may fit polynomials, which takes seconds."""
 
 SUBMISSION = Study.model_json_schema() | {"examples": [EXAMPLE]}
 SUBMISSION["properties"]["priority"] = {
@@ -94,7 +96,7 @@ async def submit(
     """Accept a study; 200 when it is known already, whatever became of it."""
     priority = taken_priority(content)
     found = await examiner.examine(content)
-    job, new = await asyncio.to_thread(keeper.accept, found.study, found.runs, priority)
+    job, new = await asyncio.to_thread(keeper.accept, found, priority)
     if not new:
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_study", study_id=job.id).path
@@ -105,8 +107,9 @@ async def submit(
 def list_studies(which: Annotated[StudyFilter, Query()], jobs: TheJobs) -> StudyPage:
     """List studies, the latest first."""
     page, total = jobs.page(
-        limit=which.limit, offset=which.offset, state=which.status, tag=which.tag
-    )
+        limit=which.limit, offset=which.offset, state=which.status, tag=which.tag,
+        scene=which.scene, text=which.text,
+    )  # fmt: skip
     return StudyPage(total=total, items=[overview.summary(job) for job in page])
 
 
@@ -183,6 +186,24 @@ def predict(
     add = None if found.enough else found.run.to_dict()
     told = {name: getattr(found, name) for name in Prediction.model_fields.keys() - {"add"}}
     return Prediction(**told, add=add)
+
+
+@router.get("/{study_id}/sensitivity", responses=REFUSED)
+def tell_sensitivity(job: TheJob, jobs: TheJobs, store: TheStore, of: str) -> dict[str, Any]:
+    """Tell which parameter matters for a number of the runs: indices of sensitivity.
+
+    Of `parameters` each has `first` and `total`, the share of the variance of `of` that it makes
+    alone, and with others, and how well they are known. A sample that does not bear it is refused
+    with the reason.
+    """
+    from studies import open_netcdf, sensitivity  # xarray takes half a second to import
+    from studies.views.sensitivity import told
+
+    with open_netcdf(Path(dataset(job, jobs, store).path)) as runs:
+        if (size := runs["status"].size) > MOST_FITTED:
+            allowed = f"at most {MOST_FITTED} are fitted here: fetch the data set, and fit it there"
+            raise StudyError("runs", size, allowed)
+        return told(sensitivity(runs, of))
 
 
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)

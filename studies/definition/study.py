@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -20,6 +20,8 @@ from pydantic import (
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
+from studies.definition.files import read_study
+from studies.definition.fit import Fit, checked_fit
 from studies.definition.goal import Goal, checked_goal
 from studies.definition.identity import content_id
 from studies.definition.labels import checked_labels
@@ -38,7 +40,6 @@ from studies.definition.sweep import (
 from studies.definition.vocabulary import taken
 from studies.errors import StudyError, one_of
 from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
-from studies.toml import read_study
 
 
 class Study(BaseModel):
@@ -62,6 +63,8 @@ class Study(BaseModel):
         (`studies.definition.goal`); empty if the runs are those of the axes
     refine : numbers by which runs are chosen within the ranges of the axes, and how closely
         (`studies.definition.refine`); empty if the runs are those of the axes
+    fit : measured lines, and bounds of the parameters with which runs come closest to them
+        (`studies.definition.fit`); empty if the runs are those of the axes
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=described)
@@ -76,15 +79,17 @@ class Study(BaseModel):
     allow: list[Literal["large_strain"]] = Field(default_factory=list)
     goal: dict[str, Any] = Field(default_factory=dict)
     refine: dict[str, Any] = Field(default_factory=dict)
+    fit: dict[str, Any] = Field(default_factory=dict)
     _problem: Scene = PrivateAttr()
 
     @classmethod
-    def from_toml(cls, path: Path | str) -> Self:
+    def from_toml(cls, path: Path | str, measured: Sequence[Path] = ()) -> Self:
         """Read a study file; the scene may be a file beside it: ``scene = "pin.toml"``.
 
-        So may be the points of a curve: ``wheel_profile = "worn.csv"``.
+        So may be the points of a curve: ``wheel_profile = "worn.csv"``. Files ``measured`` are the
+        lines of its fit.
         """
-        content = read_study(path)
+        content = read_study(path, measured)
         return cls.from_dict(content, scenes=beside(Path(path).parent))
 
     @classmethod
@@ -133,6 +138,9 @@ class Study(BaseModel):
         StudyError
             for the first combination that the scene refuses
         """
+        if isinstance(self.asks, Fit):
+            Expansion(self.problem, self.parameters | self.asks.first, self.sweep).check()
+            return self
         if not isinstance(self.asks, Goal):
             self.expansion.check()
             return self
@@ -194,6 +202,16 @@ class Study(BaseModel):
                 allowed = "chooses the runs, and so does the goal: keep one"
                 raise StudyError("refine", content["refine"], allowed)
             own["refine"] = checked_refine(content["refine"], scene, axes).content
+        if "fit" in content:
+            if others := own.keys() & {"goal", "refine"}:
+                allowed = f"chooses the runs, and so does {next(iter(others))}: keep one"
+                raise StudyError("fit", "a table", allowed)
+            fit = checked_fit(content["fit"], scene, axes)
+            for name in fit.free.keys() & {*fixed, *owners(axes)}:
+                where = "parameters" if name in fixed else f"sweep.{owners(axes)[name]}"
+                allowed = f"is what the fit searches: take it out of {where}"
+                raise StudyError(f"fit.ranges.{name}", content["fit"]["ranges"][name], allowed)
+            own["fit"] = fit.content
         return own | labels
 
     def model_post_init(self, context: Any) -> None:
@@ -206,8 +224,10 @@ class Study(BaseModel):
         return self._problem
 
     @cached_property
-    def asks(self) -> Goal | Refine | None:
-        """What chooses the runs by the outcomes of others: a goal, or a refinement."""
+    def asks(self) -> Goal | Refine | Fit | None:
+        """What chooses the runs by the outcomes of others: goals, a refinement, or a fit."""
+        if self.fit:
+            return checked_fit(self.fit, self.problem, self.sweep)
         if self.refine:
             return checked_refine(self.refine, self.problem, self.sweep)
         return checked_goal(self.goal, self.problem) if self.goal else None
@@ -234,7 +254,7 @@ class Study(BaseModel):
         }
         source = self.expansion.source
         labels = checked_labels(self.model_dump(include={"note", "tags", "keep", "allow"}))
-        beside = [each for each in (labels, self.goal, self.refine) if each]
+        beside = [each for each in (labels, self.goal, self.refine, self.fit) if each]
         return content_id("study", self.name, self.scene, self.fixed, axes, source, *beside)
 
     @property
@@ -244,6 +264,7 @@ class Study(BaseModel):
         swept = {
             *owners(self.sweep),
             *([self.asks.parameter] if isinstance(self.asks, Goal) else []),
+            *(self.asks.free if isinstance(self.asks, Fit) else ()),
         }
         defaults = {name: p.default for name, p in known.items() if name not in swept}
         return defaults | self.parameters
@@ -261,7 +282,7 @@ class Study(BaseModel):
     @property
     def size(self) -> int:
         """Number of runs; of a study that chooses them the largest possible one."""
-        if isinstance(self.asks, Refine):
+        if isinstance(self.asks, Refine | Fit):
             return self.asks.most
         return self.expansion.size * (self.asks.most[1] if self.asks else 1)
 

@@ -1,8 +1,8 @@
-"""The runs of a study that chooses them by the outcomes of others: a goal, or a refinement.
+"""The runs of a study that chooses them by the outcomes of others: a goal, a refinement or a fit.
 
-The searches at the places of the axes go on each by itself, and a refinement is one program at one
-place: as soon as it is known what is needed next, it is handed to the workers. A search along a
-path that goes on is the task of one worker, which asks for its runs itself.
+The searches at the places of the axes go on each by itself; a refinement, and a fit, is one program
+at one place: as soon as it is known what is needed next, it is handed to the workers. A search
+along a path that goes on is the task of one worker, which asks for its runs itself.
 """
 
 from __future__ import annotations
@@ -11,17 +11,21 @@ from collections import deque
 from collections.abc import Collection, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
+from functools import partial
 from itertools import takewhile
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from studies.definition.cases import Case, LoadingPath
+from studies.definition.fit import Fit, Fitting, standings
 from studies.definition.goal import Goal, PathLimit, Search
+from studies.definition.measured import Line, Read
 from studies.definition.place import Place
 from studies.definition.refine import Refinement
 from studies.definition.study import Study
 from studies.definition.sweep import owners
+from studies.storage import runfile
 from studies.storage.store import Store
 
 
@@ -54,7 +58,7 @@ class Asking:
         self._store = store
         self._at: list[list[str]] = []
         self.places: list[Place[Any]] = []
-        for at, fixed, program in _programs(study):
+        for at, fixed, program in _programs(study, store):
             self._at.append(at)
             self.places.append(
                 Place(
@@ -151,13 +155,17 @@ class Asking:
         return []
 
 
-def _programs(study: Study) -> Iterator[tuple[list[str], dict[str, Any], Any]]:
+def _programs(study: Study, store: Store) -> Iterator[tuple[list[str], dict[str, Any], Any]]:
     """Yield the programs of a study: where each is, as text, what is fixed there, and itself."""
     swept = owners(study.sweep)
     if isinstance(study.asks, Goal):
         for case in study.cases():
             at = [f"{axis} = {value}" for axis, value in study.place(case).items()]
             yield at, {name: case.values[name] for name in swept}, Search(study.asks)
+    elif isinstance(study.asks, Fit):
+        names = {name for line in study.asks.measured for name in (line.of, line.over)}
+        read = partial(_variables, store, names)
+        yield [], {}, Fitting(study.asks, standings(study.sweep), read)
     elif study.asks:
         branches = {
             tuple(study.place(case)[axis] for axis in study.axes if axis not in study.asks.axes):
@@ -165,6 +173,13 @@ def _programs(study: Study) -> Iterator[tuple[list[str], dict[str, Any], Any]]:
             for case in study.cases()
         }  # fmt: skip
         yield [], {}, Refinement(study.asks, list(branches.values()), study.allow)
+
+
+def _variables(store: Store, names: Collection[str], row: Mapping[str, Any]) -> Read:
+    """Return what gives some variables of a run, and the values of their dimensions."""
+    with runfile.opened(store.run_path(row["id"])) as run:
+        found = {name: Line(*each) for name, each in runfile.lines(run, names).items()}
+    return found.get
 
 
 def _short(value: Any) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,6 @@ _NAME = "data set"
 
 def answers(study: Study, store: Store, asking: Asking) -> Combined:
     """Write the data set of a study with a goal, unless there is one with the same answers."""
-    path, made = store.dataset_path(study.id), Made(study, store)
     searches = [place.program for place in asking.places]
     outcomes = [_outcome(study, search) for search in searches]
     runs = [[search.reason, list(search.rows.values())] for search in searches]
@@ -47,13 +46,21 @@ def answers(study: Study, store: Store, asking: Asking) -> Combined:
         for search, outcome in zip(searches, outcomes, strict=True)
         if outcome[0] != OK
     ]
-    anew = made.kept(_NAME, of) is None
-    if anew:
-        content = runfile.packed(_content(study, searches, outcomes))
-        with needs_room(store.directory), appearing(path) as part:
-            part.write_bytes(seal.sealed(f"dataset {study.id}", content))
-        made.note(_NAME, of, [path.name])
+    anew = written(study, store, of, lambda: _content(study, searches, outcomes))
+    path = store.dataset_path(study.id)
     return Combined(path=path, counts=dict(counts), failed=failed, missing=(), anew=anew)
+
+
+def written(study: Study, store: Store, of: str, content: Callable[[], RunContent]) -> bool:
+    """Write a data set of answers, unless there is one made of the same, ``of``; tell whether."""
+    path, made = store.dataset_path(study.id), Made(study, store)
+    if made.kept(_NAME, of):
+        return False
+    packed = runfile.packed(content())
+    with needs_room(store.directory), appearing(path) as part:
+        part.write_bytes(seal.sealed(f"dataset {study.id}", packed))
+    made.note(_NAME, of, [path.name])
+    return True
 
 
 def _outcome(study: Study, search: Search) -> tuple[str, str]:
@@ -113,8 +120,8 @@ def _content(study: Study, found: list[Search], outcomes: list[tuple[str, str]])
     axes = {each: [first[each]] for each in usual} | study.axes
     shape = tuple(map(len, axes.values()))
     beside = {"coordinates": " ".join(linked)} if linked else {}
-    attributes = layout.axis_attributes(scene, name)
-    unit = {key: attributes[key] for key in attributes.keys() & {"units"}}
+    words = layout.axis_attributes(scene, name)
+    unit = {key: words[key] for key in words.keys() & {"units"}}
     order = _order(study, cases, list(axes), shape)
     searches = [found[k] for k in order]
     variables: dict[str, Variable] = axis_variables(scene, axes, linked)
@@ -138,10 +145,15 @@ def _content(study: Study, found: list[Search], outcomes: list[tuple[str, str]])
         words = {"long_name": f"id of the run at the {end} end"}
         add(f"run_{end}", [_run(each, getattr(each, end)) for each in searches], object, words)
     variables |= _tried(searches, tuple(axes), shape, {**unit, **beside})
-    attrs = provenance(study.name, scene, study.fixed) | {"goal": canonical(study.goal)}
+    return RunContent(variables, attributes(study, "goal"))
+
+
+def attributes(study: Study, entry: str) -> dict[str, Any]:
+    """Return the attributes of a data set of answers, with an entry of the study as text."""
+    attrs = provenance(study.name, study.problem, study.fixed)
     words = {"note": study.note, "tags": " ".join(study.tags)}
     attrs |= {key: text for key, text in words.items() if text}
-    return RunContent(variables, {**attrs, "id": study.id, SYMMETRIC: 0})
+    return {**attrs, entry: canonical(getattr(study, entry)), "id": study.id, SYMMETRIC: 0}
 
 
 def _tried(

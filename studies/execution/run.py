@@ -22,6 +22,7 @@ from studies.definition.vocabulary import KEEP, OK, SOLVED
 from studies.errors import StoreFull, StudyError, Unusable
 from studies.execution.asking import Asking
 from studies.execution.bundles import Bundle, bundles
+from studies.execution.calibrated import calibrated
 from studies.execution.cluster import Access, connect, own_workers
 from studies.execution.estimate import memory_needed
 from studies.execution.goals import answers
@@ -189,9 +190,12 @@ def run_study(
             work.compute(workers, access, stop)
         if asking:
             stopped, anew = not asking.ended, bool(work.computed)
-            combined = (
-                answers(study, store, asking) if study.goal else refined(study, store, asking, anew)
-            )
+            if study.goal:
+                combined = answers(study, store, asking)
+            elif study.fit:
+                combined = calibrated(study, store, asking)
+            else:
+                combined = refined(study, store, asking, anew)
         else:
             stopped = stop_requested and bool(wanted - work.computed)
             combined = result(study, store, complete=not wanted, stopped=stopped)
@@ -329,7 +333,7 @@ class _Work:
         recorded as ``error``, and the paths behind it make a new task. If another path is at fault,
         that one was completed meanwhile, and no run is recorded as ``error``.
         """
-        stored = task.stored(self.store)
+        stored = task.stored(self.store, known=self.computed)
         for number, path in enumerate(task.paths):
             lacking = [case for case in path.cases if case.id not in self.computed]
             self._keep(path.id, [stored[case.id] for case in lacking if case.id in stored])

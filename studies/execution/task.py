@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -71,9 +71,9 @@ class PathTask:
         """The cases of all paths."""
         return [case for path in self.paths for case in path.cases]
 
-    def stored(self, store: Store) -> dict[str, dict[str, Any]]:
-        """Return, by id, the rows of the runs that this task has stored."""
-        times = store.modified(case.id for case in self.cases)
+    def stored(self, store: Store, known: Container[str] = ()) -> dict[str, dict[str, Any]]:
+        """Return, by id, the rows of the runs that this task has stored, without those known."""
+        times = store.modified(case.id for case in self.cases if case.id not in known)
         fresh = [run_id for run_id, at in times.items() if at != self.stale.get(run_id)]
         return {run_id: row for run_id in fresh if (row := store.found(run_id))}
 
