@@ -21,7 +21,7 @@ def run(options: argparse.Namespace) -> int:
     from residua.progress import Progress
     from studies.definition.study import Study
     from studies.execution.cluster import Access
-    from studies.execution.forking import variables
+    from studies.execution.forking import FORK_HERE, variables
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, run_study
     from studies.storage.store import Store
@@ -49,7 +49,8 @@ def run(options: argparse.Namespace) -> int:
         progress(event)
 
     # Before a worker knows the module path of this process, it would look in the current directory.
-    with _interruption() as interrupted, variables({"PYTHONSAFEPATH": "1"}):
+    for_workers = {"PYTHONSAFEPATH": "1", FORK_HERE: "1"}
+    with _interruption() as interrupted, variables(for_workers):
         outcome = run_study(
             study,
             store,
@@ -136,7 +137,7 @@ def best(options: argparse.Namespace) -> int:
 
 def predict(options: argparse.Namespace) -> int:
     """Tell a number between the runs of a study, with its error."""
-    from studies.execution.run import run_study
+    from studies.execution.task import compute_here
     from studies.views.answers import answer
     from studies.views.picking import study_of
     from studies.views.reading import find_study, open_netcdf
@@ -147,7 +148,7 @@ def predict(options: argparse.Namespace) -> int:
     with open_netcdf(path) as dataset:
         found = answer(dataset, study, store, **asked)
         if not found.enough and options.compute:
-            run_study(found.run, store, workers=1)
+            compute_here(found.run, store)
             found = answer(dataset, study, store, **asked)
     unit = f" {found.unit}" if found.unit not in {"", "1"} else ""
     print(f"{found.of} = {found.value:.6g}{unit}, error {found.error:.2g}{unit} (by {found.by})")

@@ -29,6 +29,8 @@ class StudyFilter(Window):
 
     status: StudyState | None = None
     tag: str | None = Field(default=None, description="one of the tags of the study")
+    scene: str | None = Field(default=None, description="name of its scene, or id of a posted one")
+    text: str | None = Field(default=None, description="a part of its name or its note")
 
 
 class RunFilter(Window):
@@ -71,6 +73,20 @@ class Prediction(BaseModel):
     )
 
 
+class TableFilter(BaseModel):
+    """The runs of a study that are requested, by any column of its table."""
+
+    model_config = ConfigDict(extra="allow")
+
+    sort: str = Field(default="", description="a column; with a minus, the largest first")
+    columns: str = Field(default="", description="names with commas between; all by default")
+
+    @property
+    def conditions(self) -> dict[str, str]:
+        """The conditions by column."""
+        return {name: str(value) for name, value in (self.model_extra or {}).items() if value != ""}
+
+
 class MapQuery(BaseModel):
     """Which field of a run is drawn."""
 
@@ -82,6 +98,7 @@ class MapQuery(BaseModel):
         "the bodies are not released",
     )
     component: str | None = Field(default=None, description="of a stress; the first by default")
+    stage: str | None = Field(default=None, description="of several stages; the last by default")
     zoom: float | None = Field(
         default=None,
         gt=0,

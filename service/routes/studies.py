@@ -96,7 +96,7 @@ async def submit(
     """Accept a study; 200 when it is known already, whatever became of it."""
     priority = taken_priority(content)
     found = await examiner.examine(content)
-    job, new = await asyncio.to_thread(keeper.accept, found.study, found.runs, priority)
+    job, new = await asyncio.to_thread(keeper.accept, found, priority)
     if not new:
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_study", study_id=job.id).path
@@ -107,8 +107,9 @@ async def submit(
 def list_studies(which: Annotated[StudyFilter, Query()], jobs: TheJobs) -> StudyPage:
     """List studies, the latest first."""
     page, total = jobs.page(
-        limit=which.limit, offset=which.offset, state=which.status, tag=which.tag
-    )
+        limit=which.limit, offset=which.offset, state=which.status, tag=which.tag,
+        scene=which.scene, text=which.text,
+    )  # fmt: skip
     return StudyPage(total=total, items=[overview.summary(job) for job in page])
 
 
@@ -177,7 +178,7 @@ def predict(
     from studies import open_netcdf  # xarray takes half a second to import
     from studies.views.answers import answer
 
-    path, asked = dataset(job, jobs, store).path, query.model_dump()
+    path, asked = Path(dataset(job, jobs, store).path), query.model_dump()
     at = {name: asked.pop(name) for name in query.model_extra or {}}
     study = Study.known(jobs.study(job.id), store.scene)
     with open_netcdf(path) as runs:

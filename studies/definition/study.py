@@ -20,6 +20,7 @@ from pydantic import (
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
+from studies.definition.files import read_study
 from studies.definition.fit import Fit, checked_fit
 from studies.definition.goal import Goal, checked_goal
 from studies.definition.identity import content_id
@@ -39,7 +40,6 @@ from studies.definition.sweep import (
 from studies.definition.vocabulary import taken
 from studies.errors import StudyError, one_of
 from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
-from studies.toml import read_study
 
 
 class Study(BaseModel):

@@ -333,7 +333,7 @@ class _Work:
         recorded as ``error``, and the paths behind it make a new task. If another path is at fault,
         that one was completed meanwhile, and no run is recorded as ``error``.
         """
-        stored = task.stored(self.store)
+        stored = task.stored(self.store, known=self.computed)
         for number, path in enumerate(task.paths):
             lacking = [case for case in path.cases if case.id not in self.computed]
             self._keep(path.id, [stored[case.id] for case in lacking if case.id in stored])

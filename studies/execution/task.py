@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from studies.definition.cases import Case, LoadingPath
 from studies.definition.goal import PathLimit, Search
 from studies.definition.identity import solver_hash
 from studies.definition.place import Place
+from studies.definition.study import Study
 from studies.errors import StoreFull, StudyError, without_folders
 from studies.execution.proof import Proof, Unfit
 from studies.storage.store import Store
@@ -70,9 +71,9 @@ class PathTask:
         """The cases of all paths."""
         return [case for path in self.paths for case in path.cases]
 
-    def stored(self, store: Store) -> dict[str, dict[str, Any]]:
-        """Return, by id, the rows of the runs that this task has stored."""
-        times = store.modified(case.id for case in self.cases)
+    def stored(self, store: Store, known: Container[str] = ()) -> dict[str, dict[str, Any]]:
+        """Return, by id, the rows of the runs that this task has stored, without those known."""
+        times = store.modified(case.id for case in self.cases if case.id not in known)
         fresh = [run_id for run_id, at in times.items() if at != self.stale.get(run_id)]
         return {run_id: row for run_id in fresh if (row := store.found(run_id))}
 
@@ -116,6 +117,22 @@ def walk(
                 _walk(task, path, store, stored, report, should_stop)
             finally:
                 release()
+
+
+def compute_here(study: Study, store: Store) -> None:
+    """Compute the runs of a small study in this process; nothing but the runs is stored.
+
+    Raises
+    ------
+    StoreBusy
+        when another process computes into the same store
+    """
+    with store.writing():
+        directory = store.directory.resolve()
+        for path in study.paths():
+            task = PathTask(study.problem, (path,), directory, solver_hash(), study.keep)
+            walk(task, lambda _: None, lambda: False)
+        store.sound(study.run_ids())
 
 
 def _walk(

@@ -2,7 +2,7 @@
 
 ```
 runs/<run id>.nc              one file a run, shared by all studies
-scenes/<scene id>/             scenes of files: scene.json and the meshes
+scenes/<scene id>/             scenes of files: scene.json, the meshes and their arrays
 studies/<study id>/study.json
 studies/<study id>/dataset.nc the runs of a study combined
 studies/<study id>/made.json  digests of its inputs, and of files made from it
@@ -123,9 +123,12 @@ class Store:
         """
         return self._indexed(lambda index: index.page(limit, offset, name))
 
-    def scene_sizes(self) -> dict[str, int]:
-        """Return the size of all scenes that each owner has posted [bytes]; errors as `scenes`."""
-        return self._indexed(shelf.Index.sizes)
+    def scene_files(self) -> list[shelf.Kept]:
+        """Return the files of all scenes, the oldest first; errors as `scenes`.
+
+        Scenes that this version does not allow are among them.
+        """
+        return self._indexed(shelf.Index.files)
 
     def _indexed(self, ask: Callable[[shelf.Index], Found]) -> Found:
         """Return what is asked of the index of scenes, which follows the files first."""
@@ -133,7 +136,7 @@ class Store:
 
         def asked() -> Found:
             with suppress(StoreFull):  # then the latest ones are missing
-                index.follow(lambda scene_id: self.scene(scene_id, whole=False))
+                index.follow(lambda scene_id: self.scene(scene_id, whole=False), self._refused)
             return ask(index)
 
         state = seal.state_of(index.path)

@@ -13,7 +13,7 @@ from fastapi import FastAPI, Request
 from starlette.exceptions import HTTPException
 
 from service.app import create_app
-from service.errors import on_http_error, on_scene_error
+from service.errors import STATUS, on_http_error, on_scene_error
 from service.settings import Settings
 from service.strict import StrictRequest
 from studies import Study, StudyError
@@ -316,6 +316,20 @@ def test_a_defect_shows_nothing_of_its_inside(app: FastAPI) -> None:
     answer = ask(app, "/broken")
     problem(answer, 500)
     assert "secret" not in answer.text and "Traceback" not in answer.text
+
+
+@pytest.mark.parametrize("error", [*STATUS])
+def test_every_kind_of_error_has_the_status_of_the_table(
+    app: FastAPI, error: type[Exception]
+) -> None:
+    arguments = {"FileDamaged": (Path("a"), "run a", "no seal"), "RequestValidationError": ([],)}
+    arguments |= dict.fromkeys(("StudyError", "Unusable"), ("a", 1, "must be 2"))
+
+    def failing() -> None:
+        raise error(*arguments.get(error.__name__, (["reason"],)))
+
+    app.add_api_route("/failing", failing)
+    problem(ask(app, "/failing"), STATUS[error])
 
 
 def test_the_description_names_every_resource_and_its_problems(app: FastAPI) -> None:
