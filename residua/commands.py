@@ -180,7 +180,8 @@ def submit(service: Any, options: argparse.Namespace) -> str:
 def status(service: Any, options: argparse.Namespace) -> str:
     """Print the state of a study on a running service."""
     state = service.status(options.id)
-    return f"{state['status']}  {state['progress']:g} %"
+    stage = f"  {state['stage']}" if state["stage"] else ""
+    return f"{state['status']}  {state['progress']:g} %{stage}"
 
 
 def cancel(service: Any, options: argparse.Namespace) -> str:

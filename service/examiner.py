@@ -34,7 +34,7 @@ class Examined:
     Attributes
     ----------
     study : the checked study
-    runs : ids of its runs in the order of its cases
+    runs : ids of its runs in the order of its cases; of a study with a goal they are not known
     estimate : its estimated cost
     """
 
@@ -77,9 +77,6 @@ def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examin
     """Return a checked study with its run ids and its cost; called in a separate process."""
     store = Store(directory)
     study = Study.known(content, partial(_posted, store))
-    if study.asks:
-        allowed = "is searched by `residua run`, not by a service: submit the runs themselves"
-        raise StudyError("goal", study.goal, allowed)
     bounds.check_size(study)
     runs = list(study.checked().run_ids())
     cost = estimate(study, store)

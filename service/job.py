@@ -48,6 +48,7 @@ class Job:
     submitted, started, finished : ISO 8601, UTC
     turn : the greater was accepted or retried later
     digest : checksum of the text of the study
+    stage : of a study with a goal, how many of its searches have ended
     """
 
     id: str
@@ -65,6 +66,7 @@ class Job:
     finished: str | None
     turn: int
     digest: int
+    stage: str
 
 
 COLUMNS = tuple(each.name for each in fields(Job))
@@ -96,10 +98,14 @@ def wanted(state: StudyState | None = None, tag: str | None = None) -> tuple[str
     return (f"WHERE {' AND '.join(clauses)}" if clauses else ""), values
 
 
-def verdict(counts: Mapping[str, int]) -> tuple[StudyState, str]:
-    """Return the final state of a study from the number of its runs by status, and the reason."""
+def verdict(counts: Mapping[str, int], stage: str = "") -> tuple[StudyState, str]:
+    """Return the final state of a study from the number of its runs by status, and the reason.
+
+    Those of a study with a ``stage`` are the answers to its goal.
+    """
     others = {status: count for status, count in counts.items() if count and status != "ok"}
     if not others:
         return StudyState.SUCCESSFUL, ""
     listed = ", ".join(f"{count} {status}" for status, count in others.items())
-    return StudyState.FAILED, f"{sum(others.values())} of {sum(counts.values())} runs: {listed}"
+    what = "searches" if stage else "runs"
+    return StudyState.FAILED, f"{sum(others.values())} of {sum(counts.values())} {what}: {listed}"

@@ -8,7 +8,7 @@ from service.job import COLUMNS
 from studies.errors import StudyError
 from studies.storage.database import checksum
 
-VERSION = 2
+VERSION = 3
 
 TABLES = (
     """CREATE TABLE job (
@@ -28,6 +28,7 @@ TABLES = (
         finished TEXT,
         turn INTEGER NOT NULL,
         digest INTEGER,
+        stage TEXT NOT NULL DEFAULT '',
         checksum INTEGER
     )""",
     "CREATE INDEX job_by_turn ON job (turn)",
@@ -44,7 +45,7 @@ FIRST_FORM = (
     """INSERT INTO job SELECT id, json_extract(study, '$.name'), json_extract(study, '$.scene'),
         study, size, state, message, progress, again * 1000000000
         * CAST(strftime('%s', 'now') AS INTEGER), '', 0, submitted, started, finished, turn,
-        NULL, NULL FROM first""",
+        NULL, '', NULL FROM first""",
     """INSERT INTO run SELECT first.id, each.key, each.value
         FROM first, json_each(first.runs) AS each""",
     "DROP TABLE first",
@@ -58,10 +59,20 @@ SECOND_FORM = (
 )
 """Adds the columns that the second form, the first with rows of runs, has not."""
 
+STAGE = "ALTER TABLE job ADD COLUMN stage TEXT NOT NULL DEFAULT ''"
+"""Adds the column that the third form has not."""
+
 CHECKSUMS = (
     "UPDATE job SET digest = checksum(study)",
     f"UPDATE job SET checksum = checksum({', '.join(COLUMNS)})",
 )
+
+THIRD_FORM = (
+    STAGE,
+    f"""UPDATE job SET checksum = checksum({", ".join(COLUMNS)})
+        WHERE checksum = checksum({", ".join(each for each in COLUMNS if each != "stage")})""",
+)
+"""Adds it; a row that was damaged stays so."""
 
 
 def prepare(connection: sqlite3.Connection, new: bool) -> None:
@@ -84,8 +95,10 @@ def prepare(connection: sqlite3.Connection, new: bool) -> None:
     if not new and "job" not in known:
         raise sqlite3.DatabaseError("it holds no queue")
     connection.create_function("checksum", -1, lambda *values: checksum(values))
-    if "run" in known:
-        statements: tuple[str, ...] = (*SECOND_FORM, TABLES[-1], *CHECKSUMS)
+    if version == 2:
+        statements: tuple[str, ...] = (*THIRD_FORM, TABLES[-1])
+    elif "run" in known:
+        statements = (*SECOND_FORM, STAGE, TABLES[-1], *CHECKSUMS)
     elif "job" in known:
         statements = ("ALTER TABLE job RENAME TO first", *TABLES, *FIRST_FORM, *CHECKSUMS)
     else:

@@ -242,6 +242,10 @@ class Study(BaseModel):
         """Number of runs; of a study with a goal the largest possible one."""
         return self.expansion.size * (self.asks.most[1] if self.asks else 1)
 
+    def stage(self, ended: int = 0) -> str:
+        """Return how many of its searches have ended, as text; empty without a goal."""
+        return f"{ended} of {self.expansion.size} searches ended" if self.asks else ""
+
     def run_ids(self) -> Iterator[str]:
         """Yield the ids of the runs, in the order of `cases`, without building the cases.
 

@@ -89,6 +89,16 @@ class Goals:
         return all(search.reason for search in self.searches)
 
     @property
+    def asked(self) -> list[str]:
+        """Ids of the runs that the searches have asked for, as far as they are known."""
+        return sorted({str(row["id"]) for each in self.searches for row in each.rows.values()})
+
+    @property
+    def stage(self) -> str:
+        """How many of the searches have ended, as text."""
+        return self._study.stage(sum(bool(each.reason) for each in self.searches))
+
+    @property
     def progress(self) -> float:
         """Share of all searches that is done, 0 to 1."""
         return float(np.mean([search.progress for search in self.searches]))

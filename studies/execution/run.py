@@ -59,6 +59,7 @@ class StudyEvent:
     fraction : fraction of this path that is done, 0 to 1
     run, status, message : id, status and message of the run, or the reason of waiting
     place : of a study with a goal, where the run is and the round of its search
+    stage : of a study with a goal, how many of its searches have ended
     """
 
     kind: str
@@ -69,6 +70,7 @@ class StudyEvent:
     status: str = ""
     message: str = ""
     place: str = ""
+    stage: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,6 +83,8 @@ class StudyOutcome:
     counts : number of runs by status in the data set, with ``missing``
     failed : (run id, status, message) of every run that is neither ``ok`` nor ``missing``
     computed : ids of the runs computed this time
+    asked, stage : of a study with a goal, ids of the runs that its searches have asked for, and
+        how many of these have ended
     dataset : the combined data set
     anew : whether the data set was written; it is kept if it was made of the same runs
     wall_seconds : duration
@@ -91,6 +95,8 @@ class StudyOutcome:
     counts: Mapping[str, int]
     failed: Sequence[tuple[str, str, str]]
     computed: Sequence[str]
+    asked: Sequence[str]
+    stage: str
     dataset: Path
     anew: bool
     wall_seconds: float
@@ -195,6 +201,8 @@ def run_study(
         counts=combined.counts,
         failed=combined.failed,
         computed=sorted(work.computed),
+        asked=goals.asked if goals else (),
+        stage=goals.stage if goals else "",
         dataset=combined.path,
         anew=combined.anew,
         wall_seconds=time.monotonic() - started,
@@ -315,7 +323,8 @@ class _Work:
             )  # fmt: skip
 
     def _tell(self, kind: str, **content: Any) -> None:
-        self.emit(StudyEvent(kind=kind, progress=self._progress(), **content))
+        stage = self.goals.stage if self.goals else ""
+        self.emit(StudyEvent(kind=kind, progress=self._progress(), stage=stage, **content))
 
     def _close(self, task: PathTask, error: Exception | None, at_fault: str = "") -> None:
         """Record the runs of a task without a report.

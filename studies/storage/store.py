@@ -196,12 +196,22 @@ class Store:
         """
         if not study.asks:
             return set(study.run_ids())
+        asked = self.asked(study.id)
+        if asked is not None:
+            return asked
+        return {row["id"] for row in self.catalogue.runs(scene=study.problem.name, limit=-1)[0]}
+
+    def asked(self, study_id: str) -> set[str] | None:
+        """Return the ids of the runs that the search of a study has asked for; None before its end.
+
+        They are in its data set.
+        """
         import h5py
 
-        with suppress(FileDamaged), h5py.File(self.dataset(study.id), "r") as file:
+        with suppress(FileDamaged), h5py.File(self.dataset(study_id), "r") as file:
             if STOPPED not in file["message"].asstr()[...].ravel():
                 return {each for each in file["tried_run"].asstr()[...].ravel() if each}
-        return {row["id"] for row in self.catalogue.runs(scene=study.problem.name, limit=-1)[0]}
+        return None
 
     def study(self, study_id: str) -> Study:
         """Return the study of this id, as it was saved.
