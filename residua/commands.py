@@ -34,7 +34,8 @@ def run(options: argparse.Namespace) -> int:
     access = options.scheduler and Access(
         options.scheduler, options.tls_ca, options.tls_cert, options.tls_key
     )
-    study, store = Study.from_toml(options.study), Store(options.out)
+    store = Store(options.out)
+    study = Study.from_toml(options.study, store.definition, store.scene)
     if options.dry_run:
         print(dry_run(study, store))
         return OK

@@ -76,7 +76,7 @@ class Examiner:
 def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:
     """Return a checked study with its run ids and its cost; called in a separate process."""
     store = Store(directory)
-    study = Study.known(content, partial(_posted, store))
+    study = Study.known(content, partial(_posted, store), store.definition)
     bounds.check_size(study)
     runs = list(study.checked().run_ids())
     cost = estimate(study, store)

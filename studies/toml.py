@@ -92,8 +92,9 @@ def read_study(path: Path | str) -> dict[str, Any]:
 
     ``[points] file = "tests.csv"`` names a table beside the study, and so does an axis of the sweep
     that has this entry: see `read_table`. A value of a parameter that ends in ``.csv`` or ``.txt``
-    names the points of a curve. What is in the files takes their place, so that the content of a
-    study needs no other file.
+    names the points of a curve. The study that this one ``extends`` may be a file, too. What is in
+    the files takes their place, so that the content of a study needs no other file, except that of
+    a scene.
 
     Raises
     ------
@@ -107,6 +108,11 @@ def read_study(path: Path | str) -> dict[str, Any]:
     if isinstance(sweep := tables.get("sweep"), dict):
         for name in sweep:
             sweep[name] = _with_table(sweep[name], f"sweep.{name}", folder)
+    before = tables.get("extends")
+    if isinstance(before, str) and before.endswith(".toml"):
+        tables["extends"] = theirs = read_study(folder / before)
+        if str(theirs.get("scene", "")).endswith(".toml"):
+            theirs["scene"] = str(Path(before).parent / theirs["scene"])
     for table in _MAY_NAME_FILES:
         if table in tables:
             tables[table] = _with_points(tables[table], table, folder)

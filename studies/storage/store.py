@@ -234,6 +234,28 @@ class Store:
             raise StudyError("study", study_id, allowed)
         return study
 
+    def definition(self, name: str) -> Mapping[str, Any] | None:
+        """Return the content of the study of this id or name; None if there is none.
+
+        Raises
+        ------
+        StudyError
+            if several studies have the name
+        """
+        found: dict[str, Mapping[str, Any]] = {}
+        for study_id in [name] if is_id(name) else self.study_ids():
+            path = self.study_directory(study_id) / _STUDY
+            with suppress(FileDamaged):
+                content = seal.content_of(path, f"study {study_id}")
+                if name in (study_id, content.get("name")):
+                    found[study_id] = content
+        if len(found) > 1:
+            ids = ", ".join(found)
+            raise StudyError(
+                "extends", name, f"is the name of several studies: give an id of {ids}"
+            )
+        return next(iter(found.values()), None)
+
     def save_study(self, study: Study) -> Path:
         """Store the definition of the study and its scene, and return its directory."""
         self.save_scene(study.problem)
