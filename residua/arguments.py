@@ -24,6 +24,27 @@ def parser() -> argparse.ArgumentParser:
         one.set_defaults(command=command, **defaults)
         return one
 
+    _add_run(add)
+    _add_views(add)
+    one = add("serve", commands.serve)
+    one.add_argument("--host", help="default: 127.0.0.1; with another one callers need API keys")
+    one.add_argument("--port", type=_integer(0, 65535), help="default: 8000")
+    one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
+    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
+
+    _add_access(add)
+    _add_remote(add)
+    return whole
+
+
+class _Parser(argparse.ArgumentParser):
+    """Tells a mistake in one line, as the commands do."""
+
+    def error(self, message: str) -> NoReturn:
+        sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
+
+
+def _add_run(add: Callable[..., argparse.ArgumentParser]) -> None:
     one = add("run", commands.run)
     one.add_argument("study", type=_path, metavar="STUDY.toml")
     one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
@@ -44,6 +65,8 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--resume", action="store_true", help="do not try failed runs again")
     one.add_argument("--dry-run", action="store_true", help="print the estimated cost, and end")
 
+
+def _add_views(add: Callable[..., argparse.ArgumentParser]) -> None:
     one = add("scenes", commands.scenes)
     one.add_argument("name", nargs="?")
 
@@ -51,7 +74,7 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("path", type=_path, metavar="DIR|RUN")
 
     one = add("plot", commands.plot)
-    one.add_argument("path", type=_path, metavar="RUN|DIR")
+    one.add_argument("path", type=_place, metavar="RUN|DIR")
     one.add_argument(
         "--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
         help="of the sweep, or of the field's own dimensions, such as pass=2",
@@ -72,7 +95,7 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--out", type=_path, required=True, metavar="PNG")
 
     one = add("best", commands.best)
-    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("path", type=_place, metavar="DIR")
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
     one.add_argument(
         "--where", nargs="+", action="extend", default=[], metavar="CONDITION",
@@ -81,27 +104,20 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--lowest", action="store_true", help="the lowest numbers first")
     one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
 
+    one = add("diff", commands.diff)
+    one.add_argument("first", type=_place, metavar="A", help="a study: a folder, a file or a URL")
+    one.add_argument("second", type=_place, metavar="B", help="a study that may differ from it")
+    one.add_argument(
+        "--ignore", nargs="+", action="extend", default=[], metavar="NAME",
+        help="parameters that do not count, such as those of the mesh",
+    )  # fmt: skip
+    one.add_argument("--field", help="the number of the runs that is drawn")
+    one.add_argument("--out", type=_path, metavar="PNG", help="draw what differs")
+
     one = add("export", commands.export)
     one.add_argument("path", type=_path, metavar="RUN|DIR")
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
     one.add_argument("--vtu", type=_path, required=True, metavar="FOLDER", help="where they go")
-
-    one = add("serve", commands.serve)
-    one.add_argument("--host", help="default: 127.0.0.1; with another one callers need API keys")
-    one.add_argument("--port", type=_integer(0, 65535), help="default: 8000")
-    one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
-    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
-
-    _add_access(add)
-    _add_remote(add)
-    return whole
-
-
-class _Parser(argparse.ArgumentParser):
-    """Tells a mistake in one line, as the commands do."""
-
-    def error(self, message: str) -> NoReturn:
-        sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
 
 
 def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:
@@ -142,6 +158,11 @@ def _path(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError(f"{text!r}: must be the name of a file or a folder")
     return Path(text)
+
+
+def _place(text: str) -> Path | str:
+    """Return the path of a study, or its URL as it is: a path has no double slash."""
+    return text if text.startswith(("http://", "https://")) else _path(text)
 
 
 def _integer(least: int, most: int) -> Callable[[str], int]:

@@ -129,6 +129,22 @@ def best(options: argparse.Namespace) -> int:
     return OK
 
 
+def diff(options: argparse.Namespace) -> int:
+    """Tell what differs between two studies, also of two versions of the solver."""
+    from studies.views.differing import diff, difference_table
+    from studies.views.reading import open_study
+
+    with open_study(options.first) as first, open_study(options.second) as second:
+        found = diff(first, second, options.ignore)
+    print(difference_table(found))
+    if options.out is not None:
+        from studies.views.plots.differing import difference_figure
+
+        _save(difference_figure(found, options.field), options.out)
+        print(f"wrote {options.out}")
+    return OK
+
+
 def export(options: argparse.Namespace) -> int:
     """Write the fields at the nodes of a run (keep = "fields") as files for ParaView."""
     from solver.errors import ModelError
@@ -181,7 +197,7 @@ def submit(service: Any, options: argparse.Namespace) -> str:
 def status(service: Any, options: argparse.Namespace) -> str:
     """Print the state of a study on a running service."""
     state = service.status(options.id)
-    stage = f"  {state['stage']}" if state["stage"] else ""
+    stage = f"  {state['stage']}" if state.get("stage") else ""
     return f"{state['status']}  {state['progress']:g} %{stage}"
 
 

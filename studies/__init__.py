@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
     from studies.storage.store import Store
+    from studies.views.differing import Difference, diff
     from studies.views.grids import to_grid
     from studies.views.reading import open_netcdf, open_study
     from studies.views.solution import to_xarray
@@ -36,12 +37,14 @@ _HOMES = {
     "Case": "definition.cases",
     "Limits": "execution.limits",
     "Bounds": "execution.estimate",
+    "Difference": "views.differing",
     "Estimate": "execution.estimate",
     "LoadingPath": "definition.cases",
     "Store": "storage.store",
     "Study": "definition.study",
     "StudyEvent": "execution.run",
     "StudyOutcome": "execution.run",
+    "diff": "views.differing",
     "estimate": "execution.estimate",
     "open_netcdf": "views.reading",
     "open_study": "views.reading",
@@ -58,6 +61,7 @@ __all__ = [
     "Bounds",
     "Case",
     "CatalogueDamaged",
+    "Difference",
     "Estimate",
     "FileDamaged",
     "GridLost",
@@ -70,6 +74,7 @@ __all__ = [
     "StudyError",
     "StudyEvent",
     "StudyOutcome",
+    "diff",
     "estimate",
     "open_netcdf",
     "open_study",
