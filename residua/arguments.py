@@ -49,7 +49,16 @@ def _add_run(add: Callable[..., argparse.ArgumentParser]) -> None:
     one.add_argument("study", type=_path, metavar="STUDY.toml")
     one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
     one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one per core)")
-    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
+    where = one.add_mutually_exclusive_group()
+    where.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
+    where.add_argument(
+        "--scheduler-file", type=_path, metavar="FILE",
+        help="the same, by the file to which it writes its address",
+    )  # fmt: skip
+    where.add_argument(
+        "--part", type=_part, metavar="I/N",
+        help="compute as one of N processes that share the directory, and combine nothing",
+    )  # fmt: skip
     for name, what in (("ca", "authority"), ("cert", "own certificate"), ("key", "own key")):
         one.add_argument(f"--tls-{name}", metavar="PEM", help=f"{what} for a tls:// scheduler")
     one.add_argument(
@@ -64,6 +73,18 @@ def _add_run(add: Callable[..., argparse.ArgumentParser]) -> None:
     )  # fmt: skip
     one.add_argument("--resume", action="store_true", help="do not try failed runs again")
     one.add_argument("--dry-run", action="store_true", help="print the estimated cost, and end")
+
+    one = add("slurm", commands.slurm)
+    one.add_argument("study", type=_path, metavar="STUDY.toml")
+    one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
+    one.add_argument("--tasks", type=_integer(1, 10**6), default=16, help="default: %(default)s")
+    one.add_argument("--time", default="04:00:00", help="limit of a task (default: %(default)s)")
+    one.add_argument("--memory", default="2G", help="of a task (default: %(default)s)")
+    one.add_argument(
+        "--with-scheduler", action="store_true",
+        help="the tasks are workers of a scheduler, in place of parts that share a directory",
+    )  # fmt: skip
+    one.add_argument("--script", type=_path, required=True, metavar="FILE", help="what is written")
 
 
 def _add_views(add: Callable[..., argparse.ArgumentParser]) -> None:
@@ -163,6 +184,13 @@ def _path(text: str) -> Path:
 def _place(text: str) -> Path | str:
     """Return the path of a study, or its URL as it is: a path has no double slash."""
     return text if text.startswith(("http://", "https://")) else _path(text)
+
+
+def _part(text: str) -> tuple[int, int]:
+    number, sign, count = text.partition("/")
+    if not (sign and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
+        raise argparse.ArgumentTypeError(f"{text!r}: must be I/N with 1 <= I <= N")
+    return int(number), int(count)
 
 
 def _integer(least: int, most: int) -> Callable[[str], int]:

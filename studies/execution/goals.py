@@ -54,12 +54,20 @@ class Goals:
     study : a study with a goal
     store : the runs that are there are not computed again
     resume, since : as in `run_study`: which failed runs are taken as they are
+    only : number of the one search that is to be carried out; by default all are
     """
 
-    def __init__(self, study: Study, store: Store, resume: bool = False, since: int = 0) -> None:
+    def __init__(
+        self,
+        study: Study,
+        store: Store,
+        resume: bool = False,
+        since: int = 0,
+        only: int | None = None,
+    ) -> None:
         assert study.asks is not None
         self._study, self._store = study, store
-        self.cases = list(study.cases())
+        self.cases = [case for k, case in enumerate(study.cases()) if only in (None, k)]
         swept = owners(study.sweep)
         self.places = [
             Place(

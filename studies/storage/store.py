@@ -6,6 +6,7 @@ scenes/<scene id>/             scenes of files: scene.json and the meshes
 studies/<study id>/study.json
 studies/<study id>/dataset.nc the runs of a study combined
 studies/<study id>/made.json  digests of its inputs, and of files made from it
+claims/                        what processes that share the directory compute now
 catalogue.sqlite              made again from the files if it is missing or damaged
 scenes.sqlite                 index of the scenes, likewise
 unreadable/                   what was damaged or in a wrong place
@@ -436,14 +437,9 @@ class Store:
         if self.held:
             yield
             return
-        with self._writable():
-            for name in ("runs", "studies"):
-                (self.directory / name).mkdir(parents=True, exist_ok=True)
-                with tempfile.TemporaryFile(dir=self.directory / name):
-                    pass  # a directory may exist and still not be writable
-            busy = "computes here; wait until it has ended, or name another directory"
-            held = lock(self.directory / ".lock", busy)
+        held = self._locked()
         try:
+            self.remove_claims()
             patterns = ("*/**/*.part", "catalogue*.part") if tidy else ()  # not those of keys
             for part in filter(_left, chain.from_iterable(map(self.directory.glob, patterns))):
                 part.unlink(missing_ok=True)
@@ -451,6 +447,36 @@ class Store:
             yield
         finally:
             os.close(held)
+
+    @contextmanager
+    def sharing(self) -> Iterator[None]:
+        """Lock the directory against those who are its only writer, together with others.
+
+        Raises
+        ------
+        StoreBusy
+            if a process that does not share has the lock
+        StudyError
+            if the directory is not writable
+        """
+        held = self._locked(shared=True)
+        try:
+            yield
+        finally:
+            os.close(held)
+
+    def _locked(self, shared: bool = False) -> int:
+        with self._writable():
+            for name in ("runs", "studies"):
+                (self.directory / name).mkdir(parents=True, exist_ok=True)
+                with tempfile.TemporaryFile(dir=self.directory / name):
+                    pass  # a directory may exist and still not be writable
+            busy = "computes here; wait until it has ended, or name another directory"
+            return lock(self.directory / ".lock", busy, shared=shared)
+
+    def remove_claims(self) -> None:
+        """Delete what processes that shared the directory, and have ended, have claimed."""
+        shutil.rmtree(self.directory / "claims", ignore_errors=True)
 
     @contextmanager
     def _writable(self) -> Iterator[None]:

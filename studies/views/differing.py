@@ -63,7 +63,8 @@ class Difference:
     common : number of runs that both have
     only : runs that only the first one has, and only the second: the parameters that vary
     statuses : runs with another status: their parameters, and both statuses
-    changes : the variables that changed, the largest relative change first; those of the computation last
+    changes : the variables that changed, the largest relative change first, and last those that
+        tell of the computation
     unlike : variables that could not be compared, and why
     unknown : parameters that only one of the two has, with their values: they do not count
     pairs : for each number of the runs its values in both, over the common runs
