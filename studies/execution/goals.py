@@ -136,6 +136,14 @@ class Goals:
             return None
         return next(place.runs(wanted[:1]).cases())
 
+    def stored(self, path: str, since: int) -> list[Mapping[str, Any]]:
+        """Return the rows of the runs of a search that have been stored since a time [ns].
+
+        Some may have been stored by a worker that died before it told of them.
+        """
+        rows = self.places[self._paths[path][0]].search.rows.values()
+        return [row for row in rows if row["modified"] >= since]
+
     def closed(self, path: str) -> None:
         """Ask again for runs of which a path that has ended told nothing."""
         number, values = self._paths[path]

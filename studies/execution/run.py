@@ -227,6 +227,7 @@ class _Work:
     priority: int
     emit: Callable[[StudyEvent], None]
     goals: Goals | None = None
+    begun: int = field(default_factory=time.time_ns)
     computed: set[str] = field(default_factory=set)
     _left: deque[PathTask] = field(default_factory=deque)
     _walked: int = 0
@@ -352,6 +353,7 @@ class _Work:
                 if owed is not None:
                     self._keep(path.id, [self.store.write_run(owed, str(error))])
                 self.goals.closed(path.id)
+                self._keep(path.id, self.goals.stored(path.id, self.begun))
 
     def _progress(self) -> float:
         """Return the completed fraction of the study, including runs found in the store."""
