@@ -83,7 +83,7 @@ def _part(study: Study, options: argparse.Namespace) -> int:
     from residua.progress import Progress
     from studies.execution.part import run_part
 
-    if options.workers is not None:
+    if options.workers not in (None, 1):
         raise StudyError("--workers", options.workers, "a part is one process: leave it out")
     progress = Progress(study)
     with _interruption(signal.SIGTERM) as interrupted:

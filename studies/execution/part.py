@@ -126,14 +126,15 @@ class _Part:
                     break
                 if self._complete(unit):
                     continue
-                with claims.held(unit.name) as deaths:
-                    if deaths is None:
+                with claims.held(unit.name) as claim:
+                    if claim is None:
                         waiting.append(unit)
                         continue
                     claimed = True
-                    unit.compute(self, deaths >= _MOST_DEATHS)
-                if self.stop():
-                    waiting.append(unit)
+                    unit.compute(self, claim.deaths >= _MOST_DEATHS)
+                    claim.done = not self.stop()
+                    if not claim.done:
+                        waiting.append(unit)
             left = waiting
         return PartOutcome(computed=self.computed, left=len(left), stopped=self.stop())
 

@@ -17,6 +17,7 @@ import threading
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -24,6 +25,21 @@ BEAT = 20.0
 """Seconds after which an owner changes the time of its claim."""
 STALE = 300.0
 """Age of a claim of another machine at which it is dead [s]."""
+
+
+@dataclass(slots=True)
+class Claim:
+    """A claim that this process has.
+
+    Attributes
+    ----------
+    deaths : number of owners that have died with it
+    done : whether nothing is left to do: then the file stays, for machines that do not see yet what
+        was done, as those that keep for a while what they know of a directory
+    """
+
+    deaths: int
+    done: bool = False
 
 
 class Claims:
@@ -40,8 +56,8 @@ class Claims:
         directory.mkdir(parents=True, exist_ok=True)
 
     @contextmanager
-    def held(self, name: str) -> Iterator[int | None]:
-        """Claim a name; give the number of owners that have died with it, None if one is alive."""
+    def held(self, name: str) -> Iterator[Claim | None]:
+        """Claim a name, until the end of the context; None if another owner may be alive."""
         deaths, own = 0, self._own()
         try:
             while self._path(name, deaths + 1).exists():
@@ -51,11 +67,12 @@ class Claims:
                     yield None
                     return
                 deaths += 1
+            claim = Claim(deaths)
             try:
                 with _beating(own):
-                    yield deaths
+                    yield claim
             finally:
-                for number in range(deaths + 1):
+                for number in range(0 if claim.done else deaths + 1):
                     self._path(name, number).unlink(missing_ok=True)
         finally:
             own.unlink(missing_ok=True)

@@ -18,7 +18,7 @@ from residua.cli import main
 from studies import Store, StoreBusy, Study, StudyError, open_study, run_study
 from studies.definition.identity import solver_hash
 from studies.execution.part import run_part
-from studies.storage.claims import Claims
+from studies.storage.claims import Claim, Claims
 from tests.studies.conftest import write_study
 
 SWEEP = {"friction": [k / 50 for k in range(12)], "load_ratio": [0.25, 0.5]}
@@ -95,7 +95,6 @@ def test_one_part_computes_all_and_the_next_one_nothing(tmp_path: Path) -> None:
     assert (len(first.computed), first.left, first.stopped) == (24, 0, False)
     assert run_part(of, out, (1, 3)).computed == []
     assert not (out / "catalogue.sqlite").exists(), "it is no file that machines may share"
-    assert list((out / "claims").iterdir()) == []
 
 
 def test_a_goal_is_searched_by_a_part(tmp_path: Path) -> None:
@@ -113,7 +112,8 @@ def test_a_part_that_is_stopped_releases_what_it_has(tmp_path: Path) -> None:
     stopped = run_part(of, out, (1, 2), should_stop=lambda: len(runs(out)) >= 5)
     assert stopped.stopped
     assert stopped.left > 0
-    assert list((out / "claims").iterdir()) == []
+    done = {path.id for path in of.paths() if runs(out) >= {case.id for case in path.cases}}
+    assert {claim.stem for claim in (out / "claims").iterdir()} == done
     assert run_part(of, out, (2, 2)).left == 0
     assert max(begun(tmp_path).values()) <= 2
 
@@ -136,28 +136,32 @@ def test_a_path_that_kills_two_is_blamed(tmp_path: Path) -> None:
 
 def test_a_claim_has_one_owner_until_it_ends_or_dies(tmp_path: Path) -> None:
     mine, other = Claims(tmp_path / "claims"), Claims(tmp_path / "claims")
-    with mine.held("a") as deaths:
-        assert deaths == 0
+    with mine.held("a") as claim:
+        assert claim == Claim(0)
         with other.held("a") as second:
             assert second is None
         with other.held("b") as second:
-            assert second == 0
-    with other.held("a") as deaths:
-        assert deaths == 0
+            assert second == Claim(0)
+    with other.held("a") as claim:
+        assert claim == Claim(0)
     left = tmp_path / "claims" / "c.0"
     left.write_text(json.dumps({"machine": "elsewhere"}))
-    with mine.held("c") as deaths:
-        assert deaths is None, "its owner was there a moment ago"
+    with mine.held("c") as claim:
+        assert claim is None, "its owner was there a moment ago"
     os.utime(left, (time.time() - 400.0,) * 2)
     with left.open() as file:
         fcntl.flock(file, fcntl.LOCK_EX)
-        with mine.held("c") as deaths:
-            assert deaths == 1, "the lock of another machine tells nothing"
+        with mine.held("c") as claim:
+            assert claim == Claim(1), "the lock of another machine tells nothing"
             with other.held("c") as second:
                 assert second is None
-    with other.held("d") as deaths, pytest.raises(KeyboardInterrupt), mine.held("e"):
+    with other.held("d"), pytest.raises(KeyboardInterrupt), mine.held("e"):
         raise KeyboardInterrupt
     assert [*(tmp_path / "claims").iterdir()] == []
+    with mine.held("f") as claim:
+        assert claim is not None
+        claim.done = True
+    assert [path.name for path in (tmp_path / "claims").iterdir()] == ["f.0"]
 
 
 def test_parts_and_a_writer_exclude_each_other(tmp_path: Path) -> None:
