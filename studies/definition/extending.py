@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
@@ -19,9 +19,6 @@ from studies.definition.points import MOST_POINTS, field_of, is_points, with_poi
 from studies.definition.sweep import Axes, checked_axes, owners, positions
 from studies.errors import StudyError
 from studies.toml import CASE
-
-if TYPE_CHECKING:
-    from studies.definition.study import Study
 
 EXTENDS = "extends"
 """Entry of a study that names the one that it extends."""
@@ -34,7 +31,24 @@ SCHEMA = {
 """JSON Schema of the entry."""
 
 
-def extended(content: Mapping[str, Any], base: Study, known: Mapping[str, Parameter]) -> Any:
+class Extended(NamedTuple):
+    """The study that is extended.
+
+    Attributes
+    ----------
+    name, scene, parameters, sweep, goal : as those of `Study`
+    fixed : all parameters that are not swept
+    """
+
+    name: str
+    scene: str
+    parameters: Mapping[str, Any]
+    sweep: Axes
+    goal: Mapping[str, Any]
+    fixed: Mapping[str, Any]
+
+
+def extended(content: Mapping[str, Any], base: Extended, known: Mapping[str, Parameter]) -> Any:
     """Return the content of a study that has the runs of `base` and those that it adds.
 
     Parameters
@@ -67,7 +81,7 @@ def extended(content: Mapping[str, Any], base: Study, known: Mapping[str, Parame
 _ADDED = (EXTENDS, "points", "sample", "sweep", "parameters", "scene")
 
 
-def _longer(name: str, axis: list[Any] | dict[str, Any], base: Study) -> Any:
+def _longer(name: str, axis: list[Any] | dict[str, Any], base: Extended) -> Any:
     """Return an axis of `base` with the values or labels that it did not have."""
     field, before = f"sweep.{name}", base.sweep.get(name)
     if isinstance(axis, dict):
@@ -91,7 +105,7 @@ def _longer(name: str, axis: list[Any] | dict[str, Any], base: Study) -> Any:
     return sorted(values) if rising else values
 
 
-def _with_points(base: Study, added: Axes) -> dict[str, Any]:
+def _with_points(base: Extended, added: Axes) -> dict[str, Any]:
     """Return the axes of `base` with more points; its runs become points if it has none."""
     (name, more), *others = [(name, axis) for name, axis in added.items() if is_points(axis)]
     if others:

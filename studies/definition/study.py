@@ -20,7 +20,7 @@ from pydantic import (
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
-from studies.definition.extending import EXTENDS, SCHEMA, extended
+from studies.definition.extending import EXTENDS, SCHEMA, Extended, extended
 from studies.definition.goal import Goal, checked_goal
 from studies.definition.identity import content_id
 from studies.definition.labels import checked_labels
@@ -165,7 +165,8 @@ class Study(BaseModel):
         if own != base.scene and name_of(scene_named(own, scenes)) != base.scene:
             allowed = f"must be that of {base.name}, which is extended, or left out"
             raise StudyError("scene", own, allowed)
-        full: dict[str, Any] = extended(content, base, parameters_of(base.problem))
+        before = Extended(base.name, base.scene, base.parameters, base.sweep, base.goal, base.fixed)
+        full: dict[str, Any] = extended(content, before, parameters_of(base.problem))
         return full
 
     def checked(self) -> Self:

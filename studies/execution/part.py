@@ -93,12 +93,12 @@ def run_part(
         with store.sharing():
             store.save_study(study)
             emit = on_event or (lambda event: None)
-            work = _Part(study, store, emit, should_stop or (lambda: False))
+            work = _PartWork(study, store, emit, should_stop or (lambda: False))
             return work.done((number - 1) / count)
 
 
 @dataclass(slots=True)
-class _Part:
+class _PartWork:
     """The work of one process."""
 
     study: Study
@@ -118,7 +118,7 @@ class _Part:
         left, count, claimed = units[first:] + units[:first], len(units), True
         while claimed and left and not self.stop():
             claimed = False
-            waiting: list[_Path | _Search] = []
+            waiting: list[_PathUnit | _SearchUnit] = []
             for at, unit in enumerate(left):
                 self._share = 1.0 - (len(left) - at + len(waiting)) / count
                 if self.stop():
@@ -138,18 +138,20 @@ class _Part:
             left = waiting
         return PartOutcome(computed=self.computed, left=len(left), stopped=self.stop())
 
-    def _units(self) -> list[_Path | _Search]:
+    def _units(self) -> list[_PathUnit | _SearchUnit]:
         if self.study.asks:
-            return [_Search(case.id, k) for k, case in enumerate(self.study.cases())]
-        return [_Path(path.id, path) for path in self.study.paths()]
+            return [_SearchUnit(case.id, k) for k, case in enumerate(self.study.cases())]
+        return [_PathUnit(path.id, path) for path in self.study.paths()]
 
-    def _complete(self, unit: _Path | _Search) -> bool:
+    def _complete(self, unit: _PathUnit | _SearchUnit) -> bool:
         """Whether the runs of a unit were there when the files were listed last."""
         if time.monotonic() - self._looked > _LOOK:
             with os.scandir(self.store.directory / "runs") as files:
                 self._there = {each.name.removesuffix(".nc") for each in files}
             self._looked = time.monotonic()
-        return isinstance(unit, _Path) and all(case.id in self._there for case in unit.path.cases)
+        return isinstance(unit, _PathUnit) and all(
+            case.id in self._there for case in unit.path.cases
+        )
 
     def walk(self, task: PathTask, hear: Callable[[str, dict[str, Any]], str]) -> None:
         """Compute the runs of a task."""
@@ -181,13 +183,13 @@ class _Part:
 
 
 @dataclass(frozen=True, slots=True)
-class _Path:
+class _PathUnit:
     """A loading path of a sweep."""
 
     name: str
     path: LoadingPath
 
-    def compute(self, part: _Part, hopeless: bool) -> None:
+    def compute(self, part: _PartWork, hopeless: bool) -> None:
         """Compute its runs that are not there; or store that those who tried have died."""
         cases = tuple(case for case in self.path.cases if not part.store.run_path(case.id).exists())
         if hopeless:
@@ -199,13 +201,13 @@ class _Path:
 
 
 @dataclass(frozen=True, slots=True)
-class _Search:
+class _SearchUnit:
     """The search at one place of the axes of a study with a goal."""
 
     name: str
     number: int
 
-    def compute(self, part: _Part, hopeless: bool) -> None:
+    def compute(self, part: _PartWork, hopeless: bool) -> None:
         """Search to the end; or store that those who tried have died."""
         goals = Goals(part.study, part.store, resume=True, only=self.number)
 
@@ -224,7 +226,7 @@ class _Search:
             goals.closed(asked.path.id)
 
     @staticmethod
-    def _asked(goals: Goals, part: _Part) -> Iterator[Any]:
+    def _asked(goals: Goals, part: _PartWork) -> Iterator[Any]:
         for asked in goals.paths():
             if asked is None or part.stop():
                 return
