@@ -140,18 +140,12 @@ class Jobs(Database):
         """Add runs that a search has asked for, and write how many of the searches have ended."""
         with self.transaction() as connection, suppress(NotFound):
             job = self.read(connection, job_id)
-            known = "SELECT COUNT(*) FROM run WHERE job = ?"
-            (count,) = connection.execute(known, (job_id,)).fetchone()
-            more = [
-                run
-                for run in runs
-                if not connection.execute(
-                    "SELECT 1 FROM run WHERE job = ? AND run = ?", (job_id, run)
-                ).fetchone()
-            ]
+            rows = connection.execute("SELECT run FROM run WHERE job = ?", (job_id,))
+            known = {row["run"] for row in rows}
+            more = [run for run in runs if run not in known]
             connection.executemany(
                 "INSERT INTO run VALUES (?, ?, ?)",
-                ((job_id, position, run) for position, run in enumerate(more, count)),
+                ((job_id, position, run) for position, run in enumerate(more, len(known))),
             )
             put(connection, job, stage=stage)
 

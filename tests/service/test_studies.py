@@ -316,6 +316,19 @@ def test_a_goal_that_is_not_reached_fails_with_the_reason(service: Server) -> No
     assert detail["stage"] == "1 of 1 searches ended"
 
 
+def test_a_study_extends_one_that_is_known(service: Server, done: dict[str, Any]) -> None:
+    for named in (done["id"], fake_study("done")):
+        more = {"name": "more", "extends": named, "sweep": {"friction": [0.1]}}
+        study_id = service.post(more)
+    sweep = fake_study("more")["sweep"] | {"friction": [0.0, 0.1, 0.3]}
+    assert service.post(fake_study("more") | {"sweep": sweep}) == study_id
+    detail = service.finished(study_id)
+    assert detail["counts"] == {"ok": 6}
+    assert {run["id"] for run in done["runs"]} < {run["id"] for run in detail["runs"]}
+    refused = service.client.post("/studies", json={"name": "more", "extends": "0" * 32})
+    assert refused.json()["errors"][0]["field"] == "extends"
+
+
 def test_a_goal_has_the_same_id_everywhere(tmp_path: Path) -> None:
     file = ROOT / "data" / "studies" / "limit-load.toml"
     settings = Settings(data=tmp_path, scheduler=NOWHERE["RESIDUA_SCHEDULER"])
