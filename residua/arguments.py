@@ -24,16 +24,54 @@ def parser() -> argparse.ArgumentParser:
         one.set_defaults(command=command, **defaults)
         return one
 
-    _add_run(add)
-    _add_views(add)
+    _add_run(add("run", commands.run))
+    one = add("fit", commands.fit)
+    one.add_argument(
+        "--measured", type=_path, nargs="+", default=[], metavar="CSV",
+        help="measured lines: columns PLACE and VALUE, named as variables of the runs, and sigma",
+    )  # fmt: skip
+    _add_run(one)
+
+    one = add("scenes", commands.scenes)
+    one.add_argument("name", nargs="?")
+
+    one = add("show", commands.show)
+    one.add_argument("path", type=_path, metavar="DIR|RUN")
+
+    one = add("plot", commands.plot)
+    one.add_argument("path", type=_place, metavar="RUN|DIR")
+    one.add_argument(
+        "--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
+        help="of the sweep, or of the field's own dimensions, such as pass=2",
+    )  # fmt: skip
+    one.add_argument("--field", help="default: residual_stress, or map_stress if not released")
+    one.add_argument("--component")
+    one.add_argument(
+        "--zoom", type=float, metavar="MM",
+        help="only within this distance of the contact's centre, or of its edge if half of the "
+        "bodies was computed",
+    )  # fmt: skip
+    one.add_argument(
+        "--window", type=float, nargs=4, metavar=("X0", "X1", "Y0", "Y1"),
+        help="only this part of a map [mm]",
+    )  # fmt: skip
+    one.add_argument("--over", metavar="AXIS", help="draw lines for each value of this axis")
+    one.add_argument("--resolution", type=float, metavar="DPI", help="dots per inch, 50 to 600")
+    one.add_argument("--out", type=_path, required=True, metavar="PNG")
+
+    one = add("export", commands.export)
+    one.add_argument("path", type=_path, metavar="RUN|DIR")
+    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
+    one.add_argument("--vtu", type=_path, required=True, metavar="FOLDER", help="where they go")
+
     one = add("serve", commands.serve)
     one.add_argument("--host", help="default: 127.0.0.1; with another one callers need API keys")
     one.add_argument("--port", type=_integer(0, 65535), help="default: 8000")
     one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
 
-    _add_access(add)
-    _add_remote(add)
+    for more in (_add_cluster, _add_numbers, _add_access, _add_remote):
+        more(add)
     return whole
 
 
@@ -44,8 +82,7 @@ class _Parser(argparse.ArgumentParser):
         sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
 
 
-def _add_run(add: Callable[..., argparse.ArgumentParser]) -> None:
-    one = add("run", commands.run)
+def _add_run(one: argparse.ArgumentParser) -> None:
     one.add_argument("study", type=_path, metavar="STUDY.toml")
     one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
     one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one per core)")
@@ -74,6 +111,8 @@ def _add_run(add: Callable[..., argparse.ArgumentParser]) -> None:
     one.add_argument("--resume", action="store_true", help="do not try failed runs again")
     one.add_argument("--dry-run", action="store_true", help="print the estimated cost, and end")
 
+
+def _add_cluster(add: Callable[..., argparse.ArgumentParser]) -> None:
     one = add("slurm", commands.slurm)
     one.add_argument("study", type=_path, metavar="STUDY.toml")
     one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
@@ -87,33 +126,16 @@ def _add_run(add: Callable[..., argparse.ArgumentParser]) -> None:
     one.add_argument("--script", type=_path, required=True, metavar="FILE", help="what is written")
 
 
-def _add_views(add: Callable[..., argparse.ArgumentParser]) -> None:
-    one = add("scenes", commands.scenes)
-    one.add_argument("name", nargs="?")
-
-    one = add("show", commands.show)
-    one.add_argument("path", type=_path, metavar="DIR|RUN")
-
-    one = add("plot", commands.plot)
-    one.add_argument("path", type=_place, metavar="RUN|DIR")
+def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
+    one = add("diff", commands.diff)
+    one.add_argument("first", type=_place, metavar="A", help="a study: a folder, a file or a URL")
+    one.add_argument("second", type=_place, metavar="B", help="a study that may differ from it")
     one.add_argument(
-        "--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
-        help="of the sweep, or of the field's own dimensions, such as pass=2",
+        "--ignore", nargs="+", action="extend", default=[], metavar="NAME",
+        help="parameters that do not count, such as those of the mesh",
     )  # fmt: skip
-    one.add_argument("--field", help="default: residual_stress, or map_stress if not released")
-    one.add_argument("--component")
-    one.add_argument(
-        "--zoom", type=float, metavar="MM",
-        help="only within this distance of the contact's centre, or of its edge if half of the "
-        "bodies was computed",
-    )  # fmt: skip
-    one.add_argument(
-        "--window", type=float, nargs=4, metavar=("X0", "X1", "Y0", "Y1"),
-        help="only this part of a map [mm]",
-    )  # fmt: skip
-    one.add_argument("--over", metavar="AXIS", help="draw lines for each value of this axis")
-    one.add_argument("--resolution", type=float, metavar="DPI", help="dots per inch, 50 to 600")
-    one.add_argument("--out", type=_path, required=True, metavar="PNG")
+    one.add_argument("--field", help="the number of the runs that is drawn")
+    one.add_argument("--out", type=_path, metavar="PNG", help="draw what differs")
 
     one = add("best", commands.best)
     one.add_argument("path", type=_place, metavar="DIR")
@@ -125,20 +147,25 @@ def _add_views(add: Callable[..., argparse.ArgumentParser]) -> None:
     one.add_argument("--lowest", action="store_true", help="the lowest numbers first")
     one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
 
-    one = add("diff", commands.diff)
-    one.add_argument("first", type=_place, metavar="A", help="a study: a folder, a file or a URL")
-    one.add_argument("second", type=_place, metavar="B", help="a study that may differ from it")
+    one = add("predict", commands.predict)
+    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("at", nargs="+", metavar="NAME=VALUE", help="each parameter that varies")
+    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
+    one.add_argument("--by", choices=["cells", "gaussian"], help="default: cells, if it has any")
+    one.add_argument("--within", type=float, metavar="E", help="largest error that is enough")
     one.add_argument(
-        "--ignore", nargs="+", action="extend", default=[], metavar="NAME",
-        help="parameters that do not count, such as those of the mesh",
-    )  # fmt: skip
-    one.add_argument("--field", help="the number of the runs that is drawn")
-    one.add_argument("--out", type=_path, metavar="PNG", help="draw what differs")
+        "--compute", action="store_true", help="compute the run there if the error is larger"
+    )
 
-    one = add("export", commands.export)
-    one.add_argument("path", type=_path, metavar="RUN|DIR")
+    one = add("sensitivity", commands.sensitivity)
+    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
-    one.add_argument("--vtu", type=_path, required=True, metavar="FOLDER", help="where they go")
+    one.add_argument(
+        "--method", default="chaos",
+        help="chaos (default); delta, pawn or rbd_fast, with the library SALib",
+    )  # fmt: skip
+    one.add_argument("--out", type=_path, metavar="PNG", help="draw indices, tornado and runs")
 
 
 def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:

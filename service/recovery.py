@@ -79,7 +79,7 @@ def _add(study_id: str, jobs: Jobs, store: Store, begun: bool = True) -> None:
     if not (counts or begun):
         return
     if study.asks:
-        asked = store.asked(study.id)
+        asked = store.asked(study)
         ended = asked is not None and all(store.run_path(run).is_file() for run in asked)
         stage = study.stage(study.expansion.size if ended else 0)
         jobs.accept(study.id, study.to_dict(), sorted(asked or ()), most=study.size, stage=stage)

@@ -28,8 +28,11 @@ if TYPE_CHECKING:
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
     from studies.storage.store import Store
     from studies.views.differing import Difference, diff
+    from studies.views.fits import fit
     from studies.views.grids import to_grid
+    from studies.views.predict import predict
     from studies.views.reading import open_netcdf, open_study
+    from studies.views.sensitivity import sensitivity
     from studies.views.solution import to_xarray
 
 _HOMES = {
@@ -46,11 +49,14 @@ _HOMES = {
     "StudyOutcome": "execution.run",
     "diff": "views.differing",
     "estimate": "execution.estimate",
+    "fit": "views.fits",
     "open_netcdf": "views.reading",
     "open_study": "views.reading",
     "own_workers": "execution.cluster",
+    "predict": "views.predict",
     "run_study": "execution.run",
     "scene_schema": "definition.parameters",
+    "sensitivity": "views.sensitivity",
     "sweep": "execution.function",
     "to_grid": "views.grids",
     "to_xarray": "views.solution",
@@ -76,11 +82,14 @@ __all__ = [
     "StudyOutcome",
     "diff",
     "estimate",
+    "fit",
     "open_netcdf",
     "open_study",
     "own_workers",
+    "predict",
     "run_study",
     "scene_schema",
+    "sensitivity",
     "sweep",
     "to_grid",
     "to_xarray",

@@ -18,7 +18,7 @@ from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
 from studies.errors import StudyError
-from studies.execution.goals import Goals
+from studies.execution.asking import Asking
 from studies.execution.run import StudyEvent
 from studies.execution.task import PathTask, walk
 from studies.scratch import scratch
@@ -86,6 +86,9 @@ def run_part(
     number, count = part
     if not 1 <= number <= count:
         raise StudyError("part", f"{number}/{count}", "must be i/n with 1 <= i <= n")
+    if study.asks and not study.goal:
+        allowed = "parts cannot share this study, which chooses its runs: use a scheduler"
+        raise StudyError("part", f"{number}/{count}", allowed)
     with scratch() as folder:
         store = Store(directory)
         # SQLite is not made for directories that machines share
@@ -209,25 +212,25 @@ class _SearchUnit:
 
     def compute(self, part: _PartWork, hopeless: bool) -> None:
         """Search to the end; or store that those who tried have died."""
-        goals = Goals(part.study, part.store, resume=True, only=self.number)
+        asking = Asking(part.study, part.store, resume=True, only=self.number)
 
         def hear(path: str, row: dict[str, Any]) -> str:
-            place = goals.about(path, row)
-            goals.heard(path, row)
+            place = asking.about(path, row)
+            asking.heard(path, row)
             return place
 
-        for asked in self._asked(goals, part):
+        for asked in self._asked(asking, part):
             if hopeless:
-                owed = goals.owed(asked.path.id) or asked.path.cases[0]
+                owed = asking.owed(asked.path.id) or asked.path.cases[0]
                 part.store.write_run(owed, _DIED)
                 hopeless = False
             else:
                 part.walk(part.task(asked.path, limit=asked.limit, place=asked.place), hear)
-            goals.closed(asked.path.id)
+            asking.closed(asked.path.id)
 
     @staticmethod
-    def _asked(goals: Goals, part: _PartWork) -> Iterator[Any]:
-        for asked in goals.paths():
+    def _asked(asking: Asking, part: _PartWork) -> Iterator[Any]:
+        for asked in asking.paths():
             if asked is None or part.stop():
                 return
             yield asked
