@@ -178,7 +178,7 @@ def predict(
     from studies import open_netcdf  # xarray takes half a second to import
     from studies.views.answers import answer
 
-    path, asked = dataset(job, jobs, store).path, query.model_dump()
+    path, asked = Path(dataset(job, jobs, store).path), query.model_dump()
     at = {name: asked.pop(name) for name in query.model_extra or {}}
     study = Study.known(jobs.study(job.id), store.scene)
     with open_netcdf(path) as runs:
