@@ -57,7 +57,7 @@ class Gate:
     """Middleware that refuses a request before its body is read.
 
     The caller's scope is stored in ``request.state.caller``: a `Scope`, or None without a key; in
-    ``request.state.name`` the name of the key, or the address of a caller without one.
+    ``request.state.name`` the name of the key, or ``address …`` of a caller without one.
     """
 
     def __init__(self, app: ASGIApp, settings: Settings, keys: Keys) -> None:
@@ -109,7 +109,8 @@ class Gate:
 
     async def caller(self, request: Request) -> Scope | None:
         """Return the caller's scope, or raise `HTTPException` if it is not sufficient."""
-        request.state.name = request.client.host if request.client else ""
+        # No name of a key has a space.
+        request.state.name = f"address {request.client.host if request.client else 'unknown'}"
         if not self.keys_needed:
             return Scope.ADMIN
         wanted, header = needed(request), request.headers.get("authorization", "")

@@ -81,7 +81,8 @@ def create_app(settings: Settings) -> FastAPI:
     store = open_store(settings.data)
     jobs = open_queue(settings.data / "jobs.sqlite", store, settings.max_queue)
     mend = Mender(jobs, store).look
-    runner = Runner(settings, jobs, Pool.of(settings, held), Starter("service.child", held), mend)
+    starter = Starter(held)
+    runner = Runner(settings, jobs, Pool(settings, starter), starter, mend)
     examiner = Examiner(settings)
     kept = settings.keep_days, settings.keep_bytes
     scenes = settings.max_scenes_bytes, settings.max_key_scenes_bytes

@@ -72,7 +72,7 @@ async def get_caller(request: Request) -> Scope | None:
 
 
 async def get_name(request: Request) -> str:
-    """Return the name of the caller's key; without one its address."""
+    """Return the name of the caller's key; without one, ``address`` and its address."""
     name: str = request.state.name
     return name
 

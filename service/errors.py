@@ -266,14 +266,11 @@ def on_unexpected(request: Request, exc: Exception) -> Problem:
 
 
 HANDLERS: dict[type[Exception], Callable[[Request, Any], Response]] = {
+    **dict.fromkeys(STATUS, on_plain_error),
     StudyError: on_field_error,
     SceneError: on_scene_error,
     Unusable: on_unusable,
     RequestValidationError: on_validation_error,
-    **dict.fromkeys(
-        (NotFound, Conflict, Busy, NoRoom, QueueLost, StoreFull, CatalogueDamaged, FileDamaged),
-        on_plain_error,
-    ),
     OSError: on_system_error,
     HTTPException: on_http_error,
     Exception: on_unexpected,

@@ -48,6 +48,7 @@ class Job:
     submitted, started, finished : ISO 8601, UTC
     turn : the greater was accepted or retried later
     digest : checksum of the text of the study
+    bytes : estimated size of the runs that it lacked, and of its data set
     """
 
     id: str
@@ -65,6 +66,7 @@ class Job:
     finished: str | None
     turn: int
     digest: int
+    bytes: float
 
 
 COLUMNS = tuple(each.name for each in fields(Job))

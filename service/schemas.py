@@ -45,6 +45,34 @@ class RunFilter(Window):
     hardening: str | None = None
 
 
+class PredictQuery(BaseModel):
+    """Which number is predicted, and where: beside these, the parameters that the study varies."""
+
+    model_config = ConfigDict(extra="allow")
+
+    of: str = Field(description="a number of the runs")
+    by: Literal["cells", "gaussian"] | None = Field(
+        default=None, description="in the cells of a refinement, or by a Gaussian process"
+    )
+    within: float | None = Field(
+        default=None, ge=0, allow_inf_nan=False, description="largest error that is enough"
+    )
+
+
+class Prediction(BaseModel):
+    """A number between the runs of a study."""
+
+    of: str
+    value: float
+    error: float = Field(description="how far it may be off; 0 if the run was computed")
+    unit: str
+    by: str = Field(description="``cells``, ``gaussian``, or ``run``: that of this place is there")
+    at: dict[str, Any] = Field(description="parameters of the place")
+    add: dict[str, Any] | None = Field(
+        description="the study to submit where the error is more than `within`"
+    )
+
+
 class TableFilter(BaseModel):
     """The runs of a study that are requested, by any column of its table."""
 

@@ -251,7 +251,7 @@ async def make(
         except NoRoom as error:
             wrong[""] = str(error)
     if "submit" in given and found is not None:
-        job, _ = await run_in_threadpool(keeper.accept, found.study, found.runs, 0)
+        job, _ = await run_in_threadpool(keeper.accept, found, 0)
         return _back(request, job.id)
     if "application/json" in request.headers.get("accept", ""):
         costs = None if found is None else dataclasses.asdict(found.estimate)
