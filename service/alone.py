@@ -18,7 +18,6 @@ import tempfile
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import ceil
 from pathlib import Path
 from typing import NoReturn
 
@@ -66,7 +65,7 @@ def alone(function: Callable[..., str], *given: object, folder: Path, seconds: f
     Parameters
     ----------
     folder : where it may write
-    seconds : its processor time
+    seconds : its processor time, in whole seconds
     """
     out, into = os.pipe()
     process = os.fork()
@@ -91,7 +90,8 @@ def _answer(
     status = FAILED
     try:
         _let_go(into)
-        resource.setrlimit(resource.RLIMIT_CPU, (ceil(seconds), ceil(seconds) + 1))
+        most = max(int(seconds), 1)
+        resource.setrlimit(resource.RLIMIT_CPU, (most, most + 1))
         tempfile.tempdir = str(folder)
         with os.fdopen(into, "w", encoding="utf-8") as pipe:
             pipe.write(f"{_shut_in(folder)}\n")
