@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 _MARGIN = 0.25
 """Vertices nearer than this many element lengths are candidates."""
+_POWER = 5 / 3
+"""Power of the gap in the slip of a vertex that comes near."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,17 +172,8 @@ class Candidates:
             with np.errstate(invalid="ignore"):
                 now = np.stack([gap - old.gap, slip])
             now[:, ~np.isfinite(now).all(axis=0) | (span == 0)] = np.nan
-            past = np.stack([now, old.moved[0]])
-            out.append(
-                replace(
-                    new,
-                    touching=new.status != OPEN,
-                    gap=gap,
-                    moved=past,
-                    span=span,
-                    slipped=slipped,
-                )
-            )
+            past = {"gap": gap, "moved": np.stack([now, old.moved[0]]), "span": span}
+            out.append(replace(new, touching=new.status != OPEN, slipped=slipped, **past))
         return tuple(out)
 
 
@@ -213,7 +206,7 @@ def find_candidates(
     """Return the candidates at displacements ``u``, a ``span`` of time after ``start``.
 
     Slips count from the state ``start`` or, where a vertex had no contact then, from the moment
-    it touched, if the rates of its approach are known from the last increment.
+    it touched, if its approach is known from the last increments.
     """
     time = start.time + span
     pairings = [
@@ -238,8 +231,8 @@ def find_candidates(
         tangent = slice(n + normal.start, n + normal.stop)
         motion[normal] = pairing.gap[at]
         beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
-        earlier = np.where(before.touching, 0.0, _slip_before_contact(before, span))
-        uncounted[normal], unsure[normal] = earlier[:, at]
+        approach = np.where(before.touching, 0.0, _slip_before_contact(before, span))
+        uncounted[normal], unsure[normal] = approach[:, at]
         shear = system.bound(pair, pairing, start, time).at(at)
         lines.append(shear.over(pairing.area[at]))
         for side, (number, part, surface) in enumerate(interface.sides):
@@ -278,10 +271,10 @@ def find_candidates(
 def _slip_before_contact(before: ContactState, span: float) -> tuple[Array, Array]:
     """Return the slip (n,) before contact, and its possible error [mm].
 
-    Slip continues as a function of the gap, ``a + b gap + c gap^1.5`` through the last three
-    states, or a line through the last two. Their difference is the possible error. The power is
-    that of the gap ahead of a contact that grows, in which surfaces come closer with the root of
-    their distance to its end; with a parabola the error is twice as large.
+    Slip continues as a function of the gap, ``a + b gap + c gap^(5/3)`` through the last three
+    states, or a line through the last two. Their difference is the possible error. Beyond the end
+    of a contact that grows, surfaces move with the root of the distance y to this end: gap and slip
+    are ``y^1.5`` times a series in y, and the change of slip with the gap is one in ``gap^(2/3)``.
 
     The gap closes at its last rate; a vertex that would close later than ``span`` is taken to touch
     at its end. Where the gap does not close, or its change is not known, the slip is 0 and its
@@ -292,12 +285,12 @@ def _slip_before_contact(before: ContactState, span: float) -> tuple[Array, Arra
         closing = change * (span / before.span)
         last = before.gap - change
         gaps = np.stack([before.gap + closing, before.gap, last, last - earlier]).clip(0.0)
-        power = -np.diff(gaps**(5 / 3), axis=0) / -np.diff(gaps, axis=0)  # mean slopes
+        steeper = np.diff(gaps**_POWER, axis=0) / np.diff(gaps, axis=0)
         line, way = slip / change, gaps[0] - gaps[1]
-        bent = (line - slid / earlier) / (power[1] - power[2]) * (power[0] - power[1])
-    known, bends = closing < 0, (change * earlier > 0) & np.isfinite(bent)
-    more = np.where(bends, bent, 0.0)
-    return np.where(known, (line + more) * way, 0.0), np.where(known, more * way, np.inf)
+        bent = (line - slid / earlier) / (steeper[1] - steeper[2]) * (steeper[0] - steeper[1])
+        bent = np.where((change * earlier > 0) & np.isfinite(bent), bent, 0.0)
+        known = closing < 0
+        return np.where(known, (line + bent) * way, 0.0), np.where(known, bent * way, np.inf)
 
 
 def _near(pairing: Pairing, contact: ContactState, floating: bool) -> NDArray[np.int64]:

@@ -38,7 +38,7 @@ def timing(system: System, start: State, candidates: Candidates, compliance: Arr
     uncertain friction of vertices. If the time of touch is not known, that is the elastic stiffness
     times the slip without friction; a vertex that sticks from the beginning of the increment has no
     slip, and its tangential force is added instead. If it is known, it is the change of friction by
-    the possible error of the slip before, while all vertices in contact stick.
+    the possible error of the slip before, at vertices that stick, or might without that error.
     """
     n = candidates.n
     N = np.maximum(candidates.forces[:n], 0.0)
@@ -49,11 +49,13 @@ def timing(system: System, start: State, candidates: Candidates, compliance: Arr
         slipped = np.abs(np.concatenate([slip[at] for slip, at in slips]))
         strained = np.abs(candidates.forces[n:]) + slipped / np.diag(compliance)[n:]
         untimed = np.isinf(candidates.unsure)
-        off = np.where((N > 0) & ~untimed, candidates.unsure, 0.0)
+        off = np.where(untimed, 0.0, candidates.unsure)
+        slides = (candidates.status != STICK) & (np.abs(candidates.motion[n:]) > np.abs(off))
+        sticks = np.flatnonzero((N > 0) & ~slides)
+        off[(N <= 0) | slides] = 0.0
         if off.any():
-            closed = np.flatnonzero(N > 0)
-            tangential = compliance[n:, n:][np.ix_(closed, closed)]
-            off[closed] = _SHARE * linalg.pinvh(tangential) @ off[closed]
+            tangential = compliance[n:, n:][np.ix_(sticks, sticks)]
+            off[sticks] = _SHARE * linalg.pinvh(tangential) @ off[sticks]
         unknown = np.minimum(bound, np.where(untimed, strained, np.abs(off)))
     stuck = np.where((N > 0) & (candidates.status == STICK), bound, 0.0)
     found = np.zeros((5, len(system.interfaces)))
