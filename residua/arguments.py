@@ -24,25 +24,13 @@ def parser() -> argparse.ArgumentParser:
         one.set_defaults(command=command, **defaults)
         return one
 
-    one = add("run", commands.run)
-    one.add_argument("study", type=_path, metavar="STUDY.toml")
-    one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
-    one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one per core)")
-    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
-    for name, what in (("ca", "authority"), ("cert", "own certificate"), ("key", "own key")):
-        one.add_argument(f"--tls-{name}", metavar="PEM", help=f"{what} for a tls:// scheduler")
+    _add_run(add("run", commands.run))
+    one = add("fit", commands.fit)
     one.add_argument(
-        "--stall-seconds", type=float, metavar="S", default=Limits().stall_seconds,
-        help="end a path after this time without progress (default: %(default)g)",
+        "--measured", type=_path, nargs="+", default=[], metavar="CSV",
+        help="measured lines: columns PLACE and VALUE, named as variables of the runs, and sigma",
     )  # fmt: skip
-    one.add_argument("--path-seconds", type=float, metavar="S", help="end a path after this time")
-    one.add_argument("--memory", metavar="SIZE", help="largest memory of a process, such as 2GB")
-    one.add_argument(
-        "--patience", type=float, metavar="S",
-        help="end after this time without a worker that accepts tasks (default: wait)",
-    )  # fmt: skip
-    one.add_argument("--resume", action="store_true", help="do not try failed runs again")
-    one.add_argument("--dry-run", action="store_true", help="print the estimated cost, and end")
+    _add_run(one)
 
     one = add("scenes", commands.scenes)
     one.add_argument("name", nargs="?")
@@ -71,16 +59,6 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--resolution", type=float, metavar="DPI", help="dots per inch, 50 to 600")
     one.add_argument("--out", type=_path, required=True, metavar="PNG")
 
-    one = add("best", commands.best)
-    one.add_argument("path", type=_path, metavar="DIR")
-    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
-    one.add_argument(
-        "--where", nargs="+", action="extend", default=[], metavar="CONDITION",
-        help='such as "friction<0.3" or "hardening=none"; runs must meet all',
-    )  # fmt: skip
-    one.add_argument("--lowest", action="store_true", help="the lowest numbers first")
-    one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
-
     one = add("export", commands.export)
     one.add_argument("path", type=_path, metavar="RUN|DIR")
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
@@ -92,8 +70,8 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
 
-    _add_access(add)
-    _add_remote(add)
+    for more in (_add_numbers, _add_access, _add_remote):
+        more(add)
     return whole
 
 
@@ -102,6 +80,59 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
+
+
+def _add_run(one: argparse.ArgumentParser) -> None:
+    one.add_argument("study", type=_path, metavar="STUDY.toml")
+    one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
+    one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one per core)")
+    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
+    for name, what in (("ca", "authority"), ("cert", "own certificate"), ("key", "own key")):
+        one.add_argument(f"--tls-{name}", metavar="PEM", help=f"{what} for a tls:// scheduler")
+    one.add_argument(
+        "--stall-seconds", type=float, metavar="S", default=Limits().stall_seconds,
+        help="end a path after this time without progress (default: %(default)g)",
+    )  # fmt: skip
+    one.add_argument("--path-seconds", type=float, metavar="S", help="end a path after this time")
+    one.add_argument("--memory", metavar="SIZE", help="largest memory of a process, such as 2GB")
+    one.add_argument(
+        "--patience", type=float, metavar="S",
+        help="end after this time without a worker that accepts tasks (default: wait)",
+    )  # fmt: skip
+    one.add_argument("--resume", action="store_true", help="do not try failed runs again")
+    one.add_argument("--dry-run", action="store_true", help="print the estimated cost, and end")
+
+
+def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
+    one = add("best", commands.best)
+    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
+    one.add_argument(
+        "--where", nargs="+", action="extend", default=[], metavar="CONDITION",
+        help='such as "friction<0.3" or "hardening=none"; runs must meet all',
+    )  # fmt: skip
+    one.add_argument("--lowest", action="store_true", help="the lowest numbers first")
+    one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
+
+    one = add("predict", commands.predict)
+    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("at", nargs="+", metavar="NAME=VALUE", help="each parameter that varies")
+    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
+    one.add_argument("--by", choices=["cells", "gaussian"], help="default: cells, if it has any")
+    one.add_argument("--within", type=float, metavar="E", help="largest error that is enough")
+    one.add_argument(
+        "--compute", action="store_true", help="compute the run there if the error is larger"
+    )
+
+    one = add("sensitivity", commands.sensitivity)
+    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
+    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
+    one.add_argument(
+        "--method", default="chaos",
+        help="chaos (default); delta, pawn or rbd_fast, with the library SALib",
+    )  # fmt: skip
+    one.add_argument("--out", type=_path, metavar="PNG", help="draw indices, tornado and runs")
 
 
 def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:

@@ -10,8 +10,8 @@ from typing import Any
 import httpx
 
 from studies.appearing import appearing
+from studies.definition.files import read_study
 from studies.errors import StudyError
-from studies.toml import read_study
 
 _WAIT = 60.0
 """Seconds to wait for an answer."""

@@ -21,7 +21,7 @@ def run(options: argparse.Namespace) -> int:
     from residua.progress import Progress
     from studies.definition.study import Study
     from studies.execution.cluster import Access
-    from studies.execution.forking import variables
+    from studies.execution.forking import FORK_HERE, variables
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, run_study
     from studies.storage.store import Store
@@ -34,7 +34,8 @@ def run(options: argparse.Namespace) -> int:
     access = options.scheduler and Access(
         options.scheduler, options.tls_ca, options.tls_cert, options.tls_key
     )
-    study, store = Study.from_toml(options.study), Store(options.out)
+    measured = getattr(options, "measured", ())
+    study, store = Study.from_toml(options.study, measured), Store(options.out)
     if options.dry_run:
         print(dry_run(study, store))
         return OK
@@ -48,7 +49,8 @@ def run(options: argparse.Namespace) -> int:
         progress(event)
 
     # Before a worker knows the module path of this process, it would look in the current directory.
-    with _interruption() as interrupted, variables({"PYTHONSAFEPATH": "1"}):
+    for_workers = {"PYTHONSAFEPATH": "1", FORK_HERE: "1"}
+    with _interruption() as interrupted, variables(for_workers):
         outcome = run_study(
             study,
             store,
@@ -69,6 +71,11 @@ def run(options: argparse.Namespace) -> int:
     if outcome.stopped:
         return INTERRUPTED
     return OK if outcome.ok else FAILED
+
+
+def fit(options: argparse.Namespace) -> int:
+    """Find the parameters with which runs come closest to what was measured."""
+    return run(options)
 
 
 def scenes(options: argparse.Namespace) -> int:
@@ -125,6 +132,49 @@ def best(options: argparse.Namespace) -> int:
             dataset, options.of, options.where, lowest=options.lowest, count=options.count
         )
         print(best_table(dataset, options.of, runs))
+    return OK
+
+
+def predict(options: argparse.Namespace) -> int:
+    """Tell a number between the runs of a study, with its error."""
+    from studies.execution.run import run_study
+    from studies.views.answers import answer
+    from studies.views.picking import study_of
+    from studies.views.reading import find_study, open_netcdf
+
+    at, path = _selection(options.at, "NAME=VALUE"), find_study(options.path)
+    study, store = study_of(path)
+    asked: dict[str, Any] = {"of": options.of, "at": at, "by": options.by, "within": options.within}
+    with open_netcdf(path) as dataset:
+        found = answer(dataset, study, store, **asked)
+        if not found.enough and options.compute:
+            run_study(found.run, store, workers=1)
+            found = answer(dataset, study, store, **asked)
+    unit = f" {found.unit}" if found.unit not in {"", "1"} else ""
+    print(f"{found.of} = {found.value:.6g}{unit}, error {found.error:.2g}{unit} (by {found.by})")
+    if found.enough:
+        return OK
+    place = ", ".join(f"{name} = {value}" for name, value in found.at.items())
+    failed = store.run(next(found.run.run_ids())) if options.compute else None
+    told = f"its run ended as {failed['status']}" if failed else "--compute adds this run"
+    print(f"the error is above {options.within:g} at {place}: {told}")
+    return FAILED
+
+
+def sensitivity(options: argparse.Namespace) -> int:
+    """Tell which parameter of a sample matters for a number of its runs, and draw it."""
+    from studies.views import sensitivity as indices
+    from studies.views.reading import open_study
+
+    selection = _selection(options.select)
+    with open_study(options.path) as dataset:
+        found = indices.sensitivity(dataset, options.of, selection, method=options.method)
+        print(indices.sensitivity_table(found))
+        if options.out:
+            from studies.views.plots.sensitivity import sensitivity_figure
+
+            _save(sensitivity_figure(dataset, found, selection), options.out)
+            print(f"wrote {options.out}")
     return OK
 
 
@@ -237,14 +287,14 @@ def _written(option: str, path: Path) -> Iterator[Path]:
         raise StudyError(option, str(path), f"cannot be written: {error.strerror}") from None
 
 
-def _selection(texts: Sequence[str]) -> dict[str, str]:
-    """Return the names and values of ``--select``, each name once."""
+def _selection(texts: Sequence[str], option: str = "--select") -> dict[str, str]:
+    """Return the names and values of an option, each name once."""
     chosen: dict[str, str] = {}
     for text in texts:
         name, sign, value = (part.strip() for part in text.partition("="))
         if not sign:
-            raise StudyError("--select", text, "must be NAME=VALUE")
+            raise StudyError(option, text, "must be NAME=VALUE")
         if name in chosen:
-            raise StudyError("--select", text, f"{name} is selected already, as {chosen[name]}")
+            raise StudyError(option, text, f"{name} is given already, as {chosen[name]}")
         chosen[name] = value
     return chosen

@@ -48,6 +48,7 @@ class Job:
     submitted, started, finished : ISO 8601, UTC
     turn : the greater was accepted or retried later
     digest : checksum of the text of the study
+    bytes : estimated size of the runs that it lacked, and of its data set
     """
 
     id: str
@@ -65,6 +66,7 @@ class Job:
     finished: str | None
     turn: int
     digest: int
+    bytes: float
 
 
 COLUMNS = tuple(each.name for each in fields(Job))
@@ -87,10 +89,24 @@ def row_of(job: Job) -> list[Any]:
     return [*plain, checksum(plain)]
 
 
-def wanted(state: StudyState | None = None, tag: str | None = None) -> tuple[str, list[str]]:
-    """Return the SQL condition for jobs in a state, of studies with a tag, and its values."""
+def wanted(
+    state: StudyState | None = None,
+    tag: str | None = None,
+    scene: str | None = None,
+    text: str | None = None,
+) -> tuple[str, list[str]]:
+    """Return the SQL condition for jobs, and its values.
+
+    Parameters
+    ----------
+    state, scene : state and scene of the job
+    tag : one of the tags of its study
+    text : a part of its name or note, in capitals or not
+    """
     tagged = "json_valid(study) AND ? IN (SELECT value FROM json_each(study, '$.tags'))"
-    conditions = {"state = ?": state, tagged: tag}
+    noted = "CASE WHEN json_valid(study) THEN json_extract(study, '$.note') END"
+    said = f"instr(lower(name || ' ' || COALESCE({noted}, '')), lower(?))"
+    conditions = {"state = ?": state, tagged: tag, "scene = ?": scene, said: text}
     clauses = [clause for clause, value in conditions.items() if value is not None]
     values = [str(value) for value in conditions.values() if value is not None]
     return (f"WHERE {' AND '.join(clauses)}" if clauses else ""), values

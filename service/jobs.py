@@ -59,12 +59,18 @@ class Jobs(Database):
         self.damaged = False
 
     def accept(
-        self, job_id: str, study: dict[str, Any], runs: Iterable[str], priority: int = 0
+        self,
+        job_id: str,
+        study: dict[str, Any],
+        runs: Iterable[str],
+        priority: int = 0,
+        size: float = 0.0,
     ) -> tuple[Job, bool]:
         """Return the job of this study, and whether it is new.
 
         ``runs`` are the ids of its runs in the order of its cases. They are stored, because a
-        changed solver would give other ids, and the study would not find its runs.
+        changed solver would give other ids, and the study would not find its runs. ``size`` is what
+        it will write [bytes].
 
         Raises
         ------
@@ -75,22 +81,24 @@ class Jobs(Database):
             with suppress(NotFound, Conflict):
                 self._study(connection, job_id)
                 return self.read(connection, job_id), False
-            count = "SELECT COUNT(*) FROM job WHERE state = ?"
-            (waiting,) = connection.execute(count, (StudyState.ACCEPTED,)).fetchone()
+            (waiting,) = connection.execute(
+                "SELECT COUNT(*) FROM job WHERE state = ?", (StudyState.ACCEPTED,)
+            ).fetchone()
             if self.longest is not None and waiting >= self.longest:
                 raise Busy(f"{waiting} studies wait already, the largest number: post it later")
             connection.execute("DELETE FROM job WHERE id = ?", (job_id,))  # an unreadable row
             connection.execute("DELETE FROM run WHERE job = ?", (job_id,))
-            size = connection.executemany(
+            count = connection.executemany(
                 "INSERT INTO run VALUES (?, ?, ?)",
                 ((job_id, position, run) for position, run in enumerate(runs)),
             ).rowcount
             text = json.dumps(study)
             job = Job(
-                id=job_id, name=study["name"], scene=study["scene"], size=max(size, 0),
+                id=job_id, name=study["name"], scene=study["scene"], size=max(count, 0),
                 state=StudyState.ACCEPTED, message="", progress=0.0, since=0, stood="",
                 priority=priority, submitted=now(), started=None, finished=None,
                 turn=connection.execute(NEXT_TURN).fetchone()[0], digest=checksum([text]),
+                bytes=float(size),
             )  # fmt: skip
             connection.execute(
                 f"INSERT INTO job ({ALL}, study) VALUES ({MARKS}, ?)", [*row_of(job), text]
@@ -146,6 +154,19 @@ class Jobs(Database):
         with self.transaction("BEGIN") as connection:
             counted = connection.execute("SELECT state, COUNT(*) FROM job GROUP BY state")
             return dict(counted.fetchall())
+
+    def promised(self, but: str) -> float:
+        """Return what all studies but one will still write before they end [bytes].
+
+        About half of a study are its runs; its data set is written at the end.
+        """
+        with self.transaction("BEGIN") as connection:
+            (total,) = connection.execute(
+                "SELECT TOTAL(bytes * (1 - progress / 200)) FROM job"
+                " WHERE state IN (?, ?) AND id <> ?",
+                (StudyState.ACCEPTED, StudyState.RUNNING, but),
+            ).fetchone()
+        return float(total)
 
     def take(self, busy: Collection[str] = (), largest: int = sys.maxsize) -> Job | None:
         """Mark the next job as running, and return it; None if there is none.

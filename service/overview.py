@@ -121,16 +121,6 @@ def _own_words(study: dict[str, Any]) -> dict[str, Any]:
 
 
 def _columns(job: Job) -> dict[str, Any]:
-    return {
-        "id": job.id,
-        "name": job.name,
-        "scene": job.scene,
-        "status": job.state,
-        "message": job.message,
-        "progress": round(job.progress, 1),
-        "priority": job.priority,
-        "size": job.size,
-        "submitted": job.submitted,
-        "started": job.started,
-        "finished": job.finished,
-    }
+    names = StudySummary.model_fields.keys() - {"status"}
+    columns = {name: getattr(job, name) for name in names}
+    return columns | {"status": job.state, "progress": round(job.progress, 1)}

@@ -10,7 +10,6 @@ import math
 import re
 import sys
 import time
-from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -20,7 +19,7 @@ from service.errors import Conflict, NotFound, QueueLost
 from service.job import Job, StudyState, verdict
 from service.jobs import Jobs
 from service.pool import Pool, PoolAway
-from service.processes import Starter
+from service.processes import Process, Starter
 from service.settings import Settings
 from studies.errors import CatalogueDamaged, StoreBusy, StoreFull, Unusable, without_folders
 
@@ -33,7 +32,7 @@ SMALL = 100
 """Largest number of runs of a study for which the last place is reserved."""
 
 READY_SECONDS = 5.0
-"""Time without a study after which the processes of the next one are started, to load [s]."""
+"""Time without a study after which what the next one needs is loaded [s]."""
 
 SILENT = "its process says nothing: it is frozen, or the machine is overloaded"
 
@@ -116,7 +115,7 @@ class Runner:
                 if idle >= self.settings.idle_seconds:
                     await self.pool.close()
                 if idle >= READY_SECONDS:
-                    await asyncio.gather(self.pool.prepare(), self.starter.prepare())
+                    await self.starter.prepare()
                 trouble = ""
             except (CatalogueDamaged, QueueLost, StoreBusy, StoreFull, Unusable, OSError) as error:
                 if trouble != (trouble := str(error)):  # log it only once
@@ -127,8 +126,7 @@ class Runner:
                 pause *= 10
             await self._pause(pause)
         await asyncio.gather(*self._studies.values(), return_exceptions=True)
-        ending = self.pool.close(), self.pool.starter.close(), self.starter.close()
-        await asyncio.gather(*ending)
+        await self.pool.close()
 
     async def _next(self) -> bool:
         """Begin the next study; return whether there was one, and a free place for it.
@@ -206,8 +204,6 @@ class Runner:
                 if silence > max(self.settings.stall_seconds or math.inf, 2 * SILENCE_SECONDS):
                     attempt.reason = SILENT
                     break
-                if attempt.runs:  # while the workers compute, there is time
-                    await self.starter.prepare()
                 now = attempt.progress, self._plain(waiting)
                 if reported != now and await self._write(self.jobs.note, job.id, *now):
                     reported = now
@@ -224,17 +220,18 @@ class Runner:
         return attempt
 
     async def _start(self, job: Job) -> Process:
+        study = await asyncio.to_thread(self.jobs.study, job.id)
         order = {
             "id": job.id,
-            "study": await asyncio.to_thread(self.jobs.study, job.id),
+            "study": study,
             "data": str(self.settings.data.resolve()),
-            "access": await self.pool.access(),
+            "access": await self.pool.access(study),
             "limits": asdict(self.settings.limits),
             "priority": job.priority,
             "since": job.since,
             "grace": self.settings.grace_seconds,
         }
-        return await self.starter.give(order)
+        return await self.starter.start("service.child", order)
 
     def _plain(self, text: str) -> str:
         """Return a message about a study without folders of this machine."""
@@ -271,7 +268,6 @@ class Runner:
 
 async def follow(child: Process, attempt: Attempt) -> None:
     """Write the events of a child into ``attempt`` until its output ends."""
-    assert child.stdout is not None
     async for line in child.stdout:
         message = json.loads(line)
         attempt.heard = time.monotonic()

@@ -29,6 +29,8 @@ class StudyFilter(Window):
 
     status: StudyState | None = None
     tag: str | None = Field(default=None, description="one of the tags of the study")
+    scene: str | None = Field(default=None, description="name of its scene, or id of a posted one")
+    text: str | None = Field(default=None, description="a part of its name or its note")
 
 
 class RunFilter(Window):
@@ -43,6 +45,48 @@ class RunFilter(Window):
     hardening: str | None = None
 
 
+class PredictQuery(BaseModel):
+    """Which number is predicted, and where: beside these, the parameters that the study varies."""
+
+    model_config = ConfigDict(extra="allow")
+
+    of: str = Field(description="a number of the runs")
+    by: Literal["cells", "gaussian"] | None = Field(
+        default=None, description="in the cells of a refinement, or by a Gaussian process"
+    )
+    within: float | None = Field(
+        default=None, ge=0, allow_inf_nan=False, description="largest error that is enough"
+    )
+
+
+class Prediction(BaseModel):
+    """A number between the runs of a study."""
+
+    of: str
+    value: float
+    error: float = Field(description="how far it may be off; 0 if the run was computed")
+    unit: str
+    by: str = Field(description="``cells``, ``gaussian``, or ``run``: that of this place is there")
+    at: dict[str, Any] = Field(description="parameters of the place")
+    add: dict[str, Any] | None = Field(
+        description="the study to submit where the error is more than `within`"
+    )
+
+
+class TableFilter(BaseModel):
+    """The runs of a study that are requested, by any column of its table."""
+
+    model_config = ConfigDict(extra="allow")
+
+    sort: str = Field(default="", description="a column; with a minus, the largest first")
+    columns: str = Field(default="", description="names with commas between; all by default")
+
+    @property
+    def conditions(self) -> dict[str, str]:
+        """The conditions by column."""
+        return {name: str(value) for name, value in (self.model_extra or {}).items() if value != ""}
+
+
 class MapQuery(BaseModel):
     """Which field of a run is drawn."""
 
@@ -54,6 +98,7 @@ class MapQuery(BaseModel):
         "the bodies are not released",
     )
     component: str | None = Field(default=None, description="of a stress; the first by default")
+    stage: str | None = Field(default=None, description="of several stages; the last by default")
     zoom: float | None = Field(
         default=None,
         gt=0,

@@ -64,6 +64,8 @@ def most_kept() -> int:
 
 _KEPT: OrderedDict[Hashable, Any] = OrderedDict()
 """Values by key, the last used one at the end."""
+_UNKNOWN: Any = object()
+"""What stands for a value that is not kept."""
 _PATH = object()
 """Key in between: values that were used since the last `release` stand behind it."""
 _IN_USE: weakref.WeakValueDictionary[Hashable, Any] = weakref.WeakValueDictionary()
@@ -74,20 +76,18 @@ _LOCK = threading.RLock()
 def remembered(key: Hashable, make: Callable[[], R]) -> R:
     """Return the value of a key, made anew if it is not kept.
 
-    All values together have at most the bytes of `most_kept` when another one is made. None is not
-    kept.
+    All values together have at most the bytes of `most_kept` when another one is made.
     """
     with _LOCK:
-        value: R | None = _KEPT.get(key, _IN_USE.get(key))
-    if value is None:
+        value: R = _KEPT.get(key, _IN_USE.get(key, _UNKNOWN))
+    if value is _UNKNOWN:
         _evict(most_kept())
         value = make()
-    if value is not None:
-        with _LOCK:
-            _KEPT[key] = value
-            _KEPT.move_to_end(key)
-            with suppress(TypeError):  # nothing refers weakly to some kinds of objects
-                _IN_USE[key] = value
+    with _LOCK:
+        _KEPT[key] = value
+        _KEPT.move_to_end(key)
+        with suppress(TypeError):  # nothing refers weakly to some kinds of objects
+            _IN_USE[key] = value
     return value
 
 

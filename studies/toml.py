@@ -1,8 +1,7 @@
-"""Read TOML files of studies and scenes, and the files of points and curves that a study names."""
+"""Read TOML files of studies and scenes."""
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 import stat
@@ -11,7 +10,6 @@ from itertools import accumulate, chain
 from pathlib import Path
 from typing import Any
 
-from solver.errors import ModelError
 from studies.errors import StudyError
 
 LARGEST = 50_000_000
@@ -29,7 +27,6 @@ _TEXT = re.compile(
     re.DOTALL,
 )
 _KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
-_DECIMAL_COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _STEP = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
@@ -85,118 +82,6 @@ def read_toml(path: Path | str, field: str) -> dict[str, Any]:
         for ``field``, when the file cannot be read or is no TOML
     """
     return toml_of(read_bytes(path, field), field, str(path))
-
-
-def read_study(path: Path | str) -> dict[str, Any]:
-    """Return the tables of a study file.
-
-    ``[points] file = "tests.csv"`` names a table beside the study, and so does an axis of the sweep
-    that has this entry: see `read_table`. A value of a parameter that ends in ``.csv`` or ``.txt``
-    names the points of a curve. What is in the files takes their place, so that the content of a
-    study needs no other file.
-
-    Raises
-    ------
-    StudyError
-        for ``file``, when the study cannot be read or is no TOML; for the place that names another
-        file which cannot be read
-    """
-    tables, folder = read_toml(path, "file"), Path(path).parent
-    if "points" in tables:
-        tables["points"] = _with_table(tables["points"], "points", folder)
-    if isinstance(sweep := tables.get("sweep"), dict):
-        for name in sweep:
-            sweep[name] = _with_table(sweep[name], f"sweep.{name}", folder)
-    for table in _MAY_NAME_FILES:
-        if table in tables:
-            tables[table] = _with_points(tables[table], table, folder)
-    return tables
-
-
-_MAY_NAME_FILES, _OF_POINTS = ("parameters", "points", "sweep"), (".csv", ".txt")
-
-
-def _with_table(axis: Any, field: str, folder: Path) -> Any:
-    """Return the rows of a file of points in place of its name."""
-    if not isinstance(axis, dict) or not isinstance(axis.get("file"), str):
-        return axis
-    for key in axis.keys() - {"file"}:
-        raise StudyError(f"{field}.{key}", axis[key], "must be in the file, or left out")
-    return read_table(folder / axis["file"], f"{field}.file")
-
-
-def read_table(path: Path | str, field: str) -> list[dict[str, str]]:
-    """Return the rows of a table of text, each by the heading of its columns.
-
-    The first line has the headings. Columns are separated by comma, semicolon or tab; after a
-    semicolon numbers may have a decimal comma. Lines that begin with ``#`` and those without any
-    text are left out, and so is an empty cell: its row does not have this heading. A cell is text:
-    whether it is a number, its parameter decides (`studies.definition.points`).
-
-    Raises
-    ------
-    StudyError
-        for ``field``, when the file cannot be read, has no row, or a row of another length
-    """
-    name = Path(path).name
-    try:
-        lines = read_bytes(path, field).decode("utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        raise StudyError(field, name, "must be text in UTF-8") from None
-    text = [(k, each) for k, each in enumerate(lines, 1) if each.strip() and each.strip()[0] != "#"]
-    delimiter = next((each for each in ";\t" if text and each in text[0][1]), ",")
-    rows = [(k, _cells(each, delimiter, k, field, name)) for k, each in text]
-    (_, headings), *filled = [each for each in rows if any(each[1])] or [(0, [])]
-    if not filled:
-        raise StudyError(field, name, "must have a line of headings, and a line for each point")
-    twice = [heading for k, heading in enumerate(headings) if heading in headings[:k]]
-    if twice or "" in headings:
-        allowed = f"has the heading {twice[0]!r} twice" if twice else "has a column without heading"
-        raise StudyError(field, name, allowed)
-    for number, row in filled:
-        if len(row) != len(headings):
-            allowed = f"has {len(row)} cells in line {number}, and {len(headings)} headings"
-            raise StudyError(field, name, allowed)
-    return [
-        {key: _cell(key, text, delimiter) for key, text in zip(headings, row, strict=True) if text}
-        for _, row in filled
-    ]
-
-
-def _cells(line: str, delimiter: str, number: int, field: str, name: str) -> list[str]:
-    """Return the cells of a line of a table: a cell does not go on in the next line."""
-    try:
-        row = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
-    except csv.Error as error:
-        raise StudyError(field, name, f"must have cells in line {number}: {error}") from None
-    return [cell.strip() for cell in row]
-
-
-def _cell(heading: str, text: str, delimiter: str) -> str:
-    """Return a cell; the decimal comma of a number becomes a point, that of a name stays."""
-    number = delimiter == ";" and heading != CASE and _DECIMAL_COMMA.fullmatch(text)
-    return text.replace(",", ".") if number else text
-
-
-def _with_points(value: Any, field: str, folder: Path) -> Any:
-    """Return a value with points in place of names of files; the name of a case is none."""
-    if isinstance(value, dict):
-        return {
-            key: each
-            if key == CASE and isinstance(each, str)
-            else _with_points(each, f"{field}.{key}", folder)
-            for key, each in value.items()
-        }
-    if isinstance(value, list):
-        return [_with_points(each, f"{field}[{k}]", folder) for k, each in enumerate(value)]
-    if not isinstance(value, str) or not value.endswith(_OF_POINTS):
-        return value
-    from solver.mesh.points import read_points  # loads numpy
-
-    try:
-        return read_points(folder / value).T.tolist()
-    except ModelError as error:
-        raise StudyError(field, value, f"{error.field} {error.allowed}") from None
 
 
 def toml_of(data: bytes, field: str, name: str) -> dict[str, Any]:

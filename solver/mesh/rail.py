@@ -7,6 +7,7 @@ point of the running surface is at y = 0.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -49,8 +50,44 @@ _PLACES = {
 """Piece of the outline on the left, and share of its length."""
 
 
+class Rail(ABC):
+    """What a wheel needs of a rail."""
+
+    __slots__ = ()
+
+    @property
+    @abstractmethod
+    def outline(self) -> Outline:
+        """Outline of the section, counterclockwise."""
+
+    @property
+    @abstractmethod
+    def running(self) -> Pair:
+        """Lengths along the outline between which a wheel may touch it [mm].
+
+        The first is on the right: z decreases in between.
+        """
+
+    def place(self, at: float) -> float:
+        """Return the length along the outline of the point of the running surface at z [mm].
+
+        Raises
+        ------
+        ModelError
+            for ``at``, if the head does not reach so far
+        """
+        from scipy.optimize import brentq
+
+        ends = np.sort(self.outline.at(np.array(self.running))[0])
+        if not ends[0] <= at <= ends[1]:
+            raise ModelError("at", at, f"must be from {ends[0]:.4g} to {ends[1]:.4g} [mm]")
+        return float(
+            brentq(lambda s: self.outline.at(np.array(s))[0] - at, *self.running, xtol=1e-12)
+        )
+
+
 @dataclass(frozen=True, slots=True)
-class RailSection:
+class RailSection(Rail):
     """The section of a rail.
 
     Attributes
@@ -87,23 +124,6 @@ class RailSection:
         """
         left, right = self.places["heads"]
         return right, self.outline.length + left
-
-    def place(self, at: float) -> float:
-        """Return the length along the outline of the point of the running surface at z [mm].
-
-        Raises
-        ------
-        ModelError
-            for ``at``, if the head does not reach so far
-        """
-        from scipy.optimize import brentq
-
-        ends = np.sort(self.outline.at(np.array(self.running))[0])
-        if not ends[0] <= at <= ends[1]:
-            raise ModelError("at", at, f"must be from {ends[0]:.4g} to {ends[1]:.4g} [mm]")
-        return float(
-            brentq(lambda s: self.outline.at(np.array(s))[0] - at, *self.running, xtol=1e-12)
-        )
 
     def canted(self, slope: float) -> RailSection:
         """Return the section turned about its top, counterclockwise by atan(slope).

@@ -87,6 +87,11 @@ class Zone:
         return round(2 * self.half_width / self.size)
 
     @property
+    def elements(self) -> int:
+        """Number of elements."""
+        return self.columns * self.rows
+
+    @property
     def _whole(self) -> int:
         """Number of elements in depth before some are divided."""
         return round(self.depth / (self.layer or self.size))

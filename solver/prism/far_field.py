@@ -18,15 +18,15 @@ both planes, torsion, shear and foundation are those of the section, not of a th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from solver.errors import ModelError
 from solver.prism.modes import superposed
 from solver.prism.sampled import sampled_answers
-from solver.prism.section import I_AXIS
+from solver.prism.section import I_AXIS, I_COMPONENTS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -96,7 +96,7 @@ class FarField:
         self._k = 2 * np.pi / (modes.length * _RATIO**levels) * np.array(waves)
         every = forces if span is None else np.hstack([forces, section.mean_motions.T])
         basis, found = sampled_answers(section, every, self._k)
-        self._basis = basis[modes.unknowns]
+        self._basis = basis
         n = len(size)
 
         def own(shares: dict[int, float]) -> _SectionLoad:
@@ -110,10 +110,10 @@ class FarField:
             moved = section.mean_motions @ basis
             self._sources += _clamped(own(shares), ends, moved, span / 2, beyond)
         apart = np.asarray(modes.x - x, dtype=float)
-        self.displacement = self._summed(modes.rows, modes.along, apart)
+        self.displacement = self._summed(modes.rows @ self._own, modes.along, apart)
         self.strain = self.strain_at(apart)
         axis = modes.unknowns % 3 == I_AXIS
-        self.beneath = self._summed(sparse.eye_array(len(axis)), axis, np.zeros(1))[:, 0]
+        self.beneath = self._summed(self._own, axis, np.zeros(1))[:, 0]
         only = _shares(modes.length * _RATIO ** (levels - 1), 1)
         self.last = self.strain_at(np.zeros(1), [_FarLoad(own(only), 0.0, np.eye(n))])
 
@@ -124,23 +124,40 @@ class FarField:
     def strain_at(self, apart: Array, sources: list[_FarLoad] | None = None) -> Array:
         """Return ``strain`` (n_points, n, 6, 4) at distances (n,) from the resultants along x."""
         modes = self._modes
-        still = self._summed(modes.B0, modes.carrying, apart, sources)
-        waving = self._summed(modes.B1, modes.carrying, apart, sources, power=1)
+        still = self._summed(modes.B0 @ self._own, modes.carrying, apart, sources)
+        waving = self._summed(modes.B1 @ self._own, modes.carrying, apart, sources, power=1)
         return modes.by_point(still + waving)
 
+    @cached_property
+    def around(self) -> Array:
+        """Strain (n, 6, 4) at all points of the section where the resultants act, Mandel."""
+        section = self._modes.section
+        B0, B1 = section.strain_matrices(np.arange(len(section.dofs)), np.arange(section.n))
+        carrying = np.isin(np.arange(6), I_COMPONENTS).repeat(section.weights.size)
+        here = np.zeros(1)
+        still = self._summed(B0 @ self._basis, carrying, here)
+        waving = self._summed(B1 @ self._basis, carrying, here, power=1)
+        return np.asarray((still + waving)[:, 0].reshape(6, -1, 4).swapaxes(0, 1))
+
+    @property
+    def _own(self) -> Array:
+        """The directions (m, r) of the zone's unknowns."""
+        return self._basis[self._modes.unknowns]
+
     def _summed(
-        self, operator: sparse.csr_array, carrying: Points, apart: Array,
+        self, directions: Array, carrying: Points, apart: Array,
         sources: list[_FarLoad] | None = None, power: int = 0,
     ) -> Array:  # fmt: skip
-        """Return results (n_results, n, 4) at distances (n,), of k^power times an operator.
+        """Return results (n_results, n, 4) at distances (n,), times k^power.
 
-        ``carrying`` (n_results,) is whether a result carries i.
+        ``directions`` (n_results, r) are those of the section's directions, ``carrying``
+        (n_results,) is whether a result carries i.
         """
         each = [
             source.load.summed(apart - source.x, power) @ source.factors
             for source in (self._sources if sources is None else sources)
         ]
-        return _combined(operator @ self._basis, np.sum(each, axis=0), carrying)
+        return _combined(directions, np.sum(each, axis=0), carrying)
 
 
 def _combined(directions: Array, sums: Array, carrying: Points) -> Array:

@@ -30,13 +30,13 @@ class PrismSize:
 
     Attributes
     ----------
-    columns, rows : elements of the zone, across and in depth
+    columns, elements : elements of the zone, along its surface and in all
     window : stations where the material may yield
     waves : waves along the prism
     """
 
     columns: int
-    rows: int
+    elements: int
     window: int
     waves: int
 
@@ -53,8 +53,8 @@ class PrismSize:
     @property
     def _factorised(self) -> int:
         """Unknowns of the zone in all waves."""
-        along, up = self.columns, self.rows
-        nodes = (along + 1) * (up + 1) + along * (up + 1) + up * (along + 1)
+        along, up = self.columns, self.elements / self.columns
+        nodes = round((along + 1) * (up + 1) + along * (up + 1) + up * (along + 1))
         return self.waves * 3 * nodes
 
     def passes(self, count: int, turns: int, *, scattered: bool) -> float:
@@ -62,7 +62,7 @@ class PrismSize:
 
         If they are scattered, ever heavier ones come along, ever more rarely.
         """
-        still = _STILL + _POINT * 4 * self.columns * self.rows * self.window
+        still = _STILL + _POINT * 4 * self.elements * self.window
         yields = _YIELDS * turns * (1 - 0.5 ** (count / turns))
         return still * (count + yields * (1 + math.log(count) * scattered))
 

@@ -14,7 +14,6 @@ from solver.tensors import SQRT2
 
 if TYPE_CHECKING:
     from solver.materials.law import Law
-    from solver.mesh.zone import Zone
     from solver.prism.section import Section
     from solver.scenes.prism_parameters import PrismParameters
 
@@ -72,13 +71,14 @@ class PrismWindow:
 
     Attributes
     ----------
-    zone : where elements are small and may yield
+    columns, elements : elements of the zone that may yield, along its surface and in all
     spacing : distance of stations [mm]
     reach : half the length where the load is expected to act [mm]; it may act as far as the window
         allows, since yielding makes a contact longer ahead
     """
 
-    zone: Zone
+    columns: int
+    elements: int
     spacing: float
     reach: float
 
@@ -91,8 +91,8 @@ class PrismWindow:
     def size(self) -> PrismSize:
         """Numbers that tell the work of a pass."""
         return PrismSize(
-            columns=self.zone.columns,
-            rows=self.zone.rows,
+            columns=self.columns,
+            elements=self.elements,
             window=self._stations(_AHEAD) + self._stations(_BEHIND) + 1,
             waves=self._stations(_LENGTH / 2) + 1,
         )
@@ -115,7 +115,7 @@ class PrismWindow:
         """
         return PrismTrack(
             section,
-            np.arange(len(section.weights)) < self.zone.columns * self.zone.rows,
+            np.arange(len(section.weights)) < self.elements,
             "running",
             length=length or self.length,
             spacing=self.spacing,

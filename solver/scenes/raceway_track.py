@@ -64,13 +64,20 @@ class RacewayGeometry:
     reach: float
 
     @property
-    def window(self) -> PrismWindow:
-        """Where the raceway may yield."""
-        zone = Zone(
+    def zone(self) -> Zone:
+        """Where elements are small."""
+        return Zone(
             at=0.0, half_width=self.half_width, depth=self.depth, size=self.size,
             layer=self.layer, split=self.split,
         )  # fmt: skip
-        return PrismWindow(zone=zone, spacing=self.spacing, reach=self.reach)
+
+    @property
+    def window(self) -> PrismWindow:
+        """Where the raceway may yield."""
+        zone = self.zone
+        return PrismWindow(
+            columns=zone.columns, elements=zone.elements, spacing=self.spacing, reach=self.reach
+        )
 
 
 def geometry(parameters: RacewayParameters, reach: float = 1.0) -> RacewayGeometry:
@@ -112,7 +119,7 @@ def section_of(own: RacewayGeometry) -> Section:
     """Return the meshed section of a raceway, held at its foot."""
     E, nu = own.elasticity
     return Section(
-        raceway_mesh(2 * own.block, own.block, own.window.zone, own.groove),
+        raceway_mesh(2 * own.block, own.block, own.zone, own.groove),
         Elasticity(youngs_modulus=E, poisson_ratio=nu),
         supports={"foot": "xyz"},
     )

@@ -11,6 +11,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.mesh.rail import rail_60e1
+from solver.mesh.section_mesh import MeshedRail, SectionMesh
 from solver.mesh.wheel_profile import conical, crowned, measured, s1002
 from solver.prism.profiled_wheel import ProfiledWheel
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.materials import Elasticity
-    from solver.mesh.rail import RailSection
+    from solver.mesh.rail import Rail, RailSection
     from solver.mesh.wheel_profile import WheelProfile
     from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
 
@@ -55,7 +56,7 @@ class _Touching(NamedTuple):
     wheel_radius: float
     wheel_elasticity: Elasticity
     contact_modulus: float
-    rail_profile: str | Points
+    rail_profile: str | Points | SectionMesh
     cant: float
     foundation: float
     youngs_modulus: float
@@ -167,7 +168,7 @@ class _Gap:
     level : this gap at the edge of contact [mm]
     """
 
-    def __init__(self, p: _Touching, section: RailSection, aside: float = 0.0) -> None:
+    def __init__(self, p: _Touching, section: Rail, aside: float = 0.0) -> None:
         outline, wheel = section.outline, wheel_of(p, aside)
         right, left = upper(section)
         self.s = np.arange(left, right, -_STEP)
@@ -228,7 +229,7 @@ class _Gap:
             raise ModelError("lateral_position", lateral_position, allowed)
 
 
-def _aside(p: _Touching, section: RailSection, here: _Gap) -> tuple[float, float]:
+def _aside(p: _Touching, section: Rail, here: _Gap) -> tuple[float, float]:
     """Return the right and left end of the contact when the rail has moved aside [mm].
 
     The rail is a beam on its foundation under the lateral force that the slope of the contact
@@ -272,21 +273,23 @@ def wheel_profile(parameters: WheelRailParameters | _Touching) -> WheelProfile:
     return conical(p.wheel_slope) if p.wheel_profile == "conical" else crowned(p.crown_radius)
 
 
-def rail_of(parameters: WheelRailParameters | _Touching) -> RailSection:
+def rail_of(parameters: WheelRailParameters | _Touching) -> Rail:
     """Return the section of the rail."""
     return canted(parameters.rail_profile, parameters.cant)
 
 
 @lru_cache(maxsize=16)
-def canted(profile: str | Points, cant: float) -> RailSection:
+def canted(profile: str | Points | SectionMesh, cant: float) -> RailSection | MeshedRail:
     """Return the section of a canted rail."""
+    if isinstance(profile, SectionMesh):
+        return MeshedRail.of(profile).canted(cant)
     section = rail_60e1()
     if not isinstance(profile, str):
         section = section.worn(np.array(profile).T)
     return section.canted(cant)
 
 
-def upper(section: RailSection) -> tuple[float, float]:
+def upper(section: Rail) -> tuple[float, float]:
     """Return the lengths along the outline between which a wheel may touch the rail [mm]."""
     right, left = section.running
     s = np.arange(right, left, _STEP)

@@ -11,6 +11,7 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.mesh.points import as_points
+from solver.mesh.section_mesh import SectionMesh
 from solver.parameters import Other, Stress, described
 from solver.parts import declared
 from solver.scenes.initial_stress import INITIAL_STRESS, SectionStress
@@ -74,10 +75,11 @@ class WheelRailParameters(PrismParameters):
         "position z of the wheel's running circle from the axis of the upright rail; z points to "
         "the outside of the track",
     )
-    rail_profile: Literal["60e1"] | Points = described(
+    rail_profile: Literal["60e1"] | Points | SectionMesh = described(
         "60e1",
-        "rail: 60E1, or 60E1 with a running surface through a list of points [z, y] in mm, z from "
-        "the axis of the upright rail and increasing, y from the top of the new rail",
+        "rail: 60E1; 60E1 with a running surface through a list of points [z, y] in mm, z from "
+        "the axis of the upright rail and increasing, y from the top of the new rail; or a mesh of "
+        "its section: points [z, y], elements, and edges of the running surface and of the foot",
     )
     cant: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
         0.025, "cant of the rail towards the middle of the track, its tangent"
@@ -146,7 +148,9 @@ class WheelRailParameters(PrismParameters):
         PrismParameters.__post_init__(self)
         for name in ("rail_profile", "wheel_profile"):
             value = getattr(self, name)
-            if not isinstance(value, str):
+            if isinstance(value, SectionMesh):
+                value.checked(name)
+            elif not isinstance(value, str):
                 object.__setattr__(self, name, as_points(name, value))
         self._check_head()
         _ = self.rail_stress  # raises an error for parameters that do not fit together
@@ -174,7 +178,7 @@ class WheelRailParameters(PrismParameters):
 
     def _check_head(self) -> None:
         """Raise `ModelError` for points that are no running surface of the rail."""
-        if isinstance(self.rail_profile, str):
+        if isinstance(self.rail_profile, str | SectionMesh):
             return
         (first, *_), (last, *_) = self.rail_profile[0], self.rail_profile[-1]
         y = [y for _, y in self.rail_profile]

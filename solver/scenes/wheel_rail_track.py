@@ -15,6 +15,7 @@ import numpy as np
 from solver.errors import ModelError
 from solver.materials import Elasticity
 from solver.memory import kept
+from solver.mesh.section_mesh import MeshedRail, SectionMesh, ZonedMesh
 from solver.mesh.zone import Zone, rail_mesh
 from solver.prism.patch import RollingPatch
 from solver.prism.section import Section
@@ -41,7 +42,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _FOOT = 150.0
-"""Width of the foot of the rail, over which the foundation acts [mm]."""
+"""Width of the foot of 60E1, over which the foundation acts [mm]."""
+_COARSE = 2.0
+"""Largest ratio of the elements of a mesh under the wheel to those of the accuracy."""
 _DEEPEST = 0.9
 """Largest depth of the zone over the least radius of the surface there."""
 _BESIDE, _DEPTH = 0.35, 1.5
@@ -72,7 +75,7 @@ class RailGeometry:
     spacing, reach : distance of stations; half the length where the load may act [mm]
     """
 
-    profile: str | Points
+    profile: str | Points | SectionMesh
     cant: float
     foundation: float
     span: float | None
@@ -88,11 +91,10 @@ class RailGeometry:
     @property
     def window(self) -> PrismWindow:
         """Where the rail may yield."""
-        zone = Zone(
-            at=self.at, half_width=self.half_width, depth=self.depth, size=self.size,
-            split=self.split,
-        )  # fmt: skip
-        return PrismWindow(zone=zone, spacing=self.spacing, reach=self.reach)
+        own = mesh_of(self)
+        return PrismWindow(
+            columns=own.columns, elements=own.elements, spacing=self.spacing, reach=self.reach
+        )
 
 
 def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometry:
@@ -154,7 +156,9 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
         half_width=half_width,
         depth=depth,
         size=h,
-        split=min(split_rows(p, mean, h), round(depth / h)),
+        split=0
+        if isinstance(p.rail_profile, SectionMesh)
+        else min(split_rows(p, mean, h), round(depth / h)),
         spacing=p.spacing,
         reach=whole(reach * (_REACH * contact.along + contact.ahead), p.spacing),
     )
@@ -166,7 +170,9 @@ def _places(parameters: WheelRailParameters) -> float | tuple[float, float]:
     return each[0] if min(each) == max(each) else (min(each), max(each))
 
 
-def _check_points(name: str, points: str | Points, z: Array, curvature: Array, size: float) -> None:
+def _check_points(
+    name: str, points: str | Points | SectionMesh, z: Array, curvature: Array, size: float
+) -> None:
     """Raise `ModelError` for points that do not tell the profile to elements of a size [mm].
 
     Parameters
@@ -177,13 +183,15 @@ def _check_points(name: str, points: str | Points, z: Array, curvature: Array, s
         return
     at = int(abs(curvature).argmax())
     radius = 1 / max(float(abs(curvature[at])), 1e-9)
-    told = f"{len(points)} points"
+    told = points.told if isinstance(points, SectionMesh) else f"{len(points)} points"
     if radius < _SMOOTH * size:
         allowed = (
             f"must be smooth: at z = {z[at]:.4g} mm the radius of the curve through them is "
             f"{radius:.2g} mm, below {_SMOOTH:g} sides of elements; smooth the points"
         )
         raise ModelError(name, told, allowed)
+    if isinstance(points, SectionMesh):  # `MeshedRail.zoned` looks at its edges
+        return
     given = np.array(points)[:, 0]
     inside = np.flatnonzero((given[1:] > z.min()) & (given[:-1] < z.max()))
     widest = inside[np.diff(given)[inside].argmax()] if len(inside) else 0
@@ -196,12 +204,24 @@ def _check_points(name: str, points: str | Points, z: Array, curvature: Array, s
 
 
 @kept
+def mesh_of(own: RailGeometry) -> ZonedMesh:
+    """Return the mesh of a rail."""
+    zone = Zone(
+        at=own.at, half_width=own.half_width, depth=own.depth, size=own.size, split=own.split
+    )
+    rail = canted(own.profile, own.cant)
+    if isinstance(rail, MeshedRail):
+        return rail.zoned(zone, _COARSE * own.size)
+    return ZonedMesh(rail_mesh(rail, zone), zone.columns, zone.elements)
+
+
+@kept
 def section_of(own: RailGeometry) -> Section:
     """Return the meshed section of a rail on its foundation."""
-    E, nu = own.elasticity
-    spring = own.foundation / _FOOT
+    (E, nu), rail = own.elasticity, canted(own.profile, own.cant)
+    spring = own.foundation / (rail.foot if isinstance(rail, MeshedRail) else _FOOT)
     return Section(
-        rail_mesh(canted(own.profile, own.cant), own.window.zone),
+        mesh_of(own).mesh,
         Elasticity(youngs_modulus=E, poisson_ratio=nu),
         springs={"foot": (spring, spring, spring)},
     )
@@ -218,6 +238,8 @@ def meshed(parameters: WheelRailParameters, own: RailGeometry) -> Section:
     try:
         section = section_of(own)
     except ModelError as error:
+        if isinstance(own.profile, SectionMesh):
+            raise ModelError("rail_profile", own.profile.told, f"is refused: {error}") from None
         allowed = f"leaves no room for the zone of small elements in the head: {error}"
         raise ModelError("lateral_position", _places(parameters), allowed) from None
     p = parameters

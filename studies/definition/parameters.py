@@ -192,6 +192,8 @@ def _bare(hint: Any) -> Any:
 def _describe(schema: Mapping[str, Any]) -> str:
     if "enum" in schema:
         return "one of " + ", ".join(str(option) for option in schema["enum"])
+    if "$ref" in schema:  # a class with fields of its own
+        return f"a {schema['$ref'].rpartition('/')[2]}"
     if "const" in schema:
         return str(schema["const"])
     kind = schema.get("type", "value")

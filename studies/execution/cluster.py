@@ -106,10 +106,17 @@ class Access:
         return cls(**content)  # type: ignore[arg-type]
 
 
-def prepare_workers() -> None:
-    """Begin to load what the workers of `own_workers` need, and dask in this process."""
-    prepare(_FROM_THE_START)
-    import distributed  # noqa: F401
+def prepare_workers(more: Sequence[str] = ()) -> str:
+    """Begin to load what the workers of `own_workers` need, in the process that is forked for them.
+
+    Return the method of `multiprocessing` to start them. ``more`` are modules to load in addition.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    _ignore_interrupts()
+    try:
+        return prepare(_FROM_THE_START, more)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _ignore_interrupts() -> None:
@@ -147,8 +154,8 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
         if the running script would start workers in each worker again
     """
     check_script()
+    method = prepare_workers()
     with ThreadPoolExecutor(1, initializer=_ignore_interrupts) as starter:
-        method = starter.submit(prepare, _FROM_THE_START).result()
         import dask  # takes half a second to import, while the workers' process loads the solver
         import distributed.utils
         from distributed import LocalCluster, Security

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
+from solver.memory import bytes_in
 from studies.errors import StudyError
-
-_SIZE = re.compile(r"[1-9]\d*(\.\d+)? ?[kMGT]i?B")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,5 +37,5 @@ class Limits:
             value = getattr(self, name)
             if value is not None and not value > 0.0:
                 raise StudyError(name, value, "must be greater than 0")
-        if self.memory is not None and not _SIZE.fullmatch(self.memory):
+        if self.memory is not None and not bytes_in(self.memory):
             raise StudyError("memory", self.memory, "must be a size such as 500MB or 2GB")

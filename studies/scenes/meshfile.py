@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.memory import kept
+from solver.mesh.cells import facets_of, mesh_of_cells
+from solver.mesh.section_mesh import FOOT, RUNNING, SectionMesh
+from studies.scenes.meshdata import MeshData
 from studies.scratch import scratch
 
 if TYPE_CHECKING:
@@ -19,6 +22,9 @@ if TYPE_CHECKING:
 
 OUTLINE = "outline"
 """Boundary of every mesh: all edges with an element on one side only."""
+
+FORMATS = (".msh", ".vtk", ".vtu", ".mesh", ".bdf", ".nas")
+"""Endings of mesh files in formats that do not refer to other files."""
 
 MOST_POINTS = 1_000_000
 """Largest number of points of a mesh file."""
@@ -38,10 +44,16 @@ class MeshFile:
     ----------
     name : name of the file; its ending tells the format
     data : its bytes
+    arrays : what was read from them before (`MeshData.packed`); empty if they are to be read here
     """
 
     name: str
     data: bytes
+    arrays: bytes = b""
+
+    def read(self) -> Self:
+        """Return the file with its arrays, so that nobody else needs to read its data."""
+        return replace(self, arrays=_read(self.name, self.data).packed())
 
     def mesh(self, part: str | None) -> Mesh:
         """Return the part of this name, or all cells, with named boundaries.
@@ -51,13 +63,33 @@ class MeshFile:
         ModelError
             if the file cannot be read, has no such part, or is no plane mesh
         """
-        return _mesh(self.name, self.data, part)
+        return _mesh(self.name, self.data, self.arrays, part)
+
+    def section(self) -> SectionMesh:
+        """Return the section of a rail: all cells, and the lines `running` and `foot`.
+
+        Raises
+        ------
+        ModelError
+            if the file is no mesh of quadrilaterals, or has no such lines
+        """
+        mesh = self.mesh(None)
+        if mesh.elem.refdom.nnodes != 4:
+            raise ModelError("mesh", self.name, "must have quadrilaterals")
+        known = mesh.boundaries or {}
+        for name in (RUNNING, FOOT):
+            if name not in known:
+                allowed = f"must name the lines {RUNNING} and {FOOT}; it has {', '.join(known)}"
+                raise ModelError("mesh", self.name, allowed)
+        return SectionMesh.of(mesh)
 
 
 @kept
-def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
-    found = _read(name, data)
-    points = np.asarray(found.points, dtype=float)
+def _mesh(name: str, data: bytes, arrays: bytes, part: str | None) -> Mesh:
+    try:
+        points, blocks, sets, nodes = MeshData.unpacked(arrays) if arrays else _read(name, data)
+    except ValueError as error:
+        raise ModelError("mesh", name, f"cannot be read: {error}") from None
     if len(points) > MOST_POINTS:
         raise ModelError("mesh", name, f"must have at most {MOST_POINTS} points, not {len(points)}")
     if not np.isfinite(points).all():
@@ -66,11 +98,9 @@ def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
         raise ModelError("mesh", name, "must have points of two or three coordinates")
     if points.shape[1] == 3 and np.ptp(points[:, 2]) > 0:
         raise ModelError("mesh", name, "must lie in a plane: its z differ")
-    blocks = [(block.type, np.asarray(block.data)) for block in found.cells]
     for kind, each in blocks:
         if each.size and not 0 <= each.min() <= each.max() < len(points):
             raise ModelError("mesh", name, f"has a {kind} of points that do not exist")
-    sets = _sets(found)
     plane = [k for k, (kind, _) in enumerate(blocks) if kind in _CELLS]
     if not plane:
         listed = ", ".join(sorted({kind for kind, _ in blocks})) or "none"
@@ -91,12 +121,13 @@ def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
         raise ModelError(
             "mesh", name, f"a body must have cells of one kind, not {', '.join((kind, *others))}"
         )
-    mesh, number = _made(points[:, :2], np.vstack(list(chosen.values())), kind)
+    mesh, number = mesh_of_cells(points[:, :2], np.vstack(list(chosen.values())), _CELLS[kind])
     lines = {k: cells[:, :2] for k, (kind, cells) in enumerate(blocks) if kind in _LINES}
-    return mesh.with_boundaries(_boundaries(mesh, number, lines, sets, found.point_sets))
+    return mesh.with_boundaries(_boundaries(mesh, number, lines, sets, nodes))
 
 
-def _read(name: str, data: bytes) -> Any:
+@kept
+def _read(name: str, data: bytes) -> MeshData:
     import meshio
 
     with scratch() as folder:
@@ -104,7 +135,7 @@ def _read(name: str, data: bytes) -> Any:
         path.write_bytes(data)
         try:
             with contextlib.redirect_stdout(None), contextlib.redirect_stderr(None):
-                return meshio.read(path)  # meshio prints remarks
+                return _arrays(meshio.read(path))  # meshio prints remarks
         except SystemExit:  # meshio exits if it does not know a format
             reason = "its format is not known"
         except MemoryError:
@@ -114,10 +145,21 @@ def _read(name: str, data: bytes) -> Any:
     raise ModelError("mesh", name, f"cannot be read: {reason}")
 
 
+def _arrays(found: Any) -> MeshData:
+    return MeshData(
+        points=np.asarray(found.points, dtype=float),
+        cells=[(block.type, np.asarray(block.data)) for block in found.cells],
+        sets=_sets(found),
+        nodes={name: np.asarray(own, dtype=np.int64) for name, own in found.point_sets.items()},
+    )
+
+
 def _sets(found: Any) -> dict[str, dict[int, Any]]:
     """Return the cells of each set by block; the name of a set without one is its number."""
     sets = {
-        name: dict(enumerate(each))
+        name: {
+            k: np.asarray(rows, dtype=np.int64) for k, rows in enumerate(each) if rows is not None
+        }
         for name, each in found.cell_sets.items()
         if not name.startswith("gmsh:")
     }
@@ -132,33 +174,7 @@ def _sets(found: Any) -> dict[str, dict[int, Any]]:
 
 def _rows(own: dict[int, Any], block: int) -> NDArray[np.int64]:
     """Return the cells of a block that belong to a set."""
-    rows = own.get(block)
-    return np.asarray([] if rows is None else rows, dtype=np.int64)
-
-
-def _made(points: NDArray[np.float64], cells: NDArray[np.int64], kind: str) -> tuple[Mesh, Any]:
-    """Return the mesh, and the index of its corner at each point, -1 at other points."""
-    from skfem import MeshQuad, MeshQuad2, MeshTri, MeshTri2
-
-    corners = _CELLS[kind]
-    straight, curved = (MeshQuad, MeshQuad2) if corners == 4 else (MeshTri, MeshTri2)
-    used, local = np.unique(cells[:, :corners], return_inverse=True)
-    number = np.full(len(points), -1)
-    number[used] = np.arange(len(used))
-    nodes = np.ascontiguousarray(points[used].T)
-    mesh = straight(nodes, np.ascontiguousarray(local.reshape(-1, corners).T), sort_t=False)
-    if cells.shape[1] == corners:
-        return mesh, number
-    bent = curved.from_mesh(mesh)
-    at = bent.doflocs.copy()
-    dofs = bent.dofs.element_dofs
-    for k in range(corners, 2 * corners):  # both number the sides from the first corner
-        at[:, dofs[k]] = points[cells[:, k]].T
-    if corners == 4:
-        X = points[cells].transpose(2, 1, 0)
-        middle = X[:, 8] if cells.shape[1] == 9 else X[:, 4:8].sum(1) / 2 - X[:, :4].sum(1) / 4
-        at[:, dofs[8]] = middle
-    return curved(doflocs=at, t=bent.t, sort_t=False, validate=False), number
+    return own.get(block, np.zeros(0, dtype=np.int64))
 
 
 def _boundaries(
@@ -169,17 +185,15 @@ def _boundaries(
     nodes: dict[str, Any],
 ) -> dict[str, NDArray[np.int64]]:
     """Return the outline, and the facets of each set of lines or nodes that lies on the mesh."""
-    facets = {ends: k for k, ends in enumerate(map(tuple, np.sort(mesh.facets, axis=0).T.tolist()))}
     outline = np.asarray(mesh.boundary_facets())
     found = {OUTLINE: outline}
     for name, own in nodes.items():  # the edges of the outline with both ends in the set
-        inside = np.isin(mesh.facets[:, outline], number[np.asarray(own, dtype=np.int64)])
+        inside = np.isin(mesh.facets[:, outline], number[own])
         if inside.all(0).any():
             found[name] = outline[inside.all(0)]
     for name, own in sets.items():
         pairs = [number[cells[_rows(own, k)]] for k, cells in lines.items()]
-        ends = np.sort(np.vstack([np.zeros((0, 2), dtype=int), *pairs]), axis=1)
-        known = [facets[pair] for pair in map(tuple, ends.tolist()) if pair in facets]
-        if known:
-            found[name] = np.unique(known)
+        facets = facets_of(mesh, np.vstack([np.zeros((0, 2), dtype=int), *pairs]))
+        if (facets >= 0).any():
+            found[name] = np.unique(facets[facets >= 0])
     return found

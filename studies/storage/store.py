@@ -2,7 +2,7 @@
 
 ```
 runs/<run id>.nc              one file a run, shared by all studies
-scenes/<scene id>/             scenes of files: scene.json and the meshes
+scenes/<scene id>/             scenes of files: scene.json, the meshes and their arrays
 studies/<study id>/study.json
 studies/<study id>/dataset.nc the runs of a study combined
 studies/<study id>/made.json  digests of its inputs, and of files made from it
@@ -34,9 +34,10 @@ from solver.results.record import Record
 from solver.scenes import Scene
 from studies.appearing import appearing
 from studies.definition.cases import Case
-from studies.definition.goal import STOPPED
 from studies.definition.identity import is_id
+from studies.definition.refine import OPEN
 from studies.definition.study import Study
+from studies.definition.vocabulary import STOPPED
 from studies.errors import CatalogueDamaged, FileDamaged, StoreFull, StudyError, Unusable
 from studies.scenes.description import Description
 from studies.scenes.scene import FileScene
@@ -122,9 +123,12 @@ class Store:
         """
         return self._indexed(lambda index: index.page(limit, offset, name))
 
-    def scene_sizes(self) -> dict[str, int]:
-        """Return the size of all scenes that each owner has posted [bytes]; errors as `scenes`."""
-        return self._indexed(shelf.Index.sizes)
+    def scene_files(self) -> list[shelf.Kept]:
+        """Return the files of all scenes, the oldest first; errors as `scenes`.
+
+        Scenes that this version does not allow are among them.
+        """
+        return self._indexed(shelf.Index.files)
 
     def _indexed(self, ask: Callable[[shelf.Index], Found]) -> Found:
         """Return what is asked of the index of scenes, which follows the files first."""
@@ -132,7 +136,7 @@ class Store:
 
         def asked() -> Found:
             with suppress(StoreFull):  # then the latest ones are missing
-                index.follow(lambda scene_id: self.scene(scene_id, whole=False))
+                index.follow(lambda scene_id: self.scene(scene_id, whole=False), self._refused)
             return ask(index)
 
         state = seal.state_of(index.path)
@@ -190,17 +194,18 @@ class Store:
             return Counter()
 
     def runs_of(self, study: Study) -> set[str]:
-        """Return the ids of the runs of a study; of a goal those that its search has asked for.
+        """Return the ids of the runs of a study; if it chooses them, those that it has asked for.
 
-        What a search has asked for is known at its end. Until then all runs of its scene count.
+        What it has asked for is known at its end. Until then all runs of its scene count.
         """
         if not study.asks:
             return set(study.run_ids())
         import h5py
 
         with suppress(FileDamaged), h5py.File(self.dataset(study.id), "r") as file:
-            if STOPPED not in file["message"].asstr()[...].ravel():
-                return {each for each in file["tried_run"].asstr()[...].ravel() if each}
+            ended, runs = ("cell_state", "run") if study.refine else ("message", "tried_run")
+            if not {STOPPED, OPEN} & set(file[ended].asstr()[...].ravel()):
+                return {each for each in file[runs].asstr()[...].ravel() if each}
         return {row["id"] for row in self.catalogue.runs(scene=study.problem.name, limit=-1)[0]}
 
     def study(self, study_id: str) -> Study:

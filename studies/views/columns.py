@@ -26,8 +26,10 @@ def value_text(value: Any) -> str:
 
 
 def counted(value: Any) -> str:
-    """Return a list of points or tables, or the JSON of one, as their number; all else as text."""
+    """Return a list of points or tables, or the JSON of one, as their number; other text as is."""
     text = str(value)
+    if text.startswith("[[["):  # points, elements and lines of a section
+        return "a mesh"
     if text.startswith("[["):
         return f"{text.count('[') - 1} points"
     return f"{text.count('{')} tables" if text.startswith("[{") else text

@@ -134,8 +134,7 @@ def test_the_death_of_a_study_leaves_the_service_alive_and_is_made_good(lively: 
     study_id = lively.post(long_study("wounded"))
     wait_until(lambda: len(stored(lively) - others) >= 3)
     before = stored(lively) - others
-    assert lively.process is not None
-    for child in psutil.Process(lively.process.pid).children():
+    for child in children(lively):
         child.kill()
     assert lively.client.get("/health").status_code == 200
     assert lively.finished(study_id)["counts"] == {"ok": 12}

@@ -15,10 +15,11 @@ import h5py
 import pytest
 
 from service.errors import Busy, Conflict, NotFound, QueueLost
-from service.job import StudyState
+from service.job import StudyState, row_of
 from service.jobs import Jobs
 from service.recovery import open_queue
 from studies import Store, StoreBusy, Study, StudyError
+from studies.storage.database import checksum
 from studies.storage.lock import lock
 from studies.storage.seal import seal
 
@@ -268,6 +269,23 @@ def test_a_queue_without_checksums_gets_them(tmp_path: Path) -> None:
         connection.execute("PRAGMA user_version = 1")
     again = Jobs(jobs.path)
     assert (again.get("a"), again.study("a"), again.runs("a")) == (before, STUDY, ["x", "y"])
+
+
+def test_a_damaged_row_of_an_earlier_form_stays_damaged(tmp_path: Path) -> None:
+    jobs = Jobs(tmp_path / "jobs.sqlite")
+    before = [jobs.accept(name, STUDY, [name])[0] for name in "ab"]
+    with closing(sqlite3.connect(jobs.path)) as connection, connection:
+        connection.execute("ALTER TABLE job DROP COLUMN bytes")
+        for job in before:
+            *values, _, _ = row_of(job)
+            found = (checksum(values), job.id)
+            connection.execute("UPDATE job SET checksum = ? WHERE id = ?", found)
+        connection.execute("UPDATE job SET message = 'other' WHERE id = 'b'")
+        connection.execute("PRAGMA user_version = 2")
+    again = Jobs(jobs.path)
+    assert again.get("a") == before[0]
+    with pytest.raises(NotFound):
+        again.get("b")
 
 
 def test_a_queue_of_a_later_form_is_left_alone(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from service.errors import Conflict, NotFound
 from service.job import StudyState
 from service.jobs import Jobs, put
 from service.pool import Pool
+from service.processes import Starter
 from service.retention import Keeper
 from service.settings import Settings
 from studies import Store, Study
@@ -192,7 +193,12 @@ def test_a_study_deleted_as_its_turn_comes_is_not_begun(place: Place) -> None:
     place.keeper().purge(study.id)
     settings = Settings(data=place.store.directory)
     runner = Scripted(
-        settings, place.jobs, Pool.of(settings, 0), 0, lambda: place.jobs, script=[[]]
+        settings,
+        place.jobs,
+        Pool(settings, Starter(0)),
+        Starter(0),
+        lambda: place.jobs,
+        script=[[]],
     )
     asyncio.run(runner._compute(job))
     assert not runner.orders and not place.there(study)

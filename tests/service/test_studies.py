@@ -105,6 +105,24 @@ def test_the_data_set_arrives_as_it_was_stored(
     assert (part.status_code, part.content) == (206, answer.content[:8])
 
 
+def test_sensitivity_is_told_or_refused_with_the_reason(
+    service: Server, done: dict[str, Any]
+) -> None:
+    url = f"/studies/{done['id']}/sensitivity"
+    few = service.client.get(url, params={"of": "max_plastic_strain"})
+    assert few.status_code == 422
+    assert "has 2 values: 3 at least" in few.text
+    assert "did you mean" in service.client.get(url, params={"of": "max_plastic_strane"}).text
+    axes = {"load_ratio": [0.2, 0.4, 0.6], "friction": [0.0, 0.1, 0.2, 0.3]}
+    grid = service.finished(service.post(fake_study("grid") | {"sweep": axes}))
+    found = service.client.get(
+        f"/studies/{grid['id']}/sensitivity", params={"of": "max_plastic_strain"}
+    ).json()
+    assert found["q2"] > 0.99
+    parameters = found["parameters"]
+    assert parameters["load_ratio"]["total"] > parameters["friction"]["total"] > 0.0
+
+
 @pytest.mark.parametrize(
     "part", ["bytes=5-2", "bytes=a-b", "lines=1-2", "bytes=0-" + "9" * 5000, "bytes=0-1,3-4"]
 )

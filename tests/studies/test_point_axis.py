@@ -244,7 +244,11 @@ def test_wrong_points_are_refused_with_their_place(points: Any, field: str, allo
 def test_no_parameter_takes_a_table_so_that_a_list_of_tables_is_points(scene: str) -> None:
     for parameter in parameters_of(SCENES[scene]).values():
         assert parameter.name != CASE
-        options = parameter.schema.get("anyOf", [parameter.schema])
+        named = parameter.schema.get("$defs", {})
+        options = [
+            named[each["$ref"].rpartition("/")[2]] if "$ref" in each else each
+            for each in parameter.schema.get("anyOf", [parameter.schema])
+        ]
         assert all(each.keys() & {"type", "enum", "const"} for each in options), parameter.schema
         assert "object" not in [each.get("type") for each in options], parameter.name
         with pytest.raises(StudyError):

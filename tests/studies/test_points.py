@@ -95,7 +95,7 @@ def test_what_is_no_profile_is_refused(value: object, told: str) -> None:
 
 def test_the_description_says_that_points_are_allowed() -> None:
     allowed = parameters_of(SCENES["wheel_rail"])["rail_profile"].allowed
-    assert allowed == "60e1 or a list of [a finite number, a finite number]"
+    assert allowed == "60e1 or a list of [a finite number, a finite number] or a SectionMesh"
 
 
 def test_tables_and_pictures_count_points_and_entries() -> None:

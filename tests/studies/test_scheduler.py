@@ -137,9 +137,8 @@ def test_a_lost_scheduler_is_told_apart_from_failed_runs(
         if event.kind == "run":
             scheduler.kill()
 
-    time.sleep(2.0)  # the scheduler is listening
     with pytest.raises(GridLost):
-        run_study(study, store, scheduler=address, on_event=kill_scheduler)
+        answered(study, store, address, on_event=kill_scheduler)
     assert {row["status"] for row in store.catalogue.runs()[0]} == {"ok"}
     outcome = run_study(study, store, workers=1)
     assert outcome.counts == {"ok": 3}

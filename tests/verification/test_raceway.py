@@ -133,8 +133,8 @@ def test_rows_are_divided_where_hardening_is_weak(
     accuracy: Literal["draft", "standard", "fine"], given: dict[str, Any], split: int
 ) -> None:
     own = geometry(SCENE.parameters(accuracy=accuracy, load_by="force", **given))
-    assert own.window.zone.split == split
-    assert own.window.size.rows == round(own.depth / own.layer) + split  # the estimate's
+    assert own.zone.split == split
+    assert own.zone.rows == round(own.depth / own.layer) + split  # the estimate's
 
 
 def test_the_scene_is_a_pass_of_the_given_ellipse() -> None:

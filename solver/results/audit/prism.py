@@ -65,6 +65,9 @@ def audit_prism(
     # behind of all passes, not of this one: what each leaves over must not add up
     left_strain, left_surface = plain.constant(stiff * after.plastic_strain)
     left_strain += track.initial_strain
+    under_load = np.delete(_left_before(track, plain, before), track.modes.points, axis=0)
+    under_load += plain.beside(waves)
+    left_outside = np.delete(left_strain, track.modes.points, axis=0)
     unsteady = deviation(plain.strain(waves) - found.strain)
     unsteady_behind = deviation(left_strain[track.modes.points] - after.strain)
     residual = law.stiffness(6) @ (after.strain - after.plastic_strain).T
@@ -81,7 +84,7 @@ def audit_prism(
         "audit_yield": max(
             flow.beyond(),
             largest(law.yield_value(residual, after.state)),
-            _beyond_outside(track, law, left_strain),
+            *(_beyond_outside(law, each) for each in (left_outside, under_load)),
         )
         / law.yield_stress,
         "audit_dissipation": flow.dissipation(),
@@ -118,14 +121,21 @@ def _rows(found: Pass[PrismState]) -> NDArray[np.int64]:
     return np.unique(np.append(np.argsort(-added)[:count], anywhere))
 
 
-def _beyond_outside(track: PrismTrack, law: Law, strain: Array) -> float:
-    """Return the residual stress beyond yield where no point may flow, outside the zone [MPa].
+def _left_before(track: PrismTrack, plain: PlainPrism, before: PrismState) -> Array:
+    """Return the strain (n, 6) before the pass at all points of the section."""
+    if not before.plastic_strain.any():
+        return track.initial_strain
+    stress = 2 * track.elasticity.shear_modulus * before.plastic_strain
+    return plain.constant(stress)[0] + track.initial_strain
+
+
+def _beyond_outside(law: Law, elastic: Array) -> float:
+    """Return the stress beyond yield where no point may flow, outside the zone [MPa].
 
     Parameters
     ----------
-    strain : (n, 6) behind the pass at all points of the section
+    elastic : (n, 6) strain at points there
     """
-    elastic = np.delete(strain, track.modes.points, axis=0)
     virgin = law.initial(len(elastic), 6)
     return largest(law.yield_value(law.stiffness(6) @ elastic.T, virgin))
 

@@ -1,0 +1,291 @@
+"""The section of a rail given by a mesh of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.mesh.cells import facets_of, mesh_of_cells
+from solver.mesh.outline import Outline, smooth_curve
+from solver.mesh.rail import Rail
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from skfem import Mesh, MeshQuad2
+
+    from solver.mesh.zone import Zone
+
+    Array = NDArray[np.float64]
+    Numbers = NDArray[np.int64]
+
+RUNNING, FOOT = "running", "foot"
+"""Lines that a section must have: where the wheel may touch, and where the foundation acts."""
+_DIGITS = 6
+"""Digits of a millimetre that are kept."""
+_SIDES = (4, 8)
+"""Numbers of points of a cell: corners one after the other, then the middles of the sides."""
+
+
+class SectionMesh(NamedTuple):
+    """A mesh of quadrilaterals with the lines `RUNNING` and `FOOT`, as plain numbers.
+
+    Attributes
+    ----------
+    points : positions z, y [mm]
+    cells : numbers of the points of each element, from 0 on: four corners, or with the middles of
+        the sides
+    running, foot : pairs of corners, the edges of the lines
+    """
+
+    points: tuple[tuple[float, float], ...]
+    cells: tuple[tuple[int, ...], ...]
+    running: tuple[tuple[int, int], ...]
+    foot: tuple[tuple[int, int], ...]
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> SectionMesh:
+        """Return the numbers of a scikit-fem mesh with these lines, coordinates z and y."""
+        nodes = mesh.dofs.element_dofs[:8]
+        used, cells = np.unique(nodes, return_inverse=True)
+        lines = (
+            np.searchsorted(used, mesh.facets[:, mesh.boundaries[name]]).T.tolist()
+            for name in (RUNNING, FOOT)
+        )
+        points = np.round(mesh.doflocs[:, used], _DIGITS).T.tolist()
+        rows = (points, cells.reshape(nodes.shape).T.tolist(), *lines)
+        return cls(*(tuple(map(tuple, each)) for each in rows))
+
+    def checked(self, field: str) -> SectionMesh:
+        """Return the mesh, or raise `ModelError` for ``field`` if it is no section of a rail."""
+        count = len(self.points)
+
+        def refuse(allowed: str) -> ModelError:
+            return ModelError(field, self.told, allowed)
+
+        if not np.isfinite(np.array(self.points, dtype=float)).all():
+            raise refuse("must have finite points")
+        if len({len(each) for each in self.cells}) != 1 or len(self.cells[0]) not in _SIDES:
+            raise refuse("must have elements of four points each, or of eight")
+        for rows in (self.cells, self.running, self.foot):
+            if rows and not 0 <= np.min(rows) <= np.max(rows) < count:
+                raise refuse(f"must have points numbered from 0 to {count - 1}")
+        mesh, number = self._made
+        for name in (RUNNING, FOOT):
+            edges = getattr(self, name)
+            facets = self._facets(mesh, number, name)
+            if not edges or (facets < 0).any() or (mesh.f2t[1, facets] >= 0).any():
+                raise refuse(f"must have a line {name} of edges of elements, on the outside")
+        try:
+            ends = self._chain
+        except ValueError as error:
+            raise refuse(str(error)) from None
+        z = np.array(self.points)[ends, 0]
+        if not (np.diff(z) > 0).all():
+            raise refuse(f"must have a line {RUNNING} along which z increases, without its sides")
+        return self
+
+    @property
+    def told(self) -> str:
+        """The mesh in a few words, for errors."""
+        return f"a mesh of {len(self.cells)} elements"
+
+    @property
+    def _made(self) -> tuple[Mesh, Numbers]:
+        """The mesh, and the number of its corner at each point."""
+        return mesh_of_cells(np.array(self.points), np.array(self.cells), 4)
+
+    def _facets(self, mesh: Mesh, number: Numbers, name: str) -> Numbers:
+        """Return the facets of a line."""
+        return facets_of(mesh, number[np.array(getattr(self, name), dtype=np.int64).reshape(-1, 2)])
+
+    @property
+    def _chain(self) -> list[int]:
+        """The corners of the running line from small to large z."""
+        ends = _walked(np.array(self.running))
+        return ends if self.points[ends[0]][0] < self.points[ends[-1]][0] else ends[::-1]
+
+
+@dataclass(frozen=True, slots=True)
+class ZonedMesh:
+    """A section whose first elements are the zone that may yield; ``running`` is its surface.
+
+    Attributes
+    ----------
+    mesh : 8-node quadrilaterals, as of `solver.mesh.zone`
+    columns, elements : numbers of edges of the surface and of elements of the zone
+    """
+
+    mesh: MeshQuad2
+    columns: int
+    elements: int
+
+
+@dataclass(frozen=True, eq=False)
+class MeshedRail(Rail):
+    """A rail with the section of a mesh; the highest point of its running line is at y = 0.
+
+    Attributes
+    ----------
+    section : the mesh
+    points : (n, 2) its points in their places [mm]
+    """
+
+    section: SectionMesh
+    points: Array
+
+    @classmethod
+    def of(cls, section: SectionMesh) -> MeshedRail:
+        """Return the rail as it stands in the mesh."""
+        return cls(section, np.array(section.points))._on_top()
+
+    def canted(self, slope: float) -> MeshedRail:
+        """Return the rail turned about its top, as `RailSection.canted` does."""
+        c, s = np.array([1.0, slope]) / np.hypot(1.0, slope)
+        return replace(self, points=self.points @ [[c, s], [-s, c]])._on_top()
+
+    def _on_top(self) -> MeshedRail:
+        top = self.outline.at(np.array(self.outline.highest(self.running)))[1]
+        return replace(self, points=self.points - [0.0, float(top)])
+
+    @property
+    def foot(self) -> float:
+        """Length of the foot line [mm]."""
+        ends = self.points[np.array(self.section.foot)]
+        return float(np.hypot(*(ends[:, 1] - ends[:, 0]).T).sum())
+
+    def _along(self, corners: list[int]) -> Array:
+        """Return the nodes (2, n) along edges from corner to corner."""
+        middle = {
+            frozenset((cell[k], cell[(k + 1) % 4])): cell[4 + k]
+            for cell in self.section.cells
+            for k in range(len(cell) - 4)
+        }
+        nodes = [corners[0]]
+        for pair in pairwise(corners):
+            between = middle.get(frozenset(pair))
+            nodes += [pair[1]] if between is None else [between, pair[1]]
+        return self.points[nodes].T
+
+    @cached_property
+    def _surface(self) -> tuple[Array, Array]:
+        """Joints and bends of the running line from small to large z, as of `smooth_curve`."""
+        return smooth_curve(self._along(self.section._chain))
+
+    @cached_property
+    def outline(self) -> Outline:
+        """The outline, counterclockwise; it begins below the left end of the running line."""
+        joints, bends = self._surface
+        mesh, number = self.section._made
+        point = np.flatnonzero(number >= 0)
+        around = point[mesh.facets[:, mesh.boundary_facets()].T]
+        chain = self.section._chain
+        rest = _walked(around, start=chain[0], away=chain[1], end=chain[-1])
+        below = self._along(rest)[:, 1:-1]
+        return Outline(
+            np.hstack([below, joints[:, ::-1]]),
+            np.concatenate([np.zeros(below.shape[1]), -bends[::-1], [0.0]]),
+        )
+
+    @cached_property
+    def running(self) -> tuple[float, float]:
+        """See `Rail.running`."""
+        lengths = self.outline.lengths
+        arcs = self._surface[1].size
+        return float(lengths[: -arcs - 1].sum()), float(lengths[:-1].sum())
+
+    def zoned(self, zone: Zone, largest: float) -> ZonedMesh:
+        """Return the mesh with the elements of a zone first; ``zone.size`` and rows do not count.
+
+        Raises
+        ------
+        ModelError
+            for ``rail_profile``, if an edge of the surface is longer than ``largest`` [mm]
+        """
+        mesh, number = self.section._made
+        chain = np.array(self.section._chain)
+        ends = np.stack([chain[:-1], chain[1:]], axis=1)
+        X = self.points[ends]  # (edges, 2, zy)
+        side = np.hypot(*(X[:, 1] - X[:, 0]).T)
+        right = self.running[1]
+        s = right - np.cumsum(side) + side / 2
+        chosen = np.flatnonzero(abs(s - self.place(zone.at)) < zone.half_width)
+        for k in chosen[side[chosen] > largest][:1]:
+            raise ModelError(
+                "rail_profile", self.section.told,
+                f"must have elements at most {largest:g} mm wide where the wheel may touch, not "
+                f"{side[k]:.3g} at z = {X[k, 0, 0]:.3g} mm",
+            )  # fmt: skip
+        under = mesh.f2t[0, facets_of(mesh, number[ends[chosen]])]
+        cells = np.array(self.section.cells)
+        centre = self.points[cells].mean(axis=1)
+        nearest, away = _nearest(centre, X[chosen])
+        inside = (away < zone.depth) & nearest
+        inside[under] = True
+        order = np.argsort(~inside, kind="stable")
+        whole, number = mesh_of_cells(self.points, cells[order], 4)
+        boundaries = {
+            RUNNING: facets_of(whole, number[ends[chosen]]),
+            FOOT: self.section._facets(whole, number, FOOT),
+        }
+        from skfem import MeshQuad2
+
+        curved = whole if cells.shape[1] > 4 else MeshQuad2.from_mesh(whole)
+        return ZonedMesh(curved.with_boundaries(boundaries), len(chosen), int(inside.sum()))
+
+
+def _nearest(points: Array, edges: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Return whether the nearest place of a chain to points (n, 2) is not its end, and how far.
+
+    Parameters
+    ----------
+    edges : (m, 2, 2) the ends of its edges, in their order
+    """
+    along = edges[:, 1] - edges[:, 0]
+    apart = points[:, None] - edges[:, 0]
+    share = (apart * along).sum(-1) / (along**2).sum(-1)
+    distance = np.linalg.norm(apart - np.clip(share, 0, 1)[..., None] * along, axis=-1)
+    nearest, row = distance.argmin(axis=1), np.arange(len(points))
+    at = share[row, nearest]
+    beyond = ((nearest == 0) & (at < 0)) | ((nearest == len(edges) - 1) & (at > 1))
+    return ~beyond, distance[row, nearest]
+
+
+def _walked(
+    edges: Numbers, start: int | None = None, away: int | None = None, end: int | None = None
+) -> list[int]:
+    """Return the corners along edges (n, 2), one after the other.
+
+    Parameters
+    ----------
+    start, away, end : first corner, one beside it to which not to go, and last corner; by default
+        the edges are one chain from an end to the other
+
+    Raises
+    ------
+    ValueError
+        if they are no chain
+    """
+    beside: dict[int, list[int]] = {}
+    for one, other in edges.tolist():
+        beside.setdefault(one, []).append(other)
+        beside.setdefault(other, []).append(one)
+    if start is None:
+        ends = [corner for corner, others in beside.items() if len(others) == 1]
+        if len(ends) != 2:
+            raise ValueError(f"must have a line {RUNNING} that is one chain of edges")
+        start, end = ends
+    found, before = [start], away
+    while found[-1] != end:
+        onward = [each for each in beside[found[-1]] if each != before]
+        if len(onward) != 1 or len(found) > len(edges):
+            raise ValueError("must have an outline that does not touch itself")
+        before = found[-1]
+        found += onward
+    if away is None and len(found) != len(edges) + 1:
+        raise ValueError(f"must have a line {RUNNING} that is one chain of edges")
+    return found
