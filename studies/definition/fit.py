@@ -29,7 +29,7 @@ import numpy as np
 from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.definition.identity import canonical
-from studies.definition.measured import Measured, Numbers, Read, checked_measured, content_of
+from studies.definition.measured import MeasuredLine, Numbers, Read, checked_measured, content_of
 from studies.definition.parameters import Parameter, parameters_of
 from studies.definition.spaced import SPACINGS, between, rounded
 from studies.definition.sweep import Axes, positions
@@ -94,7 +94,7 @@ class Fit:
     """
 
     free: Mapping[str, Free]
-    measured: list[Measured]
+    measured: list[MeasuredLine]
     step: float = 0.05
     most: int = 100
 
@@ -105,7 +105,7 @@ class Fit:
 
     @cached_property
     def values(self) -> Numbers:
-        """Measured values of all lines."""
+        """MeasuredLine values of all lines."""
         return np.concatenate([each.values for each in self.measured])
 
     @cached_property

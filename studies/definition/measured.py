@@ -49,7 +49,7 @@ Read = Callable[[str], Line | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Measured:
+class MeasuredLine:
     """A measured line.
 
     Attributes
@@ -171,7 +171,7 @@ def _at(places: Numbers, x: Numbers, y: Numbers, over: str) -> Numbers:
     return np.asarray(y[k] + slope * (places - x[k]))
 
 
-def checked_measured(content: Any, scene: Scene, axes: Collection[str]) -> list[Measured]:
+def checked_measured(content: Any, scene: Scene, axes: Collection[str]) -> list[MeasuredLine]:
     """Return the measured lines of a study.
 
     Parameters
@@ -192,7 +192,7 @@ def checked_measured(content: Any, scene: Scene, axes: Collection[str]) -> list[
     return [_checked(f"fit.measured[{k}]", one, scene, axes) for k, one in enumerate(content)]
 
 
-def _checked(field: str, content: Any, scene: Scene, axes: Collection[str]) -> Measured:
+def _checked(field: str, content: Any, scene: Scene, axes: Collection[str]) -> MeasuredLine:
     if isinstance(content, str) or (isinstance(content, Mapping) and "file" in content):
         allowed = "names a file, which only a study file can: give the lines themselves"
         raise StudyError(field, content, allowed)
@@ -235,13 +235,13 @@ def _checked(field: str, content: Any, scene: Scene, axes: Collection[str]) -> M
     for name, value in at.items():
         if name not in axes and name not in quantity.dims:
             raise StudyError(f"{field}.at.{name}", value, one_of(name, [*axes, *quantity.dims]))
-    return Measured(
+    return MeasuredLine(
         of=of, over=over, at=dict(at), places=places, values=values, sigma=sigma, told=told,
         unit=quantity.units,
     )  # fmt: skip
 
 
-def content_of(line: Measured) -> dict[str, Any]:
+def content_of(line: MeasuredLine) -> dict[str, Any]:
     """Return what `checked_measured` reads."""
     found: dict[str, Any] = {"of": line.of, "values": line.values.tolist()}
     if line.over:
