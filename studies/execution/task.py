@@ -144,10 +144,11 @@ def _walk(
     should_stop: Callable[[], bool],
 ) -> None:
     """Compute those runs of a loading path that are not stored; see `walk`."""
+    follows = {} if task.place is None else {"follows": True}  # the path of a search goes on
 
     def keep(row: dict[str, Any]) -> None:
         with contextlib.suppress(Exception):  # the file has the row too
-            report({"path": path.id, "row": row})
+            report({"path": path.id, "row": row, **follows})
 
     reported, since = -1.0, 0.0
 
