@@ -15,7 +15,7 @@ from studies.definition.sweep import Axes
 from studies.definition.vocabulary import KEEP, SOLVED
 
 
-class Program(Protocol):
+class Chooser(Protocol):
     """What asks for runs until it ends: the search for a goal, or a refinement.
 
     What it asks for depends only on the runs that it has asked for, and not on the order in which
@@ -63,7 +63,7 @@ class Program(Protocol):
         """Tell it that the scene refuses a run; return whether it needs to know this now."""
 
 
-Asks = TypeVar("Asks", bound=Program)
+Asks = TypeVar("Asks", bound=Chooser)
 
 
 @dataclass(slots=True, kw_only=True)

@@ -92,7 +92,7 @@ class Wanted(NamedTuple):
     point: Point
 
 
-class Settled(NamedTuple):
+class RefinedCell(NamedTuple):
     """A cell that is not divided.
 
     Attributes
@@ -149,7 +149,7 @@ class Refinement:
     allow: Sequence[str] = ()
     rows: dict[Wanted, Mapping[str, Any] | str] = field(default_factory=dict)
     asked: dict[Wanted, int] = field(default_factory=dict)
-    settled: list[Settled] = field(default_factory=list)
+    settled: list[RefinedCell] = field(default_factory=list)
     _lacks: dict[Cell, int] = field(default_factory=dict)
     _waits: dict[Wanted, list[Cell]] = field(default_factory=dict)
     _known: list[Cell] = field(default_factory=list)
@@ -191,10 +191,10 @@ class Refinement:
         return f"round {stage}, {runs}, {100 * self.share:.0f} % of the ranges settled"
 
     @property
-    def cells(self) -> list[Settled]:
+    def cells(self) -> list[RefinedCell]:
         """The cells that are not divided, those included of which something is still open."""
-        halved = (Settled(each.cell, OPEN, each.left) for each in self._halvings)
-        every = [*self.settled, *halved, *(Settled(cell, OPEN) for cell in self._lacks)]
+        halved = (RefinedCell(each.cell, OPEN, each.left) for each in self._halvings)
+        every = [*self.settled, *halved, *(RefinedCell(cell, OPEN) for cell in self._lacks)]
         return sorted(every, key=lambda each: (each.cell.branch, each.cell))
 
     @property
@@ -281,7 +281,7 @@ class Refinement:
         there = {at: each for at, each in known.items() if each is not None}
         every, left = set(range(len(cell.low))), ()
         if not there:
-            self.settled.append(Settled(cell, FAILED))
+            self.settled.append(RefinedCell(cell, FAILED))
             return
         if len(there) < len(known):
             changes = {
@@ -302,7 +302,7 @@ class Refinement:
         if can:
             self._halvings.append(_Halving(cell, can, miss, left))
         else:
-            self.settled.append(Settled(cell, SMALLEST if axes else SETTLED, left))
+            self.settled.append(RefinedCell(cell, SMALLEST if axes else SETTLED, left))
 
     def _look_around(self) -> None:
         """Add what the cells miss at runs of their neighbours to the errors that are left in them.
@@ -327,7 +327,7 @@ class Refinement:
                 self._halvings.append(_Halving(cell, can, self._ratio(most), most))
             else:
                 small = axes and state == SETTLED
-                self.settled.append(Settled(cell, SMALLEST if small else state, most))
+                self.settled.append(RefinedCell(cell, SMALLEST if small else state, most))
 
     def _ratio(self, misses: tuple[float, ...]) -> float:
         """Return how far misses are beyond what is allowed: above 1 if they are."""
@@ -350,7 +350,7 @@ class Refinement:
                 new = {Wanted(part.branch, at) for part in parts for at in points_of(part)}
                 full = full or len(self.asked.keys() | new) > self.refine.most
                 if full:
-                    self.settled.append(Settled(cell, MOST, left))
+                    self.settled.append(RefinedCell(cell, MOST, left))
                     continue
                 for part in parts:
                     self._open(part)

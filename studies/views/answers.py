@@ -22,7 +22,7 @@ RUN = "run"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class NumberBetween:
     """A number at a place.
 
     Attributes
@@ -53,7 +53,7 @@ def answer(
     *,
     by: str | None = None,
     within: float | None = None,
-) -> Answer:
+) -> NumberBetween:
     """Return a number at a place: of the run there, if the store has it, else as `predict` does.
 
     Parameters
@@ -89,6 +89,6 @@ def answer(
         value, error, way = float(row["scalars"][of]), 0.0, RUN
     unit = str(dataset[of].attrs.get("units", ""))
     enough = within is None or error <= within
-    return Answer(
+    return NumberBetween(
         of=of, value=value, error=error, unit=unit, by=way, at=place, run=run, enough=enough
     )

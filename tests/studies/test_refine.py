@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import math
 import random
+import signal
+import subprocess
+import sys
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -11,15 +15,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 
 from solver.results.record import Record, Status
-from studies import Bounds, Store, Study, StudyError, estimate, open_study
+from studies import Bounds, Store, Study, StudyError, estimate, open_study, run_study
 from studies.definition.cells import weights
 from studies.definition.refine import Refine, Refinement, Wanted
 from studies.execution.asking import Asking
 from tests.studies.fakes import FAKE, Canned, FakeParameters, record
-from tests.studies.test_goal import search_here
+from tests.studies.test_goal import ROOT, search_here
 
 OF = "peak_residual_tension"
 AXES = {"load_ratio": [0.1, 1.0], "friction": [0.0, 0.4]}
@@ -315,3 +320,33 @@ def test_a_refinement_needs_axes_of_numbers_and_no_goal() -> None:
     content = study().to_dict() | {"goal": {"find": "limit_load", "between": [0.1, 1.0]}}
     with pytest.raises(StudyError, match=r"keep one|take it out"):
         Study.from_dict(content, FAKE)
+
+
+@pytest.mark.processes
+@pytest.mark.usefixtures("one_worker")
+def test_a_killed_refinement_is_taken_up_and_computes_no_run_twice(tmp_path: Path) -> None:
+    out, file = tmp_path / "out", tmp_path / "study.toml"
+    file.write_text(
+        'name = "refined"\nscene = "fake"\n[parameters]\nseconds = 0.4\n'
+        "[sweep]\nload_ratio = [0.1, 0.9]\nfriction = [0.0, 0.4]\n"
+        '[refine]\nof = ["peak_contact_pressure"]\n'
+    )
+    command = ["-m", "tests.residua.command", "run", str(file), "--out", str(out), "--workers", "1"]
+    with subprocess.Popen(
+        [sys.executable, *command], cwd=ROOT, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+        start_new_session=True,
+    ) as parent:  # fmt: skip
+        deadline = time.monotonic() + 60.0
+        while len(list(out.glob("runs/*.nc"))) < 4:
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        family = psutil.Process(parent.pid).children(recursive=True)
+        parent.send_signal(signal.SIGKILL)
+    assert psutil.wait_procs(family, timeout=10)[1] == []
+    before = {path.stem for path in out.glob("runs/*.nc")}
+    outcome = run_study(Study.from_toml(file), Store(out), workers=1)
+    assert outcome.ok
+    assert not before & set(outcome.computed)
+    with open_study(out) as dataset:
+        assert set(dataset["run"].to_numpy()) == before | set(outcome.computed)
+        assert dataset.sizes["point"] == 9
