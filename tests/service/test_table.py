@@ -225,6 +225,15 @@ def test_after_signing_in_a_caller_stays_here(seen: Seen, then: str, kept: bool)
     assert f'name="then" value="{wanted}"' in page
 
 
+def test_a_study_of_one_run_has_a_table_and_a_page(seen: Seen) -> None:
+    posted = {"name": "alone", "scene": "punch"}
+    study_id = seen.client.post("/studies", json=posted).json()["id"]
+    answer = seen.client.get(f"/studies/{study_id}/table.csv")
+    (row,) = csv.DictReader(io.StringIO(answer.text))
+    assert row["status"] == "pending"
+    assert seen.client.get(f"/ui/studies/{study_id}").status_code == 200
+
+
 def test_files_are_read_one_at_a_time() -> None:
     now, most = 0, 0
 
