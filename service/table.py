@@ -213,7 +213,8 @@ def _sweep(
 ) -> Iterator[Column]:
     """Yield the axes of a sweep, and what axes of labels and points set, over its runs."""
     shape = tuple(len(values) for values in axes.values())
-    at = dict(zip(axes, np.indices(shape).reshape(len(shape), -1), strict=True))
+    places = np.unravel_index(np.arange(math.prod(shape)), shape) if shape else ()
+    at = dict(zip(axes, places, strict=True))
     own = {name: (name, values) for name, values in axes.items()}
     known = parameters_of(scene) if scene else {}
     for name, (axis, values) in {**own, **linked_values(dict(sweep))}.items():

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import csv
 import io
 import json
 import math
+import time
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
+from service.maps import Pictures
 from service.settings import Settings
 from studies import Store, open_netcdf, open_study
 from tests.studies.conftest import compute_here, fake_study
@@ -220,3 +223,30 @@ def test_after_signing_in_a_caller_stays_here(seen: Seen, then: str, kept: bool)
     page = seen.client.get("/ui/sign-in", params={"then": then}).text
     wanted = then if kept else "/ui"
     assert f'name="then" value="{wanted}"' in page
+
+
+def test_a_study_of_one_run_has_a_table_and_a_page(seen: Seen) -> None:
+    posted = {"name": "alone", "scene": "punch"}
+    study_id = seen.client.post("/studies", json=posted).json()["id"]
+    answer = seen.client.get(f"/studies/{study_id}/table.csv")
+    (row,) = csv.DictReader(io.StringIO(answer.text))
+    assert row["status"] == "pending"
+    assert seen.client.get(f"/ui/studies/{study_id}").status_code == 200
+
+
+def test_files_are_read_one_at_a_time() -> None:
+    now, most = 0, 0
+
+    def read() -> None:
+        nonlocal now, most
+        now += 1
+        most = max(most, now)
+        time.sleep(0.02)
+        now -= 1
+
+    async def all_at_once() -> None:
+        pictures = Pictures(8, 1000)
+        await asyncio.gather(*(pictures.alone(read) for _ in range(6)))
+
+    asyncio.run(all_at_once())
+    assert most == 1
