@@ -16,7 +16,7 @@ from fastapi.testclient import TestClient
 from service.app import create_app
 from service.settings import Settings
 from studies import Study, StudyError, open_study
-from studies.toml import read_study
+from studies.definition.files import read_study
 from tests.architecture.sources import ROOT
 from tests.service.servers import NOWHERE, Server, fake_study, wait_until
 
