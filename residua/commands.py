@@ -200,7 +200,7 @@ def diff(options: argparse.Namespace) -> int:
 
 def predict(options: argparse.Namespace) -> int:
     """Tell a number between the runs of a study, with its error."""
-    from studies.execution.run import run_study
+    from studies.execution.task import compute_here
     from studies.views.answers import answer
     from studies.views.picking import study_of
     from studies.views.reading import find_study, open_netcdf
@@ -211,7 +211,7 @@ def predict(options: argparse.Namespace) -> int:
     with open_netcdf(path) as dataset:
         found = answer(dataset, study, store, **asked)
         if not found.enough and options.compute:
-            run_study(found.run, store, workers=1)
+            compute_here(found.run, store)
             found = answer(dataset, study, store, **asked)
     unit = f" {found.unit}" if found.unit not in {"", "1"} else ""
     print(f"{found.of} = {found.value:.6g}{unit}, error {found.error:.2g}{unit} (by {found.by})")

@@ -17,6 +17,7 @@ from studies.definition.cases import Case, LoadingPath
 from studies.definition.goal import PathLimit, Search
 from studies.definition.identity import solver_hash
 from studies.definition.place import Place
+from studies.definition.study import Study
 from studies.errors import StoreFull, StudyError, without_folders
 from studies.execution.proof import Proof, Unfit
 from studies.storage.store import Store
@@ -116,6 +117,22 @@ def walk(
                 _walk(task, path, store, stored, report, should_stop)
             finally:
                 release()
+
+
+def compute_here(study: Study, store: Store) -> None:
+    """Compute the runs of a small study in this process; nothing but the runs is stored.
+
+    Raises
+    ------
+    StoreBusy
+        when another process computes into the same store
+    """
+    with store.writing():
+        directory = store.directory.resolve()
+        for path in study.paths():
+            task = PathTask(study.problem, (path,), directory, solver_hash(), study.keep)
+            walk(task, lambda _: None, lambda: False)
+        store.sound(study.run_ids())
 
 
 def _walk(

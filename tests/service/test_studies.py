@@ -15,6 +15,9 @@ from fastapi.testclient import TestClient
 
 from service.app import create_app
 from service.settings import Settings
+from solver.mesh.rail import rail_60e1
+from solver.mesh.section_mesh import SectionMesh
+from solver.mesh.zone import Zone, rail_mesh
 from studies import Study, StudyError, open_study
 from studies.definition.files import read_study
 from tests.architecture.sources import ROOT
@@ -358,6 +361,22 @@ def test_a_goal_has_the_same_id_everywhere(tmp_path: Path) -> None:
     assert (posted["id"], posted["size"]) == (study.id, study.size)
     assert refused.status_code == 422
     assert refused.json()["errors"][0]["field"] == "goal.find"
+
+
+def test_a_study_holds_the_mesh_of_a_rail(service: Server) -> None:
+    """It is data of the study as points are: no file is sent."""
+    mesh = SectionMesh.of(rail_mesh(rail_60e1(), Zone(at=0, half_width=20, depth=14, size=2.0)))
+    study = {
+        "name": "own-rail", "scene": "wheel_rail",
+        "parameters": {"accuracy": "draft", "rail_profile": mesh},
+    }  # fmt: skip
+    answer = service.client.post("/estimate", json=study)
+    assert answer.status_code == 200, answer.text
+    study["parameters"] = {"rail_profile": mesh._replace(foot=())}
+    refused = service.client.post("/estimate", json=study)
+    assert refused.status_code == 422
+    told = "must have a line foot of edges of elements, on the outside"
+    assert told in refused.json()["errors"][0]["allowed"]
 
 
 def test_studies_are_found_by_a_tag(service: Server) -> None:
