@@ -148,7 +148,7 @@ def test_a_study_is_found_by_file_name_and_id(tmp_path: Path) -> None:
     for named in ("base.toml", "base", base.id):
         text = f'name = "more"\nextends = "{named}"\n[sweep]\nfriction = [0.1]\n'
         (tmp_path / "more.toml").write_text(text)
-        study = Study.from_toml(tmp_path / "more.toml", store.definition, store.scene)
+        study = Study.from_toml(tmp_path / "more.toml", (), store.definition, store.scene)
         ids.add(study.id)
     assert len(ids) == 1
     assert len(set(study.run_ids()) & set(store.sound(study.run_ids()))) == 4
