@@ -1,4 +1,4 @@
-"""Define a load, centrifugal force, and compare it with the closed form of a rotating cylinder."""
+"""Define a load, the pressure of a fluid at rest, and compare it with a wall's closed form."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -8,32 +8,34 @@ from annotated_types import Interval, Unit
 
 from solver import Body, Material, Model, solve
 from solver.mesh import grid
-from solver.model.loads import LOADS, Load
+from solver.model.loads import LOADS, BoundaryLoad
 
 
-@LOADS.word("centrifugal")
+@LOADS.word("hydrostatic")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Centrifugal(Load):
-    """The centrifugal force of a body that rotates about the axis x = 0."""
+class Hydrostatic(BoundaryLoad):
+    """The pressure of a fluid at rest below its level: its weight times the depth."""
 
-    density: Annotated[float, Interval(gt=0.0), Unit("t/mm3")] = 7.85e-9
-    speed: Annotated[float, Interval(ge=0.0), Unit("rad/s")]
+    weight: Annotated[float, Interval(ge=0.0), Unit("N/mm3")] = 9.81e-6
+    level: float
 
-    def body_force(self, x):
-        """Return the force per volume (2, n) at positions x [N/mm3]."""
-        return np.stack([self.density * self.speed**2 * x[0], np.zeros(x.shape[1])])
+    def push(self, x, along):
+        """Return the forces (2, n) on pieces of the boundary [N/mm]."""
+        pressure = self.weight * np.maximum(self.level - x[1], 0.0)
+        return pressure * np.stack([-along[1], along[0]])
 
 
 if __name__ == "__main__":
-    nu, radius, turning = 0.3, 100.0, Centrifugal(speed=3000.0)
-    shaft = Body(
-        name="shaft", mesh=grid(np.linspace(0, radius, 41), np.linspace(0, 5, 3)),
-        material=Material(youngs_modulus=2e5, poisson_ratio=nu), kinematics="axisymmetric",
-        supports={"bottom": "y", "top": "y"}, loads=(turning,),
+    height, water = 50.0, Hydrostatic(boundary="right", level=50.0)
+    wall = Body(
+        name="wall", mesh=grid(np.linspace(0, 5, 3), np.linspace(0, height, 21)),
+        material=Material(youngs_modulus=3e4, poisson_ratio=0.2), kinematics="plane_stress",
+        supports={"left": "x", "bottom": "y"}, loads=(water,),
     )  # fmt: skip
-    solution = solve(Model(bodies=(shaft,)))
-    r, stress = solution.nodes("shaft")[0], solution.stress("shaft", "loaded")
-    level = (3 - 2 * nu) / (8 * (1 - nu)) * turning.density * turning.speed**2  # plane strain
-    assert np.allclose(stress[0], level * (radius**2 - r**2), atol=1e-3 * level * radius**2)
+    solution = solve(Model(bodies=(wall,)))
+    y, stress = solution.nodes("wall")[1], solution.stress("wall", "loaded")
+    above = y > 20.0  # the flat ground changes the stress of its foot
+    pressure = water.weight * (height - y)
+    assert np.allclose(stress[0, above], -pressure[above], atol=1e-3 * pressure.max())
     assert solution.audit().passed
-    print(f"stress on the axis: {stress[0, r == 0].mean():.1f} MPa")
+    print(f"pressure on the foot: {pressure.max():.2e} MPa")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 
@@ -18,6 +19,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     if reason := wrong_package():
         return complain(reason, BAD_INPUT)
+    # BLAS reads it when it is loaded. Workers compute; and only a process of one thread is forked.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     from residua.arguments import parser  # imports the other packages, which are checked now
     from solver.errors import ModelError
     from solver.parts import load_own_parts

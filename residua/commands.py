@@ -9,10 +9,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from threading import Thread
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from residua.status import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
 from studies.errors import StudyError
+
+if TYPE_CHECKING:
+    from studies.definition.study import Study
 
 
 def run(options: argparse.Namespace) -> int:
@@ -21,7 +24,7 @@ def run(options: argparse.Namespace) -> int:
     from residua.progress import Progress
     from studies.definition.study import Study
     from studies.execution.cluster import Access
-    from studies.execution.forking import variables
+    from studies.execution.forking import FORK_HERE, variables
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, run_study
     from studies.storage.store import Store
@@ -31,13 +34,18 @@ def run(options: argparse.Namespace) -> int:
         stall_seconds=options.stall_seconds, path_seconds=options.path_seconds,
         memory=options.memory, patience=options.patience,
     )  # fmt: skip
-    access = options.scheduler and Access(
-        options.scheduler, options.tls_ca, options.tls_cert, options.tls_key
-    )
-    study, store = Study.from_toml(options.study), Store(options.out)
+    store = Store(options.out)
+    measured = getattr(options, "measured", ())
+    study = Study.from_toml(options.study, measured, store.definition, store.scene)
     if options.dry_run:
         print(dry_run(study, store))
         return OK
+    if options.part:
+        return _part(study, options)
+    certificates = options.tls_ca, options.tls_cert, options.tls_key
+    access = options.scheduler and Access(options.scheduler, *certificates)
+    if options.scheduler_file:
+        access = Access.of_file(options.scheduler_file, *certificates)
     if warning := long_run(study, store):
         print(warning, file=sys.stderr)
     progress, preparing = Progress(study), Thread(target=prepare)
@@ -48,7 +56,8 @@ def run(options: argparse.Namespace) -> int:
         progress(event)
 
     # Before a worker knows the module path of this process, it would look in the current directory.
-    with _interruption() as interrupted, variables({"PYTHONSAFEPATH": "1"}):
+    for_workers = {"PYTHONSAFEPATH": "1", FORK_HERE: "1"}
+    with _interruption() as interrupted, variables(for_workers):
         outcome = run_study(
             study,
             store,
@@ -69,6 +78,51 @@ def run(options: argparse.Namespace) -> int:
     if outcome.stopped:
         return INTERRUPTED
     return OK if outcome.ok else FAILED
+
+
+def _part(study: Study, options: argparse.Namespace) -> int:
+    """Compute as one of several processes."""
+    from residua.progress import Progress
+    from studies.execution.part import run_part
+
+    if options.workers not in (None, 1):
+        raise StudyError("--workers", options.workers, "a part is one process: leave it out")
+    progress = Progress(study)
+    with _interruption(signal.SIGTERM) as interrupted:
+        found = run_part(
+            study, options.out, options.part,
+            on_event=progress, should_stop=lambda: bool(interrupted),
+        )  # fmt: skip
+    progress.close()
+    number, count = options.part
+    left = "searches" if study.asks else "loading paths"
+    others = f", {found.left} {left} are left to others" if found.left else ""
+    print(f"{study.name}: part {number} of {count}: {len(found.computed)} runs computed{others}")
+    return INTERRUPTED if found.stopped else OK
+
+
+def slurm(options: argparse.Namespace) -> int:
+    """Write a script for sbatch, which computes a study on a cluster."""
+    from residua.slurm import script
+    from studies.definition.study import Study
+    from studies.storage.store import Store
+
+    store = Store(options.out)
+    study = Study.from_toml(options.study, (), store.definition, store.scene)
+    text = script(
+        study.name, options.study, options.out, options.script,
+        tasks=options.tasks, time=options.time, memory=options.memory,
+        scheduler=options.with_scheduler,
+    )  # fmt: skip
+    with _written("--script", options.script) as part:
+        part.write_text(text, encoding="utf-8")
+    print(f"wrote {options.script}; its head tells how to submit it")
+    return OK
+
+
+def fit(options: argparse.Namespace) -> int:
+    """Find the parameters with which runs come closest to what was measured."""
+    return run(options)
 
 
 def scenes(options: argparse.Namespace) -> int:
@@ -128,6 +182,65 @@ def best(options: argparse.Namespace) -> int:
     return OK
 
 
+def diff(options: argparse.Namespace) -> int:
+    """Tell what differs between two studies, also of two versions of the solver."""
+    from studies.views.differing import diff, difference_table
+    from studies.views.reading import open_study
+
+    with open_study(options.first) as first, open_study(options.second) as second:
+        found = diff(first, second, options.ignore)
+    print(difference_table(found))
+    if options.out is not None:
+        from studies.views.plots.differing import difference_figure
+
+        _save(difference_figure(found, options.field), options.out)
+        print(f"wrote {options.out}")
+    return OK
+
+
+def predict(options: argparse.Namespace) -> int:
+    """Tell a number between the runs of a study, with its error."""
+    from studies.execution.task import compute_here
+    from studies.views.answers import answer
+    from studies.views.picking import study_of
+    from studies.views.reading import find_study, open_netcdf
+
+    at, path = _selection(options.at, "NAME=VALUE"), find_study(options.path)
+    study, store = study_of(path)
+    asked: dict[str, Any] = {"of": options.of, "at": at, "by": options.by, "within": options.within}
+    with open_netcdf(path) as dataset:
+        found = answer(dataset, study, store, **asked)
+        if not found.enough and options.compute:
+            compute_here(found.run, store)
+            found = answer(dataset, study, store, **asked)
+    unit = f" {found.unit}" if found.unit not in {"", "1"} else ""
+    print(f"{found.of} = {found.value:.6g}{unit}, error {found.error:.2g}{unit} (by {found.by})")
+    if found.enough:
+        return OK
+    place = ", ".join(f"{name} = {value}" for name, value in found.at.items())
+    failed = store.run(next(found.run.run_ids())) if options.compute else None
+    told = f"its run ended as {failed['status']}" if failed else "--compute adds this run"
+    print(f"the error is above {options.within:g} at {place}: {told}")
+    return FAILED
+
+
+def sensitivity(options: argparse.Namespace) -> int:
+    """Tell which parameter of a sample matters for a number of its runs, and draw it."""
+    from studies.views import sensitivity as indices
+    from studies.views.reading import open_study
+
+    selection = _selection(options.select)
+    with open_study(options.path) as dataset:
+        found = indices.sensitivity(dataset, options.of, selection, method=options.method)
+        print(indices.sensitivity_table(found))
+        if options.out:
+            from studies.views.plots.sensitivity import sensitivity_figure
+
+            _save(sensitivity_figure(dataset, found, selection), options.out)
+            print(f"wrote {options.out}")
+    return OK
+
+
 def export(options: argparse.Namespace) -> int:
     """Write the fields at the nodes of a run (keep = "fields") as files for ParaView."""
     from solver.errors import ModelError
@@ -180,7 +293,8 @@ def submit(service: Any, options: argparse.Namespace) -> str:
 def status(service: Any, options: argparse.Namespace) -> str:
     """Print the state of a study on a running service."""
     state = service.status(options.id)
-    return f"{state['status']}  {state['progress']:g} %"
+    stage = f"  {state['stage']}" if state.get("stage") else ""
+    return f"{state['status']}  {state['progress']:g} %{stage}"
 
 
 def cancel(service: Any, options: argparse.Namespace) -> str:
@@ -197,8 +311,8 @@ def fetch(service: Any, options: argparse.Namespace) -> str:
 
 
 @contextmanager
-def _interruption() -> Iterator[list[int]]:
-    """Give a list that is empty until Ctrl-C; a second Ctrl-C stops at once."""
+def _interruption(*others: signal.Signals) -> Iterator[list[int]]:
+    """Give a list that is empty until Ctrl-C, or another signal; a second one stops at once."""
     received: list[int] = []
 
     def receive(number: int, frame: object) -> None:
@@ -207,11 +321,12 @@ def _interruption() -> Iterator[list[int]]:
         received.append(number)
         print("\nstopping; finished runs are kept", file=sys.stderr)
 
-    before = signal.signal(signal.SIGINT, receive)
+    before = {each: signal.signal(each, receive) for each in (signal.SIGINT, *others)}
     try:
         yield received
     finally:
-        signal.signal(signal.SIGINT, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 def _save(drawn: Any, path: Path) -> None:
@@ -237,14 +352,14 @@ def _written(option: str, path: Path) -> Iterator[Path]:
         raise StudyError(option, str(path), f"cannot be written: {error.strerror}") from None
 
 
-def _selection(texts: Sequence[str]) -> dict[str, str]:
-    """Return the names and values of ``--select``, each name once."""
+def _selection(texts: Sequence[str], option: str = "--select") -> dict[str, str]:
+    """Return the names and values of an option, each name once."""
     chosen: dict[str, str] = {}
     for text in texts:
         name, sign, value = (part.strip() for part in text.partition("="))
         if not sign:
-            raise StudyError("--select", text, "must be NAME=VALUE")
+            raise StudyError(option, text, "must be NAME=VALUE")
         if name in chosen:
-            raise StudyError("--select", text, f"{name} is selected already, as {chosen[name]}")
+            raise StudyError(option, text, f"{name} is given already, as {chosen[name]}")
         chosen[name] = value
     return chosen

@@ -15,6 +15,7 @@ from starlette.types import Scope as Connection
 
 from service.errors import on_http_error
 from service.keys import Keys, KeysError, Scope
+from service.pages.rendering import COOKIE, is_page, told
 from service.settings import Settings, address_of
 
 SAFE = ("GET", "HEAD", "OPTIONS")
@@ -24,8 +25,11 @@ NEEDED = [
     for pattern, scope in (
         # A browser sends no key with the address of a page; these pages contain no secrets.
         (r"(GET|HEAD|OPTIONS) /(health|docs(/.*)?|openapi\.json)", None),
+        (r"(GET|HEAD|OPTIONS) /(ui/(static/.*|sign-in))?", None),
+        (r"POST /ui/sign-(in|out)", None),
         (r"(GET|HEAD|OPTIONS) .*", Scope.READ),
         (r"POST /(scenes|studies|studies/[^/?]+/retry|estimate)/?", Scope.SUBMIT),
+        (r"POST /ui/(new|studies/[^/?]+/(retry|stop))", Scope.SUBMIT),
         (r"DELETE /studies/[^/?]+/?", Scope.SUBMIT),
         (r".*", Scope.ADMIN),
     )
@@ -36,6 +40,7 @@ SECONDS = 2.0
 """Longest time of reading the keys [s]."""
 
 HOST = re.compile(r"(?:\[([\da-f:.]+)\]|([^\s:/@\[\]]+))(?::\d*)?", re.IGNORECASE)
+FIELDS = re.compile(r"application/x-www-form-urlencoded\s*(?:;.*)?", re.IGNORECASE)
 FORM = re.compile(r"multipart/form-data\s*;.*", re.IGNORECASE)
 JSON = re.compile(r"application/(?:[\w.-]+\+)?json\s*(?:;.*)?", re.IGNORECASE)
 
@@ -52,7 +57,7 @@ class Gate:
     """Middleware that refuses a request before its body is read.
 
     The caller's scope is stored in ``request.state.caller``: a `Scope`, or None without a key; in
-    ``request.state.name`` the name of the key, or the address of a caller without one.
+    ``request.state.name`` the name of the key, or ``address …`` of a caller without one.
     """
 
     def __init__(self, app: ASGIApp, settings: Settings, keys: Keys) -> None:
@@ -77,6 +82,8 @@ class Gate:
                 check_content(request)
             except HTTPException as refusal:
                 answer = on_http_error(request, refusal)
+                if is_page(request):
+                    answer = told(request, answer)
         await answer(connection, receive, send)
 
     def check_host(self, given: list[str]) -> None:
@@ -102,14 +109,16 @@ class Gate:
 
     async def caller(self, request: Request) -> Scope | None:
         """Return the caller's scope, or raise `HTTPException` if it is not sufficient."""
-        request.state.name = request.client.host if request.client else ""
+        # No name of a key has a space.
+        request.state.name = f"address {request.client.host if request.client else 'unknown'}"
         if not self.keys_needed:
             return Scope.ADMIN
         wanted, header = needed(request), request.headers.get("authorization", "")
-        if not header and wanted is None:
+        kept = request.cookies.get(COOKIE, "")
+        if not (header or kept) and wanted is None:
             return None
         kind, _, text = header.partition(" ")
-        given = text.strip() if kind.lower() == "bearer" else ""
+        given = text.strip() if kind.lower() == "bearer" else "" if header else kept
         try:
             with fail_after(SECONDS):  # in a thread, which is left alone if the disk hangs
                 owner = await run_sync(
@@ -122,6 +131,8 @@ class Gate:
             raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, reason) from None
         challenge = 'Bearer realm="residua"'
         name, scope = owner or ("", None)
+        if scope is None and wanted is None and not header:  # a cookie of a key that was removed
+            return None
         if scope is None:
             status, detail = HTTPStatus.UNAUTHORIZED, "this needs authorization: Bearer <API key>"
             if header:
@@ -160,6 +171,8 @@ def check_content(request: Request) -> None:
     path = request.scope["path"].removeprefix(request.scope.get("root_path", ""))
     if path.rstrip("/") == "/scenes":
         wanted, form = FORM, "multipart/form-data"
+    elif is_page(request):
+        wanted, form = FIELDS, "application/x-www-form-urlencoded"
     else:
         wanted, form = JSON, "application/json"
     body = "transfer-encoding" in headers or headers.get("content-length", "0") != "0"

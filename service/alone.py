@@ -18,10 +18,10 @@ import tempfile
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import ceil
 from pathlib import Path
 from typing import NoReturn
 
+from studies.execution.forking import close_files
 from studies.storage.room import FULL
 
 _LIBC = ctypes.CDLL(None, use_errno=True)
@@ -65,7 +65,7 @@ def alone(function: Callable[..., str], *given: object, folder: Path, seconds: f
     Parameters
     ----------
     folder : where it may write
-    seconds : its processor time
+    seconds : its processor time, in whole seconds
     """
     out, into = os.pipe()
     process = os.fork()
@@ -90,7 +90,8 @@ def _answer(
     status = FAILED
     try:
         _let_go(into)
-        resource.setrlimit(resource.RLIMIT_CPU, (ceil(seconds), ceil(seconds) + 1))
+        most = max(int(seconds), 1)
+        resource.setrlimit(resource.RLIMIT_CPU, (most, most + 1))
         tempfile.tempdir = str(folder)
         with os.fdopen(into, "w", encoding="utf-8") as pipe:
             pipe.write(f"{_shut_in(folder)}\n")
@@ -112,8 +113,7 @@ def _let_go(into: int) -> None:
     nothing = os.open(os.devnull, os.O_RDWR)
     os.dup2(nothing, 0)
     os.dup2(nothing, 1)
-    os.closerange(3, into)
-    os.closerange(into + 1, os.sysconf("SC_OPEN_MAX"))
+    close_files(but=[into])
 
 
 def _shut_in(folder: Path) -> str:

@@ -28,6 +28,7 @@ from service.maps import Pictures
 from service.methods import head_is_get
 from service.metrics import Metrics
 from service.overview import Details
+from service.pages import routes as pages
 from service.pool import Pool
 from service.probe import Probe
 from service.processes import Starter, find_modules_at_home
@@ -36,6 +37,7 @@ from service.retention import Keeper
 from service.routes.manual import ASSETS
 from service.runner import Runner
 from service.settings import Settings, chosen
+from service.table import Tables
 from studies import Store, StoreBusy, StudyError
 from studies.errors import CatalogueDamaged, StoreFull
 from studies.scratch import remove_left
@@ -79,7 +81,8 @@ def create_app(settings: Settings) -> FastAPI:
     store = open_store(settings.data)
     jobs = open_queue(settings.data / "jobs.sqlite", store, settings.max_queue)
     mend = Mender(jobs, store).look
-    runner = Runner(settings, jobs, Pool.of(settings, held), Starter("service.child", held), mend)
+    starter = Starter(held)
+    runner = Runner(settings, jobs, Pool(settings, starter), starter, mend)
     examiner = Examiner(settings)
     kept = settings.keep_days, settings.keep_bytes
     scenes = settings.max_scenes_bytes, settings.max_key_scenes_bytes
@@ -110,7 +113,9 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.examiner = examiner
     app.state.inspector = Inspector(settings.reader_seconds)
     app.state.details = Details(jobs, store)
+    app.state.tables = Tables(jobs, store)
     app.state.keeper = keeper
+    app.state.keys = keys
     app.state.metrics = metrics
     app.state.pictures = Pictures(settings.map_queue, settings.map_bytes)
     app.state.probe = Probe()
@@ -125,6 +130,8 @@ def create_app(settings: Settings) -> FastAPI:
     for router in routes.ROUTERS:
         needs_key = settings.keys_required and "health" not in router.tags
         app.include_router(router, dependencies=[Security(BEARER)] if needs_key else [])
+    app.include_router(pages.home)
+    app.include_router(pages.router)
     app.mount("/docs", ASSETS, name="docs")
     return app
 

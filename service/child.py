@@ -1,4 +1,4 @@
-"""The process that computes one study: ``python -m service.child``.
+"""The process that computes one study.
 
 A study runs in a process of its own, so that whatever happens to it leaves the service and the
 other studies alive. The workers and the lock of the store are those of `service.pool`.
@@ -14,7 +14,6 @@ from typing import Any
 
 from service.processes import Outlet, beat, claim_stdout, read_order, watch_stdin
 from studies import GridLost, Store, Study, StudyError, StudyEvent, run_study
-from studies.definition.identity import solver_hash
 from studies.errors import CatalogueDamaged, StoreBusy, StoreFull, Unusable
 from studies.execution.cluster import Access
 from studies.execution.limits import Limits
@@ -42,7 +41,9 @@ def compute(order: Mapping[str, Any], outlet: Outlet, stop: threading.Event) -> 
         on_event=lambda event: tell(event, outlet),
         should_stop=stop.is_set,
     )
-    outlet.send("outcome", outcome.counts)
+    outlet.send("outcome", {
+        "counts": outcome.counts, "asked": outcome.asked, "stage": outcome.stage,
+    })  # fmt: skip
 
 
 def tell(event: StudyEvent, outlet: Outlet) -> None:
@@ -52,19 +53,10 @@ def tell(event: StudyEvent, outlet: Outlet) -> None:
         log.info("run: %s %s", event.status, event.message, extra={"run": event.run})
 
 
-def prepare() -> None:
-    """Load the modules that every study needs: dask, netCDF, and the sources for the run ids."""
-    import studies.execution.grid
-    import studies.storage.combine  # noqa: F401
-
-    solver_hash()
-
-
 def main() -> None:
     """Read the order and compute its study."""
     outlet = claim_stdout()
     beat(outlet)
-    prepare()
     order = read_order()
     try:
         compute(order, outlet, watch_stdin(order["grace"]))
@@ -75,7 +67,3 @@ def main() -> None:
     except Exception as error:
         outlet.send("error", {"reason": f"{type(error).__name__}: {error}"})
         raise
-
-
-if __name__ == "__main__":
-    main()

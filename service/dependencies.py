@@ -11,7 +11,7 @@ from service.examiner import Examiner
 from service.inspector import Inspector
 from service.job import Job
 from service.jobs import Jobs
-from service.keys import Scope
+from service.keys import Keys, Scope
 from service.maps import Pictures
 from service.metrics import Metrics
 from service.overview import Details
@@ -20,6 +20,7 @@ from service.retention import Keeper
 from service.runner import Runner
 from service.schemas import ContentId
 from service.settings import Settings
+from service.table import Tables
 from studies import Store
 
 
@@ -41,12 +42,14 @@ TheExaminer = Annotated[Examiner, held("examiner")]
 TheInspector = Annotated[Inspector, held("inspector")]
 TheJobs = Annotated[Jobs, held("jobs")]
 TheKeeper = Annotated[Keeper, held("keeper")]
+TheKeys = Annotated[Keys, held("keys")]
 TheMetrics = Annotated[Metrics, held("metrics")]
 ThePictures = Annotated[Pictures, held("pictures")]
 TheProbe = Annotated[Probe, held("probe")]
 TheRunner = Annotated[Runner, held("runner")]
 TheSettings = Annotated[Settings, held("settings")]
 TheStore = Annotated[Store, held("store")]
+TheTables = Annotated[Tables, held("tables")]
 
 
 def get_job(study_id: ContentId, jobs: TheJobs) -> Job:
@@ -69,7 +72,7 @@ async def get_caller(request: Request) -> Scope | None:
 
 
 async def get_name(request: Request) -> str:
-    """Return the name of the caller's key; without one its address."""
+    """Return the name of the caller's key; without one, ``address`` and its address."""
     name: str = request.state.name
     return name
 

@@ -266,18 +266,20 @@ def on_unexpected(request: Request, exc: Exception) -> Problem:
 
 
 HANDLERS: dict[type[Exception], Callable[[Request, Any], Response]] = {
+    **dict.fromkeys(STATUS, on_plain_error),
     StudyError: on_field_error,
     SceneError: on_scene_error,
     Unusable: on_unusable,
     RequestValidationError: on_validation_error,
-    **dict.fromkeys(
-        (NotFound, Conflict, Busy, NoRoom, QueueLost, StoreFull, CatalogueDamaged, FileDamaged),
-        on_plain_error,
-    ),
     OSError: on_system_error,
     HTTPException: on_http_error,
     Exception: on_unexpected,
 }
+
+
+def answer_to(request: Request, exc: Exception) -> Response:
+    """Return the answer to an exception: that of its nearest ancestor in the table."""
+    return next(HANDLERS[kind] for kind in type(exc).__mro__ if kind in HANDLERS)(request, exc)
 
 
 def install(app: FastAPI) -> None:

@@ -5,14 +5,12 @@ To check every run of a large study and to make its id takes seconds, and memory
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from service.errors import NoRoom
 from service.guarded import Guarded
 from service.settings import Settings
 from solver.scenes import Scene
@@ -34,7 +32,7 @@ class Examined:
     Attributes
     ----------
     study : the checked study
-    runs : ids of its runs in the order of its cases
+    runs : ids of its runs in the order of its cases; of a study with a goal they are not known
     estimate : its estimated cost
     """
 
@@ -62,8 +60,6 @@ class Examiner:
         ------
         StudyError
             If it has a mistake, or its cost exceeds the settings.
-        NoRoom
-            If its results would take more than the free space of the disk.
         Busy
             If too many others wait, or the process was killed.
         """
@@ -76,17 +72,15 @@ class Examiner:
 def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:
     """Return a checked study with its run ids and its cost; called in a separate process."""
     store = Store(directory)
-    study = Study.known(content, partial(_posted, store))
-    if study.asks:
-        allowed = "is searched by `residua run`, not by a service: submit the runs themselves"
-        raise StudyError("goal", study.goal, allowed)
+    study = Study.known(content, partial(_posted, store), store.definition)
+    if study.asks and not study.goal:
+        field, what = ("refine", "refined") if study.refine else ("fit", "fitted")
+        allowed = f"is {what} by `residua run`, not by a service: submit the runs themselves"
+        raise StudyError(field, getattr(study, field), allowed)
     bounds.check_size(study)
     runs = list(study.checked().run_ids())
     cost = estimate(study, store)
     bounds.check(cost)
-    if cost.bytes > (free := shutil.disk_usage(directory).free):
-        takes = f"the study takes about {cost.bytes / 1e9:.3g} GB, and {free / 1e9:.3g} GB are free"
-        raise NoRoom(f"{takes} on the disk of the data directory: use fewer runs, or make room")
     return Examined(study, runs, cost)
 
 

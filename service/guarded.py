@@ -15,8 +15,9 @@ from contextlib import asynccontextmanager, suppress
 from math import ceil
 from pathlib import Path
 from typing import TypeVar
+from weakref import WeakValueDictionary
 
-from anyio import BrokenWorkerProcess, CapacityLimiter, fail_after
+from anyio import BrokenWorkerProcess, CapacityLimiter, Lock, fail_after
 from anyio.to_process import run_sync
 
 from service.errors import Busy
@@ -69,16 +70,28 @@ class Guarded:
 
     def __init__(self, field: str, waiting: int, seconds: float) -> None:
         self.field, self.waiting, self.seconds = field, waiting, seconds
-        self.readers = CapacityLimiter(READERS)
+        self.present, self.readers = 0, CapacityLimiter(READERS)
+        self.one: WeakValueDictionary[str, Lock] = WeakValueDictionary()
 
     @asynccontextmanager
-    async def turn(self) -> AsyncIterator[None]:
-        """Wait until a process is free; raise `Busy` if too many wait."""
-        if self.readers.statistics().tasks_waiting >= self.waiting:
+    async def turn(self, caller: str = "") -> AsyncIterator[None]:
+        """Wait until a process is free, and a named caller's turn before has ended.
+
+        Raises
+        ------
+        Busy
+            if too many wait
+        """
+        if self.present >= READERS + self.waiting:
             waiting = f"{self.waiting} requests to read a {self.field} wait already"
             raise Busy(f"{waiting}: ask later")
-        async with self.readers:
-            yield
+        own = self.one.setdefault(caller, Lock()) if caller else Lock()
+        self.present += 1
+        try:
+            async with own, self.readers:
+                yield
+        finally:
+            self.present -= 1
 
     async def call(
         self, function: Callable[..., Found], *given: object, name: object, advice: str = ""
@@ -126,18 +139,17 @@ class Budget:
     """
 
     def __init__(self, seconds: float) -> None:
-        self.seconds = seconds
+        self.seconds, self.least = seconds, min(1.0, seconds / 2)
         self.even: dict[str, float] = {}
 
-    def check(self, caller: str) -> None:
-        """Raise `Busy` if a caller has used its budget, with the time to wait.
-
-        A call that begins within the budget may end beyond it; what is beyond is waited for later.
-        """
-        wait = self.even.get(caller, 0.0) - time.monotonic() - MINUTE
-        if wait >= 0.0:
+    def left(self, caller: str) -> float:
+        """Return what a caller has left [s]; raise `Busy` if that is nearly nothing."""
+        whole = max(self.even.get(caller, 0.0) - time.monotonic(), 0.0)
+        left = self.seconds * (1.0 - whole / MINUTE)
+        if left < self.least:
             used = f"{self.seconds:g} s of processor time in a minute are used"
-            raise Busy(f"{used}: ask later", max(ceil(wait), 1))
+            raise Busy(f"{used}: ask later", ceil((self.least - left) / self.seconds * MINUTE))
+        return left
 
     def charge(self, caller: str, seconds: float) -> None:
         """Take time from the budget of a caller."""

@@ -18,6 +18,13 @@ PAGE = (
 )
 """Content security policy of the interactive documentation: only scripts of this service."""
 
+CHARTS = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; connect-src 'self'; form-action 'self'; "
+    "frame-ancestors 'none'; base-uri 'none'"
+)
+"""Content security policy of the pages under ``/ui``: charts set styles, forms are sent here."""
+
 
 class SecurityHeaders:
     """Middleware that adds the headers to every answer that does not set them itself."""

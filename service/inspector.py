@@ -9,13 +9,10 @@ from __future__ import annotations
 import errno
 import json
 import logging
-from collections.abc import AsyncIterator, Mapping
-from contextlib import ExitStack, asynccontextmanager
+from base64 import b64decode, b64encode
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-
-from anyio import CancelScope
-from anyio.to_thread import run_sync as run_in_thread
 
 from service.alone import CRASHED, FAILED, Answer, alone
 from service.guarded import Budget, Guarded, beyond
@@ -27,6 +24,7 @@ from studies.scenes.meshfile import FORMATS, MeshFile
 from studies.scenes.scene import FileScene, read_scene
 from studies.scenes.table import FILE_NAME
 from studies.scratch import scratch
+from studies.toml import LARGEST
 
 log = logging.getLogger(__name__)
 
@@ -75,20 +73,25 @@ class Inspector:
             if not (FILE_NAME.fullmatch(name) and name.lower().endswith(FORMATS)):
                 allowed = f"must be the name of a file and end in one of {', '.join(FORMATS)}"
                 raise StudyError("meshes", name, allowed)
-        self.budget.check(caller)
-        async with self.process.turn():
-            self.budget.check(caller)  # others of this caller may have been read meanwhile
-            async with _written({**meshes, _FILE: text}) as folder:
-                spent = self.seconds  # if it gives no answer
-                try:
-                    answer = await self.process.call(inspected, folder, spent, name=_FILE)
-                    spent = answer.seconds
-                finally:
-                    self.budget.charge(caller, spent)
+        self.budget.left(caller)
+        async with self.process.turn(caller):
+            spent = left = self.budget.left(caller)  # all of it if there is no answer
+            try:
+                files = {**meshes, _FILE: text}
+                answer = await self.process.call(inspected, files, left, name=_FILE)
+                spent = answer.seconds
+            except OSError:  # no room for temporary files
+                spent = 0.0
+                raise
+            finally:
+                self.budget.charge(caller, spent)
+        if answer.failed == errno.ETIME and left < self.seconds:
+            self.budget.left(caller)
         found = self._read(answer)
         if mistakes := found.get("mistakes"):
             raise SceneError(_FILE, [StudyError(*each) for each in mistakes], found["count"])
-        given = {name: MeshFile(name, data) for name, data in meshes.items()}
+        arrays = {name: b64decode(text) for name, text in found["arrays"].items()}
+        given = {name: MeshFile(name, data, arrays[name]) for name, data in meshes.items()}
         return KeptScene(**found["scene"]), Description(_FILE, found["content"], given)
 
     def _read(self, answer: Answer) -> dict[str, Any]:
@@ -108,33 +111,18 @@ class Inspector:
         return found
 
 
-@asynccontextmanager
-async def _written(files: Mapping[str, bytes]) -> AsyncIterator[Path]:
-    """Give a temporary folder with these files; a disk may be slow, so threads work on it."""
-    kept = ExitStack()
-
-    def write() -> Path:
-        folder = kept.enter_context(scratch())
-        for name, data in files.items():
-            (folder / name).write_bytes(data)
-        return folder
-
-    try:
-        yield await run_in_thread(write)
-    finally:
-        with CancelScope(shield=True):
-            await run_in_thread(kept.close)
-
-
-def inspected(folder: Path, seconds: float) -> Answer:
-    """Return what a copy of this process answers, which has loaded what a scene needs."""
+def inspected(files: Mapping[str, bytes], seconds: float) -> Answer:
+    """Return what a copy of this process, which has loaded what a scene needs, finds in files."""
     import meshio  # noqa: F401
 
     import solver.contact.system
     import solver.results.samples  # noqa: F401
     import studies.scenes.building  # noqa: F401
 
-    return alone(_told, folder, folder=folder, seconds=seconds)
+    with scratch() as folder:
+        for name, data in files.items():
+            (folder / name).write_bytes(data)
+        return alone(_told, folder, folder=folder, seconds=seconds)
 
 
 def _told(folder: Path) -> str:
@@ -142,8 +130,9 @@ def _told(folder: Path) -> str:
     answer: dict[str, Any]
     try:
         scene = _read(folder)
+        arrays = _arrays(scene.description)
         kept = {"id": scene.id, "name": scene.name, "summary": scene.summary}
-        answer = {"scene": kept, "content": scene.description.content}
+        answer = {"scene": kept, "content": scene.description.content, "arrays": arrays}
     except SceneError as error:
         listed = [_fields_of(each) for each in error.mistakes]
         answer = {"mistakes": listed, "count": error.count}
@@ -159,6 +148,14 @@ def _read(folder: Path) -> FileScene:
         listed = ", ".join(needed) or "(it names none)"
         raise StudyError("meshes", name, f"must be a file that the scene names: {listed}")
     return read_scene(folder / _FILE)
+
+
+def _arrays(description: Description) -> dict[str, str]:
+    """Return the arrays of the meshes as text: nobody else reads the files themselves."""
+    read = {name: mesh.read().arrays for name, mesh in (description.meshes or {}).items()}
+    if sum(map(len, read.values())) > LARGEST:
+        raise StudyError("meshes", ", ".join(read), f"must have at most {LARGEST} bytes of arrays")
+    return {name: b64encode(arrays).decode() for name, arrays in read.items()}
 
 
 def _fields_of(mistake: StudyError) -> tuple[str, object, str]:

@@ -48,6 +48,8 @@ class Job:
     submitted, started, finished : ISO 8601, UTC
     turn : the greater was accepted or retried later
     digest : checksum of the text of the study
+    bytes : estimated size of the runs that it lacked, and of its data set
+    stage : of a study with a goal, how many of its searches have ended
     """
 
     id: str
@@ -65,6 +67,8 @@ class Job:
     finished: str | None
     turn: int
     digest: int
+    bytes: float
+    stage: str
 
 
 COLUMNS = tuple(each.name for each in fields(Job))
@@ -87,19 +91,37 @@ def row_of(job: Job) -> list[Any]:
     return [*plain, checksum(plain)]
 
 
-def wanted(state: StudyState | None = None, tag: str | None = None) -> tuple[str, list[str]]:
-    """Return the SQL condition for jobs in a state, of studies with a tag, and its values."""
+def wanted(
+    state: StudyState | None = None,
+    tag: str | None = None,
+    scene: str | None = None,
+    text: str | None = None,
+) -> tuple[str, list[str]]:
+    """Return the SQL condition for jobs, and its values.
+
+    Parameters
+    ----------
+    state, scene : state and scene of the job
+    tag : one of the tags of its study
+    text : a part of its name or note, in capitals or not
+    """
     tagged = "json_valid(study) AND ? IN (SELECT value FROM json_each(study, '$.tags'))"
-    conditions = {"state = ?": state, tagged: tag}
+    noted = "CASE WHEN json_valid(study) THEN json_extract(study, '$.note') END"
+    said = f"instr(lower(name || ' ' || COALESCE({noted}, '')), lower(?))"
+    conditions = {"state = ?": state, tagged: tag, "scene = ?": scene, said: text}
     clauses = [clause for clause, value in conditions.items() if value is not None]
     values = [str(value) for value in conditions.values() if value is not None]
     return (f"WHERE {' AND '.join(clauses)}" if clauses else ""), values
 
 
-def verdict(counts: Mapping[str, int]) -> tuple[StudyState, str]:
-    """Return the final state of a study from the number of its runs by status, and the reason."""
+def verdict(counts: Mapping[str, int], stage: str = "") -> tuple[StudyState, str]:
+    """Return the final state of a study from the number of its runs by status, and the reason.
+
+    Those of a study with a ``stage`` are the answers to its goal.
+    """
     others = {status: count for status, count in counts.items() if count and status != "ok"}
     if not others:
         return StudyState.SUCCESSFUL, ""
     listed = ", ".join(f"{count} {status}" for status, count in others.items())
-    return StudyState.FAILED, f"{sum(others.values())} of {sum(counts.values())} runs: {listed}"
+    what = "searches" if stage else "runs"
+    return StudyState.FAILED, f"{sum(others.values())} of {sum(counts.values())} {what}: {listed}"

@@ -30,6 +30,11 @@ NEXT_TURN = "SELECT COALESCE(MAX(turn), 0) + 1 FROM job"
 BEGUN = {"state": StudyState.RUNNING, "message": "", "finished": None}
 SHARED = """SELECT 1 FROM run AS mine JOIN run AS theirs ON theirs.run = mine.run
     WHERE mine.job = ? AND theirs.job IN (SELECT value FROM json_each(?)) LIMIT 1"""
+GOAL = "CASE WHEN json_valid({0}.study) THEN json_extract({0}.study, '$.goal') END IS NOT NULL"
+ALIKE = f"""SELECT 1 FROM job AS mine JOIN job AS theirs ON theirs.scene = mine.scene
+    WHERE mine.id = ? AND theirs.id IN (SELECT value FROM json_each(?))
+    AND {GOAL.format("mine")} AND {GOAL.format("theirs")} LIMIT 1"""
+BOTH = (SHARED, ALIKE)
 
 
 class Jobs(Database):
@@ -59,12 +64,21 @@ class Jobs(Database):
         self.damaged = False
 
     def accept(
-        self, job_id: str, study: dict[str, Any], runs: Iterable[str], priority: int = 0
+        self,
+        job_id: str,
+        study: dict[str, Any],
+        runs: Iterable[str],
+        priority: int = 0,
+        size: float = 0.0,
+        most: int = 0,
+        stage: str = "",
     ) -> tuple[Job, bool]:
         """Return the job of this study, and whether it is new.
 
         ``runs`` are the ids of its runs in the order of its cases. They are stored, because a
-        changed solver would give other ids, and the study would not find its runs.
+        changed solver would give other ids, and the study would not find its runs. Those of a study
+        with a goal are not known yet: they are at most ``most``, and its ``stage`` tells of its
+        searches. ``size`` is what it will write [bytes].
 
         Raises
         ------
@@ -75,22 +89,24 @@ class Jobs(Database):
             with suppress(NotFound, Conflict):
                 self._study(connection, job_id)
                 return self.read(connection, job_id), False
-            count = "SELECT COUNT(*) FROM job WHERE state = ?"
-            (waiting,) = connection.execute(count, (StudyState.ACCEPTED,)).fetchone()
+            (waiting,) = connection.execute(
+                "SELECT COUNT(*) FROM job WHERE state = ?", (StudyState.ACCEPTED,)
+            ).fetchone()
             if self.longest is not None and waiting >= self.longest:
                 raise Busy(f"{waiting} studies wait already, the largest number: post it later")
             connection.execute("DELETE FROM job WHERE id = ?", (job_id,))  # an unreadable row
             connection.execute("DELETE FROM run WHERE job = ?", (job_id,))
-            size = connection.executemany(
+            count = connection.executemany(
                 "INSERT INTO run VALUES (?, ?, ?)",
                 ((job_id, position, run) for position, run in enumerate(runs)),
             ).rowcount
             text = json.dumps(study)
             job = Job(
-                id=job_id, name=study["name"], scene=study["scene"], size=max(size, 0),
+                id=job_id, name=study["name"], scene=study["scene"], size=max(count, most, 0),
                 state=StudyState.ACCEPTED, message="", progress=0.0, since=0, stood="",
                 priority=priority, submitted=now(), started=None, finished=None,
                 turn=connection.execute(NEXT_TURN).fetchone()[0], digest=checksum([text]),
+                bytes=float(size), stage=stage,
             )  # fmt: skip
             connection.execute(
                 f"INSERT INTO job ({ALL}, study) VALUES ({MARKS}, ?)", [*row_of(job), text]
@@ -122,6 +138,28 @@ class Jobs(Database):
             )
             return [row["run"] for row in rows]
 
+    def asked(self, job_id: str, runs: Collection[str], stage: str) -> None:
+        """Add runs that a search has asked for, and write how many of the searches have ended."""
+        with self.transaction() as connection, suppress(NotFound):
+            job = self.read(connection, job_id)
+            rows = connection.execute("SELECT run FROM run WHERE job = ?", (job_id,))
+            known = {row["run"] for row in rows}
+            more = [run for run in runs if run not in known]
+            connection.executemany(
+                "INSERT INTO run VALUES (?, ?, ?)",
+                ((job_id, position, run) for position, run in enumerate(more, len(known))),
+            )
+            put(connection, job, stage=stage)
+
+    def searches(self) -> dict[str, str]:
+        """Return, by id, the scene of each waiting or running job that searches."""
+        with self.transaction("BEGIN") as connection:
+            rows = connection.execute(
+                f"SELECT id, scene FROM job WHERE state IN (?, ?) AND {GOAL.format('job')}",
+                (StudyState.RUNNING, StudyState.ACCEPTED),
+            )
+            return dict(rows.fetchall())
+
     def page(self, *, limit: int, offset: int, **which: Any) -> tuple[list[Job], int]:
         """Return a page of jobs, the latest first, and the number of all; filters: `wanted`."""
         where, values = wanted(**which)
@@ -147,11 +185,25 @@ class Jobs(Database):
             counted = connection.execute("SELECT state, COUNT(*) FROM job GROUP BY state")
             return dict(counted.fetchall())
 
+    def promised(self, but: str) -> float:
+        """Return what all studies but one will still write before they end [bytes].
+
+        About half of a study are its runs; its data set is written at the end.
+        """
+        with self.transaction("BEGIN") as connection:
+            (total,) = connection.execute(
+                "SELECT TOTAL(bytes * (1 - progress / 200)) FROM job"
+                " WHERE state IN (?, ?) AND id <> ?",
+                (StudyState.ACCEPTED, StudyState.RUNNING, but),
+            ).fetchone()
+        return float(total)
+
     def take(self, busy: Collection[str] = (), largest: int = sys.maxsize) -> Job | None:
         """Mark the next job as running, and return it; None if there is none.
 
         It has at most ``largest`` runs, and shares no run with ``busy``, the jobs that are being
-        computed, so that common runs are computed once.
+        computed, so that common runs are computed once. Two searches in one scene may ask for the
+        same runs: one of them waits.
         """
         others = json.dumps(list(busy))
         with self.transaction() as connection:
@@ -162,7 +214,7 @@ class Jobs(Database):
                 (StudyState.RUNNING, StudyState.ACCEPTED, largest, others),
             ).fetchall()
             for row in waiting:
-                if connection.execute(SHARED, (row["id"], others)).fetchone():
+                if any(connection.execute(each, (row["id"], others)).fetchone() for each in BOTH):
                     continue
                 try:
                     job = self.read(connection, row["id"])

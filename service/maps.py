@@ -6,7 +6,9 @@ import asyncio
 import hashlib
 import io
 from collections import OrderedDict
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, TypeVar
 
 from anyio import CapacityLimiter
 from anyio.to_thread import run_sync
@@ -17,11 +19,14 @@ from service.schemas import MapQuery
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
 
+Read = TypeVar("Read")
+
 
 class Pictures:
     """Draws pictures, one at a time, and keeps the latest ones.
 
-    Matplotlib shares fonts and the text cache among figures, so two cannot be drawn at once.
+    Matplotlib shares fonts and the text cache among figures, so two cannot be drawn at once; and
+    the netCDF library ends the process if two threads read files. So all reading is `alone`.
 
     Parameters
     ----------
@@ -56,9 +61,13 @@ class Pictures:
             self.underway[tag] = asyncio.create_task(self._draw(tag, path, query))
         return await asyncio.shield(self.underway[tag])
 
+    async def alone(self, read: Callable[..., Read], *arguments: Any) -> Read:
+        """Return what ``read`` returns, called in a thread while no other one reads or draws."""
+        return await run_sync(read, *arguments, limiter=self.pencil)
+
     async def _draw(self, tag: str, path: Path, query: MapQuery) -> bytes:
         try:
-            picture = await run_sync(draw, path, query, limiter=self.pencil)
+            picture = await self.alone(draw, path, query)
         finally:
             del self.underway[tag]
         self.kept[tag] = picture

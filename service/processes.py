@@ -1,28 +1,34 @@
 """Child processes of the service, and the communication with them.
 
-A process gets its order as the first line of its standard input. The end of that input means
-"stop", whether the service stops it or has died. It sends lines of JSON on its standard output. It
-inherits the lock of the data directory until it ends: a service that starts after a crash waits for
-it.
+All are forks of one process. Each gets its order as the first line of its standard input. The end
+of that input means "stop", whether the service stops it or has died. It sends lines of JSON on its
+standard output. It inherits the lock of the data directory until it ends: a service that starts
+after a crash waits for it.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import ctypes
+import errno
 import json
+import multiprocessing
 import os
 import sys
 import threading
 import time
-from asyncio.subprocess import PIPE, Process
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, TextIO
 
 from service import logs
 from solver.parts import SETTING, own_files
+from studies.execution.cluster import prepare_workers
 
 LONGEST_LINE = 1_000_000
 """Largest size of a message of a process [bytes]."""
@@ -30,7 +36,16 @@ LONGEST_LINE = 1_000_000
 BEAT_SECONDS = 5.0
 """Time between two signs of life [s]; a process counts as frozen only after a longer time."""
 
-STDIN = 0
+LOADED = ("service.child", "service.pool", "studies.storage.combine")
+"""Modules that are loaded before a process is forked, beside those that workers need."""
+
+START_SECONDS = 60.0
+"""Longest time for the start of a process, with what is loaded for it [s]."""
+
+STDIN, STDOUT = 0, 1
+
+_SET_NAME = 15
+"""Option of ``prctl``."""
 
 HOME = Path(__file__).parents[1]
 """The folder of the packages."""
@@ -50,37 +65,117 @@ def find_modules_at_home() -> None:
     os.environ[SETTING] = os.pathsep.join(map(str, own_files()))
 
 
-async def start(module: str, lock: int, *arguments: str) -> Process:
-    """Start ``python -m module``; it loads its modules, then waits for its order.
+@dataclass(slots=True, frozen=True)
+class Process:
+    """A process that this one has started.
 
-    Raises
-    ------
-    OSError
-        If the system cannot start a process.
+    Attributes
+    ----------
+    process : its id and its end
+    stdin, stdout : what it reads, and what it writes
     """
-    return await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-m",
-        module,
-        *arguments,
-        stdin=PIPE,
-        stdout=PIPE,
-        limit=LONGEST_LINE,
-        cwd="/",  # it reads no settings of libraries where the service was started
-        pass_fds=(lock,),
-        start_new_session=True,  # the service handles an interrupt from a terminal
-    )
+
+    process: BaseProcess
+    stdin: asyncio.WriteTransport
+    stdout: asyncio.StreamReader
+
+    @property
+    def pid(self) -> int | None:
+        """Its id."""
+        return self.process.pid
+
+    @property
+    def returncode(self) -> int | None:
+        """Its exit status; None while it runs. It is 255 if its parent, the fork server, died."""
+        return self.process.exitcode
+
+    async def wait(self) -> None:
+        """Wait until it has ended."""
+        while self.returncode is None:
+            await asyncio.sleep(0.02)
+
+    def kill(self) -> None:
+        """Kill it."""
+        self.process.kill()
 
 
-def send(process: Process, order: Mapping[str, Any]) -> None:
-    """Send a process its order."""
-    assert process.stdin is not None
-    process.stdin.write(json.dumps(order).encode() + b"\n")
+@dataclass(slots=True, frozen=True)
+class Starter:
+    """Starts processes as forks of one that has loaded what studies need: at once, not in seconds.
+
+    Attributes
+    ----------
+    lock : number of the open file that locks the data directory
+    """
+
+    lock: int
+
+    async def prepare(self) -> str:
+        """Start to load, unless it is done; return the method of `multiprocessing`."""
+        return await asyncio.to_thread(prepare_workers, LOADED)
+
+    async def start(self, module: str, order: Mapping[str, Any]) -> Process:
+        """Return a process that executes ``main()`` of a module, and has received its order.
+
+        Raises
+        ------
+        OSError
+            If the system cannot start a process, or not in time.
+        """
+        context = multiprocessing.get_context(await self.prepare())
+        theirs, stdin = context.Pipe(duplex=False)
+        stdout, out = context.Pipe(duplex=False)
+        held = Connection(os.dup(self.lock))
+        process: BaseProcess = context.Process(  # type: ignore[attr-defined]
+            target=_begin,
+            args=(module, theirs, out, held, dict(os.environ)),
+            daemon=True,  # if this process must end at once, it shall not wait for the other
+        )
+
+        def begin() -> None:
+            with theirs, out, held:
+                process.start()
+
+        try:
+            async with asyncio.timeout(START_SECONDS):
+                await asyncio.to_thread(begin)
+        except TimeoutError:
+            raise OSError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT)) from None
+        loop, reader = asyncio.get_running_loop(), asyncio.StreamReader(LONGEST_LINE)
+        await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), stdout)
+        writer, _ = await loop.connect_write_pipe(asyncio.BaseProtocol, stdin)
+        writer.write(json.dumps(order).encode() + b"\n")
+        return Process(process, writer, reader)
+
+
+def _begin(
+    module: str,
+    stdin: Connection,
+    stdout: Connection,
+    lock: Connection,
+    environment: Mapping[str, str],
+) -> None:
+    """Execute ``main()`` of a module in a process that has just been started."""
+    multiprocessing.current_process().daemon = False  # it may start processes
+    os.setsid()  # the service handles an interrupt from a terminal
+    os.chdir("/")  # it reads no settings of libraries where the service was started
+    os.environ.update(environment)
+    os.dup2(stdin.fileno(), STDIN)
+    os.dup2(stdout.fileno(), STDOUT)
+    stdin.close()
+    stdout.close()
+    name_process(module)
+    import_module(module).main()
+
+
+def name_process(module: str) -> None:
+    """Name this process after a module; all forks of a process have the same command line."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_SET_NAME, module.encode())
 
 
 async def end(process: Process, grace: float) -> None:
     """Stop a process by closing its input, and kill it if it does not end."""
-    assert process.stdin is not None
     process.stdin.close()
     try:
         async with asyncio.timeout(grace):
@@ -152,47 +247,3 @@ def watch_stdin(grace: float) -> threading.Event:
 
     threading.Thread(target=watch, name="stop-watch", daemon=True).start()
     return stop
-
-
-@dataclass(slots=True)
-class Starter:
-    """Starts processes of one module in advance, because loading takes a second or two.
-
-    Attributes
-    ----------
-    module, lock, arguments : as for `start`
-    """
-
-    module: str
-    lock: int
-    arguments: tuple[str, ...] = ()
-    _ready: Process | None = None
-    _starting: bool = False
-
-    async def prepare(self) -> None:
-        """Start the next process, unless there is one; if that fails, `give` starts it."""
-        if self._ready is None and not self._starting:
-            self._starting = True
-            with contextlib.suppress(OSError):
-                self._ready = await start(self.module, self.lock, *self.arguments)
-            self._starting = False
-
-    async def give(self, order: Mapping[str, Any]) -> Process:
-        """Return a process that has received this order.
-
-        Raises
-        ------
-        OSError
-            If the system cannot start one.
-        """
-        process, self._ready = self._ready, None
-        if process is None or process.returncode is not None:
-            process = await start(self.module, self.lock, *self.arguments)
-        send(process, order)
-        return process
-
-    async def close(self) -> None:
-        """End the process that waits for an order."""
-        process, self._ready = self._ready, None
-        if process is not None:
-            await end(process, 1.0)

@@ -14,16 +14,17 @@ import shutil
 import sqlite3
 import threading
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Collection, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from service.errors import Conflict, NotFound
+from service.errors import Conflict, NoRoom, NotFound
+from service.examiner import Examined
 from service.job import Job, StudyState
 from service.jobs import Jobs, put
-from studies import FileDamaged, Store, Study
+from studies import FileDamaged, Store
 from studies.scenes.description import Description
 from studies.storage.seal import content_of
 
@@ -74,13 +75,48 @@ class Keeper:
                 if user["state"] in ("accepted", "running") or self.computes(user["id"]):
                     needed = f"the study {user['id']} needs this run"
                     raise Conflict(f"{needed}: dismiss it first, or wait for its end")
+            if self._searched([run_id]):
+                needed = "a study searches in the scene of this run, and may need it"
+                raise Conflict(f"{needed}: dismiss it first, or wait for its end")
             self.store.discard([run_id])
 
-    def accept(self, study: Study, runs: list[str], priority: int) -> tuple[Job, bool]:
-        """Store a study, and put it into the queue; its scene is not deleted in between."""
+    def _searched(self, runs: Collection[str]) -> set[str]:
+        """Return those runs in whose scene a waiting or running study searches.
+
+        What a search asks for is known at its end.
+        """
+        scenes = set(self.jobs.searches().values())
+        described = (self.store.scene(each, whole=False) for each in scenes)
+        scenes.update(each.name for each in described if each)
+        rows = self.store.catalogue.rows(runs) if scenes else {}
+        return {run_id for run_id, row in rows.items() if row["scene"] in scenes}
+
+    def accept(self, found: Examined, priority: int) -> tuple[Job, bool]:
+        """Store a study, and put it into the queue; its scene is not deleted in between.
+
+        Raises
+        ------
+        NoRoom
+            as `check_room`
+        """
+        study, size = found.study, found.estimate.bytes
         with self._one:
+            self.check_room(found)
             self.store.save_study(study)
-            return self.jobs.accept(study.id, study.to_dict(), runs, priority)
+            content, most = study.to_dict(), study.size
+            return self.jobs.accept(
+                study.id, content, found.runs, priority, size, most, study.stage()
+            )
+
+    def check_room(self, found: Examined) -> None:
+        """Raise `NoRoom` if a study does not fit on the disk beside those that have not ended."""
+        size, promised = found.estimate.bytes, self.jobs.promised(but=found.study.id)
+        free = shutil.disk_usage(self.store.directory).free
+        if size and size + promised > free:
+            takes, has, others = (f"{each / 1e9:.3g} GB" for each in (size, free, promised))
+            told = f"the study takes about {takes}, and {has} are free on the disk of the data"
+            before = f", of which studies before it take {others}" if promised else ""
+            raise NoRoom(f"{told} directory{before}: use fewer runs, or make room")
 
     def keep_scene(self, scene_id: str, description: Description, owner: str) -> bool:
         """Store a posted scene for a key; return whether it is new.
@@ -92,9 +128,11 @@ class Keeper:
         """
         with self._one:
             if self.store.scene(scene_id, whole=False) is None:
-                given = sum(len(mesh.data) for mesh in (description.meshes or {}).values())
-                there = self.store.scene_sizes()
-                own, every = there.get(owner, 0), sum(there.values())
+                meshes = (description.meshes or {}).values()
+                given = sum(len(mesh.data) + len(mesh.arrays) for mesh in meshes)
+                there = self.store.scene_files()
+                own = sum(scene.size for scene in there if scene.owner == owner)
+                every = sum(scene.size for scene in there)
                 for whose, taken, most in (("your", own, self.own), ("the", every, self.scenes)):
                     if most is not None and taken + given > most:
                         would = f"{whose} posted scenes would take {taken + given} bytes"
@@ -155,6 +193,7 @@ class Keeper:
                 (study_id,),
             )
             unneeded = {row["run"] for row in own} - elsewhere
+            unneeded -= self._searched(unneeded)
             freed = size(directory) + sum(size(self.store.run_path(run)) for run in unneeded)
             self.store.discard(unneeded)
             with suppress(FileNotFoundError):
@@ -175,7 +214,7 @@ class Keeper:
         excess = 0
         if self.size is not None:
             used = sum(size(self.store.directory / name) for name in ("runs", "studies"))
-            excess = used + sum(self.store.scene_sizes().values()) - self.size
+            excess = used + sum(scene.size for scene in self.store.scene_files()) - self.size
         if excess > 0:
             excess -= self._sweep_scenes(excess)
         for job in self.jobs.ended():
@@ -189,16 +228,16 @@ class Keeper:
 
     def _sweep_scenes(self, excess: int) -> int:
         """Delete scenes that no study needs, the oldest first; return the bytes freed."""
-        freed, before, users = 0, time.time_ns() - FRESH, self._users()
-        for scene in reversed(self.store.scenes(limit=-1)):
-            if freed >= excess or scene.added > before:
-                break
-            if scene.id in users:
-                continue
-            with suppress(Conflict, NotFound):
-                self.delete_scene(scene.id)
-                freed += scene.size
-                log.info("deleted a posted scene: above %s bytes", self.size)
+        freed, before = 0, time.time_ns() - FRESH
+        with self._one:
+            users = self._users()
+            for scene in self.store.scene_files():
+                if freed >= excess or scene.added > before:
+                    break
+                if scene.id not in users:
+                    self.store.discard_scene(scene.id)
+                    freed += scene.size
+                    log.info("deleted a posted scene: above %s bytes", self.size)
         return freed
 
     @asynccontextmanager

@@ -10,7 +10,6 @@ import math
 import re
 import sys
 import time
-from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -20,7 +19,7 @@ from service.errors import Conflict, NotFound, QueueLost
 from service.job import Job, StudyState, verdict
 from service.jobs import Jobs
 from service.pool import Pool, PoolAway
-from service.processes import Starter
+from service.processes import Process, Starter
 from service.settings import Settings
 from studies.errors import CatalogueDamaged, StoreBusy, StoreFull, Unusable, without_folders
 
@@ -33,7 +32,7 @@ SMALL = 100
 """Largest number of runs of a study for which the last place is reserved."""
 
 READY_SECONDS = 5.0
-"""Time without a study after which the processes of the next one are started, to load [s]."""
+"""Time without a study after which what the next one needs is loaded [s]."""
 
 SILENT = "its process says nothing: it is frozen, or the machine is overloaded"
 
@@ -48,6 +47,8 @@ class Attempt:
     heard : time of the last message of its process [s]
     waiting : reason for which the study waits; empty if it does not
     runs : number of runs that were finished
+    asked, stage : of a study with a goal, the runs that its searches have asked for, and how many
+        of these have ended
     counts : number of runs by status at the end of the study; None if it did not end
     reason : why it did not end
     patient : whether waiting helps: no scheduler answers, or another process uses the directory
@@ -58,6 +59,8 @@ class Attempt:
     heard: float = field(default_factory=time.monotonic)
     waiting: str = ""
     runs: int = 0
+    asked: set[str] = field(default_factory=set)
+    stage: str = ""
     counts: dict[str, int] | None = None
     reason: str = "its process ended without a result or an error message; see the service's log"
     patient: bool = False
@@ -116,7 +119,7 @@ class Runner:
                 if idle >= self.settings.idle_seconds:
                     await self.pool.close()
                 if idle >= READY_SECONDS:
-                    await asyncio.gather(self.pool.prepare(), self.starter.prepare())
+                    await self.starter.prepare()
                 trouble = ""
             except (CatalogueDamaged, QueueLost, StoreBusy, StoreFull, Unusable, OSError) as error:
                 if trouble != (trouble := str(error)):  # log it only once
@@ -127,8 +130,7 @@ class Runner:
                 pause *= 10
             await self._pause(pause)
         await asyncio.gather(*self._studies.values(), return_exceptions=True)
-        ending = self.pool.close(), self.pool.starter.close(), self.starter.close()
-        await asyncio.gather(*ending)
+        await self.pool.close()
 
     async def _next(self) -> bool:
         """Begin the next study; return whether there was one, and a free place for it.
@@ -167,10 +169,13 @@ class Runner:
             return
         while True:
             attempt = await self._attempt(job, progress)
+            if attempt.stage:
+                await self._write(self.jobs.asked, job.id, attempt.asked, attempt.stage)
             if await self._unwanted(job):
                 return
             if attempt.counts is not None:
-                await asyncio.to_thread(self.jobs.finish, job.id, *verdict(attempt.counts))
+                end = verdict(attempt.counts, attempt.stage)
+                await asyncio.to_thread(self.jobs.finish, job.id, *end)
                 return
             progress = attempt.progress
             barren = 0 if attempt.runs or attempt.patient else barren + 1
@@ -196,7 +201,7 @@ class Runner:
             return Attempt(progress, reason=f"its process cannot be started: {error.strerror}")
         except Conflict as error:  # its row is damaged
             return Attempt(progress, reason=str(error), hopeless=True)
-        attempt, reported = Attempt(progress), (progress, "")
+        attempt, reported, stage = Attempt(progress), (progress, ""), (0, "")
         events = asyncio.create_task(follow(child, attempt))
         try:
             while not events.done() and not await self._unwanted(job):
@@ -206,8 +211,8 @@ class Runner:
                 if silence > max(self.settings.stall_seconds or math.inf, 2 * SILENCE_SECONDS):
                     attempt.reason = SILENT
                     break
-                if attempt.runs:  # while the workers compute, there is time
-                    await self.starter.prepare()
+                if stage != (stage := (len(attempt.asked), attempt.stage)):
+                    await self._write(self.jobs.asked, job.id, set(attempt.asked), attempt.stage)
                 now = attempt.progress, self._plain(waiting)
                 if reported != now and await self._write(self.jobs.note, job.id, *now):
                     reported = now
@@ -224,17 +229,18 @@ class Runner:
         return attempt
 
     async def _start(self, job: Job) -> Process:
+        study = await asyncio.to_thread(self.jobs.study, job.id)
         order = {
             "id": job.id,
-            "study": await asyncio.to_thread(self.jobs.study, job.id),
+            "study": study,
             "data": str(self.settings.data.resolve()),
-            "access": await self.pool.access(),
+            "access": await self.pool.access(study),
             "limits": asdict(self.settings.limits),
             "priority": job.priority,
             "since": job.since,
             "grace": self.settings.grace_seconds,
         }
-        return await self.starter.give(order)
+        return await self.starter.start("service.child", order)
 
     def _plain(self, text: str) -> str:
         """Return a message about a study without folders of this machine."""
@@ -271,7 +277,6 @@ class Runner:
 
 async def follow(child: Process, attempt: Attempt) -> None:
     """Write the events of a child into ``attempt`` until its output ends."""
-    assert child.stdout is not None
     async for line in child.stdout:
         message = json.loads(line)
         attempt.heard = time.monotonic()
@@ -281,10 +286,13 @@ async def follow(child: Process, attempt: Attempt) -> None:
                 attempt.waiting = content["message"]
             case "event":
                 attempt.waiting = ""
-                attempt.progress = 100 * content["progress"]
+                attempt.progress, attempt.stage = 100 * content["progress"], content["stage"]
                 attempt.runs += content["kind"] == "run"
+                if attempt.stage and content["run"]:
+                    attempt.asked.add(content["run"])
             case "outcome":
-                attempt.counts = content
+                attempt.counts, attempt.stage = content["counts"], content["stage"]
+                attempt.asked.update(content["asked"])
             case "refused" | "wait" | "error" as kind:
                 attempt.reason = content["reason"]
                 attempt.hopeless = kind == "refused"

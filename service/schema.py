@@ -8,60 +8,52 @@ from service.job import COLUMNS
 from studies.errors import StudyError
 from studies.storage.database import checksum
 
-VERSION = 2
+VERSION = 4
 
-TABLES = (
-    """CREATE TABLE job (
-        id TEXT PRIMARY KEY,
-        name TEXT NOT NULL,
-        scene TEXT NOT NULL,
-        study TEXT NOT NULL,
-        size INTEGER NOT NULL,
-        state TEXT NOT NULL,
-        message TEXT NOT NULL,
-        progress REAL NOT NULL,
-        since INTEGER NOT NULL,
-        stood TEXT NOT NULL,
-        priority INTEGER NOT NULL,
-        submitted TEXT NOT NULL,
-        started TEXT,
-        finished TEXT,
-        turn INTEGER NOT NULL,
-        digest INTEGER,
-        checksum INTEGER
-    )""",
+JOB = """CREATE TABLE job (
+    id TEXT PRIMARY KEY,
+    name TEXT NOT NULL,
+    scene TEXT NOT NULL,
+    study TEXT NOT NULL,
+    size INTEGER NOT NULL,
+    state TEXT NOT NULL,
+    message TEXT NOT NULL,
+    progress REAL NOT NULL,
+    since INTEGER NOT NULL,
+    stood TEXT NOT NULL,
+    priority INTEGER NOT NULL,
+    submitted TEXT NOT NULL,
+    started TEXT,
+    finished TEXT,
+    turn INTEGER NOT NULL,
+    digest INTEGER,
+    bytes REAL NOT NULL,
+    stage TEXT NOT NULL,
+    checksum INTEGER
+)"""
+RUN = """CREATE TABLE IF NOT EXISTS run (
+    job TEXT NOT NULL, position INTEGER NOT NULL, run TEXT NOT NULL,
+    PRIMARY KEY (job, position)
+) WITHOUT ROWID"""
+REST = (
     "CREATE INDEX job_by_turn ON job (turn)",
     "CREATE INDEX job_by_state ON job (state, priority, turn)",
-    """CREATE TABLE run (
-        job TEXT NOT NULL, position INTEGER NOT NULL, run TEXT NOT NULL,
-        PRIMARY KEY (job, position)
-    ) WITHOUT ROWID""",
-    "CREATE INDEX run_by_id ON run (run)",
+    "CREATE INDEX IF NOT EXISTS run_by_id ON run (run)",
     f"PRAGMA user_version = {VERSION}",
 )
 
-FIRST_FORM = (
-    """INSERT INTO job SELECT id, json_extract(study, '$.name'), json_extract(study, '$.scene'),
-        study, size, state, message, progress, again * 1000000000
-        * CAST(strftime('%s', 'now') AS INTEGER), '', 0, submitted, started, finished, turn,
-        NULL, NULL FROM first""",
-    """INSERT INTO run SELECT first.id, each.key, each.value
-        FROM first, json_each(first.runs) AS each""",
-    "DROP TABLE first",
-)
-"""Copies the rows of the first form, in which a row held all its runs as one text."""
-
-
-SECOND_FORM = (
-    "ALTER TABLE job ADD COLUMN digest INTEGER",
-    "ALTER TABLE job ADD COLUMN checksum INTEGER",
-)
-"""Adds the columns that the second form, the first with rows of runs, has not."""
-
-CHECKSUMS = (
-    "UPDATE job SET digest = checksum(study)",
-    f"UPDATE job SET checksum = checksum({', '.join(COLUMNS)})",
-)
+ADDED = {
+    "name": "json_extract(study, '$.name')",
+    "scene": "json_extract(study, '$.scene')",
+    "since": "again * 1000000000 * CAST(strftime('%s', 'now') AS INTEGER)",
+    "stood": "''",
+    "priority": "0",
+    "digest": "checksum(study)",
+    "bytes": "0.0",
+    "stage": "''",
+}
+"""Columns that earlier forms have not, and what takes their place. The first had no table of runs
+but a text of all its runs in each row, and was the only one without ``since``."""
 
 
 def prepare(connection: sqlite3.Connection, new: bool) -> None:
@@ -83,12 +75,22 @@ def prepare(connection: sqlite3.Connection, new: bool) -> None:
         raise StudyError("jobs.sqlite", f"form {version}", allowed)
     if not new and "job" not in known:
         raise sqlite3.DatabaseError("it holds no queue")
+    statements = [JOB, RUN, *REST]
+    if "job" in known:
+        statements = ["ALTER TABLE job RENAME TO old", JOB, RUN, *_copied(connection), *REST]
     connection.create_function("checksum", -1, lambda *values: checksum(values))
-    if "run" in known:
-        statements: tuple[str, ...] = (*SECOND_FORM, TABLES[-1], *CHECKSUMS)
-    elif "job" in known:
-        statements = ("ALTER TABLE job RENAME TO first", *TABLES, *FIRST_FORM, *CHECKSUMS)
-    else:
-        statements = TABLES
     for statement in statements:
         connection.execute(statement)
+
+
+def _copied(connection: sqlite3.Connection) -> list[str]:
+    """Return what copies the rows of a table of an earlier form; a damaged row stays damaged."""
+    there = [row["name"] for row in connection.execute("PRAGMA table_info(job)")]
+    before = ", ".join(name for name in COLUMNS if name in there)
+    values = ", ".join(name if name in there else ADDED[name] for name in COLUMNS)
+    right = f"checksum({before}) = checksum" if "checksum" in there else "TRUE"
+    names = ", ".join(COLUMNS)
+    rows = f"INSERT INTO job ({names}, study, checksum) SELECT {values}, study, {right} FROM old"
+    summed = f"UPDATE job SET checksum = checksum({names}) WHERE checksum = 1"
+    runs = "INSERT INTO run SELECT old.id, each.key, each.value FROM old, json_each(runs) AS each"
+    return [rows, summed, *([runs] if "runs" in there else []), "DROP TABLE old"]

@@ -29,6 +29,8 @@ class StudyFilter(Window):
 
     status: StudyState | None = None
     tag: str | None = Field(default=None, description="one of the tags of the study")
+    scene: str | None = Field(default=None, description="name of its scene, or id of a posted one")
+    text: str | None = Field(default=None, description="a part of its name or its note")
 
 
 class RunFilter(Window):
@@ -43,6 +45,48 @@ class RunFilter(Window):
     hardening: str | None = None
 
 
+class PredictQuery(BaseModel):
+    """Which number is predicted, and where: beside these, the parameters that the study varies."""
+
+    model_config = ConfigDict(extra="allow")
+
+    of: str = Field(description="a number of the runs")
+    by: Literal["cells", "gaussian"] | None = Field(
+        default=None, description="in the cells of a refinement, or by a Gaussian process"
+    )
+    within: float | None = Field(
+        default=None, ge=0, allow_inf_nan=False, description="largest error that is enough"
+    )
+
+
+class Prediction(BaseModel):
+    """A number between the runs of a study."""
+
+    of: str
+    value: float
+    error: float = Field(description="how far it may be off; 0 if the run was computed")
+    unit: str
+    by: str = Field(description="``cells``, ``gaussian``, or ``run``: that of this place is there")
+    at: dict[str, Any] = Field(description="parameters of the place")
+    add: dict[str, Any] | None = Field(
+        description="the study to submit where the error is more than `within`"
+    )
+
+
+class TableFilter(BaseModel):
+    """The runs of a study that are requested, by any column of its table."""
+
+    model_config = ConfigDict(extra="allow")
+
+    sort: str = Field(default="", description="a column; with a minus, the largest first")
+    columns: str = Field(default="", description="names with commas between; all by default")
+
+    @property
+    def conditions(self) -> dict[str, str]:
+        """The conditions by column."""
+        return {name: str(value) for name, value in (self.model_extra or {}).items() if value != ""}
+
+
 class MapQuery(BaseModel):
     """Which field of a run is drawn."""
 
@@ -54,6 +98,7 @@ class MapQuery(BaseModel):
         "the bodies are not released",
     )
     component: str | None = Field(default=None, description="of a stress; the first by default")
+    stage: str | None = Field(default=None, description="of several stages; the last by default")
     zoom: float | None = Field(
         default=None,
         gt=0,
@@ -80,7 +125,8 @@ class StudySummary(BaseModel):
         description="why it failed; while it runs, what it waits for or why it was started again"
     )
     progress: float = Field(ge=0, le=100, description="percentage of the work that is done")
-    size: int = Field(description="number of runs")
+    size: int = Field(description="number of runs; of a study with a goal the largest possible one")
+    stage: str = Field(description="of a study with a goal, how many of its searches have ended")
     priority: int = Field(description="the greater is computed first")
     submitted: str
     started: str | None
@@ -101,6 +147,7 @@ class StudyDetail(StudySummary):
 
     parameters: dict[str, Any]
     sweep: Axes
+    goal: dict[str, Any] = Field(description="what is searched at each place of the axes")
     note: str = Field(description="what its author wrote of it")
     tags: list[str]
     keep: str = Field(description="``fields`` where the runs keep the fields at the nodes")
@@ -108,7 +155,9 @@ class StudyDetail(StudySummary):
         description="``large_strain`` where runs outside small-strain theory are taken as ok"
     )
     counts: dict[str, int] = Field(description="runs by status, as the study takes them")
-    runs: list[StudyRun] = Field(description="a page of its runs")
+    runs: list[StudyRun] = Field(
+        description="a page of its runs; of a study with a goal those that it has asked for"
+    )
 
 
 class Run(BaseModel):

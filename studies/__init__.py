@@ -27,8 +27,12 @@ if TYPE_CHECKING:
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
     from studies.storage.store import Store
+    from studies.views.differing import Difference, diff
+    from studies.views.fits import fit
     from studies.views.grids import to_grid
+    from studies.views.predict import predict
     from studies.views.reading import open_netcdf, open_study
+    from studies.views.sensitivity import sensitivity
     from studies.views.solution import to_xarray
 
 _HOMES = {
@@ -36,18 +40,23 @@ _HOMES = {
     "Case": "definition.cases",
     "Limits": "execution.limits",
     "Bounds": "execution.estimate",
+    "Difference": "views.differing",
     "Estimate": "execution.estimate",
     "LoadingPath": "definition.cases",
     "Store": "storage.store",
     "Study": "definition.study",
     "StudyEvent": "execution.run",
     "StudyOutcome": "execution.run",
+    "diff": "views.differing",
     "estimate": "execution.estimate",
+    "fit": "views.fits",
     "open_netcdf": "views.reading",
     "open_study": "views.reading",
     "own_workers": "execution.cluster",
+    "predict": "views.predict",
     "run_study": "execution.run",
     "scene_schema": "definition.parameters",
+    "sensitivity": "views.sensitivity",
     "sweep": "execution.function",
     "to_grid": "views.grids",
     "to_xarray": "views.solution",
@@ -58,6 +67,7 @@ __all__ = [
     "Bounds",
     "Case",
     "CatalogueDamaged",
+    "Difference",
     "Estimate",
     "FileDamaged",
     "GridLost",
@@ -70,12 +80,16 @@ __all__ = [
     "StudyError",
     "StudyEvent",
     "StudyOutcome",
+    "diff",
     "estimate",
+    "fit",
     "open_netcdf",
     "open_study",
     "own_workers",
+    "predict",
     "run_study",
     "scene_schema",
+    "sensitivity",
     "sweep",
     "to_grid",
     "to_xarray",

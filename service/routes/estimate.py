@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body
 from pydantic import WithJsonSchema
 
-from service.dependencies import TheExaminer
+from service.dependencies import TheExaminer, TheKeeper
 from service.errors import REFUSED
 from service.routes.studies import SUBMISSION, taken_priority
 from service.strict import StrictRoute
@@ -18,7 +19,9 @@ router = APIRouter(tags=["studies"], route_class=StrictRoute)
 
 @router.post("/estimate", responses=REFUSED)
 async def estimate(
-    content: Annotated[dict[str, Any], Body(), WithJsonSchema(SUBMISSION)], examiner: TheExaminer
+    content: Annotated[dict[str, Any], Body(), WithJsonSchema(SUBMISSION)],
+    examiner: TheExaminer,
+    keeper: TheKeeper,
 ) -> Estimate:
     """Tell what a study asks for beyond the runs that are there; nothing is stored.
 
@@ -26,4 +29,6 @@ async def estimate(
     refused as it is when it is submitted.
     """
     taken_priority(content)
-    return (await examiner.examine(content)).estimate
+    found = await examiner.examine(content)
+    await asyncio.to_thread(keeper.check_room, found)
+    return found.estimate

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from http import HTTPStatus
+from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
@@ -53,20 +54,27 @@ def fetch_run(run: TheRun, store: TheStore) -> FileResponse:
 
 
 @router.get("/{run_id}.vtu", responses={200: {"content": {VTU: {}}}, **REFUSED})
-def fetch_mesh(run: TheRun, store: TheStore, stage: str | None = None) -> Response:
+async def fetch_mesh(
+    run: TheRun, store: TheStore, pictures: ThePictures, stage: str | None = None
+) -> Response:
     """Return the fields at the nodes at a stage, the last one by default, as ParaView reads them.
 
     The study must say `"keep": "fields"`.
     """
+    content = await pictures.alone(nodal_fields, store.run_path(run["id"]), stage)
+    named = {"content-disposition": f'attachment; filename="{run["id"]}.vtu"'}
+    return Response(content, media_type=VTU, headers=named)
+
+
+def nodal_fields(path: Path, stage: str | None) -> bytes:
+    """Return the fields at the nodes of a run at a stage, as a VTU file."""
     from studies import open_netcdf  # xarray takes half a second to import
 
-    with open_netcdf(store.run_path(run["id"])) as dataset:
+    with open_netcdf(path) as dataset:
         fields = read(dataset)
     if stage is not None and stage not in fields.stages:
         raise StudyError("stage", stage, f"must be one of {', '.join(fields.stages)}")
-    content = vtu_of(fields, stage or list(fields.stages)[-1])
-    named = {"content-disposition": f'attachment; filename="{run["id"]}.vtu"'}
-    return Response(content, media_type=VTU, headers=named)
+    return vtu_of(fields, stage or list(fields.stages)[-1])
 
 
 @router.get("/{run_id:stem}")

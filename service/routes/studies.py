@@ -7,6 +7,7 @@ import logging
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from http import HTTPStatus
+from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query, Request, Response
@@ -21,16 +22,27 @@ from service.dependencies import (
     TheJob,
     TheJobs,
     TheKeeper,
+    ThePictures,
     TheRunner,
     TheSettings,
     TheStore,
 )
 from service.errors import REFUSED, Busy, Conflict, NotFound, QueueLost
 from service.files import NETCDF, netcdf
-from service.job import StudyState
-from service.schemas import ContentId, StudyDetail, StudyFilter, StudyPage, StudySummary, Window
+from service.job import Job, StudyState
+from service.jobs import Jobs
+from service.schemas import (
+    ContentId,
+    Prediction,
+    PredictQuery,
+    StudyDetail,
+    StudyFilter,
+    StudyPage,
+    StudySummary,
+    Window,
+)
 from service.strict import StrictRoute
-from studies import Study, StudyError
+from studies import Store, Study, StudyError
 from studies.errors import FileDamaged, StoreFull
 
 log = logging.getLogger(__name__)
@@ -45,6 +57,8 @@ EXAMPLE = {
 }
 
 PRIORITIES = range(-100, 101)
+MOST_FITTED = 1000
+"""Largest number of runs to which a request may fit polynomials, which takes seconds."""
 
 SUBMISSION = Study.model_json_schema() | {"examples": [EXAMPLE]}
 SUBMISSION["properties"]["priority"] = {
@@ -84,7 +98,7 @@ async def submit(
     """Accept a study; 200 when it is known already, whatever became of it."""
     priority = taken_priority(content)
     found = await examiner.examine(content)
-    job, new = await asyncio.to_thread(keeper.accept, found.study, found.runs, priority)
+    job, new = await asyncio.to_thread(keeper.accept, found, priority)
     if not new:
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_study", study_id=job.id).path
@@ -95,8 +109,9 @@ async def submit(
 def list_studies(which: Annotated[StudyFilter, Query()], jobs: TheJobs) -> StudyPage:
     """List studies, the latest first."""
     page, total = jobs.page(
-        limit=which.limit, offset=which.offset, state=which.status, tag=which.tag
-    )
+        limit=which.limit, offset=which.offset, state=which.status, tag=which.tag,
+        scene=which.scene, text=which.text,
+    )  # fmt: skip
     return StudyPage(total=total, items=[overview.summary(job) for job in page])
 
 
@@ -150,6 +165,63 @@ async def events(
         if now and now.status.final:
             return
         await asyncio.sleep(settings.poll_seconds)
+
+
+@router.get("/{study_id}/predict", responses=REFUSED)
+async def predict(
+    job: TheJob,
+    query: Annotated[PredictQuery, Query()],
+    jobs: TheJobs,
+    store: TheStore,
+    pictures: ThePictures,
+) -> Prediction:
+    """Tell a number between the runs of a study, with its error.
+
+    Beside the queries named below, every parameter that the study varies is one:
+    `?of=peak_residual_tension&load_ratio=0.62&friction=0.21`. A place outside of the runs, or
+    across failed ones, is refused.
+    """
+    return await pictures.alone(_predicted, job, query, jobs, store)
+
+
+def _predicted(job: Job, query: PredictQuery, jobs: Jobs, store: Store) -> Prediction:
+    """Return what `predict` tells."""
+    from studies import open_netcdf  # xarray takes half a second to import
+    from studies.views.answers import answer
+
+    path, asked = Path(dataset(job, jobs, store).path), query.model_dump()
+    at = {name: asked.pop(name) for name in query.model_extra or {}}
+    study = Study.known(jobs.study(job.id), store.scene)
+    with open_netcdf(path) as runs:
+        found = answer(runs, study, store, at=at, **asked)
+    add = None if found.enough else found.run.to_dict()
+    told = {name: getattr(found, name) for name in Prediction.model_fields.keys() - {"add"}}
+    return Prediction(**told, add=add)
+
+
+@router.get("/{study_id}/sensitivity", responses=REFUSED)
+async def tell_sensitivity(
+    job: TheJob, jobs: TheJobs, store: TheStore, pictures: ThePictures, of: str
+) -> dict[str, Any]:
+    """Tell which parameter matters for a number of the runs: indices of sensitivity.
+
+    Of `parameters` each has `first` and `total`, the share of the variance of `of` that it makes
+    alone, and with others, and how well they are known. A sample that does not bear it is refused
+    with the reason.
+    """
+    return await pictures.alone(_indices, job, jobs, store, of)
+
+
+def _indices(job: Job, jobs: Jobs, store: Store, of: str) -> dict[str, Any]:
+    """Return what `tell_sensitivity` tells."""
+    from studies import open_netcdf, sensitivity  # xarray takes half a second to import
+    from studies.views.sensitivity import told
+
+    with open_netcdf(Path(dataset(job, jobs, store).path)) as runs:
+        if (size := runs["status"].size) > MOST_FITTED:
+            allowed = f"at most {MOST_FITTED} are fitted here: fetch the data set, and fit it there"
+            raise StudyError("runs", size, allowed)
+        return told(sensitivity(runs, of))
 
 
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)

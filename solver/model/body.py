@@ -87,7 +87,7 @@ class Body:
         for boundary in self.supports:
             self.facets(boundary, "supports")
         for load in self.every_load:
-            load.check()
+            load.check(self.kinematics)
             for boundary in load.boundaries:
                 self.facets(boundary, load.name, outer=load.outside)
         for boundary, held in self.supports.items():

@@ -4,7 +4,7 @@ A kind of load is a subclass of `Load` that overrides some of its methods: a for
 force per volume, an eigenstrain, a stress present before loading, a prescribed displacement, or a
 loss of stiffness and strength. The solver uses only these methods; no other code knows the kinds.
 Values are those at load factor 1. The load factor at a time is that of the amplitude; without an
-amplitude it is the time itself.
+amplitude it is the time itself. A `Value` may vary in space.
 """
 
 from __future__ import annotations
@@ -12,17 +12,21 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from annotated_types import Interval, Unit
 from numpy.typing import NDArray
 
 from solver.errors import ModelError
 from solver.model.amplitude import Amplitude
+from solver.model.kinematics import Kinematics
 from solver.parts import Parts
 
 Array = NDArray[np.float64]
 Field = Callable[[Array], Array]
+Value = float | Field
+"""A number, or a function of position: (positions (2, n) [mm]) -> (n,)."""
 
 _ALWAYS = Amplitude.constant(1.0)
 
@@ -58,8 +62,9 @@ class Load:
         """The boundaries of the body that it acts on."""
         return ()
 
-    def check(self) -> None:
-        """Raise `ModelError` for a value that is not allowed."""
+    def check(self, kinematics: Kinematics) -> None:
+        """Raise `ModelError` for a value that is not allowed in a body of these kinematics."""
+        del kinematics
 
     def push(self, x: Array, along: Array) -> Array | None:
         """Return the forces (2, n) on pieces of its boundaries, per depth of the body [N/mm].
@@ -120,16 +125,17 @@ class BoundaryLoad(Load):
 class Pressure(BoundaryLoad):
     """A pressure on a boundary, positive when it pushes: ``value`` [MPa]."""
 
-    value: float
+    value: Value
 
-    def check(self) -> None:
+    def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a pressure that is not finite."""
+        del kinematics
         _finite(f"pressure.{self.boundary}", self.value, "MPa")
 
     def push(self, x: Array, along: Array) -> Array:
         """Return the forces (2, n) on pieces of the boundary [N/mm]."""
-        del x
-        return self.value * np.stack([-along[1], along[0]])
+        pressure = _values(f"pressure.{self.boundary}", self.value, x, "MPa")
+        return pressure * np.stack([-along[1], along[0]])
 
 
 @LOADS.word("traction")
@@ -137,18 +143,108 @@ class Pressure(BoundaryLoad):
 class Traction(BoundaryLoad):
     """A force per area on a boundary, in fixed directions: ``x`` and ``y`` [MPa]."""
 
-    x: float = 0.0
-    y: float = 0.0
+    x: Value = 0.0
+    y: Value = 0.0
 
-    def check(self) -> None:
+    def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a component that is not finite."""
+        del kinematics
         for axis in ("x", "y"):
             _finite(f"traction.{self.boundary}.{axis}", getattr(self, axis), "MPa")
 
     def push(self, x: Array, along: Array) -> Array:
         """Return the forces (2, n) on pieces of the boundary [N/mm]."""
-        del x
-        return np.array([[self.x], [self.y]]) * np.linalg.norm(along, axis=0)
+        return _vector(f"traction.{self.boundary}", self, x, "MPa") * np.linalg.norm(along, axis=0)
+
+
+@LOADS.word("body_force")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BodyForce(Load):
+    """A force per volume in fixed directions: ``x`` and ``y`` [N/mm3]."""
+
+    x: Value = 0.0
+    y: Value = 0.0
+
+    def check(self, kinematics: Kinematics) -> None:
+        """Raise `ModelError` for a component that is not finite."""
+        del kinematics
+        for axis in ("x", "y"):
+            _finite(f"body_force.{axis}", getattr(self, axis), "N/mm3")
+
+    def body_force(self, x: Array) -> Array:
+        """Return the force per volume (2, n) at positions x [N/mm3]."""
+        return _vector("body_force", self, x, "N/mm3")
+
+
+Density = Annotated[float, Interval(gt=0.0), Unit("t/mm3")]
+
+
+@LOADS.word("gravity")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Gravity(Load):
+    """The weight of a body.
+
+    Attributes
+    ----------
+    density : mass per volume [t/mm3]; steel has 7.85e-9
+    x, y : acceleration of a falling body [mm/s2]
+    """
+
+    density: Density
+    x: float = 0.0
+    y: float = -9806.65
+
+    def check(self, kinematics: Kinematics) -> None:
+        """Raise `ModelError` for a number that is not allowed, or weight across the axis."""
+        _density("gravity", self.density)
+        for axis in ("x", "y"):
+            _finite(f"gravity.{axis}", getattr(self, axis), "mm/s2")
+        if kinematics == "axisymmetric" and self.x:
+            raise ModelError("gravity.x", self.x, "must be 0 in an axisymmetric body: x is radial")
+
+    def body_force(self, x: Array) -> Array:
+        """Return the force per volume (2, n) at positions x [N/mm3]."""
+        force = self.density * np.array([[self.x], [self.y]])
+        return np.broadcast_to(force, x.shape)
+
+
+@LOADS.word("centrifugal")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Centrifugal(Load):
+    """The centrifugal force of a body that rotates. The load factor multiplies the force.
+
+    Attributes
+    ----------
+    density : mass per volume [t/mm3]; steel has 7.85e-9
+    speed : angular speed at load factor 1 [rad/s]; half the force is there at 0.707 of the speed
+    axis : the direction of the axis of rotation, ``y`` or ``z``, normal to the plane; an
+        axisymmetric body rotates about its own axis
+    centre : a point of the axis [mm]
+    """
+
+    density: Density
+    speed: Annotated[float, Interval(ge=0.0), Unit("rad/s")]
+    axis: Literal["y", "z"] = "y"
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    def check(self, kinematics: Kinematics) -> None:
+        """Raise `ModelError` for a number that is not allowed, or another axis than its own."""
+        _density("centrifugal", self.density)
+        _finite("centrifugal.speed", self.speed, "rad/s")
+        for value in self.centre:
+            _finite("centrifugal.centre", value, "mm")
+        if kinematics == "axisymmetric" and (self.axis != "y" or self.centre[0]):
+            given = self.axis if self.axis != "y" else self.centre
+            name = "axis" if self.axis != "y" else "centre"
+            raise ModelError(
+                f"centrifugal.{name}", given, "an axisymmetric body rotates about x = 0: axis y"
+            )
+
+    def body_force(self, x: Array) -> Array:
+        """Return the force per volume (2, n) at positions x [N/mm3]."""
+        arm = x - np.reshape(self.centre, (2, 1))
+        across = np.array([[1.0], [self.axis == "z"]])
+        return self.density * self.speed**2 * across * arm
 
 
 @LOADS.word("displacement")
@@ -166,8 +262,9 @@ class Displacement(BoundaryLoad):
         given = enumerate((self.x, self.y))
         return {axis: value for axis, value in given if value is not None}
 
-    def check(self) -> None:
+    def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` if no component is given, or one is not finite."""
+        del kinematics
         if not self.components:
             raise ModelError(f"displacement.{self.boundary}", None, "must give x, y or both [mm]")
         for axis, value in self.components.items():
@@ -181,28 +278,27 @@ class Temperature(Load):
 
     Attributes
     ----------
-    rise : a number, or a function (positions (2, n) [mm]) -> (n,) [K]
+    rise : the rise of temperature [K]
     expansion : coefficient of linear thermal expansion [1/K]
     modulus_drop, yield_drop : relative loss of Young's modulus and of the yield stress per kelvin
         [1/K]. Every slope of the tension curve decreases with Young's modulus
     """
 
-    rise: float | Field
+    rise: Value
     expansion: float
     modulus_drop: float = 0.0
     yield_drop: float = 0.0
 
-    def check(self) -> None:
+    def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a number that is not finite."""
+        del kinematics
         for name in ("expansion", "modulus_drop", "yield_drop"):
             _finite(f"temperature.{name}", getattr(self, name), "1/K")
-        if not callable(self.rise):
-            _finite("temperature.rise", self.rise, "K")
+        _finite("temperature.rise", self.rise, "K")
 
     def at(self, x: Array) -> Array:
         """Return the rise of temperature (n,) at positions (2, n) [K]."""
-        rise = self.rise(x) if callable(self.rise) else self.rise
-        return checked("temperature.rise", rise, (x.shape[1],), "K")
+        return _values("temperature.rise", self.rise, x, "K")
 
     def eigenstrain(self, x: Array) -> Array:
         """Return the thermal strain xx, yy, zz, xy (4, n) at positions (2, n)."""
@@ -228,14 +324,14 @@ class InitialStress(Load):
 
     Attributes
     ----------
-    xx, yy, zz, xy : components of a uniform stress [MPa]
+    xx, yy, zz, xy : components [MPa]
     stress : in place of them, a function (positions (2, n) [mm]) -> xx, yy, zz, xy (4, n) [MPa]
     """
 
-    xx: float = 0.0
-    yy: float = 0.0
-    zz: float = 0.0
-    xy: float = 0.0
+    xx: Value = 0.0
+    yy: Value = 0.0
+    zz: Value = 0.0
+    xy: Value = 0.0
     stress: Field | None = None
     amplitude: Amplitude | None = _ALWAYS
     varies: ClassVar[bool] = False
@@ -270,28 +366,50 @@ class InitialStress(Load):
 
         return cls(stress=between)
 
-    def check(self) -> None:
-        """Raise `ModelError` if the stress is neither uniform nor a function of position."""
-        even = {name: getattr(self, name) for name in ("xx", "yy", "zz", "xy")}
-        for name, value in even.items():
+    def check(self, kinematics: Kinematics) -> None:
+        """Raise `ModelError` if the stress is neither components nor a function of position."""
+        del kinematics
+        each = {name: getattr(self, name) for name in ("xx", "yy", "zz", "xy")}
+        for name, value in each.items():
             _finite(f"initial_stress.{name}", value, "MPa")
         if self.stress is not None and not callable(self.stress):
             raise ModelError("initial_stress.stress", self.stress, "must be a function of position")
-        if self.stress is not None and any(even.values()):
-            raise ModelError("initial_stress", even, "must not be given beside a function, stress")
+        if self.stress is not None and any(each.values()):
+            raise ModelError("initial_stress", each, "must not be given beside a function, stress")
         if self.amplitude is not _ALWAYS:
             raise ModelError("initial_stress.amplitude", self.amplitude, "must not be given")
 
     def initial_stress(self, x: Array) -> Array:
         """Return xx, yy, zz, xy (4, n) at positions (2, n) [MPa]."""
-        even = np.array([[self.xx], [self.yy], [self.zz], [self.xy]])
-        stress = even if self.stress is None else self.stress(x)
-        return checked("initial_stress.stress", stress, (4, x.shape[1]), "MPa")
+        if self.stress is not None:
+            return checked("initial_stress.stress", self.stress(x), (4, x.shape[1]), "MPa")
+        each = {name: getattr(self, name) for name in ("xx", "yy", "zz", "xy")}
+        return np.stack([_values(f"initial_stress.{n}", v, x, "MPa") for n, v in each.items()])
 
 
 def _finite(field: str, value: object, unit: str) -> None:
+    """Raise `ModelError` for a number that is not finite; functions are checked at the points."""
+    if callable(value):
+        return
     if not isinstance(value, int | float | np.number) or not np.isfinite(float(value)):
         raise ModelError(field, value, f"must be finite [{unit}]")
+
+
+def _density(load: str, value: float) -> None:
+    _finite(f"{load}.density", value, "t/mm3")
+    if not value > 0:
+        raise ModelError(f"{load}.density", value, "must be > 0 [t/mm3]")
+
+
+def _vector(field: str, load: Traction | BodyForce, x: Array, unit: str) -> Array:
+    """Return the components x and y of a load (2, n) at positions x."""
+    each = {axis: getattr(load, axis) for axis in ("x", "y")}
+    return np.stack([_values(f"{field}.{axis}", v, x, unit) for axis, v in each.items()])
+
+
+def _values(field: str, value: Value, x: Array, unit: str) -> Array:
+    """Return a number or a function of position at positions x (n,), or raise `ModelError`."""
+    return checked(field, value(x) if callable(value) else value, (x.shape[1],), unit)
 
 
 def checked(field: str, value: object, shape: tuple[int, ...], unit: str) -> Array:

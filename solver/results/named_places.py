@@ -60,6 +60,7 @@ def at_named_places(run: FinishedRun, places: NamedPlaces, times: Sequence[float
         out |= over_increments(run.outcome.history, times, system.all_names, places.contacts)
     for number in places.numbers:
         k = run.view.stages.index(number.stage)
+        before = states[run.view.stages.index(number.minus)] if number.minus else None
         acting = {name: of[k] for name, of in zip(names, results, strict=True)}
-        out |= number.values(fields, states[k], places.lines, acting)
+        out |= number.values(fields, states[k], places.lines, acting, before)
     return out

@@ -51,6 +51,7 @@ class RequestedNumber:
     take : ``maximum``, ``minimum``, ``integral`` along a line or contact, or ``extent``, the length
         along which the value is above zero; for ``pressure`` it is the length of contact
     stage : name of the state
+    minus : name of a state whose values are taken off; empty for none. Not of a contact
     body, line, contact : name of the place; exactly one of the three
     x, y, z : ranges of a box in the body to which the number is restricted [mm]
     description : meaning in words
@@ -60,6 +61,7 @@ class RequestedNumber:
     of: str
     take: Take = "maximum"
     stage: str
+    minus: str = ""
     body: str | None = None
     line: str | None = None
     contact: str | None = None
@@ -74,7 +76,8 @@ class RequestedNumber:
         places = {"body": self.body, "line": self.line, "contact": self.contact}
         where = next(f"{kind} {name}" for kind, name in places.items() if name is not None)
         what = self.of.replace(".", " ").replace("_", " ")
-        usual = f"{self.take} of {what} of {where}, stage {self.stage}"
+        when = f"{self.stage} minus {self.minus}" if self.minus else self.stage
+        usual = f"{self.take} of {what} of {where}, stage {when}"
         units = _UNITS[self.of.partition(".")[0]]
         units = {"extent": "mm", "integral": f"{units} mm".removeprefix("1 ")}.get(self.take, units)
         number = Quantity(name=self.name, long_name=self.description or usual, units=units)
@@ -93,6 +96,7 @@ class RequestedNumber:
         at: Solved,
         lines: Mapping[str, Places],
         contacts: Mapping[str, ContactResult],
+        before: Solved | None = None,
     ) -> Values:
         """Return the number of a run, with its position if it has one; NaN if the field is unknown.
 
@@ -101,6 +105,7 @@ class RequestedNumber:
         at : the state at its stage
         lines : lines by name
         contacts : results of the contact pairs in that state, by name
+        before : the state whose values are taken off, if any
 
         Raises
         ------
@@ -110,7 +115,10 @@ class RequestedNumber:
         if self.contact is not None and (self.of, self.take) == ("pressure", "extent"):
             found: tuple[float, ...] = (contacts[self.contact].length,)
         else:
-            found = self._found(*self._sought(fields, at, lines, contacts))
+            values, X = self._sought(fields, at, lines, contacts)
+            if before is not None:
+                values = values - self._sought(fields, before, lines, contacts)[0]
+            found = self._found(values, X)
         return dict(zip(self.quantities, found, strict=False))
 
     def _found(self, values: Array, X: Array) -> tuple[float, ...]:

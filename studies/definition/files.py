@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +17,20 @@ _MAY_NAME_FILES, _OF_POINTS = ("parameters", "points", "sweep"), (".csv", ".txt"
 _DECIMAL_COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
 
-def read_study(path: Path | str) -> dict[str, Any]:
+def read_study(path: Path | str, measured: Sequence[Path] = ()) -> dict[str, Any]:
     """Return the tables of a study file.
 
     ``[points] file = "tests.csv"`` names a table beside the study, and so does an axis of the sweep
     that has this entry: see `read_table`. A value of a parameter that ends in ``.csv`` or ``.txt``
     names the points of a curve, one with the ending of a mesh file (`FORMATS`) the mesh of a
-    section. What is in the files takes their place, so that the content of a study needs no other
-    file.
+    section. ``[fit] measured`` names tables of measured lines. The study that this one ``extends``
+    may be a file. What is in the files takes their
+    place, so that the content of a study needs no other file.
+
+    Parameters
+    ----------
+    path : of the study
+    measured : tables of measured lines, in place of those that a fit names
 
     Raises
     ------
@@ -37,6 +44,21 @@ def read_study(path: Path | str) -> dict[str, Any]:
     if isinstance(sweep := tables.get("sweep"), dict):
         for name in sweep:
             sweep[name] = _with_table(sweep[name], f"sweep.{name}", folder)
+    if measured and not isinstance(tables.setdefault("fit", {}), dict):
+        raise StudyError("fit", tables["fit"], "must be a table")
+    if isinstance(fit := tables.get("fit"), dict):
+        if measured:
+            fit["measured"] = [{"rows": read_table(each, "--measured")} for each in measured]
+        elif "measured" in fit:
+            lines = fit["measured"] if isinstance(fit["measured"], list) else [fit["measured"]]
+            fit["measured"] = [
+                _with_rows(each, f"fit.measured[{k}]", folder) for k, each in enumerate(lines)
+            ]
+    before = tables.get("extends")
+    if isinstance(before, str) and before.endswith(".toml"):
+        tables["extends"] = theirs = read_study(folder / before)
+        if str(theirs.get("scene", "")).endswith(".toml"):
+            theirs["scene"] = str(Path(before).parent / theirs["scene"])
     for table in _MAY_NAME_FILES:
         if table in tables:
             tables[table] = _with_files(tables[table], table, folder)
@@ -50,6 +72,15 @@ def _with_table(axis: Any, field: str, folder: Path) -> Any:
     for key in axis.keys() - {"file"}:
         raise StudyError(f"{field}.{key}", axis[key], "must be in the file, or left out")
     return read_table(folder / axis["file"], f"{field}.file")
+
+
+def _with_rows(line: Any, field: str, folder: Path) -> Any:
+    """Return a measured line with the rows of its file, if it names one."""
+    given = {"file": line} if isinstance(line, str) else line
+    if not isinstance(given, dict) or not isinstance(given.get("file"), str):
+        return line
+    rest = {key: value for key, value in given.items() if key != "file"}
+    return rest | {"rows": read_table(folder / given["file"], field)}
 
 
 def read_table(path: Path | str, field: str) -> list[dict[str, str]]:

@@ -24,16 +24,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from solver.errors import ModelError
 from solver.parameters import is_number
-from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
-from studies.definition.expansion import Expansion
-from studies.definition.parameters import Parameter, build, parameters_of
+from studies.definition.parameters import Parameter, parameters_of
+from studies.definition.quantity import number_of_a_run
 from studies.definition.spaced import rounded
-from studies.definition.sweep import Axes
-from studies.definition.vocabulary import KEEP, SOLVED
-from studies.errors import StudyError, nearest, one_of
+from studies.definition.vocabulary import NO_EQUILIBRIUM, SOLVED
+from studies.errors import StudyError, one_of
 
 FOUND: Mapping[str, Mapping[str, Any]] = {
     "first_yield": {"of": "max_plastic_strain", "first_above": 0.0},
@@ -41,9 +38,6 @@ FOUND: Mapping[str, Mapping[str, Any]] = {
     "shakedown_limit": {"of": "shakedown_state", "first_above": "elastic_shakedown"},
 }
 """Goals that have a name, ``find``."""
-
-NO_EQUILIBRIUM = ("limit_load", "not_converged")
-"""Statuses of runs that are beyond every goal."""
 
 _EQUILIBRIUM = (*SOLVED, "audit_failed")
 """Statuses of runs that are before the limit load, also where their numbers are not good enough."""
@@ -53,9 +47,6 @@ FAILED, REFUSED = "failed", "refused"
 """Reasons for the end of a search, besides `NO_EQUILIBRIUM`: the number passed the threshold; not
 even the last value is beyond; the first value is beyond; a run has no number; the scene refuses a
 value inside the bracket."""
-
-STOPPED = "stopped before its end"
-"""Message of a search that has not ended."""
 
 _KEYS = ("parameter", "find", "of", "at", "first_above", "first_below", "within", "between")
 _KINDS = ("at", "first_above", "first_below")
@@ -268,9 +259,30 @@ class Search:
         while not self.reason and self._round_ends():
             self.rounds += 1
 
-    def refuse(self, value: float, refusal: str) -> None:
-        """End the search, because the scene refuses a value that it wants."""
+    def refuse(self, value: float, refusal: str) -> bool:
+        """End the search, because the scene refuses a value, if it wants no other one before."""
+        if value != self.wants[0]:
+            return False
         self.high, self.reason, self.refusal = value, REFUSED, refusal
+        return True
+
+    def sets(self, value: float) -> dict[str, Any]:
+        """Return the parameter that a run sets."""
+        return {self.goal.parameter: value}
+
+    def key(self, parameters: Mapping[str, Any]) -> Any:
+        """Return the value of a run with these parameters."""
+        return parameters[self.goal.parameter]
+
+    @property
+    def decided(self) -> tuple[str, ...]:
+        """Statuses without results that are not computed again."""
+        return NO_EQUILIBRIUM if self.goal.of else (*NO_EQUILIBRIUM, *_EQUILIBRIUM)
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether one loading path serves it to its end."""
+        return self.goal.goes_on
 
     @property
     def found(self) -> float:
@@ -290,6 +302,11 @@ class Search:
     def progress(self) -> float:
         """Share of the longest possible search that is done."""
         return 1.0 if self.reason else self.rounds / self.goal.most[0]
+
+    @property
+    def told(self) -> str:
+        """The round, and the largest number of rounds, as text."""
+        return f"round {self.rounds + 1} of at most {self.goal.most[0]}"
 
     @property
     def limit(self) -> PathLimit:
@@ -354,56 +371,6 @@ class Search:
         return self.goal.inside(self.low, self.high, [x])
 
 
-@dataclass(slots=True, kw_only=True)
-class Place:
-    """One place of the axes of a study: its search, and the runs that this asks for.
-
-    Attributes
-    ----------
-    scene, fixed : the scene, and the parameters of all runs here, as JSON values
-    search : the search
-    keep : what is kept in addition to the results of the scene
-    resume, since : as in `studies.run_study`: which failed runs are taken as they are
-    """
-
-    scene: Scene
-    fixed: Mapping[str, Any]
-    search: Search
-    keep: str = ""
-    resume: bool = False
-    since: int = 0
-
-    def runs(self, values: list[float]) -> Expansion:
-        """Return the runs of values of the parameter."""
-        axes: Axes = {self.search.goal.parameter: list(values)}
-        return Expansion(self.scene, self.fixed, axes)
-
-    def refusal(self, value: float) -> str:
-        """Return what the scene says of a value that it refuses; empty if it accepts it."""
-        (case,) = self.runs([value]).cases()
-        try:
-            build(case.scene, case.values)
-        except ModelError as error:
-            return str(error)
-        return ""
-
-    def stands(self, row: Mapping[str, Any]) -> bool:
-        """Whether a run in the store is taken as it is."""
-        if row["status"] in SOLVED:
-            return self.keep in ("", row[KEEP])
-        decided = NO_EQUILIBRIUM if self.search.goal.of else (*NO_EQUILIBRIUM, *_EQUILIBRIUM)
-        failed = self.resume and row["modified"] >= self.since
-        return row["status"] in decided or failed
-
-    def hear(self, row: Mapping[str, Any]) -> bool:
-        """Tell the search of a run; return whether it had asked for it."""
-        value = row["parameters"][self.search.goal.parameter]
-        asked = value in self.search.wants
-        if asked:
-            self.search.tell(value, row)
-        return asked
-
-
 def checked_goal(content: Any, scene: Scene) -> Goal:
     """Return the goal that a study asks for.
 
@@ -465,13 +432,7 @@ def _ends(content: Any, parameter: Parameter) -> tuple[float, float]:
 
 def _threshold(field_: str, value: Any, of: Any, scene: Scene) -> float:
     """Return the threshold of a number; of flags it may be a word."""
-    quantities = QUANTITIES | {each.name: each for each in scene.quantities}
-    quantity = quantities.get(of) if isinstance(of, str) else None
-    if quantity is None or quantity.dims:
-        what = "is no variable" if quantity is None else f"is over {', '.join(quantity.dims)}"
-        numbers = [name for name, each in quantities.items() if not each.dims]
-        allowed = f"{what}: must be a variable with one number a run{nearest(of, numbers)}"
-        raise StudyError("goal.of", of, allowed)
+    quantity = number_of_a_run("goal.of", of, scene)
     if isinstance(value, str) and quantity.flags is not None:
         words = {each.name.lower(): float(each) for each in quantity.flags}
         if value not in words:

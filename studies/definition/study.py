@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -20,12 +20,15 @@ from pydantic import (
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
+from studies.definition.extending import EXTENDS, SCHEMA, Extended, extended
 from studies.definition.files import read_study
+from studies.definition.fit import Fit, checked_fit
 from studies.definition.goal import Goal, checked_goal
 from studies.definition.identity import content_id
 from studies.definition.labels import checked_labels
 from studies.definition.parameters import build, parameters_of
-from studies.definition.points import ENTRIES, POINT, described, with_points
+from studies.definition.points import ENTRIES, POINT, SCHEMAS, Points, with_points
+from studies.definition.refine import Refine, checked_refine
 from studies.definition.sweep import (
     Axes,
     checked_axes,
@@ -38,6 +41,19 @@ from studies.definition.sweep import (
 from studies.definition.vocabulary import taken
 from studies.errors import StudyError, one_of
 from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
+
+Kept = Callable[[str], Mapping[str, Any] | None]
+"""Returns the content of a study that is known by its name or its id; None if there is none."""
+
+
+def _none(name: str) -> None:
+    """Know no study."""
+    return
+
+
+def _described(schema: dict[str, Any]) -> None:
+    """Add entries that are not kept to the JSON Schema of a study."""
+    schema["properties"] |= SCHEMAS | {EXTENDS: SCHEMA}
 
 
 class Study(BaseModel):
@@ -59,9 +75,13 @@ class Study(BaseModel):
         includes what the scene allows
     goal : parameter, threshold and bracket of a value that is searched at each place of the axes
         (`studies.definition.goal`); empty if the runs are those of the axes
+    refine : numbers by which runs are chosen within the ranges of the axes, and how closely
+        (`studies.definition.refine`); empty if the runs are those of the axes
+    fit : measured lines, and bounds of the parameters with which runs come closest to them
+        (`studies.definition.fit`); empty if the runs are those of the axes
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=described)
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_described)
 
     name: str
     scene: str
@@ -72,20 +92,41 @@ class Study(BaseModel):
     keep: Literal["", "fields"] = ""
     allow: list[Literal["large_strain"]] = Field(default_factory=list)
     goal: dict[str, Any] = Field(default_factory=dict)
+    refine: dict[str, Any] = Field(default_factory=dict)
+    fit: dict[str, Any] = Field(default_factory=dict)
     _problem: Scene = PrivateAttr()
 
     @classmethod
-    def from_toml(cls, path: Path | str) -> Self:
+    def from_toml(
+        cls,
+        path: Path | str,
+        measured: Sequence[Path] = (),
+        studies: Kept = _none,
+        scenes: Find = nothing,
+    ) -> Self:
         """Read a study file; the scene may be a file beside it: ``scene = "pin.toml"``.
 
-        So may be the points of a curve: ``wheel_profile = "worn.csv"``.
+        So may be the points of a curve: ``wheel_profile = "worn.csv"``; and the study that it
+        extends: ``extends = "before.toml"``.
+
+        Parameters
+        ----------
+        path : the file
+        measured : files of the lines of its fit
+        studies, scenes : find what the file names that is no file, such as a study of a store
         """
-        content = read_study(path)
-        return cls.from_dict(content, scenes=beside(Path(path).parent))
+        content, files = read_study(path, measured), beside(Path(path).parent)
+        return cls.from_dict(
+            content, scenes=lambda name: files(name) or scenes(name), studies=studies
+        )
 
     @classmethod
     def from_dict(
-        cls, content: Mapping[str, Any], scene: Scene | None = None, scenes: Find = nothing
+        cls,
+        content: Mapping[str, Any],
+        scene: Scene | None = None,
+        scenes: Find = nothing,
+        studies: Kept = _none,
     ) -> Self:
         """Check and normalise the content of a study file (or of its JSON equivalent).
 
@@ -96,14 +137,17 @@ class Study(BaseModel):
         content : name, scene, parameters and sweep
         scene : the user's own scene, in place of the name of a scene
         scenes : finds scenes that are neither built in nor installed
+        studies : finds the study that this one extends, such as `Store.definition`
         """
         if scene is not None:
             own = scene
             content, scenes = {**content, "scene": name_of(own)}, lambda name: own
-        return cls.known(content, scenes).checked()
+        return cls.known(content, scenes, studies).checked()
 
     @classmethod
-    def known(cls, content: Mapping[str, Any], scenes: Find = nothing) -> Self:
+    def known(
+        cls, content: Mapping[str, Any], scenes: Find = nothing, studies: Kept = _none
+    ) -> Self:
         """Return the study without checking its combinations; the rest is checked.
 
         Use it for content that `from_dict` has accepted before, and to get the size of a study
@@ -111,6 +155,8 @@ class Study(BaseModel):
         """
         if not isinstance(content, Mapping):
             raise StudyError("study", content, "must be a table with name, scene and sweep")
+        if EXTENDS in content:
+            content = cls._extended(content, scenes, studies)
         try:
             return cls.model_validate(dict(content), context={"scenes": scenes})
         except ValidationError as error:
@@ -121,6 +167,25 @@ class Study(BaseModel):
             field = ".".join(str(part) for part in first["loc"])
             raise StudyError(field, first["input"], first["msg"]) from None
 
+    @classmethod
+    def _extended(cls, content: Mapping[str, Any], scenes: Find, studies: Kept) -> dict[str, Any]:
+        """Return the content of a study that extends another one, in full."""
+        named = content[EXTENDS]
+        theirs = studies(named) if isinstance(named, str) else named
+        if not isinstance(theirs, Mapping):
+            allowed = "must be a study file, or name or id of a study of the output directory"
+            raise StudyError(EXTENDS, named, allowed)
+        base = cls.known(theirs, scenes, studies)
+        if base.asks and not base.goal:
+            raise StudyError(EXTENDS, base.name, "chooses its runs itself: extend another study")
+        own = content.get("scene", base.scene)
+        if own != base.scene and name_of(scene_named(own, scenes)) != base.scene:
+            allowed = f"must be that of {base.name}, which is extended, or left out"
+            raise StudyError("scene", own, allowed)
+        before = Extended(base.name, base.scene, base.parameters, base.sweep, base.goal, base.fixed)
+        full: dict[str, Any] = extended(content, before, parameters_of(base.problem))
+        return full
+
     def checked(self) -> Self:
         """Return the study after a check of all its combinations.
 
@@ -129,7 +194,10 @@ class Study(BaseModel):
         StudyError
             for the first combination that the scene refuses
         """
-        if self.asks is None:
+        if isinstance(self.asks, Fit):
+            Expansion(self.problem, self.parameters | self.asks.first, self.sweep).check()
+            return self
+        if not isinstance(self.asks, Goal):
             self.expansion.check()
             return self
         ends: Axes = {self.asks.parameter: list(self.asks.between)}
@@ -152,7 +220,11 @@ class Study(BaseModel):
         known = parameters_of(scene)
         fixed = checked_table("parameters", content.get("parameters", {}), known)
         axes = checked_axes(with_points(content, known), known)
-        if POINT in axes and scene.places and scene.places(build(scene, {})).points:
+        own_points = scene.places and scene.places(build(scene, {})).points
+        if "refine" in content and own_points:
+            allowed = "the runs of this scene have a dimension `point`, that of a refinement"
+            raise StudyError("refine", content["refine"], allowed)
+        if POINT in axes and own_points:
             allowed = (
                 "the runs of this scene have a dimension of this name, the points of the scene "
                 "file: give the points of the study another one, [sweep.NAME]"
@@ -181,6 +253,21 @@ class Study(BaseModel):
                     allowed = f"{name} is a variable of the answers of a goal: use another name"
                     raise StudyError(f"sweep.{axis}", f"{len(axes[axis])} values", allowed)
             own["goal"] = goal.content
+        if "refine" in content:
+            if "goal" in content:
+                allowed = "chooses the runs, and so does the goal: keep one"
+                raise StudyError("refine", content["refine"], allowed)
+            own["refine"] = checked_refine(content["refine"], scene, axes).content
+        if "fit" in content:
+            if others := own.keys() & {"goal", "refine"}:
+                allowed = f"chooses the runs, and so does {next(iter(others))}: keep one"
+                raise StudyError("fit", "a table", allowed)
+            fit = checked_fit(content["fit"], scene, axes)
+            for name in fit.free.keys() & {*fixed, *owners(axes)}:
+                where = "parameters" if name in fixed else f"sweep.{owners(axes)[name]}"
+                allowed = f"is what the fit searches: take it out of {where}"
+                raise StudyError(f"fit.ranges.{name}", content["fit"]["ranges"][name], allowed)
+            own["fit"] = fit.content
         return own | labels
 
     def model_post_init(self, context: Any) -> None:
@@ -193,13 +280,20 @@ class Study(BaseModel):
         return self._problem
 
     @cached_property
-    def asks(self) -> Goal | None:
-        """What is searched at each place of the axes, if the study has a goal."""
+    def asks(self) -> Goal | Refine | Fit | None:
+        """What chooses the runs by the outcomes of others: goals, a refinement, or a fit."""
+        if self.fit:
+            return checked_fit(self.fit, self.problem, self.sweep)
+        if self.refine:
+            return checked_refine(self.refine, self.problem, self.sweep)
         return checked_goal(self.goal, self.problem) if self.goal else None
 
     @cached_property
     def expansion(self) -> Expansion:
-        """The runs, built when they are requested; of a goal the places of the axes."""
+        """The runs, built when they are requested; of a goal the places of the axes.
+
+        Of a refinement they are corners of its cells.
+        """
         return Expansion(self.problem, self.parameters, self.sweep)
 
     @cached_property
@@ -216,14 +310,18 @@ class Study(BaseModel):
         }
         source = self.expansion.source
         labels = checked_labels(self.model_dump(include={"note", "tags", "keep", "allow"}))
-        beside = [each for each in (labels, self.goal) if each]
+        beside = [each for each in (labels, self.goal, self.refine, self.fit) if each]
         return content_id("study", self.name, self.scene, self.fixed, axes, source, *beside)
 
     @property
     def fixed(self) -> dict[str, Any]:
         """All parameters that are not swept, the scene's defaults included."""
         known = parameters_of(self.problem)
-        swept = owners(self.sweep) | ({self.asks.parameter: ""} if self.asks else {})
+        swept = {
+            *owners(self.sweep),
+            *([self.asks.parameter] if isinstance(self.asks, Goal) else []),
+            *(self.asks.free if isinstance(self.asks, Fit) else ()),
+        }
         defaults = {name: p.default for name, p in known.items() if name not in swept}
         return defaults | self.parameters
 
@@ -239,20 +337,27 @@ class Study(BaseModel):
 
     @property
     def size(self) -> int:
-        """Number of runs; of a study with a goal the largest possible one."""
+        """Number of runs; of a study that chooses them the largest possible one."""
+        if isinstance(self.asks, Refine | Fit):
+            return self.asks.most
         return self.expansion.size * (self.asks.most[1] if self.asks else 1)
+
+    def stage(self, ended: int = 0) -> str:
+        """Return how many of its searches have ended, as text; empty without a goal."""
+        return f"{ended} of {self.expansion.size} searches ended" if self.goal else ""
 
     def run_ids(self) -> Iterator[str]:
         """Yield the ids of the runs, in the order of `cases`, without building the cases.
 
-        Those of a study with a goal are not known: there are none.
+        Those of a study that chooses its runs are not known: there are none.
         """
         return iter(()) if self.asks else self.expansion.run_ids()
 
     def cases(self) -> Iterator[Case]:
         """Yield the runs of the study, the last axis fastest; none is kept in memory.
 
-        Those of a study with a goal have the default of its parameter: they tell the places.
+        Those of a study with a goal have the default of its parameter: they tell the places. Those
+        of a refinement are corners of its cells.
         """
         return self.expansion.cases()
 
@@ -268,6 +373,14 @@ class Study(BaseModel):
     def paths(self) -> Iterator[LoadingPath]:
         """Yield the loading paths of the study: the cases that one task computes together."""
         return self.expansion.paths()
+
+    def with_points(self, points: Points) -> Self:
+        """Return this study with other runs under its id: those that it has chosen."""
+        content = self.to_dict() | {"sweep": {POINT: points}}
+        del content["refine"]
+        chosen = self.known(content, lambda name: self.problem)
+        chosen.__dict__["id"] = self.id
+        return chosen
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `from_dict` reads."""

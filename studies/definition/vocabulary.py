@@ -18,6 +18,9 @@ SOLVED = tuple(status.name.lower() for status in Status if status.solved)
 LARGE_STRAIN = "large_strain"
 """Entry of ``allow`` in a study or a scene: runs outside small-strain theory count as ok."""
 
+NO_EQUILIBRIUM = ("limit_load", "not_converged")
+"""Statuses of runs without equilibrium, which another computation would not find."""
+
 ERROR = "error"
 MISSING = "missing"
 
@@ -39,3 +42,6 @@ LABEL_ATTRIBUTES: Mapping[str, Mapping[str, Any]] = {
     "status": {"long_name": "outcome of the run"},
     "message": {"long_name": "reason of the outcome"},
 }
+
+STOPPED = "stopped before its end"
+"""Message of a search that has not ended, and of a refinement."""

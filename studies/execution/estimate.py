@@ -15,8 +15,10 @@ from solver.errors import ModelError
 from solver.memory import most_kept
 from solver.scenes import Effort
 from studies.definition.cases import LoadingPath
+from studies.definition.fit import Fit
 from studies.definition.goal import Goal
 from studies.definition.parameters import build
+from studies.definition.refine import Refine
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK, SOLVED
 from studies.errors import StudyError
@@ -43,7 +45,9 @@ class Estimate:
     """The cost of a study. All numbers except `runs` are for the runs that the store lacks.
 
     Of a study with a goal they are the most that it may cost: the longest possible searches, with
-    every run as expensive as the one of the largest value.
+    every run as expensive as the one of the largest value. Of a refinement too: the largest number
+    of runs, each on a path of its own to the largest values of the axes; and of a fit, each
+    with the first values.
 
     Attributes
     ----------
@@ -252,8 +256,24 @@ def _asked(study: Study) -> Iterator[tuple[LoadingPath, list[Any]]]:
         yield path, [case.values.get(study.problem.branch) for case in path.cases]
 
 
-def _longest(study: Study, goal: Goal) -> Iterator[tuple[LoadingPath, list[Any]]]:
-    """Yield the loading paths of the longest possible searches, and their values."""
+def _longest(study: Study, asks: Goal | Refine | Fit) -> Iterator[tuple[LoadingPath, list[Any]]]:
+    """Yield the loading paths of the longest possible searches, or refinement, and their values."""
+    branch = study.problem.branch
+    if isinstance(asks, Refine):
+        last = {name: values[-1] for name, values in asks.axes.items()}
+        places = [case for case in study.cases() if case.values == {**case.values, **last}]
+        for place in itertools.islice(itertools.cycle(places), asks.most):
+            path = LoadingPath(place.id, build(study.problem, place.values), (place,))
+            yield path, [place.values.get(branch)]
+        return
+    if isinstance(asks, Fit):
+        for place in itertools.islice(itertools.cycle(list(study.cases())), asks.most):
+            path = LoadingPath(
+                place.id, build(study.problem, dict(place.values) | asks.first), (place,)
+            )
+            yield path, [place.values.get(branch)]
+        return
+    goal = asks
     rounds, runs = goal.most
     low, high = goal.between
     for place in study.cases():

@@ -1,39 +1,27 @@
-"""The runs that a study with a goal asks for, and what it finds.
-
-The searches at the places of the axes go on each by itself: as soon as the runs of one round are
-known, those of the next one are handed to the workers. A search along a path that goes on is the
-task of one worker, which asks for its runs itself.
-"""
+"""What a study with a goal finds: the data set of its answers."""
 
 from __future__ import annotations
 
-from collections import Counter, deque
-from collections.abc import Collection, Iterator, Mapping
-from copy import deepcopy
-from dataclasses import replace
-from itertools import takewhile
-from typing import Any, NamedTuple
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
 from studies.appearing import appearing
-from studies.definition.cases import Case, LoadingPath
-from studies.definition.goal import (
-    ALREADY,
-    FAILED,
-    NEVER,
-    NO_EQUILIBRIUM,
-    PASSED,
-    REFUSED,
-    STOPPED,
-    PathLimit,
-    Place,
-    Search,
-)
+from studies.definition.cases import Case
+from studies.definition.goal import ALREADY, FAILED, NEVER, PASSED, REFUSED, Search
 from studies.definition.identity import canonical
 from studies.definition.study import Study
-from studies.definition.sweep import owners
-from studies.definition.vocabulary import ERROR, MISSING, OK, SYMMETRIC
+from studies.definition.vocabulary import (
+    ERROR,
+    MISSING,
+    NO_EQUILIBRIUM,
+    OK,
+    STOPPED,
+    SYMMETRIC,
+)
+from studies.execution.asking import Asking
 from studies.storage import dataset as layout
 from studies.storage import runfile, seal
 from studies.storage.dataset import RunContent, Variable
@@ -46,158 +34,33 @@ from studies.storage.store import Store
 _NAME = "data set"
 
 
-class Goals:
-    """The searches of a study.
-
-    Parameters
-    ----------
-    study : a study with a goal
-    store : the runs that are there are not computed again
-    resume, since : as in `run_study`: which failed runs are taken as they are
-    """
-
-    def __init__(self, study: Study, store: Store, resume: bool = False, since: int = 0) -> None:
-        assert study.asks is not None
-        self._study, self._store = study, store
-        self.cases = list(study.cases())
-        swept = owners(study.sweep)
-        self.places = [
-            Place(
-                scene=study.problem,
-                fixed=study.parameters | {name: case.values[name] for name in swept},
-                search=Search(study.asks),
-                keep=study.keep,
-                resume=resume,
-                since=since,
-            )
-            for case in self.cases
-        ]
-        self._paths: dict[str, tuple[int, list[float]]] = {}
-        self._waits: list[set[float]] = [set() for _ in self.places]
-        self._ready: deque[Asked] = deque()
-        for number in range(len(self.places)):
-            self._go_on(number)
-
-    @property
-    def searches(self) -> list[Search]:
-        """The searches, in the order of the cases of the study."""
-        return [place.search for place in self.places]
-
-    @property
-    def ended(self) -> bool:
-        """Whether all searches have ended."""
-        return all(search.reason for search in self.searches)
-
-    @property
-    def progress(self) -> float:
-        """Share of all searches that is done, 0 to 1."""
-        return float(np.mean([search.progress for search in self.searches]))
-
-    def paths(self) -> Iterator[Asked | None]:
-        """Yield the loading paths that are asked for; None while all searches wait for runs."""
-        while not self.ended:
-            yield self._ready.popleft() if self._ready else None
-
-    def heard(self, path: str, row: Mapping[str, Any]) -> None:
-        """Tell the search of a loading path of the row of a run."""
-        number = self._paths[path][0]
-        place = self.places[number]
-        self._waits[number].discard(row["parameters"][place.search.goal.parameter])
-        if place.hear(row) and not place.search.goal.goes_on:
-            self._go_on(number)
-
-    def owed(self, path: str) -> Case | None:
-        """Return the run that a path which goes on has to compute next; None if it owes none.
-
-        Runs that it has stored are taken, also those of which it told nothing.
-        """
-        number = self._paths[path][0]
-        place = self.places[number]
-        wanted = self._lacking(number, ()) if place.search.goal.goes_on else []
-        if not wanted or place.refusal(wanted[0]):
-            return None
-        return next(place.runs(wanted[:1]).cases())
-
-    def closed(self, path: str) -> None:
-        """Ask again for runs of which a path that has ended told nothing."""
-        number, values = self._paths[path]
-        self._waits[number].difference_update(values)
-        self._go_on(number)
-
-    def about(self, path: str, row: Mapping[str, Any]) -> str:
-        """Return where a run is, and the round of its search, as text."""
-        number = self._paths[path][0]
-        search = self.places[number].search
-        name, value = search.goal.parameter, row["parameters"][search.goal.parameter]
-        at = [f"{axis} = {each}" for axis, each in self._study.place(self.cases[number]).items()]
-        rounds = f"round {search.rounds + 1} of at most {search.goal.most[0]}"
-        return ", ".join([*at, f"{name} = {value:.6g}"]) + f" ({rounds})"
-
-    def _go_on(self, number: int) -> None:
-        """Take the runs of a search that are in the store, and ask for those that are not."""
-        place, waits = self.places[number], self._waits[number]
-        lacking = self._lacking(number, waits)
-        wanted = list(takewhile(lambda value: not place.refusal(value), lacking))
-        if wanted:
-            waits.update(wanted)
-            for path in place.runs(wanted).paths():
-                # rounds share the id of a path, and one may begin before the last has ended
-                own = replace(path, id=path.cases[0].id)
-                name = place.search.goal.parameter
-                self._paths[own.id] = number, [case.values[name] for case in own.cases]
-                self._ready.append(_asked(own, place))
-        elif lacking and lacking[0] == place.search.wants[0]:
-            place.search.refuse(lacking[0], place.refusal(lacking[0]))
-
-    def _lacking(self, number: int, waits: Collection[float]) -> list[float]:
-        """Take the runs of a search that are in the store; return the values of the others."""
-        place = self.places[number]
-        while wanted := [value for value in place.search.wants if value not in waits]:
-            runs = place.runs(wanted)
-            rows = self._store.sound([case.id for case in runs.cases()])
-            stand = [rows[case.id] for case in runs.cases() if case.id in rows]
-            if not sum(place.hear(row) for row in stand if place.stands(row)):
-                return wanted
-        return []
-
-
-class Asked(NamedTuple):
-    """A loading path that a search asks for.
-
-    Either ``limit`` tells its last run, or it goes on, for as long as ``place`` asks for runs.
-    """
-
-    path: LoadingPath
-    limit: PathLimit | None
-    place: Place | None
-
-
-def _asked(path: LoadingPath, place: Place) -> Asked:
-    if place.search.goal.goes_on:
-        own = replace(place, search=deepcopy(place.search))
-        return Asked(replace(path, cases=()), None, own)
-    return Asked(path, place.search.limit, None)
-
-
-def answers(study: Study, store: Store, goals: Goals) -> Combined:
+def answers(study: Study, store: Store, asking: Asking) -> Combined:
     """Write the data set of a study with a goal, unless there is one with the same answers."""
-    path, made = store.dataset_path(study.id), Made(study, store)
-    outcomes = [_outcome(study, search) for search in goals.searches]
-    runs = [[search.reason, list(search.rows.values())] for search in goals.searches]
+    searches = [place.program for place in asking.places]
+    outcomes = [_outcome(study, search) for search in searches]
+    runs = [[search.reason, list(search.rows.values())] for search in searches]
     of = canonical([outcomes, runs])
     counts = Counter(status for status, _ in outcomes)
     failed = [
         (_run(search, search.high), *outcome)
-        for search, outcome in zip(goals.searches, outcomes, strict=True)
+        for search, outcome in zip(searches, outcomes, strict=True)
         if outcome[0] != OK
     ]
-    anew = made.kept(_NAME, of) is None
-    if anew:
-        content = runfile.packed(_content(study, goals, outcomes))
-        with needs_room(store.directory), appearing(path) as part:
-            part.write_bytes(seal.sealed(f"dataset {study.id}", content))
-        made.note(_NAME, of, [path.name])
+    anew = written(study, store, of, lambda: _content(study, searches, outcomes))
+    path = store.dataset_path(study.id)
     return Combined(path=path, counts=dict(counts), failed=failed, missing=(), anew=anew)
+
+
+def written(study: Study, store: Store, of: str, content: Callable[[], RunContent]) -> bool:
+    """Write a data set of answers, unless there is one made of the same, ``of``; tell whether."""
+    path, made = store.dataset_path(study.id), Made(study, store)
+    if made.kept(_NAME, of):
+        return False
+    packed = runfile.packed(content())
+    with needs_room(store.directory), appearing(path) as part:
+        part.write_bytes(seal.sealed(f"dataset {study.id}", packed))
+    made.note(_NAME, of, [path.name])
+    return True
 
 
 def _outcome(study: Study, search: Search) -> tuple[str, str]:
@@ -242,7 +105,7 @@ def _run(search: Search, value: float) -> str:
     return str(search.rows[value]["id"]) if value in search.rows else ""
 
 
-def _content(study: Study, goals: Goals, outcomes: list[tuple[str, str]]) -> RunContent:
+def _content(study: Study, found: list[Search], outcomes: list[tuple[str, str]]) -> RunContent:
     """Return the content of the data set of the answers.
 
     Its dimensions are those that a data set of the runs would have, without the parameter that was
@@ -250,17 +113,17 @@ def _content(study: Study, goals: Goals, outcomes: list[tuple[str, str]]) -> Run
     """
     from studies.storage.frame import axis_variables  # h5netcdf: a complete study needs it not
 
-    scene, goal = study.problem, goals.searches[0].goal
+    scene, goal, cases = study.problem, found[0].goal, list(study.cases())
     name, linked = goal.parameter, study.linked
     usual = [each for each in layout.usual_dimensions(scene) if each not in {name, *linked}]
-    first = goals.cases[0].values
+    first = cases[0].values
     axes = {each: [first[each]] for each in usual} | study.axes
     shape = tuple(map(len, axes.values()))
     beside = {"coordinates": " ".join(linked)} if linked else {}
-    attributes = layout.axis_attributes(scene, name)
-    unit = {key: attributes[key] for key in attributes.keys() & {"units"}}
-    order = _order(study, goals.cases, list(axes), shape)
-    searches = [goals.searches[k] for k in order]
+    words = layout.axis_attributes(scene, name)
+    unit = {key: words[key] for key in words.keys() & {"units"}}
+    order = _order(study, cases, list(axes), shape)
+    searches = [found[k] for k in order]
     variables: dict[str, Variable] = axis_variables(scene, axes, linked)
 
     def add(key: str, values: list[Any], kind: Any, attrs: Mapping[str, Any]) -> None:
@@ -282,10 +145,15 @@ def _content(study: Study, goals: Goals, outcomes: list[tuple[str, str]]) -> Run
         words = {"long_name": f"id of the run at the {end} end"}
         add(f"run_{end}", [_run(each, getattr(each, end)) for each in searches], object, words)
     variables |= _tried(searches, tuple(axes), shape, {**unit, **beside})
-    attrs = provenance(study.name, scene, study.fixed) | {"goal": canonical(study.goal)}
+    return RunContent(variables, attributes(study, "goal"))
+
+
+def attributes(study: Study, entry: str) -> dict[str, Any]:
+    """Return the attributes of a data set of answers, with an entry of the study as text."""
+    attrs = provenance(study.name, study.problem, study.fixed)
     words = {"note": study.note, "tags": " ".join(study.tags)}
     attrs |= {key: text for key, text in words.items() if text}
-    return RunContent(variables, {**attrs, "id": study.id, SYMMETRIC: 0})
+    return {**attrs, entry: canonical(getattr(study, entry)), "id": study.id, SYMMETRIC: 0}
 
 
 def _tried(

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
+from solver.memory import bytes_in
 from studies.errors import StudyError
-
-_SIZE = re.compile(r"[1-9]\d*(\.\d+)? ?[kMGT]i?B")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,7 +16,8 @@ class Limits:
     ----------
     stall_seconds : longest time of a loading path without progress on a worker [s]; after it its
         runs are stored as ``error`` and the worker is replaced
-    path_seconds : longest total time of a loading path on a worker [s], with the same consequence
+    path_seconds : longest total time of a loading path on a worker, or of each run of a search [s],
+        with the same consequence
     memory : largest memory of each worker process started here, such as ``"2GB"``; by default its
         share of the machine's. A worker that needs more is killed and replaced
     patience : longest time to wait for a worker [s]; after it `GridLost` is raised
@@ -39,5 +38,5 @@ class Limits:
             value = getattr(self, name)
             if value is not None and not value > 0.0:
                 raise StudyError(name, value, "must be greater than 0")
-        if self.memory is not None and not _SIZE.fullmatch(self.memory):
+        if self.memory is not None and not bytes_in(self.memory):
             raise StudyError("memory", self.memory, "must be a size such as 500MB or 2GB")

@@ -20,12 +20,15 @@ from studies.definition.identity import solver_hash
 from studies.definition.study import Study
 from studies.definition.vocabulary import KEEP, OK, SOLVED
 from studies.errors import StoreFull, StudyError, Unusable
+from studies.execution.asking import Asking
 from studies.execution.bundles import Bundle, bundles
+from studies.execution.calibrated import calibrated
 from studies.execution.cluster import Access, connect, own_workers
 from studies.execution.estimate import memory_needed
-from studies.execution.goals import Goals, answers
+from studies.execution.goals import answers
 from studies.execution.limits import Limits
 from studies.execution.proof import Proof, proof_of
+from studies.execution.refined import refined
 from studies.execution.result import result
 from studies.execution.task import PathTask, walk
 from studies.execution.watch import Waiting
@@ -58,7 +61,8 @@ class StudyEvent:
     path : id of the path; empty while waiting
     fraction : fraction of this path that is done, 0 to 1
     run, status, message : id, status and message of the run, or the reason of waiting
-    place : of a study with a goal, where the run is and the round of its search
+    place : of a study that chooses its runs, where the run is and the round of what asked for it
+    stage : of a study with a goal, how many of its searches have ended
     """
 
     kind: str
@@ -69,6 +73,7 @@ class StudyEvent:
     status: str = ""
     message: str = ""
     place: str = ""
+    stage: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,6 +86,8 @@ class StudyOutcome:
     counts : number of runs by status in the data set, with ``missing``
     failed : (run id, status, message) of every run that is neither ``ok`` nor ``missing``
     computed : ids of the runs computed this time
+    asked, stage : of a study with a goal, ids of the runs that its searches have asked for, and
+        how many of these have ended
     dataset : the combined data set
     anew : whether the data set was written; it is kept if it was made of the same runs
     wall_seconds : duration
@@ -91,6 +98,8 @@ class StudyOutcome:
     counts: Mapping[str, int]
     failed: Sequence[tuple[str, str, str]]
     computed: Sequence[str]
+    asked: Sequence[str]
+    stage: str
     dataset: Path
     anew: bool
     wall_seconds: float
@@ -169,7 +178,7 @@ def run_study(
         _answering(access)
     with store.writing():
         store.save_study(study)
-        goals = Goals(study, store, resume, since) if study.asks else None
+        asking = Asking(study, store, resume, since) if study.asks else None
         wanted: set[str] = set()
         ids = study.run_ids()
         while some := list(islice(ids, _BATCH)):
@@ -180,13 +189,19 @@ def run_study(
                 if (solved and kept) or (not solved and resume and row["modified"] >= since):
                     wanted.discard(run_id)
         emit = on_event or (lambda event: None)
-        work = _Work(study, store, wanted, limits, priority, emit, goals)
-        if wanted or (goals and not goals.ended):
+        work = _Work(study, store, wanted, limits, priority, emit, asking)
+        if wanted or (asking and not asking.ended):
             if shutil.disk_usage(store.directory).free < _ROOM:
                 raise StoreFull(str(store.directory))  # before any path is computed in vain
             work.compute(workers, access, stop)
-        if goals:
-            stopped, combined = not goals.ended, answers(study, store, goals)
+        if asking:
+            stopped, anew = not asking.ended, bool(work.computed)
+            if study.goal:
+                combined = answers(study, store, asking)
+            elif study.fit:
+                combined = calibrated(study, store, asking)
+            else:
+                combined = refined(study, store, asking, anew)
         else:
             stopped = stop_requested and bool(wanted - work.computed)
             combined = result(study, store, complete=not wanted, stopped=stopped)
@@ -195,6 +210,8 @@ def run_study(
         counts=combined.counts,
         failed=combined.failed,
         computed=sorted(work.computed),
+        asked=asking.asked if asking else (),
+        stage=asking.stage if asking else "",
         dataset=combined.path,
         anew=combined.anew,
         wall_seconds=time.monotonic() - started,
@@ -218,7 +235,8 @@ class _Work:
     limits: Limits
     priority: int
     emit: Callable[[StudyEvent], None]
-    goals: Goals | None = None
+    asking: Asking | None = None
+    begun: int = field(default_factory=time.time_ns)
     computed: set[str] = field(default_factory=set)
     _left: deque[PathTask] = field(default_factory=deque)
     _walked: int = 0
@@ -264,12 +282,12 @@ class _Work:
             raise Unusable("directory", directory, error.allowed)
 
     def _tasks(self, proof: Proof, workers: Callable[[], int]) -> Iterator[PathTask | None]:
-        if self.goals is None:
+        if self.asking is None:
             lacking = (path for path in map(self._rest, self.study.paths()) if path.cases)
             for paths in bundles(self.study.problem, lacking, workers):
                 yield self._task(proof, paths)
             return
-        for asked in self.goals.paths():
+        for asked in self.asking.paths():
             yield asked and replace(
                 self._task(proof, (asked.path,)), limit=asked.limit, place=asked.place
             )
@@ -306,16 +324,17 @@ class _Work:
             self.store.catalogue.put(fresh)
         for row in fresh:
             self.computed.add(row["id"])
-            place = self.goals.about(path, row) if self.goals else ""
-            if self.goals:
-                self.goals.heard(path, row)
+            place = self.asking.about(path, row) if self.asking else ""
+            if self.asking:
+                self.asking.heard(path, row)
             self._tell(
                 "run", path=path, run=row["id"], status=self.study.taken(row["status"]),
                 message=row["message"], place=place,
             )  # fmt: skip
 
     def _tell(self, kind: str, **content: Any) -> None:
-        self.emit(StudyEvent(kind=kind, progress=self._progress(), **content))
+        stage = self.asking.stage if self.asking else ""
+        self.emit(StudyEvent(kind=kind, progress=self._progress(), stage=stage, **content))
 
     def _close(self, task: PathTask, error: Exception | None, at_fault: str = "") -> None:
         """Record the runs of a task without a report.
@@ -324,7 +343,7 @@ class _Work:
         recorded as ``error``, and the paths behind it make a new task. If another path is at fault,
         that one was completed meanwhile, and no run is recorded as ``error``.
         """
-        stored = task.stored(self.store)
+        stored = task.stored(self.store, known=self.computed)
         for number, path in enumerate(task.paths):
             lacking = [case for case in path.cases if case.id not in self.computed]
             self._keep(path.id, [stored[case.id] for case in lacking if case.id in stored])
@@ -338,16 +357,17 @@ class _Work:
                     self._left.append(replace(task, paths=rest))
                 return
             self._walked += self._walking.pop(path.id)[0]
-            if self.goals:
-                owed = self.goals.owed(path.id) if error else None
+            if self.asking:
+                owed = self.asking.owed(path.id) if error else None
                 if owed is not None:
                     self._keep(path.id, [self.store.write_run(owed, str(error))])
-                self.goals.closed(path.id)
+                self.asking.closed(path.id)
+                self._keep(path.id, self.asking.stored(path.id, self.begun))
 
     def _progress(self) -> float:
         """Return the completed fraction of the study, including runs found in the store."""
-        if self.goals:
-            return self.goals.progress
+        if self.asking:
+            return self.asking.progress
         total = self.study.size
         walked = sum(cases * fraction for cases, fraction in self._walking.values())
         done = max(self._walked + walked, len(self.computed))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,10 @@ from solver.memory import release
 from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
-from studies.definition.goal import PathLimit, Place
+from studies.definition.goal import PathLimit, Search
 from studies.definition.identity import solver_hash
+from studies.definition.place import Place
+from studies.definition.study import Study
 from studies.errors import StoreFull, StudyError, without_folders
 from studies.execution.proof import Proof, Unfit
 from studies.storage.store import Store
@@ -57,7 +59,7 @@ class PathTask:
     proof: Proof | None = None
     stale: Mapping[str, int] = field(default_factory=dict)
     limit: PathLimit | None = None
-    place: Place | None = None
+    place: Place[Search] | None = None
 
     def __dask_tokenize__(self) -> tuple[Any, ...]:
         """Return an identity of this task, so that dask need not hash its content."""
@@ -69,9 +71,9 @@ class PathTask:
         """The cases of all paths."""
         return [case for path in self.paths for case in path.cases]
 
-    def stored(self, store: Store) -> dict[str, dict[str, Any]]:
-        """Return, by id, the rows of the runs that this task has stored."""
-        times = store.modified(case.id for case in self.cases)
+    def stored(self, store: Store, known: Container[str] = ()) -> dict[str, dict[str, Any]]:
+        """Return, by id, the rows of the runs that this task has stored, without those known."""
+        times = store.modified(case.id for case in self.cases if case.id not in known)
         fresh = [run_id for run_id, at in times.items() if at != self.stale.get(run_id)]
         return {run_id: row for run_id in fresh if (row := store.found(run_id))}
 
@@ -117,6 +119,22 @@ def walk(
                 release()
 
 
+def compute_here(study: Study, store: Store) -> None:
+    """Compute the runs of a small study in this process; nothing but the runs is stored.
+
+    Raises
+    ------
+    StoreBusy
+        when another process computes into the same store
+    """
+    with store.writing():
+        directory = store.directory.resolve()
+        for path in study.paths():
+            task = PathTask(study.problem, (path,), directory, solver_hash(), study.keep)
+            walk(task, lambda _: None, lambda: False)
+        store.sound(study.run_ids())
+
+
 def _walk(
     task: PathTask,
     path: LoadingPath,
@@ -126,10 +144,11 @@ def _walk(
     should_stop: Callable[[], bool],
 ) -> None:
     """Compute those runs of a loading path that are not stored; see `walk`."""
+    follows = {} if task.place is None else {"follows": True}  # the path of a search goes on
 
     def keep(row: dict[str, Any]) -> None:
         with contextlib.suppress(Exception):  # the file has the row too
-            report({"path": path.id, "row": row})
+            report({"path": path.id, "row": row, **follows})
 
     reported, since = -1.0, 0.0
 
@@ -189,13 +208,13 @@ def _walk(
 def _follow(
     task: PathTask,
     path: LoadingPath,
-    place: Place,
+    place: Place[Search],
     store: Store,
     keep: Callable[[dict[str, Any]], None],
     monitor: Callable[[float], None],
 ) -> None:
     """Compute the runs that a search asks for, one after the other, on one path; see `walk`."""
-    search, owed = place.search, deque[Case]()
+    search, owed = place.program, deque[Case]()
 
     def known(row: dict[str, Any]) -> None:
         place.hear(row)

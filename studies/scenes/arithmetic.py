@@ -3,19 +3,25 @@
 An expression has numbers, words (``'ball'``), parameters (``$name``), ``pi``, ``+ - * / ^``,
 parentheses and the functions of `FUNCTIONS`. Two numbers compared, ``"$gap < 2*$radius"``, or two
 words, ``"$yielding == 'ball'"``, are true or false; such conditions are joined by ``and``, ``or``
-and ``not``, and ``if(condition, one, other)`` chooses between two values. Python's own parser reads
-it; nothing else of Python is evaluated.
+and ``not``, and ``if(condition, one, other)`` chooses between two values. An expression with ``x``
+or ``y``, the position, is a `Field`: ``"$p*(1 - (x/$a)^2)"``. Python's own parser reads it; nothing
+else of Python is evaluated.
 """
 
 from __future__ import annotations
 
 import ast
+import copy
 import math
 import operator
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from solver.parameters import is_number
 
@@ -42,12 +48,27 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., float], int]] = {
 }
 """Name -> function and number of its arguments; angles are in radians."""
 
-_OPERATORS: Mapping[type[ast.AST], Callable[..., float]] = {
+_ON_FIELDS: Mapping[str, Callable[..., Any]] = {
+    name: getattr(np, {"min": "minimum", "max": "maximum"}.get(name, name)) for name in FUNCTIONS
+}
+"""The same functions for fields; a number that they do not have is nan or infinite."""
+
+POSITION = ("x", "y")
+"""Names of the coordinates [mm]."""
+
+
+def _power(base: Any, exponent: Any) -> Any:
+    """Return a power of floats: that of whole numbers could have any number of digits."""
+    fields = isinstance(base, np.ndarray) or isinstance(exponent, np.ndarray)
+    return np.float_power(base, exponent) if fields else math.pow(base, exponent)
+
+
+_OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
-    ast.Pow: math.pow,  # floats: a power of whole numbers could have any number of digits
+    ast.Pow: _power,
     ast.UAdd: operator.pos,
     ast.USub: operator.neg,
 }
@@ -73,6 +94,37 @@ class ExpressionError(ValueError):
     """An expression that has no value; the message says why."""
 
 
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A function of position (2, n) [mm] -> (n,), written as an expression of ``x`` and ``y``.
+
+    Attributes
+    ----------
+    text : the expression, without parameters
+
+    Raises
+    ------
+    ExpressionError
+        if the text cannot be read, or is no number
+    """
+
+    text: str
+
+    def __post_init__(self) -> None:
+        self(np.zeros((2, 1)))
+
+    def __call__(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values (n,) at positions (2, n)."""
+        with np.errstate(all="ignore"):  # what has no value somewhere is refused where it is used
+            try:
+                value = _operand(_read(self.text), dict(enumerate(x)))
+            except ExpressionError:
+                raise
+            except (ArithmeticError, ValueError) as error:
+                raise ExpressionError(f"has no value: {error}") from None
+        return np.broadcast_to(np.asarray(value, dtype=float), x.shape[1:])
+
+
 def is_expression(value: object) -> bool:
     """Tell whether a value of a table is an expression: a text with a ``$``."""
     return isinstance(value, str) and "$" in value
@@ -87,6 +139,7 @@ def evaluated(text: str, values: Mapping[str, Any]) -> Any:
     """Return the value of an expression: a number, a word, or true or false.
 
     The value of a text that is one parameter, such as ``"$hardening"``, is that of the parameter.
+    The value of an expression of the position is a text without parameters, which `Field` reads.
 
     Parameters
     ----------
@@ -102,7 +155,10 @@ def evaluated(text: str, values: Mapping[str, Any]) -> Any:
     if whole := _PARAMETER.fullmatch(text):
         return _known(whole[1], values)
     try:
-        value = _value(_read(text), values)
+        tree = _read(text)
+        if any(_is_position(node) for node in ast.walk(tree)):
+            return Field(_text(_Bound(values).visit(copy.deepcopy(tree)))).text
+        value = _value(tree, values)
         if is_number(value) and not math.isfinite(value):
             raise ExpressionError("must be a finite number")
     except ExpressionError:
@@ -145,7 +201,7 @@ def _depth(tree: ast.AST) -> int:
     return found
 
 
-def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
+def _value(node: ast.expr, values: Mapping[Any, Any]) -> Any:
     """Return the value of a node: a number, a word, or true or false."""
     match node:
         case ast.Constant(value=str() as word):
@@ -154,21 +210,29 @@ def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
             return _known(name.removeprefix(_MARK), values)
         case ast.Compare():
             return _compared(node, values)
-        case ast.BoolOp(op=ast.And(), values=each):
-            return all(_condition(one, values) for one in each)
-        case ast.BoolOp(values=each):
-            return any(_condition(one, values) for one in each)
+        case ast.BoolOp(op=sign, values=each):
+            both = isinstance(sign, ast.And)
+            found: Any = both
+            for one in each:
+                if found is not both and isinstance(found, bool):
+                    break
+                other = _condition(one, values)
+                found = found & other if both else found | other
+            return found
         case ast.UnaryOp(op=ast.Not(), operand=one):
-            return not _condition(one, values)
+            return True ^ _condition(one, values)
         case ast.Call(func=ast.Name(id=name), args=given, keywords=[]) if name == _IF:
             if len(given) != 3:
                 raise ExpressionError(f"if takes a condition and two values, not {len(given)}")
             test, one, other = given
-            return _value(one if _condition(test, values) else other, values)
+            holds = _condition(test, values)
+            if isinstance(holds, np.ndarray):
+                return np.where(holds, _operand(one, values), _operand(other, values))
+            return _value(one if holds else other, values)
     return _number(node, values)
 
 
-def _compared(node: ast.Compare, values: Mapping[str, Any]) -> bool:
+def _compared(node: ast.Compare, values: Mapping[Any, Any]) -> Any:
     """Tell whether a comparison of two numbers or two words is true."""
     if len(node.ops) != 1 or type(node.ops[0]) not in _COMPARISONS:
         raise ExpressionError(
@@ -177,24 +241,27 @@ def _compared(node: ast.Compare, values: Mapping[str, Any]) -> bool:
     one, other = (_value(each, values) for each in (node.left, node.comparators[0]))
     alike = isinstance(node.ops[0], _EQUALITY) and type(one) is type(other)
     for each in () if alike else (one, other):
-        if not is_number(each):
+        if not _can_compute(each):
             raise ExpressionError(f"cannot compare {_shown(one)} and {_shown(other)}")
     return _COMPARISONS[type(node.ops[0])](one, other)
 
 
-def _condition(node: ast.expr, values: Mapping[str, Any]) -> bool:
+def _condition(node: ast.expr, values: Mapping[Any, Any]) -> Any:
+    """Return whether a condition holds, for a field at each position."""
     value = _value(node, values)
-    if not isinstance(value, bool):
+    if not isinstance(value, bool) and not (isinstance(value, np.ndarray) and value.dtype == bool):
         raise ExpressionError(f"{_text(node)} is {_shown(value)}: must be true or false")
     return value
 
 
-def _number(node: ast.expr, values: Mapping[str, Any]) -> float:
+def _number(node: ast.expr, values: Mapping[Any, Any]) -> Any:
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
             return number
         case ast.Name(id="pi"):
             return math.pi
+        case ast.Name(id=name) if name in POSITION and POSITION.index(name) in values:
+            return values[POSITION.index(name)]
         case ast.UnaryOp(op=sign, operand=one) if type(sign) in _OPERATORS:
             return _OPERATORS[type(sign)](_operand(one, values))
         case ast.BinOp(left=one, op=sign, right=other) if type(sign) in _OPERATORS:
@@ -203,7 +270,9 @@ def _number(node: ast.expr, values: Mapping[str, Any]) -> float:
             function, count = FUNCTIONS[name]
             if len(given) != count:
                 raise ExpressionError(f"{name} takes {count} number(s), not {len(given)}")
-            return function(*(_operand(each, values) for each in given))
+            numbers = [_operand(each, values) for each in given]
+            fields = any(isinstance(each, np.ndarray) for each in numbers)
+            return (_ON_FIELDS[name] if fields else function)(*numbers)
         case ast.Name(id=name) | ast.Call(func=ast.Name(id=name)):
             known = ", ".join(("pi", "if", *FUNCTIONS))
             raise ExpressionError(
@@ -212,24 +281,50 @@ def _number(node: ast.expr, values: Mapping[str, Any]) -> float:
     raise ExpressionError(f"{_text(node)} cannot be read as arithmetic")
 
 
-def _operand(node: ast.expr, values: Mapping[str, Any]) -> float:
+def _operand(node: ast.expr, values: Mapping[Any, Any]) -> Any:
     """Return the value of an operand, which must be a number."""
     value = _value(node, values)
-    if is_number(value):
+    if _can_compute(value):
         return value
     raise ExpressionError(f"{_text(node)} is {_shown(value)}: only numbers can be computed with")
 
 
+def _can_compute(value: object) -> bool:
+    """Tell whether a value is a number, or a field of numbers."""
+    return is_number(value) or (isinstance(value, np.ndarray) and value.dtype != bool)
+
+
+def _is_position(node: ast.AST) -> bool:
+    return isinstance(node, ast.Name) and node.id in POSITION
+
+
+class _Bound(ast.NodeTransformer):
+    """Puts values in the place of parameters."""
+
+    def __init__(self, values: Mapping[Any, Any]) -> None:
+        self._values = values
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        """Return the value of a parameter as an expression; other names stay."""
+        if not node.id.startswith(_MARK):
+            return node
+        value = _known(node.id.removeprefix(_MARK), self._values)
+        return ast.parse(f"({1 if value else 0} == 1)" if isinstance(value, bool) else repr(value),
+                         mode="eval").body  # fmt: skip
+
+
 def _shown(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        return "a field"
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def _text(node: ast.expr) -> str:
     """Return an expression as it is written in a file."""
-    return ast.unparse(node).replace(_MARK, "$").replace(_IF, "if")
+    return ast.unparse(node).replace(_MARK, "$").replace(_IF, "if").replace("**", "^")
 
 
-def _known(name: str, values: Mapping[str, Any]) -> Any:
+def _known(name: str, values: Mapping[Any, Any]) -> Any:
     if name not in values:
         known = ", ".join(f"${each}" for each in values)
         raise ExpressionError(f"${name} is no parameter; the scene has {known or 'none'}")

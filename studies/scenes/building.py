@@ -219,14 +219,14 @@ class Builder:
 
     def _amplitude(self, where: str, given: tables.Amplitude | None) -> Amplitude | None:
         """Return a load factor over time; stage k ends at time k."""
-        stages = self.scene.stages
-        if not stages:
+        passages = self.scene.passages
+        if not passages:
             if given is not None:
                 allowed = "needs stages: with loading all loads grow together"
                 self.mistakes.append(StudyError(f"{where}.amplitude", given, allowed))
             return None
         values = [0.0]
-        for stage in stages:
+        for stage, *_ in passages:
             usual = 1.0 if given is None else values[-1]
             values.append((given or {}).get(stage.name, 0.0 if stage.release else usual))
         return Amplitude(np.arange(len(values), dtype=float), np.array(values))
@@ -242,23 +242,24 @@ def program_of(scene: tables.SceneFile) -> Program:
         return load_cycles(loading.factor, step, loading.release_increments, loading.cycles)
     stages = tuple(
         Stage(
-            name=stage.name,
+            name=kept,
             target=float(k + 1),
             steps=stage.increments,
             apart=stage.release,
             turns=k > 0,
         )
-        for k, stage in enumerate(scene.stages)
+        for k, (stage, kept, _) in enumerate(scene.passages)
     )
-    return Program(laps=(Lap(stages),), place=_place([stage.name for stage in stages]))
+    return Program(laps=(Lap(stages),), place=_place(scene.passages))
 
 
-def _place(names: list[str]) -> Any:
+def _place(passages: list[tables.Passage]) -> Any:
     """Return the function that gives the text for a time: the stage and the share of it done."""
 
     def words(time: float) -> str:
-        k = min(max(math.ceil(time - 1e-9) - 1, 0), len(names) - 1)
-        return f"{time - k:.4g} of stage {names[k]}"
+        k = min(max(math.ceil(time - 1e-9) - 1, 0), len(passages) - 1)
+        stage, _, cycle = passages[k]
+        return f"{time - k:.4g} of stage {stage.name}" + (f" in cycle {cycle}" if cycle else "")
 
     return words
 
@@ -284,7 +285,7 @@ def friction_of(table: tables.PairTable) -> FrictionLaw:
 def load_of(table: Any, amplitude: Amplitude | None = None) -> Load:
     """Return the load of a table."""
     kind = LOADS[table.kind]
-    given = table.model_dump(exclude={"kind", "body", "amplitude"}, exclude_unset=True)
+    given = {n: getattr(table, n) for n in table.model_fields_set - {"kind", "body", "amplitude"}}
     return kind(**given, **{"amplitude": amplitude} if kind.varies else {})
 
 

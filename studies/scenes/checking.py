@@ -175,6 +175,16 @@ def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:
     if bool(scene.stages) == (scene.loading is not None):
         given = "both" if scene.stages else None
         yield StudyError("stages", given, "must be given, or loading: one of the two")
+    if scene.repeat is None:
+        return
+    repeated, names = list(scene.repeat.stages), [stage.name for stage in scene.stages]
+    for name in repeated:
+        yield from _one_of("repeat.stages", name, names)
+    if set(repeated) <= set(names):
+        first = names.index(repeated[0])
+        if names[first : first + len(repeated)] != repeated:
+            allowed = f"must be stages one after the other, in their order: {', '.join(names)}"
+            yield StudyError("repeat.stages", repeated, allowed)
 
 
 def _results(scene: tables.SceneFile) -> Iterator[StudyError]:
@@ -263,6 +273,8 @@ def _outputs(scene: tables.SceneFile) -> Iterator[StudyError]:
     for name, output in scene.outputs.items():
         where = f"outputs.{name}"
         yield from _one_of(f"{where}.stage", output.stage, scene.stage_names)
+        if output.minus:
+            yield from _one_of(f"{where}.minus", output.minus, scene.stage_names)
         places: dict[str, list[str]] = {
             "body": list(scene.bodies),
             "line": list(scene.results.lines),
@@ -276,6 +288,8 @@ def _outputs(scene: tables.SceneFile) -> Iterator[StudyError]:
             continue
         ((key, value),) = given.items()
         yield from _one_of(f"{where}.{key}", value, places[key])
+        if key == "contact" and output.minus:
+            yield StudyError(f"{where}.minus", output.minus, "needs a body or a line")
         if key == "body" and output.take in ("integral", "extent"):
             yield StudyError(f"{where}.take", output.take, "needs a line or a contact")
         if key != "body" and (output.x or output.y):
@@ -285,7 +299,7 @@ def _outputs(scene: tables.SceneFile) -> Iterator[StudyError]:
 def _names(scene: tables.SceneFile) -> Iterator[StudyError]:
     groups: Mapping[str, list[str]] = {
         "rigid": [name for name in scene.rigid if name in scene.bodies],
-        "stages": _twice([stage.name for stage in scene.stages]),
+        "stages": _twice([stage.name for stage in scene.stages]) or _twice(scene.stage_names),
         "contacts": _twice([contact.name for contact in scene.contacts]),
         "results.outputs": _twice(list(scene.results.outputs or ())),
         "results.surfaces": _twice([side.partition(".")[0] for side in scene.results.surfaces]),

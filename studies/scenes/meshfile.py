@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from solver.errors import ModelError
 from solver.memory import kept
 from solver.mesh.cells import facets_of, mesh_of_cells
 from solver.mesh.section_mesh import FOOT, RUNNING, SectionMesh
+from studies.scenes.meshdata import MeshData
 from studies.scratch import scratch
 
 if TYPE_CHECKING:
@@ -43,10 +44,16 @@ class MeshFile:
     ----------
     name : name of the file; its ending tells the format
     data : its bytes
+    arrays : what was read from them before (`MeshData.packed`); empty if they are to be read here
     """
 
     name: str
     data: bytes
+    arrays: bytes = b""
+
+    def read(self) -> Self:
+        """Return the file with its arrays, so that nobody else needs to read its data."""
+        return replace(self, arrays=_read(self.name, self.data).packed())
 
     def mesh(self, part: str | None) -> Mesh:
         """Return the part of this name, or all cells, with named boundaries.
@@ -56,7 +63,7 @@ class MeshFile:
         ModelError
             if the file cannot be read, has no such part, or is no plane mesh
         """
-        return _mesh(self.name, self.data, part)
+        return _mesh(self.name, self.data, self.arrays, part)
 
     def section(self) -> SectionMesh:
         """Return the section of a rail: all cells, and the lines `running` and `foot`.
@@ -78,9 +85,11 @@ class MeshFile:
 
 
 @kept
-def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
-    found = _read(name, data)
-    points = np.asarray(found.points, dtype=float)
+def _mesh(name: str, data: bytes, arrays: bytes, part: str | None) -> Mesh:
+    try:
+        points, blocks, sets, nodes = MeshData.unpacked(arrays) if arrays else _read(name, data)
+    except ValueError as error:
+        raise ModelError("mesh", name, f"cannot be read: {error}") from None
     if len(points) > MOST_POINTS:
         raise ModelError("mesh", name, f"must have at most {MOST_POINTS} points, not {len(points)}")
     if not np.isfinite(points).all():
@@ -89,11 +98,9 @@ def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
         raise ModelError("mesh", name, "must have points of two or three coordinates")
     if points.shape[1] == 3 and np.ptp(points[:, 2]) > 0:
         raise ModelError("mesh", name, "must lie in a plane: its z differ")
-    blocks = [(block.type, np.asarray(block.data)) for block in found.cells]
     for kind, each in blocks:
         if each.size and not 0 <= each.min() <= each.max() < len(points):
             raise ModelError("mesh", name, f"has a {kind} of points that do not exist")
-    sets = _sets(found)
     plane = [k for k, (kind, _) in enumerate(blocks) if kind in _CELLS]
     if not plane:
         listed = ", ".join(sorted({kind for kind, _ in blocks})) or "none"
@@ -116,10 +123,11 @@ def _mesh(name: str, data: bytes, part: str | None) -> Mesh:
         )
     mesh, number = mesh_of_cells(points[:, :2], np.vstack(list(chosen.values())), _CELLS[kind])
     lines = {k: cells[:, :2] for k, (kind, cells) in enumerate(blocks) if kind in _LINES}
-    return mesh.with_boundaries(_boundaries(mesh, number, lines, sets, found.point_sets))
+    return mesh.with_boundaries(_boundaries(mesh, number, lines, sets, nodes))
 
 
-def _read(name: str, data: bytes) -> Any:
+@kept
+def _read(name: str, data: bytes) -> MeshData:
     import meshio
 
     with scratch() as folder:
@@ -127,7 +135,7 @@ def _read(name: str, data: bytes) -> Any:
         path.write_bytes(data)
         try:
             with contextlib.redirect_stdout(None), contextlib.redirect_stderr(None):
-                return meshio.read(path)  # meshio prints remarks
+                return _arrays(meshio.read(path))  # meshio prints remarks
         except SystemExit:  # meshio exits if it does not know a format
             reason = "its format is not known"
         except MemoryError:
@@ -137,10 +145,21 @@ def _read(name: str, data: bytes) -> Any:
     raise ModelError("mesh", name, f"cannot be read: {reason}")
 
 
+def _arrays(found: Any) -> MeshData:
+    return MeshData(
+        points=np.asarray(found.points, dtype=float),
+        cells=[(block.type, np.asarray(block.data)) for block in found.cells],
+        sets=_sets(found),
+        nodes={name: np.asarray(own, dtype=np.int64) for name, own in found.point_sets.items()},
+    )
+
+
 def _sets(found: Any) -> dict[str, dict[int, Any]]:
     """Return the cells of each set by block; the name of a set without one is its number."""
     sets = {
-        name: dict(enumerate(each))
+        name: {
+            k: np.asarray(rows, dtype=np.int64) for k, rows in enumerate(each) if rows is not None
+        }
         for name, each in found.cell_sets.items()
         if not name.startswith("gmsh:")
     }
@@ -155,8 +174,7 @@ def _sets(found: Any) -> dict[str, dict[int, Any]]:
 
 def _rows(own: dict[int, Any], block: int) -> NDArray[np.int64]:
     """Return the cells of a block that belong to a set."""
-    rows = own.get(block)
-    return np.asarray([] if rows is None else rows, dtype=np.int64)
+    return own.get(block, np.zeros(0, dtype=np.int64))
 
 
 def _boundaries(
@@ -170,7 +188,7 @@ def _boundaries(
     outline = np.asarray(mesh.boundary_facets())
     found = {OUTLINE: outline}
     for name, own in nodes.items():  # the edges of the outline with both ends in the set
-        inside = np.isin(mesh.facets[:, outline], number[np.asarray(own, dtype=np.int64)])
+        inside = np.isin(mesh.facets[:, outline], number[own])
         if inside.all(0).any():
             found[name] = outline[inside.all(0)]
     for name, own in sets.items():

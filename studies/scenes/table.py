@@ -6,13 +6,31 @@ import re
 from typing import Annotated
 
 from annotated_types import Interval
-from pydantic import BaseModel, ConfigDict, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, StringConstraints
+from pydantic_core import PydanticCustomError
+
+from studies.scenes.arithmetic import ExpressionError, Field
 
 Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,59}$")]
 """A name: 1 to 60 of ``A-Z a-z 0-9 _``, beginning with a letter."""
 FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 FileName = Annotated[str, StringConstraints(pattern=f"^{FILE_NAME.pattern}$")]
 """The name of a file beside the scene file."""
+
+
+def _field(text: str) -> Field:
+    try:
+        return Field(text)
+    except ExpressionError as error:
+        raise PydanticCustomError(
+            "expression",
+            "must be an expression of x and y; this one {reason}",
+            {"reason": str(error)},
+        ) from None
+
+
+FieldText = Annotated[str, AfterValidator(_field)]
+"""A function of position: an expression of ``x`` and ``y``."""
 Place = tuple[float, float]
 Span = tuple[float, float]
 Count = Annotated[int, Interval(ge=1, le=10_000)]

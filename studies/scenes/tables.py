@@ -10,6 +10,7 @@ from typing import (
     Annotated,
     Any,
     Literal,
+    NamedTuple,
     TypeAlias,
     Union,
     get_args,
@@ -30,7 +31,7 @@ from solver.results.outputs import outputs
 from solver.results.requested import OF_CONTACT, RequestedNumber, of_body
 from solver.scenes.material_parameters import ContactParameters, MaterialParameters
 from studies.scenes.shape_tables import ArcTable, GradedTable, LineTable, Shape
-from studies.scenes.table import Count, FileName, Label, Place, SceneTable, Side, Span
+from studies.scenes.table import Count, FieldText, FileName, Label, Place, SceneTable, Side, Span
 
 # -- bodies ------------------------------------------------------------------------------------
 
@@ -141,7 +142,7 @@ def _load(word: str, kind: type[Load]) -> type[LoadTable]:
     known: dict[str, Any] = {"amplitude": (Amplitude | None, None)} if kind.varies else {}
     known["kind"] = (Literal[word], ...)
     for name, (hint, field) in declared(kind).items():
-        kept = _without_functions(hint)
+        kept = _in_file(hint)
         if kept is not None and name != "amplitude":
             known[name] = (kept, ... if field.default is dataclasses.MISSING else field.default)
     made: type[LoadTable] = create_model(f"{kind.__name__}Table", __base__=LoadTable, **known)
@@ -149,11 +150,16 @@ def _load(word: str, kind: type[Load]) -> type[LoadTable]:
     return made
 
 
-def _without_functions(hint: Any) -> Any:
-    """Return the type of a parameter in a file, which holds no functions; None if none is left."""
+def _in_file(hint: Any) -> Any:
+    """Return the type of a parameter in a file; None if it is a function of another kind.
+
+    A number that may be a function of position is an expression there.
+    """
     if get_origin(hint) not in (Union, UnionType):
         return None if get_origin(hint) is Callable else hint
     kept = tuple(each for each in get_args(hint) if get_origin(each) is not Callable)
+    if len(kept) < len(get_args(hint)) and float in kept:
+        kept += (FieldText,)
     return None if kept == (NoneType,) else Union[kept]  # noqa: UP007
 
 
@@ -209,6 +215,17 @@ class StageTable(SceneTable):
     name: Label
     increments: Count = 10
     release: bool = False
+
+
+class RepeatTable(SceneTable):
+    """Stages that follow one another, and how many times they are gone through.
+
+    A state at the end of each is stored of the last time, and of the time before with the name
+    ``NAME_before``.
+    """
+
+    stages: Annotated[tuple[Label, ...], Field(min_length=1)]
+    times: Annotated[int, Interval(ge=2, le=1000)]
 
 
 class LoadingTable(SceneTable):
@@ -455,6 +472,7 @@ class SceneFile(SceneTable):
     allow: tuple[Literal["large_strain"], ...] = ()
     loads: tuple[AnyLoad, ...] = ()
     stages: tuple[StageTable, ...] = ()
+    repeat: RepeatTable | None = None
     loading: LoadingTable | None = None
     results: ResultsTable = ResultsTable()
     outputs: dict[Label, OutputTable] = Field(default_factory=dict)
@@ -492,6 +510,39 @@ class SceneFile(SceneTable):
         return last.name if last.release and len(self.stages) > 1 else ""
 
     @property
+    def passages(self) -> list[Passage]:
+        """The stages in the order in which they are gone through, the repeated ones many times."""
+        repeated = self.repeat.stages if self.repeat else ()
+        group = [stage for stage in self.stages if stage.name in repeated]
+        found: list[Passage] = []
+        for stage in self.stages:
+            if stage.name not in repeated:
+                found.append(Passage(stage, stage.name))
+            elif self.repeat and stage is group[0]:
+                for left in reversed(range(self.repeat.times)):
+                    ends = ("", "_before")[left] if left < 2 else None
+                    kept = ("" if ends is None else each.name + ends for each in group)
+                    cycle = self.repeat.times - left
+                    found += map(Passage, group, kept, [cycle] * len(group))
+        return found
+
+    @property
     def stage_names(self) -> list[str]:
-        """Names of the stages."""
-        return [stage.name for stage in self.stages] or ["loaded", "unloaded"]
+        """Names of the states at the ends of stages that are stored."""
+        kept = [each.kept for each in self.passages if each.kept]
+        return kept or ["loaded", "unloaded"]
+
+
+class Passage(NamedTuple):
+    """One time that a stage is gone through.
+
+    Attributes
+    ----------
+    stage : its table
+    kept : name of the state at its end; empty if it is not stored
+    cycle : number of the time, from 1; 0 for a stage that is not repeated
+    """
+
+    stage: StageTable
+    kept: str
+    cycle: int = 0

@@ -18,7 +18,7 @@ from studies.definition.vocabulary import MISSING, OK, SYMMETRIC
 from studies.errors import FileDamaged
 from studies.storage import dataset as layout
 from studies.storage import seal
-from studies.storage.frame import Frame
+from studies.storage.frame import Frame, write_beside
 from studies.storage.held import Combined
 from studies.storage.provenance import provenance, together, what_ran
 from studies.storage.room import Reservoir, needs_room
@@ -26,8 +26,13 @@ from studies.storage.runfile import global_attributes, opened
 from studies.storage.store import Store
 
 
-def combine(study: Study, store: Store, cases: Iterable[Case]) -> Combined:
-    """Write the combined data set of `study`, and return what it holds.
+def combine(
+    study: Study,
+    store: Store,
+    cases: Iterable[Case],
+    beside: layout.RunContent | None = None,
+) -> Combined:
+    """Write the combined data set of `study`, with what is ``beside``; return what it holds.
 
     Sweep dimensions come first: the usual ones, then the other axes. A parameter set by a linked
     axis is a coordinate over its labels. Runs are matched by *label* along labelled dimensions
@@ -44,14 +49,20 @@ def combine(study: Study, store: Store, cases: Iterable[Case]) -> Combined:
         left = {key: at for key, at in places.items() if key not in damaged}
         found = {key: at for key, at in left.items() if store.run_path(key).exists()}
         try:
-            return _combined(study, store, found, [key for key in places if key not in found])
+            return _combined(
+                study, store, found, [key for key in places if key not in found], beside
+            )
         except FileDamaged as error:  # the data set has parts of it: begin again
             store.set_aside(error, "the run will be computed again")
             damaged.add(error.path.stem)  # it may be there still, if it cannot be moved
 
 
 def _combined(
-    study: Study, store: Store, found: Mapping[str, tuple[int, ...]], missing: Sequence[str]
+    study: Study,
+    store: Store,
+    found: Mapping[str, tuple[int, ...]],
+    missing: Sequence[str],
+    beside: layout.RunContent | None,
 ) -> Combined:
     scene = study.problem
     target = store.dataset_path(study.id)
@@ -73,7 +84,7 @@ def _combined(
             if SYMMETRIC in run.attrs:  # a run without a record lacks it
                 halves.add(int(run.attrs[SYMMETRIC].item()))
     attrs = provenance(study.name, scene, study.fixed) | together(ran) | _words(study)
-    attrs |= seal.SEALED
+    attrs |= seal.SEALED | (dict(beside.attrs) if beside else {})
     with suppress(FileDamaged):
         store.dataset(study.id)  # a damaged or foreign one is set aside, not lost
     with needs_room(store.directory), appearing(target) as part:
@@ -83,6 +94,8 @@ def _combined(
                 frame.create_axes(file)
                 frame.create_fields(file)
                 frame.write_small(file)
+                if beside:
+                    write_beside(file, beside.variables)
             disk.check()
             with h5py.File(disk, "r+") as file:
                 for run_id, at in places.items():

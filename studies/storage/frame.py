@@ -200,6 +200,15 @@ class Frame:
         return list(range(len(run[dimension])))
 
 
+def write_beside(file: h5netcdf.File, variables: Mapping[str, layout.Variable]) -> None:
+    """Write variables with dimensions of their own, or of the sweep."""
+    for name, (dims, values, attributes) in variables.items():
+        for dim, size in zip(dims, values.shape, strict=True):
+            if dim not in file.dimensions:
+                file.dimensions[dim] = size
+        _write(file, name, dims, values, attributes, complete=True)
+
+
 def axis_variables(
     scene: Scene, axes: Mapping[str, Sequence[Any]], linked: Mapping[str, tuple[str, list[Any]]]
 ) -> dict[str, layout.Variable]:

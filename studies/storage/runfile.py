@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from threading import Lock
@@ -92,6 +92,26 @@ def global_attributes(run: h5py.File) -> dict[str, Any]:
 def variables(run: h5py.File) -> list[str]:
     """Return the names of the variables in their original order, without those of the mesh."""
     return _text(run.attrs[_ORDER]).split() if _ORDER in run.attrs else list(run)
+
+
+def lines(
+    run: h5py.File, names: Iterable[str]
+) -> dict[str, tuple[tuple[str, ...], np.ndarray[Any, Any]]]:
+    """Return variables without the sweep: dimensions and values; and the values of dimensions.
+
+    Variables that the run does not have are left out.
+    """
+    rank, found = run["status"].ndim, {}
+    for name in (each for each in names if each in run and not run[each].is_scale):
+        each = run[name]
+        scales = [next(iter(each.dims[k].values())) for k in range(rank, each.ndim)]
+        dims = tuple(scale.name.removeprefix("/") for scale in scales)
+        found[name] = dims, each[...].reshape(each.shape[rank:])
+        for dim, scale in zip(dims, scales, strict=True):
+            if not scale.attrs.get("NAME", b"").startswith(b"This is a netCDF dimension"):
+                values = scale.asstr()[...] if scale.dtype.kind == "O" else scale[...]
+                found[dim] = (dim,), values
+    return found
 
 
 def _text(value: Any) -> Any:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 from solver.scenes import Scene
 from studies.appearing import appearing
@@ -23,11 +24,12 @@ from studies.scenes.description import Description, mesh_names
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.scene import FileScene, file_scene
 from studies.storage.database import Database
-from studies.storage.seal import State, bytes_of, content_of, sealed_json, state_of
+from studies.storage.seal import State, bytes_of, check, content_of, sealed, sealed_json, state_of
 
-_FILE = "scene.json"
-_COLUMNS = "id, name, summary, branch, size, owner, added, parameters"
-_TABLE = f"CREATE TABLE IF NOT EXISTS shelf ({_COLUMNS}, state, PRIMARY KEY (id))"
+_FILE, _ARRAYS = "scene.json", ".arrays"
+_COLUMNS = "id, name, summary, branch, size, owner, added, parameters, state"
+_TABLE = f"CREATE TABLE IF NOT EXISTS shelf ({_COLUMNS}, PRIMARY KEY (id))"
+"""A scene that this version does not allow has no name: its size counts, and no list has it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +39,6 @@ class Entry:
     Attributes
     ----------
     id, name, summary, branch : content id, and as in `Scene`
-    size : of its files [bytes]
-    owner : who posted it first; empty if nobody did
-    added : time at which it was stored [ns since 1970]
     parameters : names of its parameters
     """
 
@@ -47,19 +46,29 @@ class Entry:
     name: str
     summary: str
     branch: str
-    size: int
-    owner: str
-    added: int
     parameters: list[str]
+
+
+class Kept(NamedTuple):
+    """The files of a scene: id, who posted it first, size [bytes], time [ns since 1970]."""
+
+    id: str
+    owner: str
+    size: int
+    added: int
 
 
 def keep(directory: Path, scene_id: str, description: Description, owner: str) -> None:
     """Store a scene of this content id."""
     folder = directory / "scenes" / scene_id
     folder.mkdir(parents=True, exist_ok=True)
-    written = {name: mesh.data for name, mesh in (description.meshes or {}).items()}
+    seal, written = f"scene {scene_id}", {}
+    for name, mesh in (description.meshes or {}).items():
+        written[name] = mesh.data
+        if mesh.arrays:
+            written[f"{name}{_ARRAYS}"] = sealed(seal, mesh.arrays)
     content = {"file": description.file, "content": description.content, "owner": owner}
-    written |= {_FILE: sealed_json(f"scene {scene_id}", content)}  # last: then all is there
+    written |= {_FILE: sealed_json(seal, content)}  # last: then all is there
     for name, data in written.items():
         with appearing(folder / name) as part:
             part.write_bytes(data)
@@ -109,7 +118,7 @@ def _made(folder: Path, whole: bool) -> FileScene | None:
     try:
         saved = content_of(folder / _FILE, name)
         names = mesh_names(saved["content"]) if whole else []
-        meshes = {each: MeshFile(each, bytes_of(folder / each, name)[0]) for each in names}
+        meshes = {each: _mesh(folder / each, name) for each in names}
         found = Description(saved["file"], saved["content"], meshes if whole else None)
         if whole and found.digest != scene_id:
             raise FileDamaged(folder, name, "its content has changed", state)
@@ -119,6 +128,15 @@ def _made(folder: Path, whole: bool) -> FileScene | None:
         raise FileDamaged(folder, name, reason, state) from None
 
 
+def _mesh(path: Path, name: str) -> MeshFile:
+    """Return a mesh of a scene, with its arrays if it was posted."""
+    arrays, data = path.with_name(f"{path.name}{_ARRAYS}"), bytes_of(path, name)[0]
+    if state_of(arrays) is None:
+        return MeshFile(path.name, data)
+    check(arrays, name)
+    return MeshFile(path.name, data, bytes_of(arrays, name)[0])
+
+
 class Index(Database):
     """The index of the scenes of a directory."""
 
@@ -126,17 +144,24 @@ class Index(Database):
         super().__init__(directory / "scenes.sqlite", CatalogueDamaged, StoreBusy)
         self.scenes = directory / "scenes"
 
-    def follow(self, read: Callable[[str], Scene | None]) -> None:
-        """Bring the index to the files; ``read`` gives a new scene, or None for one without."""
+    def follow(self, read: Callable[[str], Scene | None], refused: Collection[str]) -> None:
+        """Bring the index to the files.
+
+        Parameters
+        ----------
+        read : gives a new scene; None for one that is not there or not allowed
+        refused : scenes that are known not to be allowed: another version may have refused others
+        """
         paths = {path.parent.name: state_of(path) for path in self.scenes.glob(f"*/{_FILE}")}
         there = {name: (repr(state), state[2]) for name, state in paths.items() if state}
         mode = "rwc" if self.path.exists() or there else "memory"
         with self.connection("BEGIN", mode) as connection:
             connection.execute(_TABLE)
-            known = dict(connection.execute("SELECT id, state FROM shelf").fetchall())
+            rows = connection.execute("SELECT id, state, name FROM shelf").fetchall()
+        known = {key: state for key, state, name in rows if name is not None or key in refused}
+        gone = {key for key, *_ in rows} - there.keys()
         fresh = [name for name, (state, _) in there.items() if known.get(name) != state]
         rows = [row for name in fresh if (row := self._row(name, read, *there[name]))]
-        gone = known.keys() - there.keys()
         if rows or gone:
             with self.connection("BEGIN IMMEDIATE", "rw") as connection:
                 connection.executemany("DELETE FROM shelf WHERE id = ?", [[each] for each in gone])
@@ -149,13 +174,13 @@ class Index(Database):
     ) -> tuple[object, ...] | None:
         """Return the row of a scene, or None where it is deleted or set aside meanwhile."""
         try:
-            if (scene := read(name)) is None:
-                return None
+            scene = read(name)
             size, owner = self._kept(name)
         except (OSError, FileDamaged):
             return None
-        names = json.dumps([*parameters_of(scene)])
-        return name, scene.name, scene.summary, scene.branch, size, owner, added, names, state
+        about = (scene.name, scene.summary, scene.branch) if scene else (None, "", "")
+        names = json.dumps([*parameters_of(scene)] if scene else [])
+        return name, *about, size, owner, added, names, state
 
     def _kept(self, scene_id: str) -> tuple[int, str]:
         """Return the size of the files of a scene, and its owner."""
@@ -167,17 +192,17 @@ class Index(Database):
         """Return a page of the scenes, or of those of a name, the latest first."""
         with self._reading() as connection:
             rows = connection.execute(
-                f"SELECT {_COLUMNS} FROM shelf WHERE ? IN (name, '') "
-                "ORDER BY added DESC, id LIMIT ? OFFSET ?",
+                "SELECT id, name, summary, branch, parameters FROM shelf WHERE name IS NOT NULL "
+                "AND ? IN (name, '') ORDER BY added DESC, id LIMIT ? OFFSET ?",
                 [name or "", limit, offset],
             )
             return [Entry(*[*row[:-1], json.loads(row[-1])]) for row in rows]
 
-    def sizes(self) -> dict[str, int]:
-        """Return the size of all scenes of each owner [bytes]."""
+    def files(self) -> list[Kept]:
+        """Return the files of all scenes, the oldest first."""
         with self._reading() as connection:
-            found = connection.execute("SELECT owner, SUM(size) FROM shelf GROUP BY owner")
-            return dict(found.fetchall())
+            rows = connection.execute("SELECT id, owner, size, added FROM shelf ORDER BY added, id")
+            return [Kept(*row) for row in rows]
 
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:

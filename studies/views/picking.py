@@ -96,7 +96,7 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
         ok.tolist(), key=lambda at: [i if n else -i for i, n in zip(at, numeric, strict=True)]
     )
     run = chosen.isel(dict(zip(axes, best, strict=True)))
-    return _own_grid(run, [str(name) for name in run.dims])
+    return own_grid(run)
 
 
 def runs_over(
@@ -124,7 +124,7 @@ def runs_over(
     for name in own:
         grid = chosen[name].isel({axis: 0}) if axis in chosen[name].dims else chosen[name]
         chosen = chosen.drop_vars(name).assign_coords({name: (name, grid.to_numpy(), grid.attrs)})
-    return _own_grid(chosen, own)
+    return own_grid(chosen, own)
 
 
 def _same(grid: xr.DataArray, axis: str) -> bool:
@@ -144,25 +144,41 @@ def run_file(path: Path | str, selection: Mapping[str, str | float]) -> Path:
         if there is no such run
     """
     found = find_study(path)
-    beside = found.with_name("study.json")
-    if found.name != "dataset.nc" or not beside.is_file():
+    if found.name != "dataset.nc" or not found.with_name("study.json").is_file():
         return found
-    store = Store(found.resolve().parents[2])
-    try:
-        content = content_of(beside, f"study {found.parent.name}")
-    except FileDamaged as error:
-        raise StudyError("path", str(path), f"holds a damaged file: {error}") from None
-    study = Study.known(content, store.scene)
-    if study.asks:
+    study, store = study_of(found)
+    if study.goal:
         allowed = "holds what a search found: give the file of a run, such as that of run_high"
-        raise StudyError("path", str(path), allowed)
-    if study.id != found.parent.name:  # then the ids of its runs differ too
-        allowed = "was computed by another version of the solver: give the file of a run"
         raise StudyError("path", str(path), allowed)
     with open_netcdf(found) as dataset:
         run = one_run(dataset, selection)
+        if "run" in run:  # of a refinement, which chose its runs
+            return store.run_path(str(run["run"].item()))
         index = tuple(int(positions(dataset[axis], run[axis].item())[0]) for axis in study.axes)
     return store.run_path(next(case.id for case in study.cases() if case.index == index))
+
+
+def study_of(dataset: Path) -> tuple[Study, Store]:
+    """Return the study of a data set in a store, and the store.
+
+    Raises
+    ------
+    StudyError
+        if it is not in a store, or another version of the solver computed it
+    """
+    path, beside = str(dataset), dataset.with_name("study.json")
+    if not beside.is_file():
+        raise StudyError("path", path, "must be a study in an output directory")
+    store = Store(dataset.resolve().parents[2])
+    try:
+        content = content_of(beside, f"study {dataset.parent.name}")
+    except FileDamaged as error:
+        raise StudyError("path", path, f"holds a damaged file: {error}") from None
+    study = Study.known(content, store.scene)
+    if study.id != dataset.parent.name:  # then the ids of its runs differ too
+        allowed = "was computed by another version of the solver: give the file of a run"
+        raise StudyError("path", path, allowed)
+    return study, store
 
 
 def positions(axis: xr.DataArray, value: str | float) -> np.ndarray:
@@ -188,9 +204,12 @@ def positions(axis: xr.DataArray, value: str | float) -> np.ndarray:
     return np.flatnonzero(same)
 
 
-def _own_grid(runs: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
-    """Return runs with a grid of their own as the index of these dimensions, if grids differ."""
-    for name in names:
+def own_grid(runs: xr.Dataset, names: Sequence[str] | None = None) -> xr.Dataset:
+    """Return runs with a grid of their own as the index of these dimensions, if grids differ.
+
+    By default it is done for all dimensions of a single run.
+    """
+    for name in map(str, runs.dims) if names is None else names:
         if name in runs.coords and name not in runs.indexes:
             there = runs[name].notnull().to_numpy()
             runs = runs.drop_vars(f"{name}{FRACTION}", errors="ignore")

@@ -197,6 +197,6 @@ def _progress(file: Path) -> str:
     if study is None or study.id != file.parent.name:
         return f"{name}: begun with another version of the solver"
     if study.asks:
-        return f"{study.name}: the search has not ended"
+        return f"{study.name}: the {'refinement' if study.refine else 'search'} has not ended"
     finished = sum(store.run_path(run_id).is_file() for run_id in study.run_ids())
     return f"{study.name}: {finished} of {study.size} runs finished"

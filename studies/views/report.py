@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from studies.definition.fit import Fit
+from studies.definition.goal import Goal
+from studies.definition.refine import Refine
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError
@@ -64,7 +67,11 @@ def report(study: Study, store: Store, outcome: StudyOutcome) -> Report:
 
     with open_study(outcome.dataset) as dataset:
         text = _text(study, outcome, dataset)
-        drawn = _found(study.asks.parameter, dataset) if study.asks else _drawn(dataset)
+        field = _one_value(study.asks)
+        if study.fit:
+            drawn = _compared(dataset)
+        else:
+            drawn = _found(field, dataset) if field else _drawn(dataset)
         files = made.write(_NAME, of, {_TEXT: text.encode(), **drawn})
     return Report(text, files, anew=True)
 
@@ -72,8 +79,13 @@ def report(study: Study, store: Store, outcome: StudyOutcome) -> Report:
 def _text(study: Study, outcome: StudyOutcome, dataset: xr.Dataset) -> str:
     from studies.views.tables import messages, runs_table
 
-    size, what = dataset["status"].size, "answers" if study.asks else "runs"
-    table = runs_table(dataset) + "\n" if size <= SHOWN else ""
+    size, what = dataset["status"].size, "answers" if study.goal else "runs"
+    if study.fit:
+        from studies.views.fits import fit_table
+
+        what, table = "answer", fit_table(dataset) + "\n"
+    else:
+        table = runs_table(dataset) + "\n" if size <= SHOWN else ""
     counts = ", ".join(f"{number} {status}" for status, number in outcome.counts.items())
     ended = f"{study.name}: {size} {what} ({counts}{_warned(dataset)})"
     note = f"\nnote: {study.note}\n" if study.note else ""
@@ -103,6 +115,13 @@ def _drawn(dataset: xr.Dataset) -> dict[str, bytes]:
     return {f"{field}_xx.png": _png(drawn)}
 
 
+def _one_value(asks: Goal | Refine | Fit | None) -> str:
+    """Return what a study is asked for that has one value a place; empty if it is nothing."""
+    if asks is None or isinstance(asks, Fit):
+        return ""
+    return asks.parameter if isinstance(asks, Goal) else asks.of[0]
+
+
 def _found(parameter: str, dataset: xr.Dataset) -> dict[str, bytes]:
     """Draw what was found over the sweep; nothing if it cannot be drawn."""
     from studies.views.plots.sweep import sweep_figure
@@ -111,6 +130,13 @@ def _found(parameter: str, dataset: xr.Dataset) -> dict[str, bytes]:
         return {f"{parameter}.png": _png(sweep_figure(dataset, parameter))}
     except StudyError:
         return {}
+
+
+def _compared(dataset: xr.Dataset) -> dict[str, bytes]:
+    """Draw what was fitted over what was measured; nothing if there is no answer."""
+    from studies.views.plots.fit import fit_figure
+
+    return {"fit.png": _png(fit_figure(dataset))} if dataset["fitted"].notnull().all() else {}
 
 
 def _png(drawn: Any) -> bytes:

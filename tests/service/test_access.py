@@ -17,6 +17,7 @@ from fastapi.testclient import TestClient
 
 from residua.cli import main
 from service.app import create_app
+from service.dependencies import TheName
 from service.keys import Keys, KeysError, Scope
 from service.settings import Settings, chosen
 from studies import StudyError
@@ -380,3 +381,16 @@ def test_the_client_command_sends_its_key_and_no_error_shows_it(
     assert text not in capsys.readouterr().err
     mortal.stop()
     assert text not in (mortal.home / "service.log").read_text()
+
+
+def test_an_address_has_no_name_that_a_key_may_have(tmp_path: Path) -> None:
+    names = []
+    app = create_app(Settings(data=tmp_path))
+
+    async def told(name: TheName) -> None:
+        names.append(name)
+
+    app.add_api_route("/me", told)
+    assert asking(app)("GET", "/me").status_code == 200
+    with pytest.raises(StudyError, match="letters, digits"):
+        Keys(tmp_path).add(names[0], Scope.READ)

@@ -13,7 +13,7 @@ from fastapi import FastAPI, Request
 from starlette.exceptions import HTTPException
 
 from service.app import create_app
-from service.errors import on_http_error, on_scene_error
+from service.errors import STATUS, on_http_error, on_scene_error
 from service.settings import Settings
 from service.strict import StrictRequest
 from studies import Study, StudyError
@@ -213,6 +213,7 @@ def test_an_id_of_another_form_is_refused(service: Server, kind: str, name: str)
         f"/studies/{UNKNOWN}",
         f"/studies/{UNKNOWN}/dataset.nc",
         f"/studies/{UNKNOWN}/events",
+        f"/studies/{UNKNOWN}/sensitivity",
         f"/runs/{UNKNOWN}",
         f"/runs/{UNKNOWN}.nc",
         f"/runs/{UNKNOWN}/map.png",
@@ -317,6 +318,20 @@ def test_a_defect_shows_nothing_of_its_inside(app: FastAPI) -> None:
     assert "secret" not in answer.text and "Traceback" not in answer.text
 
 
+@pytest.mark.parametrize("error", [*STATUS])
+def test_every_kind_of_error_has_the_status_of_the_table(
+    app: FastAPI, error: type[Exception]
+) -> None:
+    arguments = {"FileDamaged": (Path("a"), "run a", "no seal"), "RequestValidationError": ([],)}
+    arguments |= dict.fromkeys(("StudyError", "Unusable"), ("a", 1, "must be 2"))
+
+    def failing() -> None:
+        raise error(*arguments.get(error.__name__, (["reason"],)))
+
+    app.add_api_route("/failing", failing)
+    problem(ask(app, "/failing"), STATUS[error])
+
+
 def test_the_description_names_every_resource_and_its_problems(app: FastAPI) -> None:
     description = json.loads(ask(app, "/openapi.json").text)
     assert {
@@ -327,6 +342,7 @@ def test_the_description_names_every_resource_and_its_problems(app: FastAPI) -> 
         "/studies/{study_id}/retry",
         "/studies/{study_id}/events",
         "/studies/{study_id}/dataset.nc",
+        "/studies/{study_id}/sensitivity",
         "/runs",
         "/runs/{run_id}",
         "/runs/{run_id}.nc",
@@ -347,7 +363,7 @@ def test_the_example_in_the_description_is_a_study(app: FastAPI) -> None:
     post = json.loads(ask(app, "/openapi.json").text)["paths"]["/studies"]["post"]
     schema = post["requestBody"]["content"]["application/json"]["schema"]
     own = {"name", "scene", "parameters", "sweep", "points", "sample", "goal", "note", "tags"}
-    own |= {"keep", "priority", "allow"}
+    own |= {"extends", "keep", "priority", "allow"}
     assert set(schema["properties"]) == own
     (example,) = schema["examples"]
     assert Study.from_dict(example).size == 4

@@ -341,11 +341,26 @@ def test_a_study_larger_than_the_free_disk_or_the_default_limits_is_refused(
     bounds = Settings(data=tmp_path).bounds
     axes = {"friction": [i / 1000 for i in range(200)], "load_ratio": [0.2, 0.3, 0.4, 0.5]}
     study = {"name": "a", "scene": "punch", "parameters": COARSE_PUNCH, "sweep": axes}
-    found = examined(study, tmp_path, bounds).estimate
+    one = examined(study, tmp_path, bounds)
+    two = examined(study | {"parameters": COARSE_PUNCH | {"load_step": 0.07}}, tmp_path, bounds)
+    app = create_app(Settings(data=tmp_path))
+    keeper, jobs, found = app.state.keeper, app.state.jobs, one.estimate
     free = 1_500_000_000
     with pytest.raises(NoRoom, match=r"takes about 1\.58 GB, and 1\.5 GB are free on the disk of"):
-        examined(study, tmp_path, bounds)
+        keeper.accept(one, 0)
     assert status_of(NoRoom("")) == 507
+    free = 3_000_000_000
+    keeper.accept(one, 0)
+    for check in (keeper.check_room, lambda found: keeper.accept(found, 0)):
+        with pytest.raises(NoRoom, match=r"3 GB are free .* studies before it take 1\.58 GB"):
+            check(two)
+    assert keeper.accept(one, 0)[1] is False, "it is promised once"
+    jobs.take()
+    jobs.note(one.study.id, 80.0)
+    assert jobs.promised("") == pytest.approx(0.6 * found.bytes)
+    keeper.accept(two, 0)
+    jobs.dismiss(one.study.id)
+    assert jobs.promised(two.study.id) == 0.0
     with pytest.raises(StudyError, match="cpu_seconds = 61000: at most 50000: use fewer runs"):
         bounds.check(replace(found, cpu_seconds=(1.0, 61_000.0, 1e9)))
     with pytest.raises(StudyError, match=r"bytes = 198000000000: at most 5e\+10: use fewer runs"):

@@ -17,6 +17,7 @@ from service.errors import Conflict, NotFound
 from service.job import StudyState
 from service.jobs import Jobs, put
 from service.pool import Pool
+from service.processes import Starter
 from service.retention import Keeper
 from service.settings import Settings
 from studies import Store, Study
@@ -115,6 +116,25 @@ def test_runs_of_a_search_by_the_command_line_are_kept(place: Place, most: int) 
     assert place.runs() == {*tried, *(ids(other) if most == 3 else [])}
 
 
+def test_runs_that_a_search_of_the_queue_may_need_are_kept(place: Place) -> None:
+    goal = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}
+    search = Study.from_dict({"name": "goal", "scene": "fake", "goal": goal})
+    tried = search_here(search, place.store)
+    place.jobs.accept(search.id, search.to_dict(), [], most=search.size, stage=search.stage())
+    sweep = {"load_ratio": [place.store.run(each)["parameters"]["load_ratio"] for each in tried]}
+    shared = Study.from_dict({"name": "shared", "scene": "fake", "sweep": sweep})
+    place.jobs.accept(shared.id, shared.to_dict(), ids(shared))
+    place.jobs.finish(shared.id, StudyState.FAILED, "", standing=StudyState.ACCEPTED)
+    with pytest.raises(Conflict, match="a study searches in the scene of this run"):
+        place.keeper().delete_run(tried[0])
+    place.keeper().purge(shared.id)
+    assert place.runs() == {*tried}
+    place.jobs.asked(search.id, tried, search.stage(1))
+    place.jobs.finish(search.id, StudyState.SUCCESSFUL, "", standing=StudyState.ACCEPTED)
+    place.keeper().purge(search.id)
+    assert place.runs() == set()
+
+
 @pytest.mark.parametrize("end", ["accepted", "running", "stopping"])
 def test_what_is_at_work_is_not_deleted(place: Place, end: str) -> None:
     study = place.computed("busy", [0.1])
@@ -192,7 +212,12 @@ def test_a_study_deleted_as_its_turn_comes_is_not_begun(place: Place) -> None:
     place.keeper().purge(study.id)
     settings = Settings(data=place.store.directory)
     runner = Scripted(
-        settings, place.jobs, Pool.of(settings, 0), 0, lambda: place.jobs, script=[[]]
+        settings,
+        place.jobs,
+        Pool(settings, Starter(0)),
+        Starter(0),
+        lambda: place.jobs,
+        script=[[]],
     )
     asyncio.run(runner._compute(job))
     assert not runner.orders and not place.there(study)

@@ -4,27 +4,37 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import signal
 import sqlite3
+import subprocess
+import sys
 from asyncio.subprocess import PIPE, Process
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import psutil
 import pytest
 
-from service import processes
 from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.pool import Pool
-from service.processes import Starter
+from service.processes import LOADED, Starter
 from service.runner import SILENT, Runner
 from service.settings import Settings
+from tests.architecture.sources import ROOT
 
-RUN = {"kind": "event", "content": {"kind": "run", "progress": 0.5}}
+RUN = {"kind": "event", "content": {"kind": "run", "progress": 0.5, "stage": "", "run": "b"}}
 AWAY = {"kind": "wait", "content": {"reason": "the store is busy"}}
-ALL_FAILED = {"kind": "outcome", "content": {"error": 2}}
+
+
+def outcome(counts: dict[str, int], stage: str = "", asked: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return the last message of a child."""
+    return {"kind": "outcome", "content": {"counts": counts, "stage": stage, "asked": asked}}
+
+
+ALL_FAILED = outcome({"error": 2})
 GIBBERISH = "gibberish"
 ENDLESS = "x" * 1_100_000
 
@@ -57,8 +67,8 @@ def carried_out(
         jobs.dismiss("a")
         jobs.retry("a")
     settings = Settings(**{"data": data, "attempts": 2, "poll_seconds": 0.01, **limits})
-    pool = Pool.of(settings, lock=0)
-    runner = Scripted(settings, jobs, pool, Starter("none", 0), lambda _: None, script=list(script))
+    pool = Pool(settings, Starter(0))
+    runner = Scripted(settings, jobs, pool, Starter(0), lambda _: None, script=list(script))
 
     async def work() -> None:
         async with asyncio.timeout(30.0), runner.working():
@@ -90,7 +100,7 @@ def test_a_child_that_cannot_be_understood_brought_nothing(tmp_path: Path, line:
 
 def test_time_of_work_is_no_time_of_waiting(tmp_path: Path) -> None:
     """The first child computes for longer than the service is patient."""
-    script = [[RUN] * 3, [RUN], [AWAY], [{"kind": "outcome", "content": {"ok": 2}}]]
+    script = [[RUN] * 3, [RUN], [AWAY], [outcome({"ok": 2})]]
     job, orders = carried_out(tmp_path, *script, patience_seconds=1.0, poll_seconds=0.05)
     assert len(orders) == 4 and job.state is StudyState.SUCCESSFUL
 
@@ -112,7 +122,7 @@ def test_a_frozen_process_is_told_of_and_ended(
     settings = Settings(
         data=tmp_path, attempts=2, poll_seconds=0.02, stall_seconds=0.5, grace_seconds=0.1
     )
-    runner = Frozen(settings, jobs, Pool.of(settings, lock=0), Starter("none", 0), lambda _: None)
+    runner = Frozen(settings, jobs, Pool(settings, Starter(0)), Starter(0), lambda _: None)
 
     async def work() -> None:
         async with asyncio.timeout(30.0), runner.working():
@@ -139,7 +149,7 @@ def test_a_study_that_is_no_json_fails_and_holds_nobody_back(tmp_path: Path) -> 
     with closing(sqlite3.connect(jobs.path)) as connection, connection:
         connection.execute("UPDATE job SET study = '{' WHERE id = 'bad'")
     settings = Settings(data=tmp_path, poll_seconds=0.01, scheduler="tcp://127.0.0.1:1")
-    runner = Runner(settings, jobs, Pool.of(settings, lock=0), Starter("none", 0), lambda _: None)
+    runner = Runner(settings, jobs, Pool(settings, Starter(0)), Starter(0), lambda _: None)
 
     async def work() -> None:
         async with asyncio.timeout(30.0), runner.working():
@@ -152,55 +162,81 @@ def test_a_study_that_is_no_json_fails_and_holds_nobody_back(tmp_path: Path) -> 
     assert jobs.get("good").state is StudyState.RUNNING
 
 
-def test_the_processes_of_the_next_study_load_while_there_is_none(
+def test_what_the_next_study_needs_is_loaded_while_there_is_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("service.runner.READY_SECONDS", 0.1)
+    asked: list[tuple[str, ...]] = []
+    monkeypatch.setattr("service.processes.prepare_workers", asked.append)
     jobs = Jobs(tmp_path / "jobs.sqlite")
     settings = Settings(data=tmp_path, poll_seconds=0.02)
-    starters = Starter("this", 0), Starter("this", 0)
-    pool = Pool(settings, starters[0])
-    runner = Runner(settings, jobs, pool, starters[1], lambda _: jobs)
+    starter = Starter(0)
+    runner = Runner(settings, jobs, Pool(settings, starter), starter, lambda _: jobs)
 
-    async def work() -> list[Process]:
-        async with asyncio.timeout(30.0), runner.working():
-            while not all(each._ready for each in starters):
-                await asyncio.sleep(0.02)
-            ready = [each._ready for each in starters if each._ready]
-            await asyncio.sleep(0.2)
-            assert [each._ready for each in starters] == ready, "one of each is enough"
-        return ready
-
-    ready = asyncio.run(work())
-    assert len(ready) == 2
-    assert all(process.returncode is not None for process in ready)
-
-
-def test_a_process_is_ready_before_it_is_needed() -> None:
     async def work() -> None:
-        starter = Starter("this", 0)
-        before = len(psutil.Process().children())
-        await asyncio.gather(*(starter.prepare() for _ in range(3)))
-        ready = starter._ready
-        assert ready is not None
-        assert len(psutil.Process().children()) == before + 1, "one is enough"
-        given = await starter.give({"id": "a"})
-        assert given is ready and starter._ready is None
-        await processes.end(given, 1.0)
-        await starter.prepare()
-        dead = starter._ready
-        assert dead is not None
-        dead.kill()
-        await dead.wait()
-        given = await starter.give({"id": "b"})
-        assert given.pid != dead.pid, "one that has died is of no use"
-        await processes.end(given, 1.0)
-        await starter.prepare()
-        waiting = starter._ready
-        await starter.close()
-        assert waiting is not None and waiting.returncode is not None
+        async with asyncio.timeout(30.0), runner.working():
+            while not asked:
+                await asyncio.sleep(0.02)
 
     asyncio.run(work())
+    assert set(asked) == {LOADED}
+
+
+ECHO = """
+import os, sys
+def main():
+    told = os.getsid(0), os.getcwd(), os.environ["FOR_IT"]
+    os.write(1, " ".join(map(str, told)).encode() + b"\\n")
+    os.write(1, os.read(0, 100))
+    while os.read(0, 1):
+        pass
+    sys.exit(3)
+"""
+
+
+PROGRAM = """
+import asyncio, json, os
+from service import processes
+async def work():
+    starter = processes.Starter(os.open(os.devnull, os.O_RDONLY))
+    method = await starter.prepare()
+    os.environ["FOR_IT"] = "told"
+    process = await starter.start("echo_order", {"id": "a"})
+    told = (await process.stdout.readline()).decode().split()
+    order = json.loads(await process.stdout.readline())
+    running = process.returncode
+    await processes.end(process, 10.0)
+    pid, code = process.pid, process.returncode
+    other = await starter.start("echo_order", {"id": "b"})
+    other.kill()
+    await other.wait()
+    print(json.dumps([method, told, order, running, pid, code, other.returncode]))
+if __name__ == "__main__":
+    asyncio.run(work())
+"""
+
+
+@pytest.mark.parametrize("folder", ["short", "long" * 30])
+def test_a_process_starts_the_same_by_either_method(
+    folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The name of the folder for temporary files may be too long for a socket."""
+    (tmp_path / folder).mkdir()
+    (tmp_path / "echo_order.py").write_text(ECHO)
+    (tmp_path / "program.py").write_text(PROGRAM)
+    done = subprocess.run(
+        [sys.executable, str(tmp_path / "program.py")],
+        env=os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path / folder)},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    )
+    method, told, order, running, pid, code, killed = json.loads(done.stdout)
+    assert method == ("forkserver" if folder == "short" else "spawn")
+    assert told == [str(pid), "/", "told"], "a session of its own, and no folder of the service"
+    assert order == {"id": "a"}
+    assert (running, code, killed) == (None, 3, -signal.SIGKILL)
 
 
 @pytest.mark.parametrize(

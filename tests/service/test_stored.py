@@ -10,6 +10,7 @@ import os
 import random
 import shutil
 import sqlite3
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -24,13 +25,16 @@ import pytest
 from service import access, retention
 from service.app import create_app
 from service.errors import Conflict
+from service.examiner import Examined
+from service.inspector import Inspector
 from service.job import StudyState
 from service.jobs import Jobs
 from service.keys import Keys, KeysError, Scope
 from service.probe import look
 from service.recovery import Mender, open_queue
+from service.retention import Keeper
 from service.settings import Settings
-from studies import FileDamaged, Store, Study, StudyError, open_netcdf
+from studies import FileDamaged, Store, Study, StudyError, estimate, open_netcdf
 from studies.errors import CatalogueDamaged, SceneError
 from studies.scenes.scene import FileScene, read_scene
 from studies.storage import seal, shelf
@@ -315,9 +319,14 @@ def test_a_scene_that_a_later_version_refuses_stays_and_is_not_listed(
             assert [store.scenes(9), store.scenes(9), store.scene(pin.id)] == [[], [], None]
     assert len(warned(caplog, f"scenes/{pin.id} is not allowed in this version: ")) == 1
     assert not (tmp_path / "unreadable").exists()
-    assert [each.id for each in store.scenes(9)] == [pin.id]
+    (kept,) = store.scene_files()
+    assert kept.size > len(pin.description.meshes["pin.msh"].data), "its files count"
+    assert [each.id for each in Store(tmp_path).scenes(9)] == [pin.id], "this version allows it"
     monkeypatch.setattr(shelf, "file_scene", lambda description: raised(wrong))
-    ask = asking(create_app(Settings(data=tmp_path)))
+    app = create_app(Settings(data=tmp_path, max_scenes_bytes=kept.size))
+    with pytest.raises(Conflict, match="the posted scenes would take"):
+        app.state.keeper.keep_scene("0" * 32, pin.description, "anna")
+    ask = asking(app)
     assert ask("DELETE", f"/scenes/{pin.id}").status_code == 204
     assert not (tmp_path / "scenes" / pin.id).exists()
 
@@ -618,7 +627,11 @@ def test_scenes_that_no_study_needs_are_deleted_before_studies(
     assert len(store.scenes(9)) == 3, "all are of today"
     monkeypatch.setattr(retention, "FRESH", 0)
     keeper.jobs.accept(study.id, study.to_dict(), study.run_ids())
+    looked: list[object] = []
+    users = Keeper._users
+    monkeypatch.setattr(Keeper, "_users", lambda self: looked.append(self) or users(self))
     keeper.sweep()
+    assert len(looked) == 1, "the studies are read once for all scenes"
     assert [each.id for each in store.scenes(9)] == [used.id]
     assert keeper.jobs.get(study.id).state is StudyState.ACCEPTED
 
@@ -652,9 +665,27 @@ def test_a_scene_is_not_deleted_while_a_study_of_it_is_accepted(
 
     monkeypatch.setattr(Store, "save_study", save)
     monkeypatch.setattr(threading, "excepthook", lambda _: None)
-    keeper.accept(study, list(study.run_ids()), 0)
+    keeper.accept(Examined(study, list(study.run_ids()), estimate(study, store)), 0)
     deleting.join()
     assert store.scene(pin.id) is not None
+
+
+def test_the_meshes_of_a_posted_scene_are_read_once_for_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever uses them later reads arrays: the library of meshes stays in a process shut in."""
+    text, mesh = ((ROOT / "data/scenes" / name).read_bytes() for name in ("pin.toml", "pin.msh"))
+    text = text.replace(b"0.01", b"0.011")  # no other test has made this scene
+    found, content = asyncio.run(Inspector(60.0).inspect(text, {"pin.msh": mesh}, "anna"))
+    store = Store(tmp_path)
+    assert store.keep_scene(found.id, content, "anna")
+    monkeypatch.setitem(sys.modules, "meshio", None)
+    scene = store.scene(found.id)
+    assert scene is not None and len(scene.model(scene.parameters()).bodies) == 2
+    arrays = tmp_path / "scenes" / found.id / "pin.msh.arrays"
+    flip(arrays)
+    assert store.scene(found.id) is None
+    assert store.keep_scene(found.id, content, "anna") and store.scene(found.id) is not None
 
 
 def test_a_mesh_that_has_changed_spoils_its_scene_until_it_is_posted_again(tmp_path: Path) -> None:

@@ -68,9 +68,9 @@ def test_the_death_of_the_workers_process_is_made_good(lively: Server) -> None:
     study_id = lively.post(large_study("orphaned", paths=12, seconds=0.3))
     wait_until(lambda: len(lively.computed()) >= before + 2)
     assert lively.process is not None
-    for child in psutil.Process(lively.process.pid).children():
-        if any("service.pool" in word for word in child.cmdline()):
-            child.kill()
+    family = psutil.Process(lively.process.pid).children(recursive=True)
+    (pool,) = (each for each in family if each.name() == "service.pool" != each.parent().name())
+    pool.kill()
     assert lively.finished(study_id)["counts"] == {"ok": 12}
 
 

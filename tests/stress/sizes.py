@@ -54,11 +54,7 @@ def large_study(server: Server) -> list[Figure]:
     started = time.monotonic() - began
     beside = min(seconds_for(server, one_run(f"beside-{i}", 0.95 - i / 100)) for i in range(3))
     after = megabytes(process)
-    children = [
-        each
-        for each in process.children()
-        if any("service.child" in word for word in each.cmdline())
-    ]
+    children = [each for each in process.children(recursive=True) if each.name() == "service.child"]
     computing = max(megabytes(each) for each in children)
     server.client.delete(f"/studies/{study_id}")
     return [

@@ -24,8 +24,10 @@ from solver.results.record import Record
 from studies import Bounds, Store, Study, StudyError, StudyEvent, estimate, open_study, run_study
 from studies.definition.goal import Goal, Search, checked_goal
 from studies.definition.identity import solver_hash
-from studies.execution.goals import Goals, answers
+from studies.execution.asking import Asking
+from studies.execution.goals import answers
 from studies.execution.limits import Limits
+from studies.execution.refined import refined
 from studies.execution.run import _Work
 from studies.execution.task import PathTask, walk
 from tests.studies.conftest import fake_study
@@ -69,8 +71,8 @@ def study(goal: dict[str, Any], sweep: Any = None, scene: str = "fake", **fixed:
 
 
 def search_here(study: Study, store: Store, most: int = 10**6) -> list[str]:
-    """Search in this process, until there are so many runs; return their ids."""
-    goals, computed = Goals(study, store), []
+    """Search, or refine, in this process, until there are so many runs; return their ids."""
+    goals, computed = Asking(study, store), []
 
     def hear(message: dict[str, Any]) -> None:
         if "row" in message:
@@ -90,7 +92,10 @@ def search_here(study: Study, store: Store, most: int = 10**6) -> list[str]:
         goals.closed(asked.path.id)
     store.reconcile()
     store.save_study(study)
-    answers(study, store, goals)
+    if study.goal:
+        answers(study, store, goals)
+    else:
+        refined(study, store, goals, anew=True)
     return computed
 
 
@@ -191,7 +196,7 @@ def test_the_data_set_has_what_was_found_over_the_axes(store: Store, scene: str)
 def test_a_path_ends_with_the_first_run_beyond(store: Store) -> None:
     """Behind it no run is needed: of the first round, which has 5 values, that is the third."""
     asked = study(PRESSURE | {"between": [0.2, 3.2]}, {}, half_width=20.0)
-    goals = Goals(asked, store)
+    goals = Asking(asked, store)
     path = next(filter(None, goals.paths())).path
     assert [case.values["load_ratio"] for case in path.cases] == [0.2, 0.4, 0.8, 1.6, 3.2]
     computed = search_here(asked, store)
@@ -295,27 +300,31 @@ def test_a_value_that_the_scene_refuses_ends_its_search_alone(
 def test_a_run_that_a_dead_worker_wrote_and_did_not_tell_is_kept(store: Store) -> None:
     """The death is the fault of the run after it."""
     asked = study(PRESSURE, {}, "followed")
-    goals = Goals(asked, store)
+    goals = Asking(asked, store)
     first = next(filter(None, goals.paths()))
     begun = PathTask(
         asked.problem, (first.path,), store.directory, solver_hash(), place=first.place
     )
     silent: list[Any] = []
+    before = time.time_ns() - 10**9
     walk(begun, silent.append, lambda: sum("row" in each for each in silent) > 0)
     low, *others = (each["row"] for each in silent if "row" in each)
+    assert all(("follows" in each) == ("row" in each) for each in silent)
     assert (low["parameters"]["load_ratio"], others) == (0.1, [])
-    work = _Work(asked, store, set(), Limits(), 0, lambda event: None, goals)
+    work = _Work(asked, store, set(), Limits(), 0, lambda event: None, goals, before)
     work._walking[first.path.id] = 0, 0.0
     work._close(begun, RuntimeError("the worker died"))
     assert store.run(low["id"]) == low
-    (search,) = goals.searches
+    assert low["id"] in work.computed
+    assert len(work.computed) == 2
+    (search,) = (place.program for place in goals.places)
     assert [row["status"] for row in search.rows.values()] == ["ok", "error"]
     assert search.reason == "failed"
 
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_run_of_which_a_path_told_nothing_is_asked_for_again(store: Store, scene: str) -> None:
-    goals = Goals(study(PRESSURE, {}, scene), store)
+    goals = Asking(study(PRESSURE, {}, scene), store)
     paths = goals.paths()
     lost = next(filter(None, paths)).path
     assert next(paths) is None
@@ -328,7 +337,7 @@ def test_a_run_of_which_a_path_told_nothing_is_asked_for_again(store: Store, sce
 def test_a_stored_run_beyond_ends_its_path(store: Store) -> None:
     """So does the first stored run tell whether the number of ``at`` rises."""
     asked = study(PRESSURE | {"between": [0.2, 3.2]}, {}, half_width=20.0)
-    first = next(filter(None, Goals(asked, store).paths()))
+    first = next(filter(None, Asking(asked, store).paths()))
     cases, whole = first.path.cases, (first.path,)
     task = PathTask(asked.problem, whole, store.directory, solver_hash(), limit=first.limit)
     for stored, computed in [({0, 3}, [1, 2]), ({0, 1}, [2, 3]), ({3}, [0, 1, 2])]:
@@ -453,7 +462,7 @@ def test_the_command_searches_prints_draws_and_keeps(
 
 def test_a_new_round_begins_while_other_searches_wait(store: Store) -> None:
     """The runs of the second place are not known when the first has two rounds."""
-    goals = Goals(study(PRESSURE, {"friction": [0.0, 0.1]}), store)
+    goals = Asking(study(PRESSURE, {"friction": [0.0, 0.1]}), store)
     asked = goals.paths()
     paths = [each.path for each in filter(None, (next(asked), next(asked)))]
     assert next(asked) is None

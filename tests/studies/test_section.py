@@ -30,7 +30,7 @@ from solver.scenes.scene import _merged
 from solver.tensors import to_mandel, von_mises
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.storage import ugrid
-from studies.views.plots.maps import whole
+from studies.views.plots.mapped import whole
 from studies.views.plots.picture import picture
 from studies.views.tables import runs_table
 from tests.studies.conftest import compute_here

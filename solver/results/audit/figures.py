@@ -110,3 +110,17 @@ _DECLARED = [
 
 AUDIT: dict[str, Quantity] = {figure.name: figure for figure in _DECLARED}
 """The figures, by name."""
+
+LIMITS = {
+    "audit_residual": 1e-6,
+    "audit_reactions": 1e-5,
+    "audit_action_reaction": 1e-3,
+    "audit_law": 1e-6,
+    "audit_yield": 1e-6,
+    "audit_slip": 0.03,
+    "audit_touch_time": 0.1,
+    "audit_slip_resolution": 0.5,
+    "audit_history": 1e-6,
+    "audit_energy": 1e-5,
+}
+"""Limits that do not depend on the run."""

@@ -216,7 +216,9 @@ class NamedPlacesCheck:
             values = np.where(np.isnan(values) & ~found.closed, 0.0, values) if kind in (
                 "pressure", "shear") else values  # fmt: skip
         else:
-            values, X = self._values(number, kind, part)
+            values, X = self._values(number, number.stage, kind, part)
+            if number.minus:
+                values = values - self._values(number, number.minus, kind, part)[0]
             s = _lengths(X)
         scale = self._scale(kind, values)
         if not np.isfinite(values).any():
@@ -238,14 +240,16 @@ class NamedPlacesCheck:
             return
         self._out.add(number.name, recorded, _above_zero(values, s), s[-1], share)
 
-    def _values(self, number: RequestedNumber, kind: str, part: str) -> tuple[Array, Array]:
+    def _values(
+        self, number: RequestedNumber, stage: str, kind: str, part: str
+    ) -> tuple[Array, Array]:
         """Return the values (n,) of a field of a body or line, and their positions (2, n)."""
         if number.line is not None:
             line = self._places.lines[number.line]
             body, X = line.body, line.X
         else:
             body, X = str(number.body), None
-        fields = self._source.fields(body, number.stage)
+        fields = self._source.fields(body, stage)
         if X is None and kind in ("mises", "plastic_strain"):
             X, mises, flow = fields.at_points
             values = mises if kind == "mises" else flow

@@ -12,6 +12,7 @@ from solver.contact.system import LEAST
 from solver.fem.error import error_estimate
 from solver.results.audit.bodies import AuditedBody
 from solver.results.audit.contact_error import contact_error
+from solver.results.audit.figures import LIMITS
 from solver.results.audit.forces import action_reaction, imbalance, left_on, reactions
 from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.plain import PlainBody
@@ -27,18 +28,6 @@ if TYPE_CHECKING:
     from solver.fem.discretisation import Discretisation
 
 _SURFACE_SHEAR = 1.1
-_LIMITS = {
-    "audit_residual": 1e-6,
-    "audit_reactions": 1e-5,
-    "audit_action_reaction": 1e-3,
-    "audit_law": 1e-6,
-    "audit_yield": 1e-6,
-    "audit_slip": 0.03,
-    "audit_touch_time": 0.1,
-    "audit_slip_resolution": 0.5,
-    "audit_history": 1e-6,
-    "audit_energy": 1e-5,
-}
 _TURNING = 0.02  # energy error under finite sliding: contact normals rotate within an increment
 TRAVELLING = 5e-3  # of the force: elements integrate a Hertz pressure with its steep ends
 _FORCE = 1e-6  # of the force level
@@ -218,7 +207,7 @@ def _violations(
 
 def limits_at(scale: float) -> dict[str, float]:
     """Return the limits of the figures that every kind of run has, for a force level [N]."""
-    return _LIMITS | {
+    return LIMITS | {
         "audit_tension": _FORCE * scale,
         "audit_friction_excess": _FORCE * scale,
         "audit_contact_after_unloading": _FORCE * scale,
@@ -230,7 +219,7 @@ def broken(
 ) -> tuple[str, ...]:
     """Return messages on violations: figures beyond their limits, and negative dissipation."""
     found = _beyond(figures, limits)
-    if not figures["audit_dissipation"] >= -_LIMITS["audit_yield"] * yield_stress:
+    if not figures["audit_dissipation"] >= -LIMITS["audit_yield"] * yield_stress:
         found += (f"plastic dissipation is negative: {figures['audit_dissipation']:.2e}",)
     return found
 

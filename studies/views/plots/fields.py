@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Sequence
 
+import numpy as np
 import xarray as xr
 
 from solver.tensors import AXES
@@ -17,6 +18,9 @@ Window = Sequence[float]
 _RESIDUAL, _STRESS = "residual_stress", "map_stress"
 ALONG = ("s", "depth", "increment", "fraction")
 """Dimensions along which lines are drawn."""
+DISTANCE = "distance"
+_DECAYED = 0.02
+"""Depth is shown as far as values exceed this share of the peak."""
 DRAWN = (*AXES, *ALONG)
 """Dimensions within one figure of a run: two axes of a map, or one axis or one of `ALONG`."""
 
@@ -72,6 +76,20 @@ def line_axis(values: xr.DataArray, sweep: Sequence[Hashable] = ()) -> str | Non
     axes = map_axes(values, sweep)
     alone = axes if len(axes) == 1 else ()
     return next((name for name in (*ALONG, *alone) if name in values.dims), None)
+
+
+def placed(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
+    """Return values, with the distance [mm] from the start of a line or contact as a coordinate."""
+    distance = run.get(f"{str(values.name).partition('_')[0]}_s")
+    there = distance is not None and set(distance.dims) <= set(values.dims)
+    return values.assign_coords({DISTANCE: distance}) if there else values
+
+
+def depth_shown(values: xr.DataArray, others: Sequence[Hashable]) -> int:
+    """Return the number of points down to the depth at which values have decayed."""
+    largest = abs(values).max(others).to_numpy()
+    shown = np.flatnonzero(largest > _DECAYED * largest.max())
+    return int(shown[-1]) + 2 if shown.size else values.sizes["depth"]
 
 
 def usual_field(dataset: xr.Dataset) -> str:

@@ -15,11 +15,14 @@ from studies.errors import StudyError
 from studies.views.picking import one_run
 from studies.views.plots.captions import label, value_text, words, wrapped
 from studies.views.plots.fields import (
+    DISTANCE,
     check_field,
     component_of,
+    depth_shown,
     focus,
     line_axis,
     line_fields,
+    placed,
     too_close,
 )
 from studies.views.plots.legends import (
@@ -33,13 +36,10 @@ from studies.views.plots.legends import (
 )
 from studies.views.plots.maps import entitle
 
-_DECAYED = 0.02
-"""Depth is shown as far as values exceed this share of the peak."""
 _EACH = len(STYLES)
 """Largest number of values drawn of a dimension of the field."""
 _SIZE = (8.0, 4.6)
 _LENGTHS = ("s", "depth", *AXES)
-_DISTANCE = "distance"
 
 
 def line_figure(
@@ -72,7 +72,7 @@ def line_figure(
     """
     run = run if over else one_run(run)
     check_field(field, line_fields(run))
-    values = _placed(component_of(run[field], component), run)
+    values = placed(component_of(run[field], component), run)
     along = line_axis(values)
     assert along is not None
     if zoom is not None and along not in _LENGTHS:
@@ -84,14 +84,14 @@ def line_figure(
     sizes = values.sizes
     values = _distinguishable(values, [name for name in values.dims if name != along], over)
     others = [name for name in values.dims if name != along]
-    at = _DISTANCE if _DISTANCE in values.coords else along
+    at = DISTANCE if DISTANCE in values.coords else along
     if zoom is not None:
         middle = 0.0 if along == "depth" else focus(run, zoom)
         values = values.where(abs(values[along] - middle) <= zoom, drop=True)
         if values.sizes[along] < 2:
             raise too_close(zoom)
     elif along == "depth":
-        values = values.isel(depth=slice(_depth_shown(values, others)))
+        values = values.isel(depth=slice(depth_shown(values, others)))
     sheet = Figure(figsize=_SIZE, dpi=150, layout="constrained")
     axes = sheet.add_subplot()
     entitle(axes, run, values, _SIZE[0] - 0.8)
@@ -127,13 +127,6 @@ def line_figure(
     return sheet
 
 
-def _placed(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
-    """Return values, with the distance [mm] from the start of a line or contact as a coordinate."""
-    distance = run.get(f"{str(values.name).partition('_')[0]}_s")
-    there = distance is not None and set(distance.dims) <= set(values.dims)
-    return values.assign_coords({_DISTANCE: distance}) if there else values
-
-
 def _distinguishable(
     values: xr.DataArray, others: Sequence[Hashable], over: str | None
 ) -> xr.DataArray:
@@ -163,10 +156,3 @@ def _heading(drawn: xr.DataArray, sizes: Mapping[Hashable, int]) -> str:
     """Return the name of a dimension; if some values are not drawn, with both counts."""
     name, all_of_them = words(str(drawn.name)), sizes[drawn.name]
     return name if drawn.size == all_of_them else f"{name} ({drawn.size} of {all_of_them})"
-
-
-def _depth_shown(values: xr.DataArray, others: Sequence[Hashable]) -> int:
-    """Return the number of points down to the depth at which values have decayed."""
-    largest = abs(values).max(others).to_numpy()
-    shown = np.flatnonzero(largest > _DECAYED * largest.max())
-    return int(shown[-1]) + 2 if shown.size else values.sizes["depth"]

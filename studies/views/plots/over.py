@@ -10,42 +10,20 @@ from matplotlib.transforms import ScaledTranslation
 
 from solver.model.friction import PatchStatus
 from studies.views.plots.fields import Window, map_axes
+from studies.views.plots.mapped import STATUS
 
-_STATUS = "patch_status"
 _SHEAR, _SLIP = "patch_shear", "patch_slip"
 _ARROWS = 16
 """Number of arrows over the side of a square as large as what is shown."""
 BELOW = -40.0
 """Place of words below a map, under the name of its axis [pt]."""
-_MARGIN = 0.2
-"""Width of the frame around the contact, over its longer side."""
 _WHEEL, _UP, _ABOVE = "wheel_surface", "y", 3.0
 """The profile of the wheel, its height, and how far above the body it is shown [mm]."""
 
 
-def is_patch(values: xr.DataArray, run: xr.Dataset) -> bool:
-    """Whether a map is one of the contact that a run has in a patch."""
-    return _STATUS in run and map_axes(values) == map_axes(run[_STATUS])
-
-
-def within_patch(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
-    """Return a map of the contact with a frame around it, and NaN where it is open."""
-    across, up = map_axes(values)
-    closed = run[_STATUS] != PatchStatus.OPEN
-    if not closed.any():
-        return values
-    part = closed.where(closed, drop=True)
-    margin = _MARGIN * max(float(np.ptp(part[name].to_numpy())) for name in (across, up))
-    ends = {
-        name: slice(float(part[name][0]) - margin, float(part[name][-1]) + margin)
-        for name in (across, up)
-    }
-    return values.where(closed).sel(ends)
-
-
 def draw_patch(axes: Axes, run: xr.Dataset, field: str, window: Window) -> None:
     """Draw the border of the contact, that of stick, and arrows of shear, or of slip over slip."""
-    status = run[_STATUS]
+    status = run[STATUS]
     across, up = map_axes(status)
     lines = [
         (status != PatchStatus.OPEN, "k", "edge of contact"),

@@ -15,7 +15,8 @@ from matplotlib.quiver import Quiver
 from solver.scenes import SCENES
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.views.plots.captions import setting
-from studies.views.plots.maps import map_figure, whole
+from studies.views.plots.mapped import whole
+from studies.views.plots.maps import map_figure
 from studies.views.plots.picture import picture
 from tests.studies.conftest import compute_here, fake_study
 

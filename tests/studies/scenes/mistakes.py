@@ -59,6 +59,28 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "contacts[0].frictoin",
         "did you mean friction?",
     ),
+    "a stage repeated that is none": (
+        put("repeat", {"stages": ["pres"], "times": 3}),
+        "repeat.stages",
+        "must be one of",
+    ),
+    "an output minus no stage": (
+        put(
+            "outputs", {"high": {"of": "mises", "body": "upper", "stage": "pressed", "minus": "x"}}
+        ),
+        "outputs.high.minus",
+        "must be one of",
+    ),
+    "no function of position": (
+        put("loads", 0, "value", "1 - q*x"),
+        "loads[0].value",
+        "must be a number or an expression of x and y; this one q is unknown",
+    ),
+    "a field that has no value": (
+        put("loads", 0, "value", "sqrt(x - 1e9)"),
+        "pressure.top",
+        "must be finite at all points [MPa]",
+    ),
     "unknown table": (put("body", {}), "body", "did you mean bodies?"),
     "text in a shape": (put(*SHAPE, "size", "fine"), "bodies.upper.shape.size", "number"),
     "unknown entry of a shape": (
@@ -85,8 +107,8 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
     "unknown kind": (
         put("loads", 0, "kind", "presure"),
         "loads[0].kind",
-        "must be one of displacement, initial_stress, pressure, temperature, traction; "
-        "did you mean pressure?",
+        "must be one of body_force, centrifugal, displacement, gravity, initial_stress, pressure, "
+        "temperature, traction; did you mean pressure?",
     ),
     "no kind": (without(*SHAPE, "kind"), "bodies.upper.shape.kind", "must be one of disc, fillet"),
     "wrong derived number": (

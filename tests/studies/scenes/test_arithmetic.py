@@ -5,9 +5,17 @@ from __future__ import annotations
 import math
 import random
 
+import numpy as np
 import pytest
 
-from studies.scenes.arithmetic import LONGEST, ExpressionError, evaluated, is_expression, names
+from studies.scenes.arithmetic import (
+    LONGEST,
+    ExpressionError,
+    Field,
+    evaluated,
+    is_expression,
+    names,
+)
 
 VALUES = {"a": 3.0, "n": 4, "rule": "mixed", "on": True}
 
@@ -155,4 +163,46 @@ def test_parentheses_and_sums_of_usual_length_are_read(text: str) -> None:
 )
 def test_operations_deep_inside_one_another_are_one_clear_error(text: str) -> None:
     with pytest.raises(ExpressionError, match="at most 50 operations inside one another: use der"):
+        evaluated(text, VALUES)
+
+
+X = np.array([[0.0, 1.0, 4.0], [2.0, 2.0, -1.0]])
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("$a*(1 - (x/$n)^2)", [3.0, 2.8125, 0.0]),
+        ("-$a^2*y", [-18.0, -18.0, 9.0]),
+        ("$low^2*x", [0.0, 4.0, 16.0]),
+        ("if(x > 0 and $on, sqrt(x), $low)", [-2.0, 1.0, 2.0]),
+        ("if(not (x > 0 or y < 0), $a, y)", [3.0, 2.0, -1.0]),
+        ("if($rule == 'mixed', max(x, $a), 1/0)", [3.0, 3.0, 4.0]),
+        ("2^-x*$n + abs(y)", [6.0, 4.0, 1.25]),
+        ("if(x > 0, log(x), 0)", [0.0, 0.0, math.log(4.0)]),
+        ("sin(pi*x/2)*min($a, y)", [0.0, 2.0, 0.0]),
+        ("5", [5.0, 5.0, 5.0]),
+    ],
+)
+def test_an_expression_of_the_position_is_a_function_of_it(text: str, values: list[float]) -> None:
+    bare = evaluated(text, VALUES | {"low": -2.0}) if is_expression(text) or "if" in text else text
+    assert "$" not in bare
+    assert np.allclose(Field(bare)(X), values, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("x*$rule", "only numbers"),
+        ("x > $a", "is a field: only numbers"),
+        ("x and $on", "x is a field: must be true or false"),
+        ("if(x, 1, $a)", "x is a field: must be true or false"),
+        ("x*q + $a", "q is unknown"),
+        ("x(2)*$a", "x is unknown"),
+        ("x*$b", r"\$b is no parameter"),
+        ("$a*x/0*(1/0)", "no value"),
+    ],
+)
+def test_what_is_no_function_of_position_is_refused(text: str, reason: str) -> None:
+    with pytest.raises(ExpressionError, match=reason):
         evaluated(text, VALUES)

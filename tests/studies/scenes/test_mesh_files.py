@@ -13,6 +13,7 @@ from solver.mesh.check import check_mesh
 from solver.mesh.elements import element_type
 from studies.scenes import scene
 from studies.scenes.description import Description
+from studies.scenes.meshdata import MeshData
 from studies.scenes.meshfile import OUTLINE, MeshFile
 from tests.studies.scenes.conftest import blocks
 
@@ -176,6 +177,48 @@ def test_a_damaged_gmsh_file_is_refused() -> None:
 def test_an_unknown_part_is_refused_with_those_there_are() -> None:
     with pytest.raises(ModelError, match="pin, plate"):
         MeshFile("pin.msh", PIN.read_bytes()).mesh("lug")
+
+
+@pytest.mark.parametrize("part", ["pin", "plate", None])
+def test_a_mesh_is_the_same_from_its_arrays_alone(
+    part: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = MeshFile("pin.msh", PIN.read_bytes()) if part else square()
+    again = file.read() if part else file
+    expected = file.mesh(part)
+    monkeypatch.delattr("studies.scenes.meshfile._read")
+    found = MeshFile(file.name, b"", again.arrays).mesh(part)
+    assert type(found) is type(expected)
+    np.testing.assert_array_equal(found.doflocs, expected.doflocs)
+    np.testing.assert_array_equal(found.t, expected.t)
+    assert found.boundaries.keys() == expected.boundaries.keys()
+    for name, facets in expected.boundaries.items():
+        np.testing.assert_array_equal(found.boundaries[name], facets)
+    assert part or found.boundaries["low"].size == 1
+
+
+def square() -> MeshFile:
+    """Return an element with a set of nodes, as nobody's library writes it."""
+    points, cells = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), np.array([[0, 1, 2, 3]])
+    data = MeshData(points, [("quad", cells)], {}, {"low": np.array([0, 1])})
+    return MeshFile("square.msh", b"", data.packed())
+
+
+@pytest.mark.parametrize(
+    "arrays",
+    [
+        b"nothing",
+        b"{}\n",
+        b"[" * 100_000,
+        b'[[["points"], [2, 2]]]\n' + bytes(8),
+        b'[[["points"], [4]]]\n' + bytes(32),
+        b'[[["other"], [1, 1]]]\n' + bytes(8),
+        b'[[["points"], [-1, 2]]]\n' + bytes(8),
+    ],
+)
+def test_what_are_no_arrays_of_a_mesh_is_refused(arrays: bytes) -> None:
+    with pytest.raises(ModelError, match=r"a\.msh"):
+        MeshFile("a.msh", b"", arrays).mesh(None)
 
 
 def test_the_meshes_of_scenes_that_a_process_keeps_have_a_largest_size(

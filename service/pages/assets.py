@@ -1,0 +1,61 @@
+"""The static files of the pages: packed once, and kept by browsers for good.
+
+Their address has the digest of all of them, so that a new version has other addresses.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import importlib.metadata
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+MEDIA_TYPES = {"js": "text/javascript", "css": "text/css", "svg": "image/svg+xml"}
+
+CHARTS = "plotly.js"
+"""The library of charts, which comes in the wheel `plotly`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asset:
+    """A static file.
+
+    Attributes
+    ----------
+    media_type : its type
+    packed : its content, packed by gzip
+    """
+
+    media_type: str
+    packed: bytes
+
+
+@cache
+def own() -> dict[str, bytes]:
+    """Return the files of this package by name."""
+    folder = files("service.pages") / "static"
+    return {each.name: each.read_bytes() for each in folder.iterdir() if each.is_file()}
+
+
+@cache
+def version() -> str:
+    """Return the digest of all static files."""
+    known = hashlib.sha256(importlib.metadata.version("plotly").encode())
+    for name, content in sorted(own().items()):
+        known.update(name.encode() + content)
+    return known.hexdigest()[:16]
+
+
+@cache
+def asset(name: str) -> Asset | None:
+    """Return a static file; None if there is none of this name."""
+    if name == CHARTS:
+        content = files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()
+    elif name in own():
+        content = own()[name]
+    else:
+        return None
+    kind = MEDIA_TYPES[name.rpartition(".")[2]]
+    return Asset(kind, gzip.compress(content, 6, mtime=0))

@@ -1,0 +1,183 @@
+"""The form of a new study: what its fields say as a study, and the mistakes beside them."""
+
+from __future__ import annotations
+
+import json
+import pprint
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from solver.scenes import Scene
+from studies import StudyError
+from studies.definition.cases import USUAL_AXES
+from studies.definition.parameters import Parameter, parameters_of, plain
+
+PREFIX = "p."
+"""What precedes the name of a parameter in the name of its field."""
+
+RANGE = re.compile(r"(?P<start>\S+)\s*\.\.\s*(?P<stop>\S+)\s+in\s+(?P<num>\d+)(?P<log>\s+log)?")
+"""Values of equal steps: ``0 .. 0.4 in 5``."""
+
+OF = re.compile(r"(?:(?:parameters|sweep)\.)?(?P<name>\w+)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FormField:
+    """One field of the form.
+
+    Attributes
+    ----------
+    parameter : what it sets
+    texts : what is in it; several where boxes are ticked
+    choices : the words or truth values that may be ticked; empty for a text
+    wrong : what is allowed, if what is in it is not
+    """
+
+    parameter: Parameter
+    texts: Sequence[str]
+    choices: Sequence[str]
+    wrong: str = ""
+
+    @property
+    def usual(self) -> str:
+        """The default, as one would write it."""
+        default = self.parameter.default
+        return (
+            "" if default is None else default if isinstance(default, str) else json.dumps(default)
+        )
+
+    @property
+    def first(self) -> bool:
+        """Whether it is one of those that are swept most."""
+        return self.parameter.name in USUAL_AXES
+
+
+def entries(
+    scene: Scene, given: Mapping[str, Sequence[str]], wrong: Mapping[str, str]
+) -> list[FormField]:
+    """Return the fields of the parameters of a scene with what is in them."""
+    found = []
+    for name, parameter in parameters_of(scene).items():
+        choices = choices_of(parameter)
+        texts = [each for each in given.get(PREFIX + name, ()) if each.strip()]
+        usual = FormField(parameter=parameter, texts=(), choices=choices).usual
+        texts = texts or ([usual] if choices else [])
+        found.append(
+            FormField(parameter=parameter, texts=texts, choices=choices, wrong=wrong.get(name, ""))
+        )
+    return found
+
+
+def choices_of(parameter: Parameter) -> list[str]:
+    """Return the values of a parameter that has words or truth values; empty for others."""
+    schema = parameter.schema
+    if schema.get("type") == "boolean":
+        return ["false", "true"]
+    return [str(each) for each in schema.get("enum", [])]
+
+
+def study_of(
+    scene_name: str, scene: Scene, given: Mapping[str, Sequence[str]]
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return the study that the fields describe, and each mistake by its parameter.
+
+    A field with its default, or with nothing, is left out; one with several values is swept.
+    """
+    study: dict[str, Any] = {
+        "name": _one(given, "name") or f"{scene.name}-study",
+        "scene": scene_name,
+    }
+    if note := _one(given, "note"):
+        study["note"] = note
+    if tags := [each.strip() for each in _one(given, "tags").split(",") if each.strip()]:
+        study["tags"] = tags
+    if _one(given, "keep"):
+        study["keep"] = "fields"
+    fixed: dict[str, Any] = {}
+    swept: dict[str, Any] = {}
+    wrong: dict[str, str] = {}
+    for name, parameter in parameters_of(scene).items():
+        texts = [each.strip() for each in given.get(PREFIX + name, ()) if each.strip()]
+        if not texts:
+            continue
+        try:
+            value, several = _value(parameter, texts)
+        except StudyError as error:
+            wrong[name] = error.allowed
+            continue
+        if several:
+            swept[name] = value
+        elif value != parameter.default:
+            fixed[name] = value
+    return study | {"parameters": fixed, "sweep": swept}, wrong
+
+
+def _value(parameter: Parameter, texts: Sequence[str]) -> tuple[Any, bool]:
+    """Return what texts say, and whether it is swept."""
+    if match := RANGE.fullmatch(texts[0]):
+        ends = {key: _checked(parameter, match[key]) for key in ("start", "stop")}
+        spacing = {"spacing": "log"} if match["log"] else {}
+        return {**ends, "num": int(match["num"]), **spacing}, True
+    whole = texts[0].startswith(("[", "{"))
+    parts = texts if whole or len(texts) > 1 else texts[0].split(",")
+    values = [_checked(parameter, each.strip()) for each in parts if each.strip()]
+    return (values, True) if len(values) > 1 else (values[0] if values else None, False)
+
+
+def _checked(parameter: Parameter, text: str) -> Any:
+    usual = parameter.default
+    number = "string" not in json.dumps(parameter.schema.get("type", "")) and not isinstance(
+        usual, str
+    )
+    value = parameter.normalise(plain(text, None) if number else text, parameter.name)
+    if not parameter.in_range(parameter.typed(value)):
+        raise parameter.refusal(parameter.name, value)
+    return value
+
+
+def _one(given: Mapping[str, Sequence[str]], name: str) -> str:
+    return given.get(name, [""])[0].strip()
+
+
+def beside(error: StudyError, scene: Scene) -> tuple[str, str]:
+    """Return the parameter that an error is about, or its field, and what is allowed."""
+    match = OF.match(error.field)
+    name = match["name"] if match else ""
+    return (name if name in parameters_of(scene) else error.field), error.allowed
+
+
+def as_toml(study: Mapping[str, Any]) -> str:
+    """Return the file of a study."""
+    tables = ("parameters", "sweep")
+    lines = [f"{key} = {_toml(value)}" for key, value in study.items() if key not in tables]
+    for table in tables:
+        if study[table]:
+            lines += ["", f"[{table}]"]
+            lines += [f"{key} = {_toml(value)}" for key, value in study[table].items()]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    """Return a value as TOML, which is JSON but for tables."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def as_curl(study: Mapping[str, Any], address: str) -> str:
+    """Return a line for a shell that posts a study."""
+    said = shlex.quote(json.dumps(study))
+    return f"curl -i {address} -H 'content-type: application/json' -d {said}\n"
+
+
+def as_python(study: Mapping[str, Any], address: str) -> str:
+    """Return a program that posts a study."""
+    return (
+        f"import httpx\n\nstudy = {pprint.pformat(dict(study), width=88, sort_dicts=False)}\n"
+        f"answer = httpx.post({address!r}, json=study)\nprint(answer.json())\n"
+    )

@@ -1,0 +1,120 @@
+"""Templates to answers: links, addresses of static files, numbers as text, errors as pages."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Coroutine
+from functools import cache
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import HTMLResponse, RedirectResponse
+from fastapi.routing import APIRoute
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from starlette.exceptions import HTTPException
+
+from service.errors import STATUS, answer_to
+from service.headers import CHARTS as POLICY
+from service.keys import Scope
+from service.pages import assets
+from studies.views.columns import value_text
+
+ROOT = "/ui"
+"""Path of the pages."""
+
+
+@cache
+def templates() -> Environment:
+    """Return the templates of this package."""
+    found = Environment(
+        loader=PackageLoader("service.pages"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    found.filters |= {
+        "words": lambda name: str(name).replace("_", " "),
+        "number": value_text,
+        "moment": lambda text: (text or "").replace("T", " ").removesuffix("+00:00"),
+        "data": _data,
+    }
+    return found
+
+
+def _data(content: Any) -> str:
+    """Return JSON that may stand in an element of a page."""
+    return json.dumps(content).replace("<", "\\u003c").replace("&", "\\u0026")
+
+
+def page(
+    request: Request, template: str, status: int = HTTPStatus.OK, **content: Any
+) -> HTMLResponse:
+    """Return a page made from a template."""
+
+    def link(route: str, **values: Any) -> str:
+        return request.url_for(route, **values).path
+
+    caller: Scope | None = getattr(request.state, "caller", None)
+    text = (
+        templates()
+        .get_template(f"{template}.html")
+        .render(
+            link=link,
+            asset=lambda file: link("get_asset", version=assets.version(), name=file),
+            here=request.url.path,
+            query=request.query_params,
+            origin=f"{request.url.scheme}://{request.url.netloc}",
+            may_submit=caller is not None and caller.covers(Scope.SUBMIT),
+            signed_in=COOKIE in request.cookies,
+            **content,
+        )
+    )
+    headers = {"content-security-policy": POLICY, "cache-control": "no-cache"}
+    return HTMLResponse(text, status, headers)
+
+
+COOKIE = "residua_key"
+"""Name of the cookie that has the key of a caller who has signed in."""
+
+
+def is_page(request: Request) -> bool:
+    """Whether a request is for a page."""
+    path: str = request.scope["path"].removeprefix(request.scope.get("root_path", ""))
+    return path == ROOT or path.startswith(f"{ROOT}/")
+
+
+def told(request: Request, answer: Response) -> Response:
+    """Return the answer to a refused request as a page, or the way to the page for signing in."""
+    if answer.status_code == HTTPStatus.UNAUTHORIZED:
+        wanted = f"{request.url.path}?{request.url.query}".removesuffix("?")
+        where = request.url_for("sign_in").include_query_params(then=wanted)
+        return RedirectResponse(f"{where.path}?{where.query}", HTTPStatus.SEE_OTHER)
+    said = json.loads(bytes(answer.body))
+    found = page(request, "problem", answer.status_code, problem=said)
+    for name in ("retry-after", "allow"):
+        if name in answer.headers:
+            found.headers[name] = answer.headers[name]
+    return found
+
+
+REFUSALS: tuple[type[Exception], ...] = (HTTPException, RequestValidationError, *STATUS)
+"""Errors that have a page; any other is answered as everywhere."""
+
+
+class PageRoute(APIRoute):
+    """A route whose errors are pages."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return the handler."""
+        handle = super().get_route_handler()
+
+        async def shown(request: Request) -> Response:
+            try:
+                return await handle(request)
+            except REFUSALS as error:
+                return told(request, answer_to(request, error))
+
+        return shown

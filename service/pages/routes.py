@@ -1,0 +1,376 @@
+"""The pages: studies, a study, a run, runs compared, health; signing in and out."""
+
+from __future__ import annotations
+
+import dataclasses
+import gzip
+import json
+from http import HTTPStatus
+from typing import Annotated, Any
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Form, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import JSONResponse, RedirectResponse
+
+from service import overview
+from service.dependencies import (
+    TheCaller,
+    TheDetails,
+    TheExaminer,
+    TheJobs,
+    TheKeeper,
+    TheKeys,
+    TheProbe,
+    TheRun,
+    TheRunner,
+    TheSettings,
+    TheStore,
+    TheTables,
+)
+from service.errors import NoRoom, NotFound
+from service.examiner import Examined
+from service.job import StudyState
+from service.pages import form
+from service.pages import study as chosen
+from service.pages.assets import asset
+from service.pages.compare import MOST, compared
+from service.pages.rendering import COOKIE, ROOT, PageRoute, page
+from service.pages.run import audited, numbers_shown, parameters_shown
+from service.routes.health import health
+from service.schemas import ContentId, StudyFilter, Window
+from service.table import MESSAGE, RUN, STATUS, scene_of_study
+from solver.scenes import Scene
+from studies import Store, StudyError
+from studies.scenes.registry import known_names, known_scenes
+from studies.views.columns import value_text
+
+router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
+home = APIRouter(include_in_schema=False)
+
+FOR_GOOD = {"cache-control": "public, max-age=31536000, immutable", "vary": "accept-encoding"}
+LISTED = 25
+"""Number of studies on a page."""
+POLLED = ("accepted", "running")
+
+
+@home.get("/")
+def lead(request: Request) -> Response:
+    """Lead to the pages."""
+    return RedirectResponse(request.url_for("studies_page").path, HTTPStatus.SEE_OTHER)
+
+
+@router.get("/static/{version}/{name}")
+def get_asset(name: str, request: Request) -> Response:
+    """Return a static file."""
+    found = asset(name)
+    if found is None:
+        raise NotFound("no such file")
+    if "gzip" in request.headers.get("accept-encoding", ""):
+        packed = FOR_GOOD | {"content-encoding": "gzip"}
+        return Response(found.packed, media_type=found.media_type, headers=packed)
+    return Response(gzip.decompress(found.packed), media_type=found.media_type, headers=FOR_GOOD)
+
+
+@router.get("")
+def studies_page(
+    request: Request,
+    jobs: TheJobs,
+    status: str = "",
+    tag: str = "",
+    scene: str = "",
+    text: str = "",
+    page_number: Annotated[int, Query(alias="page", ge=1, le=2**40)] = 1,
+) -> Response:
+    """Show the studies, the latest first."""
+    given = {"status": status, "tag": tag, "scene": scene, "text": text.strip()}
+    which = {name: value for name, value in given.items() if value}
+    if status:
+        known = [*StudyState]
+        if status not in known:
+            raise StudyError("status", status, f"must be one of {', '.join(known)}")
+    window = StudyFilter(limit=LISTED, offset=(page_number - 1) * LISTED)
+    wanted = {"state" if name == "status" else name: value for name, value in which.items()}
+    found, total = jobs.page(limit=window.limit, offset=window.offset, **wanted)
+    items = [(overview.summary(job), jobs.study(job.id)) for job in found]
+    return page(
+        request,
+        "studies",
+        items=items,
+        total=total,
+        which=which,
+        states=[*StudyState],
+        number=page_number,
+        pages=max(1, -(-total // LISTED)),
+        live=any(each.status in POLLED for each, _ in items),
+        turn=lambda **other: "?" + urlencode({**which, **other}),
+    )
+
+
+@router.get("/studies/{study_id}")
+async def study_page(
+    study_id: ContentId, request: Request, details: TheDetails, tables: TheTables
+) -> Response:
+    """Show a study: numbers over its sweep, one of its runs, a part of its table."""
+    study = json.loads(await details.get(study_id, Window(limit=1)))
+    table = await run_in_threadpool(tables.get, study_id)
+    query = dict(request.query_params)
+    numbers = chosen.usual(table)
+    number = query.get("number", numbers[0].name if numbers else "")
+    at = chosen.chosen_run(table, query.get("run", ""), number)
+
+    def turn(**other: Any) -> str:
+        kept = {k: v for k, v in {**query, **other}.items() if v not in ("", None)}
+        return "?" + urlencode(kept)
+
+    part = chosen.part(table, query)
+    run = None
+    if at is not None:
+        run = {
+            "id": table.columns[RUN].values[at],
+            "status": table.columns[STATUS].values[at],
+            "message": table.columns[MESSAGE].values[at],
+            "at": [(each, _cell(each, at)) for each in chosen.varied(table)],
+        }
+    csv = urlencode({**part.where, **({"sort": part.sort} if part.sort else {})})
+    return page(
+        request,
+        "study",
+        study=study,
+        table=table,
+        part=part,
+        cell=_cell,
+        number=number,
+        chosen=run,
+        turn=turn,
+        csv=f"?{csv}" if csv else "",
+        live=study["status"] in POLLED,
+        data={
+            "id": study_id,
+            "live": study["status"] in POLLED,
+            "number": number,
+            "run": run["id"] if run else None,
+            "at": at,
+            **chosen.described(table),
+        },
+    )
+
+
+def _cell(column: Any, at: int) -> str:
+    """Return a value as the tables show it: four digits, a flag by its word."""
+    value = column.values[at]
+    if column.flags and value == value:
+        return str(column.flags.get(int(value), value)).replace("_", " ")
+    return value_text(value)
+
+
+@router.get("/runs/{run_id}")
+def run_page(run: TheRun, request: Request, store: TheStore) -> Response:
+    """Show a run: its maps and lines, its numbers, its audit."""
+    scene = scene_of_study(store, run["scene"])
+    return page(
+        request,
+        "run",
+        run=run,
+        parameters=parameters_shown(run, scene),
+        audit=audited(run, scene),
+        numbers=numbers_shown(run, scene),
+        data={"run": run["id"]},
+    )
+
+
+@router.get("/compare")
+def compare_page(
+    request: Request, store: TheStore, run: Annotated[list[str] | None, Query()] = None
+) -> Response:
+    """Show what differs between runs."""
+    ids = list(dict.fromkeys(run or []))
+    if len(ids) > MOST:
+        raise StudyError("run", f"{len(ids)} runs", f"at most {MOST} runs are compared")
+    rows = []
+    for each in ids:
+        row = store.run(each) if len(each) == 32 else None
+        if row is None:
+            raise NotFound(f"no run has the id {each[:40]}")
+        rows.append(row)
+    scene = scene_of_study(store, rows[0]["scene"]) if rows else None
+    found = compared(rows, scene)
+    return page(request, "compare", rows=rows, found=found, data={"runs": ids})
+
+
+@router.get("/health")
+async def health_page(
+    request: Request,
+    runner: TheRunner,
+    jobs: TheJobs,
+    store: TheStore,
+    probe: TheProbe,
+    caller: TheCaller,
+    settings: TheSettings,
+) -> Response:
+    """Show the queue and whether the service can do its work."""
+    state = await health(runner, jobs, store, probe, caller, Response())
+    states = await run_in_threadpool(jobs.states)
+    runs = await run_in_threadpool(store.catalogue.counts)
+    queue = []
+    for wanted in (StudyState.RUNNING, StudyState.ACCEPTED):
+        found, _ = await run_in_threadpool(jobs.page, limit=50, offset=0, state=wanted)
+        queue += [overview.summary(job) for job in found]
+    return page(
+        request, "health", health=state, states=states, runs=runs, queue=queue, settings=settings
+    )
+
+
+@router.get("/new")
+def new_page(request: Request, store: TheStore, scene: str = "punch") -> Response:
+    """Show the form of a new study; parameters in the address fill it."""
+    given: dict[str, list[str]] = {}
+    for name, value in request.query_params.multi_items():
+        given.setdefault(name, []).append(value)
+    return _form(request, store, scene, given, {}, None)
+
+
+@router.post("/new")
+async def make(
+    request: Request, store: TheStore, examiner: TheExaminer, keeper: TheKeeper
+) -> Response:
+    """Tell what a study costs and what is wrong in the form, or accept the study and show it."""
+    given: dict[str, list[str]] = {}
+    for name, value in (await request.form()).multi_items():
+        given.setdefault(name, []).append(str(value))
+    scene_name = given.get("scene", [""])[0]
+    scene = await run_in_threadpool(known_scene, store, scene_name)
+    content, wrong = form.study_of(scene_name, scene, given)
+    found: Examined | None = None
+    if not wrong:
+        try:
+            found = await examiner.examine(content)
+        except StudyError as error:
+            name, allowed = form.beside(error, scene)
+            wrong[name] = allowed
+        except NoRoom as error:
+            wrong[""] = str(error)
+    if "submit" in given and found is not None:
+        job, _ = await run_in_threadpool(keeper.accept, found, 0)
+        return _back(request, job.id)
+    if "application/json" in request.headers.get("accept", ""):
+        costs = None if found is None else dataclasses.asdict(found.estimate)
+        return JSONResponse({"wrong": wrong, "estimate": costs, **_copies(request, content)})
+    return await run_in_threadpool(_form, request, store, scene_name, given, wrong, found)
+
+
+def known_scene(store: Store, name: str) -> Scene:
+    """Return a scene of the service; raise `NotFound` if there is none of this name."""
+    scene = scene_of_study(store, name)
+    if scene is None:
+        raise NotFound(f"no scene has this name; there are {', '.join(known_names())}")
+    return scene
+
+
+def _copies(request: Request, content: dict[str, Any]) -> dict[str, str]:
+    """Return a study as texts to copy."""
+    address = str(request.url_for("submit"))
+    return {
+        "toml": form.as_toml(content),
+        "curl": form.as_curl(content, address),
+        "python": form.as_python(content, address),
+    }
+
+
+def _form(
+    request: Request,
+    store: Store,
+    name: str,
+    given: dict[str, list[str]],
+    wrong: dict[str, str],
+    found: Examined | None,
+) -> Response:
+    scene = known_scene(store, name)
+    content, early = form.study_of(name, scene, given)
+    mistakes = {**early, **wrong}
+    fields = form.entries(scene, given, mistakes)
+    posted = [(each.id, f"{each.name} (posted)") for each in store.scenes(LISTED)]
+    own = {each.parameter.name for each in fields} | {"name"}
+    return page(
+        request,
+        "new",
+        HTTPStatus.UNPROCESSABLE_ENTITY if wrong else HTTPStatus.OK,
+        scene=scene,
+        scene_name=name,
+        name=content["name"],
+        scenes=[*((each.name, each.name) for each in known_scenes()), *posted],
+        given={key: values[0] for key, values in given.items()},
+        first=[each for each in fields if each.first],
+        rest=[each for each in fields if not each.first],
+        wrong=mistakes,
+        general=[text for key, text in mistakes.items() if key not in own],
+        estimate=found.estimate if found else None,
+        **_copies(request, content),
+    )
+
+
+@router.get("/sign-in")
+def sign_in(request: Request, then: str = "") -> Response:
+    """Show the form for a key."""
+    return page(request, "sign-in", then=inside(request, then), refused=False)
+
+
+@router.post("/sign-in")
+def enter(
+    request: Request,
+    keys: TheKeys,
+    key: Annotated[str, Form(max_length=200)] = "",
+    then: Annotated[str, Form(max_length=4000)] = "",
+) -> Response:
+    """Keep a key in a cookie that scripts cannot read."""
+    where = inside(request, then)
+    if keys.owner(key.strip()) is None:
+        status = HTTPStatus.UNAUTHORIZED
+        return page(request, "sign-in", status, then=where, refused=True)
+    answer = RedirectResponse(where, HTTPStatus.SEE_OTHER)
+    root = request.scope.get("root_path", "") or "/"
+    secure = request.url.scheme == "https"
+    answer.set_cookie(
+        COOKIE, key.strip(), httponly=True, samesite="strict", secure=secure, path=root
+    )
+    return answer
+
+
+@router.post("/sign-out")
+def leave(request: Request) -> Response:
+    """Forget the key."""
+    answer = RedirectResponse(request.url_for("sign_in").path, HTTPStatus.SEE_OTHER)
+    answer.delete_cookie(COOKIE, path=request.scope.get("root_path", "") or "/")
+    return answer
+
+
+def inside(request: Request, then: str) -> str:
+    """Return a path of the pages, and the first page for any other address."""
+    first = request.url_for("studies_page").path
+    plain = then.isascii() and then.isprintable() and "\\" not in then and "//" not in then
+    return then if plain and then.startswith((f"{first}/", f"{first}?")) else first
+
+
+@router.post("/studies/{study_id}/stop")
+def stop(study_id: ContentId, request: Request, jobs: TheJobs) -> Response:
+    """Stop a study, and show it."""
+    jobs.dismiss(study_id)
+    return _back(request, study_id)
+
+
+@router.post("/studies/{study_id}/retry")
+def again(study_id: ContentId, request: Request, jobs: TheJobs) -> Response:
+    """Compute the failed and missing runs of a study, and show it."""
+    jobs.retry(study_id)
+    return _back(request, study_id)
+
+
+def _back(request: Request, study_id: str) -> Response:
+    where = request.url_for("study_page", study_id=study_id).path
+    return RedirectResponse(where, HTTPStatus.SEE_OTHER)
+
+
+@router.get("/{rest:path}")
+def nothing(rest: str) -> Response:
+    """Say that there is no such page."""
+    raise NotFound(f"there is no page {ROOT}/{rest[:100]}")

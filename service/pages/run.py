@@ -1,0 +1,104 @@
+"""What the page of a run shows: parameters, numbers, and its audit in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from service.pages.study import rank
+from service.table import group_of
+from solver.results.audit.figures import LIMITS
+from solver.results.quantities import QUANTITIES
+from solver.scenes import Scene
+from studies.definition.parameters import parameters_of
+from studies.storage.dataset import attributes_of
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figure:
+    """One figure of the audit.
+
+    Attributes
+    ----------
+    name, words, unit, value : what it is
+    limit : above it the run fails; None if there is none, or it depends on the run
+    share : how far the figure is on the way to the limit, in decades, from 0 to 1
+    """
+
+    name: str
+    words: str
+    unit: str
+    value: float | None
+    limit: float | None
+
+    @property
+    def share(self) -> float:
+        """Return the place of the value between limit / 1e6 and limit, on a logarithmic scale."""
+        if not self.limit or not self.value or self.value <= 0.0:
+            return 0.0
+        return min(max(1.0 + math.log10(self.value / self.limit) / 6.0, 0.02), 1.0)
+
+    @property
+    def kept(self) -> bool:
+        """Whether the value keeps its limit."""
+        return self.limit is None or (self.value is not None and self.value <= self.limit)
+
+
+def audited(run: Mapping[str, Any], scene: Scene | None) -> dict[str, list[Figure]]:
+    """Return the figures of the audit of a run: those with a limit of their own, and the others."""
+    found = [
+        Figure(
+            name=name,
+            words=words_of(name, scene),
+            unit=unit_of(name, scene),
+            value=value,
+            limit=LIMITS.get(name),
+        )
+        for name, value in run["scalars"].items()
+        if group_of(name) == "audit"
+    ]
+    return {
+        "limited": [each for each in found if each.limit is not None],
+        "others": [each for each in found if each.limit is None],
+    }
+
+
+def numbers_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str, Any]]:
+    """Return name, meaning, unit and value of the numbers of a run that are not of the audit."""
+    found = []
+    for name, value in run["scalars"].items():
+        if group_of(name) == "audit":
+            continue
+        meanings = QUANTITIES[name].flags if name in QUANTITIES else None
+        word = meanings(int(value)).name.lower() if meanings and value is not None else value
+        each = {"name": name, "words": words_of(name, scene), "unit": unit_of(name, scene)}
+        found.append(each | {"value": word})
+    return sorted(found, key=lambda each: rank(each["name"]))
+
+
+def parameters_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str, Any]]:
+    """Return name, meaning, unit and value of each parameter; whether it is the scene's default."""
+    known = parameters_of(scene) if scene else {}
+    return [
+        {
+            "name": name,
+            "words": known[name].description if name in known else "",
+            "unit": unit if (unit := known[name].unit if name in known else "") != "1" else "",
+            "value": value,
+            "usual": name in known and known[name].default == value,
+        }
+        for name, value in run["parameters"].items()
+    ]
+
+
+def words_of(name: str, scene: Scene | None) -> str:
+    """Return the meaning of a number."""
+    return str(attributes_of(name, scene).get("long_name", name))
+
+
+def unit_of(name: str, scene: Scene | None) -> str:
+    """Return the unit of a number; empty for a ratio."""
+    unit = str(attributes_of(name, scene).get("units", ""))
+    return "" if unit == "1" else unit

@@ -1,0 +1,106 @@
+// Charts in the colours of the page, drawn by plotly.js.
+
+/* global Plotly */
+const RED_BLUE = ["#053061", "#2166ac", "#4393c3", "#92c5de", "#d1e5f0", "#f7f7f7", "#fddbc7", "#f4a582", "#d6604d", "#b2182b", "#67001f"];
+const WARM = ["#ffffcc", "#ffeda0", "#fed976", "#feb24c", "#fd8d3c", "#fc4e2a", "#e31a1c", "#bd0026", "#800026"];
+const VIRIDIS = ["#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"];
+const scale = (colours) => colours.map((each, i) => [i / (colours.length - 1), each]);
+export const SIGNED = scale(RED_BLUE);
+export const SEQUENTIAL = scale(WARM);
+export const NUMBERS = scale(VIRIDIS);
+
+const own = () => getComputedStyle(document.documentElement);
+export const colour = (name) => own().getPropertyValue(`--${name}`).trim();
+export const KEYS = () => [1, 2, 3, 4, 5, 6].map((k) => colour(`k${k}`));
+
+const drawn = new Map();
+const sizes = new ResizeObserver((changes) => {
+  for (const { target } of changes) if (drawn.has(target) && target.data) Plotly.Plots.resize(target);
+});
+
+function axis() {
+  return {
+    gridcolor: colour("grid"), zerolinecolor: colour("zero"), linecolor: colour("line"),
+    tickcolor: colour("line"), ticks: "outside", ticklen: 4, automargin: true, exponentformat: "power",
+    title: { standoff: 8, font: { size: 13 } },
+  };
+}
+
+function merged(base, more) {
+  const found = { ...base };
+  for (const [key, value] of Object.entries(more)) {
+    const both = value && base[key] && typeof value === "object" && !Array.isArray(value);
+    found[key] = both ? merged(base[key], value) : value;
+  }
+  return found;
+}
+
+export async function draw(chart, make) {
+  const again = drawn.has(chart);
+  drawn.set(chart, make);
+  if (!again) {
+    chart.replaceChildren();
+    sizes.observe(chart);
+  }
+  const { traces, layout } = make();
+  const base = {
+    font: { family: own().getPropertyValue("--sans"), size: 12.5, color: colour("soft") },
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+    margin: { l: 62, r: 16, t: 10, b: 48 }, xaxis: axis(), yaxis: axis(), showlegend: false,
+    legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 12 } },
+    hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { family: own().getPropertyValue("--sans"), size: 13, color: colour("ink") }, align: "left" },
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("zero"), activecolor: colour("accent") },
+    hovermode: "closest", dragmode: "zoom", separators: ".",
+  };
+  const buttons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]];
+  await Plotly.react(chart, traces, merged(base, layout), {
+    displaylogo: false, modeBarButtons: buttons, displayModeBar: "hover",
+  });
+  chart.classList.remove("busy");
+}
+
+export function fail(chart, reason) {
+  drawn.delete(chart);
+  if (chart.data) Plotly.purge(chart);
+  chart.classList.remove("busy");
+  const said = document.createElement("p");
+  said.className = "problem";
+  said.textContent = reason;
+  chart.replaceChildren(said);
+}
+
+export function bar(title) {
+  return {
+    thickness: 12, outlinewidth: 0, ticks: "outside", ticklen: 4, tickcolor: colour("line"),
+    title: { text: title, side: "right", font: { size: 12.5 } }, len: 1, y: 0.5, x: 1.01,
+  };
+}
+
+// The title of an axis, in lines that fit the chart.
+export function titled(chart, words, unit) {
+  const most = Math.max(16, Math.floor((chart.clientWidth - 90) / 6.8));
+  const lines = [""];
+  for (const word of named(words, unit).split(" ")) {
+    const last = lines.length - 1;
+    if (lines[last] && lines[last].length + word.length >= most) lines.push(word);
+    else lines[last] += (lines[last] ? " " : "") + word;
+  }
+  return { text: lines.join("<br>") };
+}
+
+// Colours in an order, such as those of rising loads; all stand out from the page.
+export function ordered(count) {
+  const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+  const [first, last] = dark ? [3, 9] : [0, 7.4];
+  return Array.from({ length: count }, (_, k) => {
+    const at = first + ((last - first) * k) / Math.max(count - 1, 1);
+    const low = Math.floor(at), share = at - low;
+    const [a, b] = [VIRIDIS[low], VIRIDIS[Math.min(low + 1, 9)]].map((each) => [1, 3, 5].map((i) => parseInt(each.slice(i, i + 2), 16)));
+    return `rgb(${a.map((each, i) => Math.round(each + (b[i] - each) * share)).join(",")})`;
+  });
+}
+
+export const named = (words, unit) => (unit ? `${words} [${unit}]` : words);
+
+const redraw = () => [...drawn].forEach(([chart, make]) => draw(chart, make));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);

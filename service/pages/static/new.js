@@ -1,0 +1,76 @@
+// The form of a new study: what it costs, and what is wrong in it, as one types.
+
+import { element, text } from "./page.js";
+
+const form = document.querySelector("[data-study]");
+const REST = 450;
+const copies = form.querySelectorAll(".code pre");
+let asked = null;
+
+document.querySelector("[data-scene]").addEventListener("change", (event) => event.target.form.submit());
+form.querySelector("[data-check]").hidden = true;
+
+const time = (seconds) => (seconds < 90 ? `${text(Number(seconds.toPrecision(2)))} s` : seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${text(Number((seconds / 3600).toPrecision(2)))} h`);
+const size = (bytes) => (bytes < 1e9 ? `${text(Number((bytes / 1e6).toPrecision(2)))} MB` : `${text(Number((bytes / 1e9).toPrecision(2)))} GB`);
+
+function told(wrong) {
+  const places = new Map([...form.querySelectorAll("[data-wrong]")].map((each) => [each.dataset.wrong, each]));
+  const rest = [];
+  for (const [name, place] of places) {
+    place.textContent = wrong[name] ?? "";
+    const input = place.parentElement.querySelector("input:not([type=checkbox])");
+    if (name && input) input.toggleAttribute("aria-invalid", false);
+    if (name && input && wrong[name]) input.setAttribute("aria-invalid", "true");
+    if (wrong[name]) place.closest("details")?.setAttribute("open", "");
+  }
+  for (const [name, reason] of Object.entries(wrong)) if (!places.has(name)) rest.push(reason);
+  if (rest.length) places.get("").textContent = rest.join("; ");
+}
+
+function costs(estimate) {
+  const place = form.querySelector("[data-estimate]");
+  const rows = estimate === null ? [["Runs", "–"]] : [
+    ["Runs", estimate.runs],
+    ...(estimate.to_compute === estimate.runs ? [] : [["To compute", estimate.to_compute]]),
+    ["Loading paths", estimate.paths],
+    ["Unknowns of a run", estimate.unknowns === null ? "unknown" : estimate.unknowns.toLocaleString("en")],
+    ["Processor time", estimate.cpu_seconds === null ? "unknown" : time(estimate.cpu_seconds[1])],
+    ...(estimate.cpu_seconds === null ? [] : [["", `${time(estimate.cpu_seconds[0])} – ${time(estimate.cpu_seconds[2])}`]]),
+    ["On the disk", size(estimate.bytes)],
+  ];
+  place.replaceChildren(...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, String(value))]));
+}
+
+async function check() {
+  asked?.abort();
+  asked = new AbortController();
+  try {
+    const answer = await fetch(form.action, {
+      method: "POST", body: new URLSearchParams(new FormData(form)), headers: { accept: "application/json" }, signal: asked.signal,
+    });
+    if (!answer.ok) return;
+    const found = await answer.json();
+    told(found.wrong);
+    costs(found.estimate);
+    [found.toml, found.curl, found.python].forEach((each, k) => (copies[k].textContent = each));
+  } catch (error) {
+    if (error.name !== "AbortError") throw error;
+  }
+}
+
+function mark() {
+  for (const field of form.querySelectorAll("[data-field]")) {
+    const input = field.querySelector("input:not([type=checkbox])");
+    const many = input ? /,\s*\S|\.\./.test(input.value) && !/^[[{]/.test(input.value) : field.querySelectorAll("input:checked").length > 1;
+    field.classList.toggle("swept", many && field.dataset.field !== "name");
+  }
+}
+
+let timer = 0;
+form.addEventListener("input", () => {
+  mark();
+  clearTimeout(timer);
+  timer = setTimeout(check, REST);
+});
+mark();
+check();

@@ -1,0 +1,87 @@
+// What all pages share: where the resources are, the state in the address, parts that are renewed.
+
+export const here = new URL(".", document.location).pathname;
+const found = document.location.pathname.match(/^(.*)\/ui(?:\/|$)/);
+export const root = found ? found[1] : "";
+
+export const data = () => JSON.parse(document.getElementById("data").textContent);
+
+export const state = new Map(new URLSearchParams(document.location.search));
+
+export function keep(changes) {
+  for (const [name, value] of Object.entries(changes)) {
+    if (value === null || value === undefined || value === "") state.delete(name);
+    else state.set(name, String(value));
+  }
+  const address = new URL(document.location);
+  address.search = new URLSearchParams([...state]).toString();
+  history.replaceState(null, "", address);
+}
+
+// Replace the parts of this page that the service has changed, by the same page read anew.
+export async function renew(address, only) {
+  const answer = await fetch(address ?? document.location, { headers: { accept: "text/html" } });
+  if (!answer.ok || answer.redirected) return null;
+  const fresh = new DOMParser().parseFromString(await answer.text(), "text/html");
+  for (const part of document.querySelectorAll("[data-live]")) {
+    if (only && !only.includes(part.dataset.live)) continue;
+    const other = fresh.querySelector(`[data-live="${part.dataset.live}"]`);
+    if (other && other.innerHTML !== part.innerHTML) part.replaceWith(document.importNode(other, true));
+  }
+  return fresh;
+}
+
+export function element(name, attributes = {}, ...children) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (key in made && key !== "list") made[key] = value;
+    else made.setAttribute(key, value);
+  }
+  made.append(...children.filter((each) => each !== null));
+  return made;
+}
+
+export function select(label, options, value, chosen) {
+  const made = element("select", { onchange: () => chosen(made.value) });
+  const groups = new Map();
+  for (const { name, words, group } of options) {
+    const option = element("option", { value: name, selected: name === value }, words);
+    if (!group) made.append(option);
+    else {
+      if (!groups.has(group)) groups.set(group, made.appendChild(element("optgroup", { label: group })));
+      groups.get(group).append(option);
+    }
+  }
+  return element("label", {}, label, made);
+}
+
+export function choice(label, options, value, chosen) {
+  const made = element("span", { className: "choice", role: "group" });
+  made.setAttribute("aria-label", label);
+  for (const { name, words } of options) {
+    const button = element("button", { type: "button", onclick: () => chosen(name) }, words);
+    button.setAttribute("aria-pressed", String(name === value));
+    made.append(button);
+  }
+  return made;
+}
+
+export const words = (name) => String(name).replaceAll("_", " ");
+
+// Four digits, as the tables of the service.
+export function text(value) {
+  if (typeof value !== "number") return words(value);
+  if (Number.isNaN(value)) return "–";
+  const size = Math.abs(value);
+  if (value !== 0 && (size < 1e-4 || size >= 1e5)) return value.toExponential(3).replace(/\.?0+e/, "e").replace("-", "−");
+  return String(Number(value.toPrecision(4))).replace("-", "−");
+}
+
+for (const button of document.querySelectorAll("[data-copy]")) {
+  button.hidden = !navigator.clipboard;
+  button.addEventListener("click", async () => {
+    await navigator.clipboard.writeText(button.closest(".code").querySelector("pre").textContent);
+    button.textContent = "Copied";
+    setTimeout(() => (button.textContent = "Copy"), 1500);
+  });
+}

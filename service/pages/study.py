@@ -1,0 +1,147 @@
+"""What the page of a study shows: the chosen run, and the part of the table in the address."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from service.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, group_of
+from studies.definition.vocabulary import OK
+from studies.views.tables import FIGURES
+
+ROWS = 25
+"""Number of runs on a page of the table."""
+
+SHOWN = 6
+"""Number of columns of results in the table, beside the sweep and the status."""
+
+WHERE = "where."
+"""What precedes the name of a column in the address of a filtered table."""
+
+
+@dataclass(frozen=True, slots=True)
+class TablePart:
+    """A part of a table.
+
+    Attributes
+    ----------
+    columns, rows : its columns, and the positions of its runs
+    found : number of runs that meet the conditions
+    page, pages : its number, from 1 on, and how many there are
+    sort, where : the order and the conditions, as in the address
+    """
+
+    columns: Sequence[Column]
+    rows: Sequence[int]
+    found: int
+    page: int
+    pages: int
+    sort: str
+    where: Mapping[str, str]
+
+
+def varied(table: RunTable) -> list[Column]:
+    """Return the columns of the sweep that are not the same in all runs."""
+    sweep = [each for each in table.columns.values() if each.group == "sweep"]
+    several = [each for each in sweep if len(set(each.values.tolist())) > 1]
+    return several or sweep
+
+
+def usual(table: RunTable) -> list[Column]:
+    """Return the columns of numbers that some run has, the main ones first."""
+    return sorted(
+        (each for each in table.numbers if not np.isnan(each.values).all()),
+        key=lambda each: rank(each.name),
+    )
+
+
+def varies(column: Column) -> bool:
+    """Whether the numbers of a column are not all the same."""
+    known = column.values[~np.isnan(column.values)]
+    return bool(known.size) and bool((known != known[0]).any())
+
+
+def rank(name: str) -> tuple[int, int]:
+    """Return the place of a number among others: by its group, the main ones first."""
+    main = list(FIGURES)
+    return NUMBERS.index(group_of(name)), main.index(name) if name in main else len(main)
+
+
+def part(table: RunTable, query: Mapping[str, str]) -> TablePart:
+    """Return the part of a table that the address of a page names.
+
+    Raises
+    ------
+    StudyError
+        if it names a column that is not there, or a condition that the column cannot meet
+    """
+    where = {
+        name.removeprefix(WHERE): value.strip()
+        for name, value in query.items()
+        if name.startswith(WHERE) and value.strip()
+    }
+    sort = query.get("sort", "")
+    found = table.chosen(sort, where)
+    pages = max(1, -(-len(found) // ROWS))
+    number = query.get("page", "1")
+    page = min(max(int(number), 1), pages) if number.isdecimal() else 1
+    differ = [each.name for each in usual(table) if varies(each)]
+    named = differ[:SHOWN]
+    extra = [sort.removeprefix("-"), query.get("number", ""), *where]
+    fresh = [n for n in dict.fromkeys(extra) if n in table.columns and n not in (RUN, MESSAGE)]
+    first = [*(each.name for each in varied(table)), STATUS]
+    names = dict.fromkeys([*first, *named, *fresh])
+    rows = found[(page - 1) * ROWS : page * ROWS].tolist()
+    columns = [table.columns[name] for name in names]
+    return TablePart(columns, rows, len(found), page, pages, sort, where)
+
+
+def chosen_run(table: RunTable, wanted: str, number: str) -> int | None:
+    """Return the position of a run: of this id, or the one with the largest number.
+
+    Without any that succeeded it is the first that has been computed, if there is one.
+    """
+    ids = table.columns[RUN].values
+    at = np.flatnonzero(ids == wanted)
+    if len(at):
+        return int(at[0])
+    status = table.columns[STATUS].values
+    column = table.columns.get(number)
+    values = column.values if column is not None and column.number else np.zeros(table.size)
+    known = np.where(status == OK, values, np.nan)
+    if not np.isnan(known).all():
+        return int(np.nanargmax(known))
+    computed = np.flatnonzero(status != "pending")
+    return int(computed[0]) if len(computed) else None
+
+
+def described(table: RunTable) -> dict[str, Any]:
+    """Return what the scripts of the page need to know of a table."""
+    own = {each.name: each for each in table.columns.values()}
+    return {
+        "size": table.size,
+        "axes": [
+            {
+                "name": name,
+                "words": own[name].words,
+                "unit": own[name].unit,
+                "labels": list(labels),
+                "number": own[name].number,
+            }
+            for name, labels in table.axes.items()
+        ],
+        "numbers": [
+            {
+                "name": each.name,
+                "words": each.words,
+                "unit": each.unit,
+                "group": each.group,
+                "varies": varies(each),
+                "flags": {str(code): word for code, word in each.flags.items()},
+            }
+            for each in usual(table)
+        ],
+    }

@@ -1,0 +1,151 @@
+"""Numbers of the runs of a study, at any time; values of the maps and lines of a run."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from starlette.datastructures import Headers
+from starlette.staticfiles import NotModifiedResponse
+
+import solver
+from service.dependencies import ThePictures, TheRun, TheStore, TheTables
+from service.errors import REFUSED
+from service.files import TAGS, UNCHANGED
+from service.octets import MEDIA_TYPE, octets
+from service.schemas import ContentId, TableFilter
+from service.table import OUTCOMES, STATUS
+from studies import StudyError
+from studies.storage.runfile import verify
+from studies.storage.seal import digest
+
+router = APIRouter()
+
+CSV = "text/csv"
+OCTETS: dict[int | str, dict[str, Any]] = {
+    200: {"content": {MEDIA_TYPE: {}}, "description": "A line of JSON, then the numbers"},
+}
+
+
+@router.get(
+    "/studies/{study_id}/table.csv",
+    tags=["studies"],
+    responses={200: {"content": {CSV: {}}}, **REFUSED},
+)
+def table(
+    study_id: ContentId, which: Annotated[TableFilter, Query()], tables: TheTables
+) -> Response:
+    """Return a line for each run: its place in the sweep, its status, its numbers.
+
+    Beside the queries named below, every column is one: `?friction=0.1..0.4&hardening=none`.
+    """
+    found = tables.get(study_id)
+    at = found.chosen(which.sort, which.conditions)
+    names = which.columns.split(",") if which.columns else list(found.columns)
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(found.rows(at, names))
+    named = {"content-disposition": 'attachment; filename="table.csv"'}
+    return Response(text.getvalue(), media_type=CSV, headers=named)
+
+
+@router.get("/studies/{study_id}/numbers", tags=["studies"], responses={**OCTETS, **REFUSED})
+def numbers(
+    study_id: ContentId,
+    name: Annotated[list[str], Query(min_length=1, max_length=100)],
+    tables: TheTables,
+) -> Response:
+    """Return columns of the table as octets, in the order of the sweep; NaN is no value.
+
+    The first line is JSON: `arrays` lists name, type and shape of the arrays that follow, in which
+    numbers are little endian. A `status` is a number, whose word is in `statuses`.
+    """
+    found = tables.get(study_id)
+    arrays = {}
+    for each in dict.fromkeys(name):
+        column = found.column(each, "name")
+        if each == STATUS:
+            arrays[each] = np.array([OUTCOMES.index(word) for word in column.values])
+        elif column.number:
+            arrays[each] = column.values
+        else:
+            raise StudyError("name", each, "must be a column of numbers, or status")
+    return Response(octets({"statuses": OUTCOMES}, arrays), media_type=MEDIA_TYPE)
+
+
+@router.get("/runs/{run_id}/fields", tags=["runs"])
+async def fields(
+    run: TheRun, store: TheStore, pictures: ThePictures
+) -> dict[str, list[dict[str, Any]]]:
+    """Return the variables of a run that are drawn: `maps` and `lines`, with their labels."""
+    return await pictures.alone(outlined, store.run_path(run["id"]))
+
+
+@router.get("/runs/{run_id}/values", tags=["runs"], responses={**OCTETS, **UNCHANGED, **REFUSED})
+async def values(
+    run: TheRun,
+    store: TheStore,
+    pictures: ThePictures,
+    request: Request,
+    field: str,
+    component: str | None = None,
+    stage: str | None = None,
+    minus: Annotated[str | None, Query(pattern="^[0-9a-f]{32}$")] = None,
+) -> Response:
+    """Return a map, or lines, of a run as octets: the coordinates, then the values over them.
+
+    With `minus`, the map of another run is subtracted at the points of this one.
+    """
+    if minus and await run_in_threadpool(store.run, minus) is None:
+        raise StudyError("minus", minus, "must be the id of a run")
+    files = [store.run_path(each) for each in (run["id"], minus) if each]
+    digests = await run_in_threadpool(lambda: [*map(digest, files)])
+    content = repr((solver.__version__, digests, field, component, stage))
+    tag = f'"{hashlib.sha256(content.encode("utf-8", "surrogatepass")).hexdigest()[:32]}"'
+    headers = Headers({"etag": tag, "cache-control": "no-cache"})
+    if TAGS.is_not_modified(headers, request.headers):
+        return NotModifiedResponse(headers)
+    found = await pictures.alone(read, files, field, component, stage)
+    return Response(found, media_type=MEDIA_TYPE, headers=dict(headers))
+
+
+def outlined(path: Path) -> dict[str, list[dict[str, Any]]]:
+    """Return the variables of a run's file that are drawn."""
+    from studies.views.shown import outline
+
+    with opened(path) as dataset:
+        return outline(dataset)
+
+
+def read(files: list[Path], field: str, component: str | None, stage: str | None) -> bytes:
+    """Return a map or lines of the first run as octets, less those of the second if there is one.
+
+    Raises
+    ------
+    StudyError
+        if the run has no such field, component or stage
+    """
+    from studies.views.shown import shown
+
+    with ExitStack() as stack:
+        runs = [stack.enter_context(opened(path)) for path in files]
+        found = shown(runs[0], field, component, stage, *runs[1:])
+        return octets(*found, kind="<f4")
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """Give the data set of a run, without the dimensions of a sweep."""
+    from studies import open_netcdf  # xarray takes half a second to import
+    from studies.views.picking import sweep_axes
+
+    verify(path)
+    with open_netcdf(path) as dataset:
+        yield dataset.isel(dict.fromkeys(sweep_axes(dataset), 0))

@@ -1,0 +1,270 @@
+"""The numbers of a study's runs as columns, from the catalogue: sorted, filtered, a page of them.
+
+They are there while the study runs. A run that is not in the catalogue has its values on the axes
+of the sweep, the status ``pending``, and no numbers.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from service.job import Job
+from service.jobs import Jobs
+from service.overview import PENDING
+from solver.results.audit.figures import AUDIT
+from solver.results.quantities import QUANTITIES
+from solver.scenes import Scene
+from studies import Store, StudyError
+from studies.definition.parameters import parameters_of
+from studies.definition.sweep import labels, linked_values
+from studies.definition.vocabulary import STATUSES, taken
+from studies.errors import one_of
+from studies.scenes.registry import known_names, scene_named
+from studies.storage.dataset import attributes_of, axis_attributes
+from studies.storage.seal import state_of
+
+KEPT = 8
+"""Number of tables that are kept."""
+
+SAME = 1e-9
+"""Relative difference below which a number is the one that a query names."""
+
+RANGE = re.compile(r"(?P<low>[^.]*(?:\.\d[^.]*)?)\.\.(?P<high>.*)", re.DOTALL)
+
+OUTCOMES = (*STATUSES[:-1], PENDING)
+"""Statuses of runs in a table, by their number in the column ``status`` of octets."""
+
+EFFORT = (
+    "increments", "cut_increments", "iterations", "median_iterations", "inner_fallbacks",
+    "blended_tangents", "cpu_seconds", "degrees_of_freedom",
+)  # fmt: skip
+"""Numbers that say how hard a run was to solve."""
+
+NUMBERS = ("result", "effort", "audit")
+"""Groups of columns with the numbers of runs, the main ones first."""
+
+STATUS, RUN, MESSAGE = "status", "run", "message"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """One column of a table.
+
+    Attributes
+    ----------
+    name, words, unit : name, meaning and unit
+    group : ``sweep``, ``run``, or one of `NUMBERS`
+    flags : meanings of its numbers, if they stand for words
+    values : numbers, NaN where there is none, or texts, for each run
+    """
+
+    name: str
+    words: str
+    unit: str
+    group: str
+    flags: Mapping[int, str]
+    values: np.ndarray
+
+    @property
+    def number(self) -> bool:
+        """Whether it has numbers."""
+        return self.values.dtype.kind == "f"
+
+    def text(self, at: int) -> str:
+        """Return a value with all its digits; empty if there is none."""
+        value = self.values[at].item() if self.number else self.values[at]
+        if not self.number:
+            return str(value)
+        return "" if math.isnan(value) else self.flags.get(int(value), f"{value!r}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunTable:
+    """The runs of a study in the order of its cases.
+
+    Attributes
+    ----------
+    axes : name of each axis of the sweep, with its values or labels
+    columns : all columns by name: the sweep, status, numbers, audit, id, message
+    """
+
+    axes: Mapping[str, Sequence[Any]]
+    columns: Mapping[str, Column]
+
+    @property
+    def size(self) -> int:
+        """Number of runs."""
+        return len(self.columns[RUN].values)
+
+    @property
+    def numbers(self) -> list[Column]:
+        """The columns of results that are numbers."""
+        every = self.columns.values()
+        return [each for each in every if each.number and each.group in NUMBERS]
+
+    def column(self, name: str, field: str = "columns") -> Column:
+        """Return a column; raise `StudyError` if there is none of this name."""
+        if name not in self.columns:
+            raise StudyError(field, name, one_of(name, self.columns))
+        return self.columns[name]
+
+    def chosen(self, sort: str = "", where: Mapping[str, str] | None = None) -> np.ndarray:
+        """Return the positions of the runs that meet all conditions, in order.
+
+        Parameters
+        ----------
+        sort : name of a column; with a minus before it, the largest first. Runs without a value
+            come last
+        where : a condition by column: a value, several with commas between, or a range ``0.1..0.4``
+
+        Raises
+        ------
+        StudyError
+            if there is no such column, or it has numbers and the condition none
+        """
+        keep = np.ones(self.size, dtype=bool)
+        for name, condition in (where or {}).items():
+            keep &= _meets(self.column(name, name), condition)
+        found = np.flatnonzero(keep)
+        if not sort:
+            return found
+        column = self.column(sort.removeprefix("-"), "sort")
+        values = column.values[found]
+        if not column.number:
+            _, values = np.unique(values.astype(str), return_inverse=True)
+            values = values.astype(float)
+        return found[np.argsort(-values if sort.startswith("-") else values, kind="stable")]
+
+    def rows(self, at: Sequence[int] | np.ndarray, names: Sequence[str]) -> Iterator[list[str]]:
+        """Yield the texts of these runs in these columns, after a line with the names."""
+        wanted = [self.column(name) for name in names]
+        yield [each.name for each in wanted]
+        for position in at:
+            yield [each.text(position) for each in wanted]
+
+
+class Tables:
+    """The tables of studies; one is made again when its study or the catalogue has changed."""
+
+    def __init__(self, jobs: Jobs, store: Store) -> None:
+        self.jobs, self.store = jobs, store
+        self.kept: OrderedDict[str, tuple[object, RunTable]] = OrderedDict()
+        self.one = Lock()
+
+    def get(self, study_id: str) -> RunTable:
+        """Return the table of a study."""
+        with self.one:
+            job = self.jobs.get(study_id)
+            state = job.turn, job.size, job.digest, state_of(self.store.catalogue.path)
+            known, table = self.kept.get(study_id, (None, None))
+            if table is None or known != state:
+                table = self._made(job)
+                self.kept[study_id] = state, table
+            self.kept.move_to_end(study_id)
+            while len(self.kept) > KEPT:
+                self.kept.popitem(last=False)
+            return table
+
+    def _made(self, job: Job) -> RunTable:
+        study, runs = self.jobs.study(job.id), self.jobs.runs(job.id)
+        rows, allow = self.store.catalogue.rows(runs), study.get("allow", [])
+        scene = scene_of_study(self.store, job.scene)
+        axes = {name: labels(name, axis) for name, axis in study["sweep"].items()}
+        columns = [*_sweep(study["sweep"], axes, scene)]
+        found = [rows.get(each) for each in runs]
+        outcome = [taken(row["status"], allow) if row else PENDING for row in found]
+        columns.append(_column(STATUS, np.array(outcome, dtype=object), "run"))
+        known = {each.name for each in columns}
+        scalars = [row["scalars"] if row else {} for row in found]
+        for name in dict.fromkeys(name for each in scalars for name in each if name not in known):
+            values = np.array([each.get(name, math.nan) for each in scalars], dtype=float)
+            group = group_of(name)
+            columns.append(_column(name, values, group, scene))
+        columns.append(_column(RUN, np.array(runs, dtype=object), "run"))
+        said = [row["message"] if row else "" for row in found]
+        columns.append(_column(MESSAGE, np.array(said, dtype=object), "run"))
+        return RunTable(axes=axes, columns={each.name: each for each in columns})
+
+
+def group_of(name: str) -> str:
+    """Return what a number of a run tells: ``result``, ``effort`` or ``audit``."""
+    if name in AUDIT or name.startswith("audit_"):
+        return "audit"
+    return "effort" if name in EFFORT else "result"
+
+
+def scene_of_study(store: Store, name: str) -> Scene | None:
+    """Return a scene by its name or by the id of a posted one; None if it is not known here."""
+    if scene := store.scene(name, whole=False):
+        return scene
+    return scene_named(name) if name in known_names() else None
+
+
+def _sweep(
+    sweep: Mapping[str, Any], axes: Mapping[str, Sequence[Any]], scene: Scene | None
+) -> Iterator[Column]:
+    """Yield the axes of a sweep, and what axes of labels and points set, over its runs."""
+    shape = tuple(len(values) for values in axes.values())
+    at = dict(zip(axes, np.indices(shape).reshape(len(shape), -1), strict=True))
+    own = {name: (name, values) for name, values in axes.items()}
+    known = parameters_of(scene) if scene else {}
+    for name, (axis, values) in {**own, **linked_values(dict(sweep))}.items():
+        plain = all(isinstance(each, int | float) and not isinstance(each, bool) for each in values)
+        every = np.array(values if plain else [str(each) for each in values], dtype=object)
+        every = every.astype(float) if plain else every
+        attributes = axis_attributes(scene, name) if scene and name in known else {}
+        yield _column(name, every[at[axis]], "sweep", words=attributes)
+
+
+def _column(
+    name: str,
+    values: np.ndarray,
+    group: str,
+    scene: Scene | None = None,
+    words: Mapping[str, Any] | None = None,
+) -> Column:
+    attributes = attributes_of(name, scene) if words is None else words
+    unit = str(attributes.get("units", ""))
+    quantity = QUANTITIES.get(name)
+    meanings = quantity.flags if quantity else None
+    return Column(
+        name=name,
+        words=str(attributes.get("long_name", name.replace("_", " "))),
+        unit="" if unit == "1" else unit,
+        group=group,
+        flags={flag.value: flag.name.lower() for flag in meanings} if meanings else {},
+        values=values,
+    )
+
+
+def _meets(column: Column, condition: str) -> np.ndarray:
+    """Return which runs meet a condition."""
+    if not column.number or column.flags:
+        wanted = [each.strip() for each in condition.split(",")]
+        codes = {word: code for code, word in column.flags.items()}
+        return np.isin(column.values, [codes.get(each, math.nan) for each in wanted] if codes
+                       else np.array(wanted, dtype=object))  # fmt: skip
+    values = column.values
+    if match := RANGE.fullmatch(condition):
+        low, high = (match[end].strip() for end in ("low", "high"))
+        above = values >= _number(column, low, condition) - SAME if low else True
+        below = values <= _number(column, high, condition) + SAME if high else True
+        return ~np.isnan(values) & above & below
+    numbers = [_number(column, each, condition) for each in condition.split(",")]
+    return np.any([np.isclose(values, each, rtol=SAME, atol=0.0) for each in numbers], axis=0)
+
+
+def _number(column: Column, text: str, condition: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        allowed = "must be a number, several with commas between, or a range such as 0.1..0.4"
+        raise StudyError(column.name, condition, allowed) from None

@@ -1,0 +1,458 @@
+"""Refinement: runs only where the numbers of a study change in a way that was not foreseen.
+
+The values of the axes that are numbers divide their ranges into cells; each combination of values
+on the other axes is a branch, which has cells of its own. In the first round the runs at the
+corners of all cells, at the middles of their edges and at their centres are computed. A cell is
+halved along the axis on whose edges a run in the middle missed most what the two ends predict, if
+by more than is allowed; a cell of the sweep along all axes if the run at its centre did so. Where
+some runs of a cell failed and others did not, it is halved along the axes on whose edges this
+changes. The parts ask for the runs at the middles of their edges, and so on. A cell is halved along
+an axis only so often: kinks, jumps and edges of regions of failed runs are resolved to this size.
+
+What becomes of a cell depends on its own runs, and on the range of the numbers in the first round.
+It is therefore divided as soon as its runs are known, if even the most runs that others may ask for
+up to this round are within the largest number of runs. Otherwise it waits for the end of its round:
+then those that missed most are divided first, as far as runs are left. In whichever order runs
+end, the same ones are asked for.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from solver.parameters import is_number
+from solver.scenes import Scene
+from studies.definition.cells import KINK, Cell, Point, weights
+from studies.definition.parameters import parameters_of
+from studies.definition.quantity import number_of_a_run
+from studies.definition.sweep import MAXIMUM_RUNS, Axes
+from studies.definition.vocabulary import NO_EQUILIBRIUM, OK, taken
+from studies.errors import StudyError, one_of
+
+STATES = SETTLED, FAILED, SMALLEST, MOST, OPEN = "settled", "failed", "smallest", "most", "open"
+"""What became of a cell: its runs are as foreseen; all failed; it would be divided, but is as small
+as is allowed; or no runs were left; or the refinement was stopped."""
+
+_KEYS = ("of", "until", "most", "halvings")
+_UNTIL, _MOST, _HALVINGS = 0.02, 200, 5
+"""Entries that are left out."""
+_MOST_AXES, _MOST_HALVINGS = 4, 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refine:
+    """What is asked for.
+
+    Attributes
+    ----------
+    of : numbers of the runs
+    until : largest miss that is allowed, as a share of the range of the numbers in the first round;
+        or, by number, in its unit
+    most : largest number of runs
+    halvings : how often a cell of the sweep may be halved along each axis
+    axes : values of the axes that are numbers, in increasing order
+    """
+
+    of: tuple[str, ...]
+    until: float | Mapping[str, float]
+    most: int
+    halvings: int
+    axes: Mapping[str, Sequence[float]]
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What `checked_refine` reads."""
+        until = dict(self.until) if isinstance(self.until, Mapping) else self.until
+        return {
+            "of": list(self.of), "until": until, "most": self.most, "halvings": self.halvings,
+        }  # fmt: skip
+
+    def cells(self, branches: int) -> Iterator[Cell]:
+        """Yield the cells of the sweep."""
+        intervals = [list(itertools.pairwise(values)) for values in self.axes.values()]
+        for branch in range(branches):
+            for box in itertools.product(*intervals):
+                low, high = zip(*box, strict=True)
+                yield Cell(low, high, branch, (0,) * len(box))
+
+    def first(self, branches: int) -> int:
+        """Return the number of runs of the first round."""
+        cells = self.cells(branches)
+        return len({(cell.branch, point) for cell in cells for point in points_of(cell)})
+
+
+class Wanted(NamedTuple):
+    """A run: the number of its branch, and its values on the axes that are numbers."""
+
+    branch: int
+    point: Point
+
+
+class Settled(NamedTuple):
+    """A cell that is not divided.
+
+    Attributes
+    ----------
+    cell, state : the cell, and what became of it
+    left : of each number the error that is left in it; empty if it has failed runs
+    """
+
+    cell: Cell
+    state: str
+    left: tuple[float, ...] = ()
+
+
+class _Halving(NamedTuple):
+    """A cell to be divided along some axes.
+
+    Attributes
+    ----------
+    cell, axes, left : the cell, the axes, and the errors that are left if it is not divided
+    miss : how far it missed what is allowed
+    """
+
+    cell: Cell
+    axes: list[int]
+    miss: float
+    left: tuple[float, ...]
+
+    @property
+    def order(self) -> tuple[Any, ...]:
+        """The place in its round, if not all of this can be divided."""
+        return -self.miss, self.cell
+
+
+Misses = Sequence[tuple[float, ...]]
+"""Of each axis, the largest miss of each number on the edges along it."""
+
+
+@dataclass(slots=True)
+class Refinement:
+    """The runs that a refinement asks for.
+
+    Attributes
+    ----------
+    refine : what is asked for
+    branches : parameters that the other axes set, for each combination of their positions
+    allow : what the study allows, see `taken`
+    rows : the rows of the runs it has asked for; of one that the scene refuses, the reason
+    asked : the runs it has asked for, with their rounds
+    settled : the cells that are not divided
+    """
+
+    refine: Refine
+    branches: Sequence[Mapping[str, Any]]
+    allow: Sequence[str] = ()
+    rows: dict[Wanted, Mapping[str, Any] | str] = field(default_factory=dict)
+    asked: dict[Wanted, int] = field(default_factory=dict)
+    settled: list[Settled] = field(default_factory=list)
+    _lacks: dict[Cell, int] = field(default_factory=dict)
+    _waits: dict[Wanted, list[Cell]] = field(default_factory=dict)
+    _known: list[Cell] = field(default_factory=list)
+    _halvings: list[_Halving] = field(default_factory=list)
+    _allowed: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        for cell in self.refine.cells(len(self.branches)):
+            self._open(cell)
+
+    @property
+    def wants(self) -> list[Wanted]:
+        """The runs that it lacks."""
+        return list(self._waits)
+
+    @property
+    def reason(self) -> str:
+        """Why it has ended; empty until then."""
+        if self._lacks or self._halvings:
+            return ""
+        return MOST if MOST in {each.state for each in self.settled} else SETTLED
+
+    @property
+    def share(self) -> float:
+        """Share of the ranges that is settled."""
+        whole = sum(_volume(cell) for cell in self.refine.cells(len(self.branches)))
+        return sum(_volume(each.cell) for each in self.settled) / whole
+
+    @property
+    def progress(self) -> float:
+        """Share that is done: of the ranges, or of the runs, whichever is more."""
+        return 1.0 if self.reason else max(0.99 * self.share, len(self.rows) / self.refine.most)
+
+    @property
+    def told(self) -> str:
+        """The round, and how far it is from its end, as text."""
+        stage = 1 + max(map(_round, self._lacks), default=0)
+        runs = f"run {len(self.rows)} of at most {self.refine.most}"
+        return f"round {stage}, {runs}, {100 * self.share:.0f} % of the ranges settled"
+
+    @property
+    def cells(self) -> list[Settled]:
+        """The cells that are not divided, those included of which something is still open."""
+        halved = (Settled(each.cell, OPEN, each.left) for each in self._halvings)
+        every = [*self.settled, *halved, *(Settled(cell, OPEN) for cell in self._lacks)]
+        return sorted(every, key=lambda each: (each.cell.branch, each.cell))
+
+    @property
+    def decided(self) -> tuple[str, ...]:
+        """Statuses without results that are not computed again."""
+        return NO_EQUILIBRIUM
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether one loading path serves it to its end: it serves only a round."""
+        return False
+
+    @property
+    def limit(self) -> None:
+        """What tells the last run that is needed on a loading path: all are."""
+
+    def sets(self, wanted: Wanted) -> dict[str, Any]:
+        """Return the parameters that a run sets."""
+        return {
+            **self.branches[wanted.branch],
+            **dict(zip(self.refine.axes, wanted.point, strict=True)),
+        }
+
+    def tell(self, wanted: Wanted, row: Mapping[str, Any] | str) -> None:
+        """Tell it of a run that it lacked, or why the scene refuses it."""
+        self.rows[wanted] = row
+        for cell in self._waits.pop(wanted, []):
+            self._lacks[cell] -= 1
+            if not self._lacks[cell]:
+                self._known.append(cell)
+        if not self._allowed and not self.wants:
+            self._allowed = self._largest_misses()
+        while self._allowed and self._known:
+            while self._known:
+                self._decide(self._known.pop())
+            self._divide()
+            if not self._lacks and not self._halvings:
+                self._look_around()
+                self._divide()
+
+    def key(self, parameters: Mapping[str, Any]) -> Wanted:
+        """Return the key of a run with these parameters."""
+        own = {name: parameters[name] for name in self.branches[0]}
+        point = tuple(parameters[name] for name in self.refine.axes)
+        return Wanted(list(self.branches).index(own), point)
+
+    def refuse(self, wanted: Wanted, refusal: str) -> bool:
+        """Take a run that the scene refuses as one that failed."""
+        self.tell(wanted, refusal)
+        return True
+
+    def number(self, wanted: Wanted) -> tuple[float, ...] | None:
+        """Return the numbers of a run; None if it failed, or lacks one."""
+        row = self.rows[wanted]
+        if isinstance(row, str) or taken(str(row["status"]), self.allow) != OK:
+            return None
+        found = [row["scalars"].get(name) for name in self.refine.of]
+        return None if None in found else tuple(map(float, found))
+
+    def _open(self, cell: Cell) -> None:
+        """Ask for the runs of a cell."""
+        stage, lacks = _round(cell), 0
+        for wanted in (Wanted(cell.branch, point) for point in points_of(cell)):
+            self.asked[wanted] = min(self.asked.get(wanted, stage), stage)
+            if wanted not in self.rows:
+                self._waits.setdefault(wanted, []).append(cell)
+                lacks += 1
+        self._lacks[cell] = lacks
+        if not lacks:
+            self._known.append(cell)
+
+    def _largest_misses(self) -> tuple[float, ...]:
+        """Return the largest misses that are allowed, by the runs of the first round."""
+        until, found = self.refine.until, [each for each in map(self.number, self.asked) if each]
+        if isinstance(until, Mapping):
+            return tuple(until[name] for name in self.refine.of)
+        spans = [max(each) - min(each) for each in zip(*found, strict=True)]
+        return tuple(until * span for span in spans) or (0.0,) * len(self.refine.of)
+
+    def _decide(self, cell: Cell) -> None:
+        """Settle a cell whose runs are known, or keep it to be divided."""
+        del self._lacks[cell]
+        known = {at: self.number(Wanted(cell.branch, at)) for at in points_of(cell)}
+        there = {at: each for at, each in known.items() if each is not None}
+        every, left = set(range(len(cell.low))), ()
+        if not there:
+            self.settled.append(Settled(cell, FAILED))
+            return
+        if len(there) < len(known):
+            changes = {
+                each.axis for each in cell.edges if 0 < sum(at in there for at in each[1:]) < 3
+            }
+            miss, axes = math.inf, changes or every
+        else:
+            misses = _misses(cell, there)
+            ratios = [self._ratio(each) for each in misses]
+            worst = sorted(every, key=lambda axis: -ratios[axis])
+            free = [k for k in worst if ratios[k] > 1.0 and cell.divisible(k, self.refine.halvings)]
+            miss, axes = max(ratios), set(free[:1]) or {k for k in worst if ratios[k] > 1.0}
+            if not any(cell.halved) and not axes:
+                miss = self._ratio(_off(cell, there, cell.centre, there[cell.centre]))
+                axes = every if miss > 1.0 else axes
+            left = tuple(KINK * sum(each) for each in zip(*misses, strict=True))
+        can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
+        if can:
+            self._halvings.append(_Halving(cell, can, miss, left))
+        else:
+            self.settled.append(Settled(cell, SMALLEST if axes else SETTLED, left))
+
+    def _look_around(self) -> None:
+        """Add what the cells miss at runs of their neighbours to the errors that are left in them.
+
+        Cells that miss more than is allowed are to be divided after all.
+        """
+        known = {each: number for each in self.asked if (number := self.number(each))}
+        settled, self.settled = self.settled, []
+        for cell, state, left in settled:
+            axes: set[int] = set()
+            misses = [left]
+            own = {at: known[Wanted(cell.branch, at)] for at in points_of(cell)} if left else {}
+            for (branch, at), number in known.items() if left else ():
+                if at in own or not cell.holds(branch, at):
+                    continue
+                misses.append(_off(cell, own, at, number))
+                if self._ratio(misses[-1]) > 1.0:
+                    axes |= {k for k, x in enumerate(at) if x not in (cell.low[k], cell.high[k])}
+            most = tuple(map(max, zip(*misses, strict=True)))
+            can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
+            if can and state == SETTLED:
+                self._halvings.append(_Halving(cell, can, self._ratio(most), most))
+            else:
+                small = axes and state == SETTLED
+                self.settled.append(Settled(cell, SMALLEST if small else state, most))
+
+    def _ratio(self, misses: tuple[float, ...]) -> float:
+        """Return how far misses are beyond what is allowed: above 1 if they are."""
+        pairs = zip(misses, self._allowed, strict=True)
+        return max(
+            miss / most if most else math.inf * miss if miss else 0.0 for miss, most in pairs
+        )
+
+    def _divide(self) -> None:
+        """Divide the cells that may be divided now."""
+        for stage in sorted({_round(each.cell) for each in self._halvings}):
+            own = [each for each in self._halvings if _round(each.cell) == stage]
+            early = any(_round(cell) <= stage for cell in self._lacks)
+            if early and self._at_most(stage) > self.refine.most:
+                return
+            self._halvings = [each for each in self._halvings if each not in own]
+            full = False
+            for cell, axes, _, left in sorted(own, key=lambda each: each.order):
+                parts = cell.parts(axes)
+                new = {Wanted(part.branch, at) for part in parts for at in points_of(part)}
+                full = full or len(self.asked.keys() | new) > self.refine.most
+                if full:
+                    self.settled.append(Settled(cell, MOST, left))
+                    continue
+                for part in parts:
+                    self._open(part)
+
+    def _at_most(self, stage: int) -> int:
+        """Return the most runs, if all cells up to a round are divided: those not yet known too."""
+        axes = len(self.refine.axes)
+        each = axes * 2**axes if axes == 1 else 2**axes + (axes - 1) * 2 ** (axes - 2)
+        cells = [*self._lacks, *(halving.cell for halving in self._halvings)]
+        rounds = (stage + axes - _round(cell) for cell in cells if _round(cell) <= stage)
+        return len(self.asked) + sum(each * (2**count - 1) for count in rounds)
+
+
+def points_of(cell: Cell) -> list[Point]:
+    """Return where a cell has runs: at corners, middles of edges, and the first at their centre."""
+    own = [*cell.corners, *(edge.middle for edge in cell.edges)]
+    return own if any(cell.halved) else list(dict.fromkeys([*own, cell.centre]))
+
+
+def _round(cell: Cell) -> int:
+    """Return the round in which a cell asks for its runs, from 0 on."""
+    return sum(cell.halved)
+
+
+def _volume(cell: Cell) -> float:
+    """Return the size of a cell as a share of its cell of the sweep."""
+    return 0.5 ** sum(cell.halved)
+
+
+def _misses(cell: Cell, known: Mapping[Point, tuple[float, ...]]) -> Misses:
+    """Return by how much the ends of the edges miss what is known in their middles."""
+    count = len(known[cell.low])
+    most = [[0.0] * count for _ in cell.low]
+    for axis, low, high, mid in cell.edges:
+        share = (mid[axis] - low[axis]) / (high[axis] - low[axis])
+        for k, (a, b, m) in enumerate(zip(known[low], known[high], known[mid], strict=True)):
+            most[axis][k] = max(most[axis][k], abs(m - a - (b - a) * share))
+    return [tuple(each) for each in most]
+
+
+def _off(
+    cell: Cell, known: Mapping[Point, tuple[float, ...]], at: Point, there: tuple[float, ...]
+) -> tuple[float, ...]:
+    """Return by how much the runs of a cell miss the numbers of another run in it."""
+    parts = weights(cell.low, cell.high, at).items()
+    return tuple(
+        abs(number - sum(weight * known[each][k] for each, weight in parts))
+        for k, number in enumerate(there)
+    )
+
+
+def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
+    """Return the refinement that a study asks for.
+
+    Raises
+    ------
+    StudyError
+        naming the entry, its value and what is allowed
+    """
+    if not isinstance(content, Mapping):
+        raise StudyError("refine", content, "must be a table")
+    for key in content:
+        if key not in _KEYS:
+            raise StudyError(f"refine.{key}", content[key], one_of(key, _KEYS))
+    of = content.get("of")
+    names = [of] if isinstance(of, str) else of
+    if not isinstance(names, list | tuple) or not names or len(set(map(repr, names))) < len(names):
+        allowed = "must be a list of variables with one number a run, each of them once"
+        raise StudyError("refine.of", of, allowed)
+    for name in names:
+        number_of_a_run("refine.of", name, scene)
+    known = parameters_of(scene)
+    numbers = {
+        name: sorted(values)
+        for name, values in axes.items()
+        if isinstance(values, list) and name in known and all(map(is_number, values))
+    }
+    if not 1 <= len(numbers) <= _MOST_AXES or any(len(each) < 2 for each in numbers.values()):
+        allowed = f"needs 1 to {_MOST_AXES} axes of two numbers or more: the ends of their ranges"
+        raise StudyError("refine", dict(content), allowed)
+    until = _until(content.get("until", _UNTIL), list(names))
+    most = _whole("most", content.get("most", _MOST), MAXIMUM_RUNS)
+    halvings = _whole("halvings", content.get("halvings", _HALVINGS), _MOST_HALVINGS)
+    found = Refine(of=tuple(names), until=until, most=most, halvings=halvings, axes=numbers)
+    others = math.prod(len(values) for name, values in axes.items() if name not in numbers)
+    if found.first(others) > most:
+        allowed = f"must be at least {found.first(others)}, the runs of the first round"
+        raise StudyError("refine.most", most, allowed)
+    return found
+
+
+def _until(until: Any, names: list[str]) -> float | dict[str, float]:
+    if is_number(until) and 1e-6 <= until <= 1.0:
+        return float(until)
+    own = until if isinstance(until, Mapping) and until.keys() == set(names) else {}
+    if own and all(is_number(each) and 0.0 < each < math.inf for each in own.values()):
+        return {name: float(own[name]) for name in names}
+    allowed = "must be a share of the range, >= 1e-06 and <= 1, or a number > 0 for each of `of`"
+    raise StudyError("refine.until", until, allowed)
+
+
+def _whole(name: str, value: Any, most: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+        raise StudyError(f"refine.{name}", value, f"must be an integer >= 1 and <= {most}")
+    return value

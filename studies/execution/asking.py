@@ -1,0 +1,225 @@
+"""The runs of a study that chooses them by the outcomes of others: a goal, a refinement or a fit.
+
+The searches at the places of the axes go on each by itself; a refinement, and a fit, is one program
+at one place: as soon as it is known what is needed next, it is handed to the workers. A search
+along a path that goes on is the task of one worker, which asks for its runs itself.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection, Iterator, Mapping
+from copy import deepcopy
+from dataclasses import replace
+from functools import partial
+from itertools import takewhile
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from studies.definition.cases import Case, LoadingPath
+from studies.definition.fit import Fit, Fitting, standings
+from studies.definition.goal import Goal, PathLimit, Search
+from studies.definition.measured import Line, Read
+from studies.definition.place import Place
+from studies.definition.refine import Refinement
+from studies.definition.study import Study
+from studies.definition.sweep import owners
+from studies.storage import runfile
+from studies.storage.store import Store
+
+
+class Asked(NamedTuple):
+    """A loading path that a program asks for.
+
+    Either ``limit`` tells its last run, or it goes on, for as long as ``place`` asks for runs.
+    """
+
+    path: LoadingPath
+    limit: PathLimit | None
+    place: Place[Any] | None
+
+
+class Asking:
+    """The programs of a study, and the runs that they ask for.
+
+    Parameters
+    ----------
+    study : a study that chooses its runs
+    store : the runs that are there are not computed again
+    resume, since : as in `run_study`: which failed runs are taken as they are
+    only : number of the one program that is to be carried out; by default all are
+
+    Attributes
+    ----------
+    places : the programs with their runs: of a goal in the order of the cases of the study
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        store: Store,
+        resume: bool = False,
+        since: int = 0,
+        only: int | None = None,
+    ) -> None:
+        self._study, self._store = study, store
+        self._at: list[list[str]] = []
+        self.places: list[Place[Any]] = []
+        for number, (at, fixed, program) in enumerate(_programs(study, store)):
+            if only not in (None, number):
+                continue
+            self._at.append(at)
+            self.places.append(
+                Place(
+                    scene=study.problem,
+                    fixed=study.parameters | fixed,
+                    program=program,
+                    keep=study.keep,
+                    resume=resume,
+                    since=since,
+                )
+            )
+        self._paths: dict[str, tuple[int, list[Any]]] = {}
+        self._waits: list[set[Any]] = [set() for _ in self.places]
+        self._ready: deque[Asked] = deque()
+        for number in range(len(self.places)):
+            self._go_on(number)
+
+    @property
+    def ended(self) -> bool:
+        """Whether all programs have ended."""
+        return all(place.program.reason for place in self.places)
+
+    @property
+    def asked(self) -> list[str]:
+        """Ids of the runs that the searches of a goal have asked for, as far as they are known."""
+        if not self._study.goal:
+            return []
+        rows = (row for place in self.places for row in place.program.rows.values())
+        return sorted({str(row["id"]) for row in rows})
+
+    @property
+    def stage(self) -> str:
+        """How many of the searches of a goal have ended, as text; empty for others."""
+        return self._study.stage(sum(bool(place.program.reason) for place in self.places))
+
+    @property
+    def progress(self) -> float:
+        """Share of all programs that is done, 0 to 1."""
+        return float(np.mean([place.program.progress for place in self.places]))
+
+    def paths(self) -> Iterator[Asked | None]:
+        """Yield the loading paths that are asked for; None while all programs wait for runs."""
+        while not self.ended:
+            yield self._ready.popleft() if self._ready else None
+
+    def heard(self, path: str, row: Mapping[str, Any]) -> None:
+        """Tell the program of a loading path of the row of a run."""
+        number = self._paths[path][0]
+        place = self.places[number]
+        self._waits[number].discard(place.program.key(row["parameters"]))
+        if place.hear(row) and not place.program.goes_on:
+            self._go_on(number)
+
+    def owed(self, path: str) -> Case | None:
+        """Return the run that a path which goes on has to compute next; None if it owes none.
+
+        Runs that it has stored are taken, also those of which it told nothing.
+        """
+        number = self._paths[path][0]
+        place = self.places[number]
+        wanted = self._lacking(number, ()) if place.program.goes_on else []
+        if not wanted or place.refusal(wanted[0]):
+            return None
+        return next(place.runs(wanted[:1]).cases())
+
+    def stored(self, path: str, since: int) -> list[Mapping[str, Any]]:
+        """Return the rows of the runs of a program that have been stored since a time [ns].
+
+        Some may have been stored by a worker that died before it told of them.
+        """
+        program = self.places[self._paths[path][0]].program
+        rows = program.rows.values() if program.goes_on else ()
+        return [row for row in rows if row["modified"] >= since]
+
+    def closed(self, path: str) -> None:
+        """Ask again for runs of which a path that has ended told nothing."""
+        number, keys = self._paths[path]
+        self._waits[number].difference_update(keys)
+        self._go_on(number)
+
+    def about(self, path: str, row: Mapping[str, Any]) -> str:
+        """Return where a run is, and how far its program is, as text."""
+        number = self._paths[path][0]
+        program = self.places[number].program
+        own = program.sets(program.key(row["parameters"])).items()
+        text = (f"{name} = {_short(value)}" for name, value in own)
+        return ", ".join([*self._at[number], *text]) + f" ({program.told})"
+
+    def _go_on(self, number: int) -> None:
+        """Take the runs of a program that are in the store, and ask for those that are not."""
+        place, waits = self.places[number], self._waits[number]
+        while True:
+            lacking = self._lacking(number, waits)
+            refused = next(filter(place.refusal, lacking), None)
+            if refused is None or not place.program.refuse(refused, place.refusal(refused)):
+                break
+        wanted = list(takewhile(lambda key: key != refused, lacking))
+        if not wanted:
+            return
+        waits.update(wanted)
+        for path in place.runs(wanted).paths():
+            # rounds share the id of a path, and one may begin before the last has ended
+            own = replace(path, id=path.cases[0].id)
+            self._paths[own.id] = number, [place.program.key(case.values) for case in own.cases]
+            self._ready.append(_asked(own, place))
+
+    def _lacking(self, number: int, waits: Collection[Any]) -> list[Any]:
+        """Take the runs of a program that are in the store; return the keys of the others."""
+        place = self.places[number]
+        while wanted := [key for key in place.program.wants if key not in waits]:
+            runs = place.runs(wanted)
+            rows = self._store.sound([case.id for case in runs.cases()])
+            stand = [rows[case.id] for case in runs.cases() if case.id in rows]
+            if not sum(place.hear(row) for row in stand if place.stands(row)):
+                return wanted
+        return []
+
+
+def _programs(study: Study, store: Store) -> Iterator[tuple[list[str], dict[str, Any], Any]]:
+    """Yield the programs of a study: where each is, as text, what is fixed there, and itself."""
+    swept = owners(study.sweep)
+    if isinstance(study.asks, Goal):
+        for case in study.cases():
+            at = [f"{axis} = {value}" for axis, value in study.place(case).items()]
+            yield at, {name: case.values[name] for name in swept}, Search(study.asks)
+    elif isinstance(study.asks, Fit):
+        names = {name for line in study.asks.measured for name in (line.of, line.over)}
+        read = partial(_variables, store, names)
+        yield [], {}, Fitting(study.asks, standings(study.sweep), read)
+    elif study.asks:
+        branches = {
+            tuple(study.place(case)[axis] for axis in study.axes if axis not in study.asks.axes):
+            {name: case.values[name] for name in swept if name not in study.asks.axes}
+            for case in study.cases()
+        }  # fmt: skip
+        yield [], {}, Refinement(study.asks, list(branches.values()), study.allow)
+
+
+def _variables(store: Store, names: Collection[str], row: Mapping[str, Any]) -> Read:
+    """Return what gives some variables of a run, and the values of their dimensions."""
+    with runfile.opened(store.run_path(row["id"])) as run:
+        found = {name: Line(*each) for name, each in runfile.lines(run, names).items()}
+    return found.get
+
+
+def _short(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _asked(path: LoadingPath, place: Place[Any]) -> Asked:
+    if place.program.goes_on:
+        own = replace(place, program=deepcopy(place.program))
+        return Asked(replace(path, cases=()), None, own)
+    return Asked(path, place.program.limit, None)

@@ -1,0 +1,125 @@
+"""What a fit finds: the data set of its answer."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from studies.definition.fit import FAILED, Certainty, Fitting, certainty
+from studies.definition.identity import canonical
+from studies.definition.study import Study
+from studies.definition.vocabulary import MISSING, OK, STOPPED
+from studies.execution.asking import Asking
+from studies.execution.goals import attributes, written
+from studies.storage import dataset as layout
+from studies.storage.dataset import RunContent, Variable
+from studies.storage.held import Combined
+from studies.storage.store import Store
+
+NOT_FOUND = "not_converged"
+"""Status of a fit that ended before it found the smallest sum."""
+
+
+def calibrated(study: Study, store: Store, asking: Asking) -> Combined:
+    """Write the data set of a fit, unless there is one with the same answer."""
+    program: Fitting = asking.places[0].program
+    answer = program.answer
+    known = certainty(program.fit, answer) if answer and answer.jacobian is not None else None
+    status, message = _outcome(program, known)
+    rows = [row for row in program.rows.values() if row]
+    of = canonical([status, message, rows, sorted(program.refusals.values())])
+
+    def content() -> RunContent:
+        variables = _content(study, program, known, (status, message))
+        return RunContent(variables, attributes(study, "fit"))
+
+    anew = written(study, store, of, content)
+    failed = [] if status == OK else [("", status, message)]
+    path = store.dataset_path(study.id)
+    return Combined(path=path, counts={status: 1}, failed=failed, missing=(), anew=anew)
+
+
+def _outcome(program: Fitting, known: Certainty | None) -> tuple[str, str]:
+    """Return the status of a fit, and the reason, or what there is to say of the answer."""
+    if not program.reason:
+        return MISSING, STOPPED
+    bounds = [
+        f"{name} is at its {'lowest' if share <= 0.0 else 'highest'} value"
+        for name, share in zip(program.fit.free, program.answer.shares, strict=True)
+        if not 1e-4 < share < 1.0 - 1e-4
+    ] if program.answer else []  # fmt: skip
+    told = [program.message, known.warning if known else "", *bounds]
+    status = OK if not program.message else MISSING if program.reason == FAILED else NOT_FOUND
+    return status, "; ".join(filter(None, told))
+
+
+def _content(
+    study: Study, program: Fitting, known: Certainty | None, outcome: tuple[str, str]
+) -> dict[str, Variable]:
+    scene, fit, answer = study.problem, program.fit, program.answer
+    names, count = list(fit.free), len(fit.free)
+    variables: dict[str, Variable] = {}
+
+    def add(name: str, dims: tuple[str, ...], values: Any, words: str, unit: str = "") -> None:
+        attrs = {"long_name": words} | ({"units": unit} if unit else {})
+        array = np.asarray(values)
+        variables[name] = Variable(
+            dims, array.astype(object) if array.dtype.kind == "U" else array, attrs
+        )
+
+    for name, text in zip(("status", "message"), outcome, strict=True):
+        variables[name] = Variable((), np.array(text, dtype=object), layout.attributes_of(name))
+    add("parameter", ("parameter",), np.array(names), "parameter that was searched")
+    add("parameter_2", ("parameter_2",), np.array(names), "parameter that was searched")
+    unknown = np.full((count, count), math.nan)
+    covariance = known.covariance if known else unknown
+    for k, (name, free) in enumerate(fit.free.items()):
+        unit = layout.axis_attributes(scene, name).get("units", "")
+        value = float(answer.values[k]) if answer else math.nan
+        sigma = float(np.sqrt(covariance[k, k]))
+        add(name, (), value, f"{name.replace('_', ' ')} that was found", unit)
+        add(f"{name}_sigma", (), sigma, f"standard deviation of {name.replace('_', ' ')}", unit)
+        for end in ("low", "high"):
+            add(f"{name}_{end}", (), getattr(free, end), f"{end} bound of {name}", unit)
+    both = ("parameter", "parameter_2")
+    add("covariance", both, covariance, "covariance of the values that were found")
+    add("correlation", both, known.correlation if known else unknown, "their correlation")
+    add("condition", (), known.condition if known else math.nan, "condition of the Jacobian matrix")
+    seen = answer.seen if answer else np.full(len(fit.values), math.nan)
+    misfit = float(np.mean(((seen - fit.values) / fit.sigma) ** 2))
+    add("misfit", (), misfit, "mean of the squared differences over sigma")
+    add("runs", (), np.int32(len(program.rows)), "runs of the fit")
+    lines = [k for k, line in enumerate(fit.measured) for _ in line.values]
+    places = [
+        each.places if each.over else np.full(len(each.values), math.nan) for each in fit.measured
+    ]
+    add("line", ("row",), np.array(lines, dtype=np.int32), "number of the measured line")
+    add("place", ("row",), np.concatenate(places), "where it was measured")
+    add("measured", ("row",), fit.values, "what was measured")
+    add("measured_sigma", ("row",), fit.sigma, "standard deviation of what was measured")
+    add("fitted", ("row",), seen, "what the run with the values found says")
+    for key, words in (("of", "variable that was measured"), ("over", "variable of the places")):
+        add(f"line_{key}", ("lines",), [getattr(each, key) for each in fit.measured], words)
+    at = [
+        ", ".join(f"{name} = {value}" for name, value in each.at.items()) for each in fit.measured
+    ]
+    add("line_at", ("lines",), at, "place on the other dimensions")
+    add("line_unit", ("lines",), [each.unit for each in fit.measured], "unit of what was measured")
+    _add_tried(add, program)
+    return variables
+
+
+def _add_tried(add: Any, program: Fitting) -> None:
+    """Add the runs of the fit, in the order in which they were asked for."""
+    keys = [key for key, row in program.rows.items() if row or key in program.refusals]
+    for k, name in enumerate(program.fit.free):
+        values = np.array([key.values[k] for key in keys], dtype=float)
+        add(f"tried_{name}", ("tried",), values, f"{name.replace('_', ' ')} of the runs")
+    misfits = np.array([program.misfit(key.values) for key in keys], dtype=float)
+    add("tried_misfit", ("tried",), misfits, "mean of the squared differences over sigma")
+    for entry, words in (("status", "outcome of the runs"), ("id", "id of the runs")):
+        texts = [str((program.rows[key] or {}).get(entry, "")) for key in keys]
+        name = "run" if entry == "id" else entry
+        add(f"tried_{name}", ("tried",), np.array(texts, dtype=object), words)

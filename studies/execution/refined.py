@@ -1,0 +1,66 @@
+"""The data set of a refinement: its runs over ``point``, and its cells with the error left."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from studies.definition.cases import Case
+from studies.definition.identity import canonical
+from studies.definition.refine import Refinement
+from studies.definition.study import Study
+from studies.definition.sweep import owners
+from studies.execution.asking import Asking
+from studies.execution.result import result
+from studies.storage import dataset as layout
+from studies.storage.dataset import RunContent, Variable
+from studies.storage.held import Combined
+from studies.storage.store import Store
+
+
+def refined(study: Study, store: Store, asking: Asking, anew: bool) -> Combined:
+    """Write the data set of a refinement, unless there is one of the same runs.
+
+    Parameters
+    ----------
+    study, store, asking : the study, its store, and what it has asked for
+    anew : whether runs were computed
+    """
+    program: Refinement = asking.places[0].program
+    ran = [each for each in program.asked if not isinstance(program.rows.get(each), str)]
+    order = sorted(ran, key=lambda each: (program.asked[each], each))
+    chosen = study.with_points([program.sets(each) for each in order])
+    rounds = np.array([program.asked[each] + 1 for each in order], dtype=np.int32)
+    beside = _beside(study, program, list(chosen.cases()), rounds)
+    return result(chosen, store, complete=not anew, stopped=not asking.ended, beside=beside)
+
+
+def _beside(study: Study, program: Refinement, cases: list[Case], rounds: np.ndarray) -> RunContent:
+    """Return what the data set has beside the runs."""
+    scene, refine, cells = study.problem, program.refine, program.cells
+    variables: dict[str, Variable] = {}
+
+    def add(name: str, dim: str, values: Any, words: str, unit: str = "") -> None:
+        attrs = {"long_name": words} | ({"units": unit} if unit else {})
+        variables[name] = Variable((dim,), np.asarray(values), attrs)
+
+    add("run", "point", np.array([case.id for case in cases], dtype=object), "id of the run")
+    add("round", "point", rounds, "round in which the run was asked for")
+    for axis, name in enumerate(refine.axes):
+        unit = layout.axis_attributes(scene, name).get("units", "")
+        for end in ("low", "high"):
+            values = [float(getattr(each.cell, end)[axis]) for each in cells]
+            add(f"cell_{name}_{end}", "cell", values, f"{end} end of {name} of the cell", unit)
+    for name in owners(study.sweep).keys() - refine.axes.keys():
+        values = [program.branches[each.cell.branch][name] for each in cells]
+        kind = None if all(isinstance(each, int | float) for each in values) else object
+        texts = values if kind is None else [str(each) for each in values]
+        add(f"cell_{name}", "cell", np.array(texts, dtype=kind), f"{name} of the cell")
+    states = np.array([each.state for each in cells], dtype=object)
+    add("cell_state", "cell", states, "what became of the cell")
+    for k, name in enumerate(refine.of):
+        left = [each.left[k] if each.left else np.nan for each in cells]
+        unit = layout.attributes_of(name, scene).get("units", "")
+        add(f"cell_error_{name}", "cell", left, f"error of {name} that is left in the cell", unit)
+    return RunContent(variables, {"refine": canonical(study.refine)})

@@ -1,0 +1,55 @@
+"""Fit parameters of runs to what was measured, and print what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import xarray as xr
+
+from studies.definition.study import Study
+from studies.errors import StudyError
+from studies.execution.run import run_study
+from studies.storage.store import Store
+from studies.views.columns import aligned, value_text
+from studies.views.reading import open_study
+
+
+def fit(study: Study | Mapping[str, Any], store: Store, **options: Any) -> xr.Dataset:
+    """Return the parameters with which runs come closest to measured lines, and how sure they are.
+
+    Parameters
+    ----------
+    study : a study with an entry ``fit``, or the content of a study file
+    store : the store of runs: those that are there are not computed again
+    options : of `run_study`
+
+    Raises
+    ------
+    StudyError
+        if the study has no fit, or as `run_study` does
+    """
+    own = study if isinstance(study, Study) else Study.from_dict(study, options.pop("scene", None))
+    if not own.fit:
+        raise StudyError("fit", None, "is missing: tell what was measured, and the ranges")
+    return open_study(run_study(own, store, **options).dataset)
+
+
+def fit_table(dataset: xr.Dataset) -> str:
+    """Return what was found: a line for each parameter, and how they go together."""
+    names = [str(name) for name in dataset["parameter"].to_numpy()]
+    lines = [["parameter", "value", "sigma", "lowest", "highest", "unit"]]
+    for name in names:
+        ends = ("", "_sigma", "_low", "_high")
+        numbers = [value_text(dataset[f"{name}{end}"].item()) for end in ends]
+        lines.append([name, *numbers, dataset[name].attrs.get("units", "")])
+    text = aligned(lines, 1)
+    if len(names) > 1:
+        table = dataset["correlation"].to_numpy()
+        rows = [["correlation", *names]]
+        rows += [[name, *(f"{x:.3f}" for x in row)] for name, row in zip(names, table, strict=True)]
+        text += f"\n\n{aligned(rows, 1)}"
+    told = [
+        f"{name} {value_text(dataset[name].item())}" for name in ("condition", "misfit", "runs")
+    ]
+    return f"{text}\n\n{', '.join(told)}"

@@ -1,0 +1,80 @@
+"""Draw what a fit has found over what was measured."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from solver.results.quantities import QUANTITIES
+from studies.views.plots.captions import capitalised, words
+
+_PANEL = (4.6, 4.4)
+"""Width and height of a line with its differences [in]."""
+_LINE, _MARKS = "#D55E00", "0.35"
+
+
+def fit_figure(dataset: xr.Dataset) -> Figure:
+    """Return a column for each measured line: it and the run with the values found, differences.
+
+    Parameters
+    ----------
+    dataset : data set of a fit
+    """
+    lines = range(dataset.sizes["lines"])
+    size = _PANEL[0] * len(lines), _PANEL[1] + 0.7
+    sheet = Figure(figsize=size, dpi=130, layout="constrained")
+    grid = sheet.subplots(2, len(lines), squeeze=False, height_ratios=(3, 1), sharex="col")
+    for k in lines:
+        rows = dataset.isel(row=np.flatnonzero(dataset["line"] == k))
+        _draw(grid[:, k], rows, dataset.isel(lines=k))
+    found = [f"{words(n)} {_sure(dataset, n)}" for n in map(str, dataset["parameter"].to_numpy())]
+    sheet.suptitle(f"{dataset.attrs['title']}\n{' · '.join(found)}", fontsize=10)
+    return sheet
+
+
+def _draw(panels: np.ndarray, rows: xr.Dataset, line: xr.Dataset) -> None:
+    """Draw a measured line and its differences."""
+    above, below = panels
+    over, of = line["line_over"].item(), line["line_of"].item()
+    x = rows["place"].to_numpy() if over else np.arange(rows.sizes["row"])
+    measured, sigma, fitted = (
+        rows[name].to_numpy() for name in ("measured", "measured_sigma", "fitted")
+    )
+    above.errorbar(
+        x, measured, sigma, fmt="o", color=_MARKS, markersize=3.0, linewidth=0.8, label="measured"
+    )
+    above.plot(x, fitted, "-" if over else "_", color=_LINE, linewidth=1.5, label="fitted")
+    above.set_ylabel(_named(of))
+    below.axhspan(-1.0, 1.0, color="0.93")
+    below.axhline(0.0, color="0.2", linewidth=0.8)
+    below.plot(x, (measured - fitted) / sigma, "o", color=_MARKS, markersize=3.0)
+    below.set_ylabel("Difference / σ")
+    below.set_xlabel(_named(over) if over else "Number of the value")
+    if not over:
+        below.set_xticks(x)
+    if at := line["line_at"].item():
+        above.set_title(at, fontsize=8)
+    above.legend(frameon=False, fontsize=8)
+    for axes in (above, below):
+        _plain(axes)
+
+
+def _named(name: str) -> str:
+    """Return the name of a variable with its unit."""
+    unit = QUANTITIES[name].units if name in QUANTITIES else ""
+    return capitalised(words(name)) + ("" if unit in {"", "1"} else f" [{unit}]")
+
+
+def _sure(dataset: xr.Dataset, name: str) -> str:
+    """Return the value of a parameter and its standard deviation."""
+    value, sigma = dataset[name].item(), dataset[f"{name}_sigma"].item()
+    unit = dataset[name].attrs.get("units", "1")
+    return f"{value:.4g} ± {sigma:.2g}" + ("" if unit == "1" else f" {unit}")
+
+
+def _plain(axes: Axes) -> None:
+    axes.grid(color="0.92")
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)

@@ -1,0 +1,188 @@
+"""The values of a map of one run: both halves, the part that is shown, and the end of its colours.
+
+What draws a map, and what sends its values, take them from here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from solver.model.friction import PatchStatus
+from studies.errors import StudyError, one_of
+from studies.views.plots.fields import (
+    Window,
+    check_field,
+    component_of,
+    empty_window,
+    focus,
+    is_half,
+    map_axes,
+    map_fields,
+    too_close,
+    usual_field,
+)
+
+STATUS = "patch_status"
+"""The variable that a run with its contact in a patch has."""
+_MARGIN = 0.2
+"""Width of the frame around the contact, over its longer side."""
+_STAGE = "stage"
+_PERCENT, _WORTHWHILE = 99.8, 1.5
+"""Colours end at this percentile of the map if the largest value is this many times larger: near a
+sharp corner stress is unbounded."""
+
+_SIGNED = 0.1
+"""Ratio of the lowest value of a number to the highest; below minus this it has both signs."""
+_NOTHING = 1e-3
+"""Stress up to which it is rounding [MPa]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mapped:
+    """The values of a map.
+
+    Attributes
+    ----------
+    values : over two coordinates, the last of them horizontal; NaN outside the bodies
+    signed : whether zero is in the middle of the colours; else they begin at zero
+    high : value at which the colours end
+    note : which values lie beyond the colours, as a sentence; empty if none
+    """
+
+    values: xr.DataArray
+    signed: bool
+    high: float
+    note: str
+
+
+def mapped(
+    run: xr.Dataset,
+    field: str | None = None,
+    component: str | None = None,
+    zoom: float | None = None,
+    window: Window | None = None,
+    stage: str | None = None,
+) -> Mapped:
+    """Return the values of a map of a run, with both halves if one half was computed.
+
+    The arguments are those of `map_figure`; ``run`` is that of `one_run`.
+
+    Raises
+    ------
+    StudyError
+        if the run has no such field, component or stage, or the part has no points
+    """
+    field = field or usual_field(run)
+    check_field(field, map_fields(run))
+    values = _at_stage(component_of(run[field], component), stage)
+    across, up = map_axes(values)
+    values = values.isel({name: -1 for name in values.dims if name not in (up, across)})
+    if zoom is not None:
+        middle = focus(run, zoom)
+        values = _inside(values, (middle - zoom, middle + zoom, -zoom, zoom), too_close(zoom))
+    elif is_half(run):
+        values = whole(values)
+    if is_patch(values, run) and zoom is None and window is None:
+        values = within_patch(values, run)
+    if window is not None:
+        values = _inside(values, window, empty_window(window, across, up))
+    signed = "component" in values.coords or bool(values.min() < -_SIGNED * values.max())
+    return Mapped(values, signed, *_limit(values, signed))
+
+
+def _at_stage(values: xr.DataArray, stage: str | None) -> xr.DataArray:
+    """Return the values at a stage; all of them if none is named."""
+    if stage is None:
+        return values
+    known = [str(each) for each in values[_STAGE].to_numpy()] if _STAGE in values.dims else []
+    if stage not in known:
+        raise StudyError(_STAGE, stage, one_of(stage, known) if known else "has one stage only")
+    return values.sel({_STAGE: stage})
+
+
+def is_patch(values: xr.DataArray, run: xr.Dataset) -> bool:
+    """Whether a map is one of the contact that a run has in a patch."""
+    return STATUS in run and map_axes(values) == map_axes(run[STATUS])
+
+
+def within_patch(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
+    """Return a map of the contact with a frame around it, and NaN where it is open."""
+    across, up = map_axes(values)
+    closed = run[STATUS] != PatchStatus.OPEN
+    if not closed.any():
+        return values
+    part = closed.where(closed, drop=True)
+    margin = _MARGIN * max(float(np.ptp(part[name].to_numpy())) for name in (across, up))
+    ends = {
+        name: slice(float(part[name][0]) - margin, float(part[name][-1]) + margin)
+        for name in (across, up)
+    }
+    return values.where(closed).sel(ends)
+
+
+def whole(values: xr.DataArray) -> xr.DataArray:
+    """Return a map of both halves of bodies symmetric about x = 0, from the half x >= 0.
+
+    For a section the horizontal axis is z. Shear with one index across the line of symmetry changes
+    sign. A column on the line is not repeated. If the map begins away from the line, values between
+    the halves are NaN.
+    """
+    across, _ = map_axes(values)
+    values = values.isel({across: values[across].to_numpy() >= 0.0})
+    x = values[across].to_numpy()
+    if (start := 2.0 * x[0] - x[1]) > 0.0:  # one step from the map towards the line
+        before = values.isel({across: [0]}).assign_coords({across: [start]}) * np.nan
+        values = xr.concat([before, values], across)
+    component = str(values["component"].item()) if "component" in values.coords else ""
+    sign = -1.0 if component.count(across) == 1 else 1.0
+    other = sign * values.isel({across: slice(None, 0 if x[0] < 1e-6 * x[-1] else None, -1)})
+    both = xr.concat([other.assign_coords({across: -other[across]}), values], across)
+    return both.assign_attrs(values.attrs)
+
+
+def _inside(values: xr.DataArray, window: Window, nothing: StudyError) -> xr.DataArray:
+    """Return the part of a map in a window, or raise the error ``nothing`` if it is empty."""
+    across, up = map_axes(values)
+    x, y = (values[name].to_numpy() for name in (across, up))
+    x0, x1, y0, y1 = window
+    part = values.isel({across: (x0 <= x) & (x <= x1), up: (y0 <= y) & (y <= y1)})
+    if min(part.shape) < 2 or not part.notnull().any():
+        raise nothing
+    return part
+
+
+def _limit(values: xr.DataArray, signed: bool) -> tuple[float, str]:
+    """Return the largest value of the colours, and a note on values beyond it."""
+    known = np.isfinite(values.to_numpy())
+    there, area = values.to_numpy()[known], _areas(values)[known]
+    size = np.abs(there) if signed else there
+    if not size.size or not size.max() > 0.0:
+        return 1.0, ""
+    if values.attrs.get("units") == "MPa" and size.max() < _NOTHING:
+        return 1.0, f"No value is larger than {_NOTHING:g} MPa."
+    high = _percentile(size[size > 0.0], area[size > 0.0])
+    if size.max() <= _WORTHWHILE * high:
+        return float(size.max()), ""
+    unit = values.attrs.get("units", "1")
+    note = (
+        f"Colours end at {'±' if signed else ''}{high:.3g}{'' if unit == '1' else f' {unit}'}: "
+        f"{area[size > high].sum() / area.sum():.1%} of the map lies beyond. "
+        f"Values go from {there.min():.3g} to {there.max():.3g}."
+    )
+    return high, note.replace("-", "\N{MINUS SIGN}")
+
+
+def _areas(values: xr.DataArray) -> np.ndarray:
+    """Return the area of each point of a map; points are closer where stress changes rapidly."""
+    dx, dy = (np.gradient(values[name].to_numpy()) for name in map_axes(values))
+    return np.abs(np.multiply.outer(dy, dx))
+
+
+def _percentile(values: np.ndarray, area: np.ndarray) -> float:
+    """Return the value that is not exceeded on `_PERCENT` of the area."""
+    order = np.argsort(values)
+    share = np.cumsum(area[order]) / area.sum()
+    return float(values[order][np.searchsorted(share, _PERCENT / 100.0)])

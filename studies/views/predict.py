@@ -1,0 +1,223 @@
+"""Numbers, lines and maps between the runs of a study, each with its error."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from studies.definition.cells import KINK, edges, weights
+from studies.definition.vocabulary import OK
+from studies.errors import StudyError, one_of
+from studies.storage.frame import SETS
+from studies.toml import CASE
+from studies.views.gaussian import Array, Gaussian, in_hull
+from studies.views.picking import positions, select, sweep_axes, sweep_coordinates
+
+WAYS = CELLS, GAUSSIAN = "cells", "gaussian"
+MOST = 1000
+"""Largest number of runs of a Gaussian process: its cost grows with their cube."""
+_RUN = "run_between"
+
+
+def predict(
+    dataset: xr.Dataset, of: str | Sequence[str] | None = None, *, by: str | None = None, **at: Any
+) -> xr.Dataset:
+    """Return variables at a place between the runs, each with its error, ``<name>_error``.
+
+    Parameters
+    ----------
+    dataset : data set of a study
+    of : variables over the runs: numbers, lines or maps; by default the numbers of a refinement, or
+        all numbers of the runs
+    by : ``cells``, linear in the cells of a refinement, or ``gaussian``, a Gaussian process through
+        all runs; by default in cells if there are any
+    **at : a value for each parameter that varies: numbers between those of the runs, words among
+        theirs
+
+    Returns
+    -------
+    xarray.Dataset : the place is in its coordinates. Of a Gaussian process the error is a standard
+        deviation; its attribute ``leave_one_out`` is the root of the mean square by which all
+        other runs miss a run
+
+    Raises
+    ------
+    StudyError
+        if the place is outside the hull of the runs, or between failed ones; if a parameter that
+        varies is left out, or there is no such variable
+    """
+    ways = [way for way in WAYS if way == GAUSSIAN or "cell_state" in dataset]
+    if by is not None and by not in ways:
+        raise StudyError("by", by, one_of(by, ways))
+    names, between = _names(dataset, of), _placed(dataset, at)
+    way = by or ways[0]
+    found = (_in_cells if way == CELLS else _by_process)(dataset, between, names)
+    return found.assign_coords(between.fixed | between.place).assign_attrs(by=way)
+
+
+class _Between(NamedTuple):
+    """The runs among which a place is, over one dimension, and the place.
+
+    Attributes
+    ----------
+    runs : those of the words that were given
+    place, fixed : the numbers that vary among these runs; the parameters that do not
+    """
+
+    runs: xr.Dataset
+    place: dict[str, float]
+    fixed: dict[str, Any]
+
+    @property
+    def where(self) -> tuple[str, list[float]]:
+        """The place, as the field and the value of an error."""
+        return ", ".join(self.place), list(self.place.values())
+
+    def known(self, names: Sequence[str]) -> np.ndarray:
+        """Return which runs succeeded and have these numbers."""
+        numbers = [self.runs[name] for name in names if self.runs[name].ndim == 1]
+        there = [each.notnull().to_numpy() for each in numbers]
+        return np.logical_and.reduce([(self.runs["status"] == OK).to_numpy(), *there])
+
+
+def _names(dataset: xr.Dataset, of: str | Sequence[str] | None) -> list[str]:
+    """Return the variables that are asked for."""
+    axes = tuple(sweep_axes(dataset))
+    every = {str(name): each for name, each in dataset.data_vars.items()}
+    floats = [n for n, v in every.items() if v.dtype.kind == "f" and v.dims[: len(axes)] == axes]
+    numbers = [name for name in floats if every[name].dims == axes]
+    refined = json.loads(dataset.attrs.get("refine", "{}")).get("of")
+    names = [of] if isinstance(of, str) else list(of or refined or numbers)
+    for name in names:
+        if name not in floats:
+            raise StudyError("of", name, one_of(name, floats))
+    return names
+
+
+def _placed(dataset: xr.Dataset, at: Mapping[str, Any]) -> _Between:
+    """Return the runs of the words that are given, and the numbers."""
+    coordinates, chosen = sweep_coordinates(dataset), dataset
+    for name, value in at.items():
+        if name not in coordinates:
+            raise StudyError(name, value, one_of(name, list(coordinates)))
+        if dataset[name].dtype.kind not in "fiu":
+            chosen = select(chosen, {name: value})
+    place, fixed = {}, {}
+    for name in coordinates:
+        if name == CASE or SETS in dataset[name].attrs:
+            continue
+        values = np.unique(chosen[name].to_numpy())
+        if len(values) == 1:
+            fixed[name] = values[0].item() if hasattr(values[0], "item") else values[0]
+            if name in at:
+                positions(chosen[name], at[name])
+            continue
+        if name not in at:
+            known = ", ".join(map(str, values[:5])) + (", …" if len(values) > 5 else "")
+            raise StudyError(name, "", f"must be given, because it varies: {known}")
+        try:
+            place[name] = float(at[name])
+        except (TypeError, ValueError):
+            raise StudyError(name, at[name], "must be a number") from None
+        if not values[0] <= place[name] <= values[-1]:
+            allowed = f"must be between {values[0]:g} and {values[-1]:g}, as the runs are"
+            raise StudyError(name, at[name], allowed)
+    if not place:
+        raise StudyError("at", dict(at), "no number varies among these runs: nothing is between")
+    over = sweep_axes(chosen)
+    return _Between(chosen.reset_coords().stack({_RUN: over}, create_index=False), place, fixed)
+
+
+def _in_cells(dataset: xr.Dataset, between: _Between, names: Sequence[str]) -> xr.Dataset:
+    """Predict in the smallest cell of a refinement that holds the place."""
+    place, runs = between.place, between.runs
+    inside = np.ones(dataset.sizes["cell"], dtype=bool)
+    size = np.ones(len(inside))
+    for name, at in place.items():
+        below, above = (dataset[f"cell_{name}_{end}"].to_numpy() for end in ("low", "high"))
+        inside &= (below <= at) & (at <= above)
+        size *= above - below
+    for name, at in between.fixed.items():
+        if f"cell_{name}" in dataset:
+            inside &= dataset[f"cell_{name}"].to_numpy().astype(str) == str(at)
+    known = between.known(names)
+    columns = [runs[name].to_numpy() for name in place]
+    where = {tuple(column[k] for column in columns): k for k in np.flatnonzero(known)}
+    for number in sorted(np.flatnonzero(inside), key=lambda k: size[k]):
+        low, high = (
+            tuple(
+                dataset[f"cell_{name}_{end}"].to_numpy()[number].astype(column.dtype).item()
+                for name, column in zip(place, columns, strict=True)
+            )
+            for end in ("low", "high")
+        )
+        parts = weights(low, high, tuple(place.values()))
+        if parts.keys() <= where.keys():
+            break
+    else:
+        state = dataset["cell_state"].to_numpy()[inside]
+        allowed = f"is across failed runs: its cell is {', '.join(state)}"
+        raise StudyError(*between.where, allowed)
+    found = {}
+    for name in names:
+        each = runs[name]
+        values = {at: each.isel({_RUN: where[at]}) for at in parts}
+        terms = [weight * values[at] for at, weight in parts.items()]
+        inner: xr.DataArray = sum(terms[1:], start=terms[0])
+        if f"cell_error_{name}" in dataset:
+            error = xr.zeros_like(inner) + dataset[f"cell_error_{name}"].item(number)
+        else:
+            worst: dict[int, Any] = {}
+            for axis, first, last, mid in edges(low, high):
+                share = (mid[axis] - first[axis]) / (last[axis] - first[axis])
+                miss = abs(values[mid] - values[first] * (1.0 - share) - values[last] * share)
+                worst[axis] = np.maximum(worst.get(axis, 0.0), miss)
+            error = xr.zeros_like(inner) + KINK * sum(worst.values())
+        found[name] = inner.assign_attrs(each.attrs)
+        found[f"{name}_error"] = error.assign_attrs(_error_of(each))
+    return xr.Dataset(found)
+
+
+def _by_process(dataset: xr.Dataset, between: _Between, names: Sequence[str]) -> xr.Dataset:
+    """Predict by a Gaussian process through all runs that succeeded."""
+    runs, known = between.runs, between.known(names)
+    every = np.column_stack([runs[name].to_numpy().astype(float) for name in between.place])
+    least, span = every.min(axis=0), np.ptp(every, axis=0)
+    places = (every - least) / span
+    place: Array = (np.array(list(between.place.values())) - least) / span
+    good, dimensions = places[known], places.shape[1]
+    if not dimensions + 3 <= len(good) <= MOST:
+        allowed = f"needs {dimensions + 3} to {MOST} runs that succeeded: there are {len(good)}"
+        raise StudyError("by", GAUSSIAN, allowed)
+    if not in_hull(good, place):
+        raise StudyError(*between.where, "is outside the hull of the runs that succeeded")
+    apart = np.sum((places - place) ** 2, axis=1)
+    nearest = np.argsort(apart, kind="stable")[: 1 if apart.min() == 0.0 else dimensions + 1]
+    if failed := [k for k in nearest if not known[k]]:
+        allowed = f"is across a failed run: {runs['status'].to_numpy()[failed[0]]}"
+        raise StudyError(*between.where, allowed)
+    found = {}
+    for name in names:
+        each = runs[name].isel({_RUN: known}).transpose(_RUN, ...)
+        flat = each.to_numpy().reshape(len(good), -1)
+        there = np.isfinite(flat).all(axis=0)
+        process = Gaussian(good, flat[:, there])
+        parts, variance = process.weights(place)
+        error = np.full(flat.shape[1], np.nan)
+        error[there] = process.error(variance)
+        value = xr.dot(each, xr.DataArray(parts, dims=_RUN), dim=_RUN)
+        rms = float(np.sqrt(np.mean(process.misses**2)))
+        found[name] = value.assign_attrs(each.attrs)
+        told = _error_of(each) | {"leave_one_out": rms}
+        found[f"{name}_error"] = value.copy(data=error.reshape(value.shape)).assign_attrs(told)
+    return xr.Dataset(found)
+
+
+def _error_of(values: xr.DataArray) -> dict[str, Any]:
+    """Return the attributes of the error of a variable."""
+    unit = {key: each for key, each in values.attrs.items() if key == "units"}
+    return {"long_name": f"error of {values.name} as it is predicted"} | unit

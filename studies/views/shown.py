@@ -1,0 +1,159 @@
+"""What of a run can be shown, and the values that are shown, without drawing them."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from solver.tensors import AXES
+from studies.errors import StudyError
+from studies.views.plots.fields import (
+    DISTANCE,
+    check_field,
+    component_of,
+    depth_shown,
+    line_axis,
+    line_fields,
+    map_axes,
+    map_fields,
+    placed,
+    usual_field,
+)
+from studies.views.plots.mapped import mapped
+
+
+class Shown(NamedTuple):
+    """The values of a picture.
+
+    Attributes
+    ----------
+    head : what they are: meaning, unit, labels of the dimensions that are no coordinates
+    arrays : the coordinates, and the values over them, by name; NaN where there is no value
+    """
+
+    head: dict[str, Any]
+    arrays: dict[str, np.ndarray]
+
+
+def outline(run: xr.Dataset) -> dict[str, list[dict[str, Any]]]:
+    """Return the variables of a run that are drawn as maps and as lines, with their labels.
+
+    The usual field of a map comes first.
+    """
+    first = usual_field(run)
+    maps = sorted(map_fields(run), key=lambda name: name != first)
+    return {
+        "maps": [_described(run, name) for name in maps if run[name].notnull().any()],
+        "lines": [_described(run, name) for name in line_fields(run) if run[name].notnull().any()],
+    }
+
+
+def shown(
+    run: xr.Dataset,
+    field: str,
+    component: str | None = None,
+    stage: str | None = None,
+    minus: xr.Dataset | None = None,
+) -> Shown:
+    """Return the values of a map or of lines of one run.
+
+    Parameters
+    ----------
+    run : data set of one run, as `one_run` returns it
+    field : a variable of `outline`
+    component : component of a tensor; by default the first
+    stage : of a map with several stages; by default the last
+    minus : another run, whose map is subtracted at the points of this one
+
+    Raises
+    ------
+    StudyError
+        if the run has no such field, component or stage
+    """
+    if field in map_fields(run):
+        return _map(run, field, component, stage, minus)
+    check_field(field, [*map_fields(run), *line_fields(run)])
+    if stage is not None or minus is not None:
+        name = "stage" if stage is not None else "minus"
+        raise StudyError(name, stage or field, f"is for maps, and {field} is lines: leave it out")
+    return _lines(run, field, component)
+
+
+def _map(
+    run: xr.Dataset, field: str, component: str | None, stage: str | None, minus: xr.Dataset | None
+) -> Shown:
+    drawn = mapped(run, field, component, stage=stage)
+    values, signed, high = drawn.values, drawn.signed, drawn.high
+    across, up = map_axes(values)
+    if minus is not None:
+        other = mapped(minus, field, component, stage=stage).values
+        there = {name: values[name] for name in (across, up)}
+        same = all(np.array_equal(other[name], each) for name, each in there.items())
+        values = values - (other if same else other.interp(there))
+        signed, high = True, float(abs(values).quantile(0.998))
+    edge = float(run["contact_half_width"]) if "contact_half_width" in run else 0.0
+    head = _described(run, field) | {
+        "kind": "map",
+        "across": _axis(run, across),
+        "up": _axis(run, up),
+        "signed": signed,
+        "high": high or 1.0,
+        "note": "" if minus is not None else drawn.note,
+        "edge": edge if edge > 0.0 and across == "x" else None,
+    }
+    arrays = {across: values[across], up: values[up], field: values.transpose(up, across)}
+    return Shown(head, {name: each.to_numpy() for name, each in arrays.items()})
+
+
+def _lines(run: xr.Dataset, field: str, component: str | None) -> Shown:
+    values = placed(component_of(run[field], component), run)
+    along = line_axis(values)
+    assert along is not None
+    for name in values.dims:
+        values = values.dropna(name, how="all")
+    others = [name for name in values.dims if name != along]
+    if along == "depth" and values.size:
+        values = values.isel(depth=slice(depth_shown(values, others)))
+    at = DISTANCE if DISTANCE in values.coords else along
+    values = values.transpose(*others, along)
+    head = _described(run, field) | {
+        "kind": "lines",
+        "along": _axis(values, at),
+        "over": [_labels(values, name) for name in others],
+    }
+    return Shown(head, {at: values[at].to_numpy(), field: values.to_numpy()})
+
+
+def _described(run: xr.Dataset, name: str) -> dict[str, Any]:
+    """Return name, meaning and unit of a variable, and its components and stages."""
+    values = run[name]
+    own = {each: _labels(run, each)["labels"] for each in ("component", "stage")}
+    return {
+        "name": name,
+        "words": str(values.attrs.get("long_name", name.replace("_", " "))),
+        "unit": _unit(values),
+        **{f"{each}s": labels for each, labels in own.items() if each in values.dims},
+        **({"flags": str(values.attrs["flag_meanings"]).split()} if _is_flag(values) else {}),
+    }
+
+
+def _axis(run: xr.Dataset | xr.DataArray, name: Hashable) -> dict[str, str]:
+    words = str(name) if name in AXES else str(run[name].attrs.get("long_name", name))
+    return {"name": str(name), "words": words, "unit": _unit(run[name])}
+
+
+def _labels(values: xr.Dataset | xr.DataArray, name: Hashable) -> dict[str, Any]:
+    known = values[name].to_numpy().tolist() if name in values.coords else []
+    return {"name": str(name), "labels": known, "unit": _unit(values[name]) if known else ""}
+
+
+def _unit(values: xr.DataArray) -> str:
+    unit = str(values.attrs.get("units", ""))
+    return "" if unit == "1" else unit
+
+
+def _is_flag(values: xr.DataArray) -> bool:
+    return "flag_meanings" in values.attrs

@@ -1,0 +1,269 @@
+"""The pages as people meet them, in Debian's Chromium."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from service.keys import Keys, Scope
+from studies import open_study
+from tests.service.browser import barriers, chromium, opened
+from tests.service.servers import COARSE_PUNCH, NOWHERE, Server, fake_study
+
+STUDY = {
+    "name": "seen",
+    "scene": "punch",
+    "tags": ["brochure"],
+    "note": "Looked at by the tests.",
+    "parameters": {**COARSE_PUNCH, "hardening": "isotropic"},
+    "sweep": {"load_ratio": [0.4, 0.8], "friction": [0.0, 0.3]},
+}
+NUMBER = "peak_contact_pressure"
+DRAWN = "[data-chart={}] .plot-container"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def context(browser: Any) -> Any:
+    """Give what the pages of most tests share; a page has a session of its own."""
+    return browser.new_context()
+
+
+@pytest.fixture(scope="module")
+def study(service: Server, browser: Any) -> str:
+    study_id = service.post(STUDY)
+    assert service.finished(study_id)["status"] == "successful"
+    return study_id
+
+
+@pytest.fixture(scope="module")
+def dataset(service: Server, study: str) -> xr.Dataset:
+    return open_study(f"http://127.0.0.1:{service.port}/studies/{study}")
+
+
+def base(server: Server) -> str:
+    return f"http://127.0.0.1:{server.port}"
+
+
+def runs(server: Server, study: str) -> list[str]:
+    """Return the ids of the runs of a study, in the order of the sweep."""
+    return [run["id"] for run in server.study(study)["runs"]]
+
+
+def cell(page: Any, x: float, y: float) -> tuple[float, float]:
+    """Return the place of a cell of the heat map on the screen."""
+    return page.evaluate(
+        """([x, y]) => {
+            const chart = document.querySelector("[data-chart=sweep]");
+            const { xaxis, yaxis } = chart._fullLayout, box = chart.getBoundingClientRect();
+            return [box.x + xaxis._offset + xaxis.d2p(x), box.y + yaxis._offset + yaxis.d2p(y)];
+        }""",
+        [x, y],
+    )
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_page_has_a_serious_barrier(
+    context: Any, service: Server, study: str, scheme: str
+) -> None:
+    both = runs(service, study)[:2]
+    waited = {
+        "/ui": "table.list",
+        f"/ui/studies/{study}": DRAWN.format("map"),
+        f"/ui/runs/{both[0]}": DRAWN.format("map"),
+        f"/ui/compare?run={both[0]}&run={both[1]}": DRAWN.format("difference"),
+        "/ui/new?scene=punch": "[data-estimate] dd",
+        "/ui/health": ".tiles",
+        "/ui/sign-in": "form.stack",
+    }
+    for path, there in waited.items():
+        if scheme == "dark" and "/studies/" not in path and "new" not in path:
+            continue  # the others have the same colours
+        with opened(context, base(service) + path, scheme) as page:
+            page.wait_for_selector(there)
+            assert not barriers(page), path
+
+
+def test_no_page_is_wider_than_a_phone(context: Any, service: Server, study: str) -> None:
+    for path in ("/ui/new", f"/ui/studies/{study}"):
+        with opened(context, base(service) + path, width=390) as page:
+            page.wait_for_timeout(300)
+            assert page.evaluate("document.documentElement.scrollWidth") == 390, path
+
+
+def test_values_under_the_pointer_and_of_a_clicked_run_are_those_of_the_data_set(
+    context: Any, service: Server, study: str, dataset: xr.Dataset
+) -> None:
+    with opened(context, base(service) + f"/ui/studies/{study}?number={NUMBER}") as page:
+        page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
+        shown = page.evaluate("document.querySelector('[data-chart=sweep]').data[0].z")
+        stored = dataset[NUMBER].isel(hardening=0).transpose("load_ratio", "friction")
+        assert np.array_equal(shown, stored)
+        page.mouse.move(*cell(page, 0.3, 0.8))
+        said = page.locator(".hoverlayer .hovertext").text_content()
+        value = stored.sel(friction=0.3, load_ratio=0.8).item()
+        assert float(re.search(r"[\d.]+", said)[0]) == float(f"{value:.4g}")
+        run = chosen_id(service, study, 0.4, 0.0)
+        with page.expect_response(f"**/runs/{run}/values?field=residual_stress**"):
+            page.mouse.click(*cell(page, 0.0, 0.4))
+        page.wait_for_selector("[data-chart=map]:not(.busy)")
+        assert f"run={run}" in page.url
+        at = dataset.isel(hardening=0).sel(friction=0.0, load_ratio=0.4)
+        main = page.locator(".figures .main dd").inner_text()
+        assert main.split()[0] == f"{at[NUMBER].item():.4g}"
+        x, z = page.evaluate(
+            "(({x, z}) => [[...x], z.map((row) => [...row])])"
+            "(document.querySelector('[data-chart=map]').data[0])"
+        )
+        half = np.array(z, dtype=np.float32)[:, np.array(x) >= 0.0]
+        stored = at["residual_stress"].sel(component="xx").to_numpy().astype(np.float32)
+        assert np.array_equal(half, stored, equal_nan=True)
+
+
+def chosen_id(server: Server, study: str, load: float, friction: float) -> str:
+    found = server.study(study)["runs"]
+    wanted = {"load_ratio": load, "friction": friction}
+    (run,) = [run["id"] for run in found if wanted.items() <= run["at"].items()]
+    return run
+
+
+def test_the_table_is_sorted_and_filtered(context: Any, service: Server, study: str) -> None:
+    with opened(context, base(service) + f"/ui/studies/{study}") as page:
+        page.fill("[name='where.friction']", "0.1..0.4")
+        page.click("text=Filter")
+        page.wait_for_function("document.querySelectorAll('.runs tbody tr').length === 2")
+        page.click(".runs thead a:has-text('load ratio')")
+        page.wait_for_selector(".runs th[aria-sort=descending]")
+        loads = page.locator(".runs tbody tr td:nth-child(2)").all_inner_texts()
+        assert loads == ["0.8", "0.4"]
+        assert "sort=-load_ratio" in page.url and "where.friction=0.1..0.4" in page.url
+
+
+def test_runs_are_chosen_by_keys_and_compared(context: Any, service: Server, study: str) -> None:
+    first, other, last = (
+        chosen_id(service, study, *at) for at in ((0.4, 0.0), (0.8, 0.0), (0.8, 0.3))
+    )
+    with opened(context, f"{base(service)}/ui/studies/{study}?run={first}") as page:
+        page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
+        page.click("[data-compare]")
+        page.focus("[data-chart=sweep]")
+        page.keyboard.press("ArrowUp")
+        page.wait_for_url(f"**run={other}**")
+        page.keyboard.press("ArrowRight")
+        page.wait_for_url(f"**run={last}**")
+        page.click("[data-compare]")
+        page.click("[data-comparison]")
+        page.wait_for_selector(DRAWN.format("difference"))
+        rows = page.locator(".differ tbody th").all_inner_texts()
+        assert {"friction", "load ratio"} <= {*rows} and "yield stress" not in rows
+
+
+def test_a_study_is_watched_to_its_end(context: Any, service: Server) -> None:
+    study_id = service.post(fake_study("watched", seconds=0.5))
+    with opened(context, base(service) + f"/ui/studies/{study_id}") as page:
+        page.evaluate("window.same = true")
+        page.wait_for_selector("[data-live=status] .successful", timeout=60_000)
+        page.wait_for_selector(".counts .ok + b, .counts li:has(.ok) b")
+        assert page.locator(".counts li:has(.ok) b").inner_text() == "4"
+        assert page.locator(".runs tbody .status.ok").count() == 4
+
+
+def test_a_study_is_made_by_the_form(context: Any, service: Server) -> None:
+    with opened(context, base(service) + "/ui/new?scene=fake") as page:
+        page.fill("[name=name]", "by-form")
+        page.fill("[name='p.friction']", "0, 0.3")
+        page.fill("[name='p.load_ratio']", "much")
+        page.wait_for_selector("[data-wrong=load_ratio]:has-text('finite number')")
+        assert page.get_attribute("[name='p.load_ratio']", "aria-invalid") == "true"
+        page.fill("[name='p.load_ratio']", "0.1 .. 0.5 in 3")
+        page.wait_for_selector("[data-estimate] dd:has-text('6')")
+        assert page.locator("[data-wrong=load_ratio]").inner_text() == ""
+        assert "load_ratio = {start = 0.1, stop = 0.5, num = 3}" in page.inner_text(
+            ".code >> nth=0"
+        )
+        page.click("button[name=submit]")
+        page.wait_for_selector("[data-live=status] .successful", timeout=60_000)
+        assert page.locator(".runs tbody tr").count() == 6
+
+
+def test_a_page_without_scripts_has_table_and_picture(
+    browser: Any, service: Server, study: str
+) -> None:
+    plain = browser.new_context(java_script_enabled=False)
+    with opened(plain, f"{base(service)}/ui/studies/{study}") as page:
+        assert page.locator(".runs tbody tr").count() == 4
+        size = page.locator("[data-chart=map] img").evaluate("image => image.naturalWidth")
+        assert size > 300
+
+
+@pytest.fixture(scope="module")
+def locked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, dict[Scope, str]]]:
+    """Give a service that requires keys, and a key of each scope."""
+    settings = NOWHERE | {"RESIDUA_REQUIRE_KEYS": "true"}
+    server = Server(tmp_path_factory.mktemp("locked"), settings=settings)
+    server.data.mkdir(parents=True)
+    keys = {scope: Keys(server.data).add(f"of-{scope}", scope) for scope in Scope}
+    yield server.start(), keys
+    server.close()
+
+
+def test_a_caller_signs_in_and_out(browser: Any, locked: tuple[Server, dict[Scope, str]]) -> None:
+    server, keys = locked
+    answer = server.client.post(
+        "/studies", json=fake_study("kept"), headers={"authorization": f"Bearer {keys['submit']}"}
+    )
+    page_of = f"/ui/studies/{answer.json()['id']}"
+    with opened(browser.new_context(), base(server) + page_of) as page:
+        assert "/ui/sign-in" in page.url
+        page.fill("[name=key]", keys[Scope.SUBMIT])
+        page.click("text=Sign in >> nth=-1")
+        page.wait_for_selector("h1:has-text('kept')")
+        assert page.url.endswith(page_of)
+        (cookie,) = page.context.cookies()
+        assert cookie["httpOnly"] and cookie["sameSite"] == "Strict"
+        assert page.evaluate("document.cookie") == ""
+        page.click("text=Stop")
+        page.wait_for_selector("[data-live=status] .dismissed")
+        page.click("text=Sign out")
+        page.wait_for_selector("[name=key]")
+        assert not page.context.cookies()
+
+
+def test_a_wrong_key_and_a_weak_one_are_refused(
+    browser: Any, locked: tuple[Server, dict[Scope, str]]
+) -> None:
+    server, keys = locked
+    headers = {"authorization": f"Bearer {keys[Scope.ADMIN]}"}
+    answer = server.client.post("/studies", json=fake_study("other"), headers=headers)
+    study_id = answer.json()["id"]
+    context = browser.new_context(base_url=base(server))
+    page = context.new_page()
+    page.goto("/ui/sign-in")
+    page.fill("[name=key]", "residua_wrong")
+    page.click("text=Sign in >> nth=-1")
+    assert "not known" in page.locator("[role=alert]").inner_text()
+    page.fill("[name=key]", keys[Scope.READ])
+    page.click("text=Sign in >> nth=-1")
+    page.goto(f"/ui/studies/{study_id}")
+    assert page.locator("text=Stop").count() == 0
+    refused = page.evaluate(
+        "id => fetch(`/ui/studies/${id}/stop`, {method: 'POST', headers:"
+        " {'content-type': 'application/x-www-form-urlencoded'}}).then((each) => each.status)",
+        study_id,
+    )
+    assert refused == 403
+    assert server.client.get(f"/studies/{study_id}", headers=headers).json()["status"] in (
+        "accepted",
+        "running",
+    )
+    context.close()

@@ -1,0 +1,222 @@
+"""Numbers of a study's runs, and values of a run, as they are sent."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from service.app import create_app
+from service.settings import Settings
+from studies import Store, open_netcdf, open_study
+from tests.studies.conftest import compute_here, fake_study
+
+AXES = {"load_ratio": [0.3, 0.9], "friction": [0.0, 0.2, 0.4], "hardening": ["none", "isotropic"]}
+FIELDS = {"content-type": "application/x-www-form-urlencoded"}
+
+
+class Seen:
+    """A service whose runner does not work, on a directory with a computed study."""
+
+    def __init__(self, store: Store) -> None:
+        study = fake_study(sweep=AXES)
+        compute_here(study, store)
+        self.dataset = open_study(store.dataset_path(study.id))
+        self.run = next(iter(study.run_ids()))
+        self.path = store.run_path(self.run)
+        self.client = TestClient(
+            create_app(Settings(data=store.directory)),
+            "http://localhost",
+            raise_server_exceptions=False,
+        )
+        self.id = study.id
+        self.study = f"/studies/{study.id}"
+
+    def lines(self, **query: str) -> list[dict[str, str]]:
+        """Return the table of the study, a line for each run."""
+        answer = self.client.get(f"{self.study}/table.csv", params=query)
+        assert answer.status_code == 200, answer.text
+        return list(csv.DictReader(io.StringIO(answer.text)))
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> Seen:
+    return Seen(Store(tmp_path_factory.mktemp("seen") / "out"))
+
+
+def arrays(content: bytes) -> tuple[dict, dict[str, np.ndarray]]:
+    """Return the head and the arrays of octets."""
+    line, _, rest = content.partition(b"\n")
+    assert (len(line) + 1) % 8 == 0
+    head, found = json.loads(line), {}
+    for each in head["arrays"]:
+        count, kind = math.prod(each["shape"]), np.dtype(each["type"])
+        found[each["name"]] = np.frombuffer(rest, kind, count).reshape(each["shape"])
+        rest = rest[count * kind.itemsize :]
+    assert not rest
+    return head, found
+
+
+def test_the_table_has_every_number_of_the_data_set(seen: Seen) -> None:
+    number = seen.dataset["peak_residual_tension"]
+    rows = seen.lines()
+    assert len(rows) == number.size == 12
+    for row in rows:
+        at = {name: row[name] for name in ("hardening",)}
+        at |= {name: float(row[name]) for name in ("load_ratio", "friction")}
+        assert float(row["peak_residual_tension"]) == number.sel(at).item()
+        assert row["status"] == "ok"
+
+
+def test_a_table_is_filtered_and_sorted(seen: Seen) -> None:
+    rows = seen.lines(friction="0.1..0.4", hardening="isotropic", sort="-friction")
+    assert [float(row["friction"]) for row in rows] == [0.4, 0.4, 0.2, 0.2]
+    assert {row["hardening"] for row in rows} == {"isotropic"}
+    assert len(seen.lines(friction="0.2,0.4", load_ratio="..0.5")) == 4
+    assert not seen.lines(status="error")
+    (first, *_) = seen.lines(sort="load_ratio", columns="run,load_ratio")
+    assert list(first) == ["run", "load_ratio"] and first["load_ratio"] == "0.3"
+
+
+@pytest.mark.parametrize(
+    ("query", "field"),
+    [
+        ({"friction": "much"}, "friction"),
+        ({"sort": "nothing"}, "sort"),
+        ({"columns": "run,nothing"}, "columns"),
+        ({"nothing": "1"}, "nothing"),
+    ],
+)
+def test_a_wrong_query_of_a_table_is_refused(seen: Seen, query: dict[str, str], field: str) -> None:
+    answer = seen.client.get(f"{seen.study}/table.csv", params=query)
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["field"] == field
+
+
+def test_numbers_are_sent_without_loss(seen: Seen) -> None:
+    asked = {"name": ["peak_residual_tension", "status", "friction"]}
+    answer = seen.client.get(f"{seen.study}/numbers", params=asked)
+    head, found = arrays(answer.content)
+    order = ("load_ratio", "friction", "hardening")
+    number = seen.dataset["peak_residual_tension"].transpose(
+        *seen.client.get(seen.study).json()["sweep"]
+    )
+    assert {*order} == {*number.dims}
+    assert np.array_equal(found["peak_residual_tension"], number.to_numpy().ravel())
+    assert {head["statuses"][int(code)] for code in found["status"]} == {"ok"}
+    assert {*found["friction"]} == {0.0, 0.2, 0.4}
+    assert seen.client.get(f"{seen.study}/numbers", params={"name": "run"}).status_code == 422
+
+
+def test_the_values_of_a_run_are_those_of_its_file(seen: Seen) -> None:
+    outline = seen.client.get(f"/runs/{seen.run}/fields").json()
+    assert outline["maps"][0]["name"] == "residual_stress"
+    asked = {"field": "residual_stress", "component": "yy"}
+    answer = seen.client.get(f"/runs/{seen.run}/values", params=asked)
+    head, found = arrays(answer.content)
+    assert head["unit"] == "MPa" and head["across"]["name"] == "x"
+    with open_netcdf(seen.path) as run:
+        stored = run["residual_stress"].sel(component="yy").squeeze().to_numpy()
+        here = found["x"] >= run["x"].to_numpy()[0] - 1e-6
+    assert np.array_equal(
+        found["residual_stress"][:, here], stored.astype(np.float32), equal_nan=True
+    )
+    tag = {"if-none-match": answer.headers["etag"]}
+    assert seen.client.get(answer.url, headers=tag).status_code == 304
+
+
+def test_a_map_less_itself_is_zero(seen: Seen) -> None:
+    asked = {"field": "residual_stress", "minus": seen.run}
+    answer = seen.client.get(f"/runs/{seen.run}/values", params=asked)
+    difference = arrays(answer.content)[1]["residual_stress"]
+    assert np.nanmax(np.abs(difference)) == 0.0
+    unknown = {"field": "residual_stress", "minus": "0" * 32}
+    assert seen.client.get(f"/runs/{seen.run}/values", params=unknown).status_code == 422
+
+
+def test_pages_have_a_strict_policy_and_their_files_are_kept_for_good(seen: Seen) -> None:
+    answer = seen.client.get("/", follow_redirects=True)
+    assert answer.url.path == "/ui"
+    policy = dict(
+        part.strip().split(" ", 1) for part in answer.headers["content-security-policy"].split(";")
+    )
+    assert policy["script-src"] == "'self'" and policy["default-src"] == "'none'"
+    assert "<script>" not in answer.text and "style=" not in answer.text
+    (style,) = [word.split('"')[1] for word in answer.text.split("href=") if "style.css" in word]
+    kept = seen.client.get(style)
+    assert "immutable" in kept.headers["cache-control"]
+    assert kept.headers["content-encoding"] == "gzip"
+    plain = seen.client.get(style, headers={"accept-encoding": "identity"})
+    assert plain.content == kept.content and "content-encoding" not in plain.headers
+    charts = seen.client.get(style.replace("style.css", "plotly.js"))
+    assert b"plotly.js v" in charts.content[:200]
+    assert seen.client.get(style.replace("style.css", "..%2Froutes.py")).status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("query", "status"),
+    [
+        ("?sort=nothing", 422),
+        ("?where.friction=much", 422),
+        ("?page=99&sort=-friction&where.status=ok", 200),
+        ("?run=nonsense&number=nonsense&page=x", 200),
+    ],
+)
+def test_any_address_of_a_study_is_a_page(seen: Seen, query: str, status: int) -> None:
+    answer = seen.client.get(f"/ui{seen.study}{query}")
+    assert answer.status_code == status
+    assert answer.headers["content-type"].startswith("text/html")
+
+
+@pytest.mark.parametrize(
+    "path", ["/ui/studies/" + "0" * 32, "/ui/runs/1", "/ui/x", "/ui/compare?run=1"]
+)
+def test_what_is_not_there_is_told_by_a_page(seen: Seen, path: str) -> None:
+    answer = seen.client.get(path)
+    assert answer.status_code in (404, 422)
+    assert "<h1>" in answer.text
+
+
+def test_studies_are_found_by_scene_and_text(seen: Seen) -> None:
+    assert seen.client.get("/studies", params={"scene": "fake", "text": "FAK"}).json()["total"] == 1
+    assert seen.client.get("/studies", params={"scene": "punch"}).json()["total"] == 0
+    assert seen.client.get("/studies", params={"text": "nobody"}).json()["total"] == 0
+    assert "No study matches" in seen.client.get("/ui", params={"text": "nobody"}).text
+
+
+def test_a_form_of_another_site_changes_nothing(seen: Seen) -> None:
+    address = f"/ui{seen.study}/retry"
+    other = FIELDS | {"origin": "http://other.example", "sec-fetch-site": "cross-site"}
+    assert seen.client.post(address, headers=other).status_code == 403
+    assert seen.client.get(seen.study).json()["status"] == "successful"
+    assert seen.client.post("/ui/sign-in", json={"key": "x"}).status_code == 415
+
+
+def test_a_page_shows_text_of_a_study_as_text(seen: Seen) -> None:
+    said = "</script><img src=x onerror=alert(1)>"
+    posted = {"name": "said", "scene": "punch", "note": said, "sweep": {"friction": [0.1]}}
+    study_id = seen.client.post("/studies", json=posted).json()["id"]
+    for path in ("/ui", f"/ui/studies/{study_id}"):
+        assert said not in seen.client.get(path).text
+
+
+@pytest.mark.parametrize(
+    ("then", "kept"),
+    [
+        ("/ui/health", True),
+        ("/ui?tag=rail", True),
+        ("//other.example/ui/", False),
+        ("https://other.example/ui/", False),
+        ("/ui/\\other.example", False),
+        ("/studies", False),
+    ],
+)
+def test_after_signing_in_a_caller_stays_here(seen: Seen, then: str, kept: bool) -> None:
+    page = seen.client.get("/ui/sign-in", params={"then": then}).text
+    wanted = then if kept else "/ui"
+    assert f'name="then" value="{wanted}"' in page

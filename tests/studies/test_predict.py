@@ -1,0 +1,154 @@
+"""Predictions between runs: their values, their errors, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.stats import qmc
+
+from studies import Store, StudyError, open_study, predict
+from studies.views.answers import answer
+from studies.views.gaussian import Gaussian, in_hull
+from tests.studies.conftest import compute_here, fake_study
+from tests.studies.test_goal import search_here
+from tests.studies.test_refine import AXES, OF, study
+
+
+def smooth(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return np.exp(-2.0 * x) * np.cos(3.0 * y)
+
+
+def rough(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return np.maximum(0.0, x + 0.5 * y - 0.6) + 0.05 * np.sin(25.0 * x)
+
+
+def wavy(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return np.sin(6.0 * x) * np.cos(5.0 * y)
+
+
+def sampled(number: Any, count: int = 64) -> xr.Dataset:
+    """Return a data set of points, with a number and a line over depth."""
+    x, y = qmc.Sobol(2, rng=1).random(count).T
+    depth = np.linspace(0.0, 2.0, 5)
+    values = number(x, y)
+    return xr.Dataset(
+        {
+            "status": ("point", np.full(count, "ok", dtype=object)),
+            "number": ("point", values, {"units": "MPa"}),
+            "line": (("point", "depth"), values[:, None] * np.exp(-depth)),
+        },
+        coords={
+            "point": ("point", np.arange(count), {"sets": "x y"}),
+            "x": ("point", x),
+            "y": ("point", y),
+            "depth": depth,
+        },
+    )
+
+
+def test_what_all_others_miss_has_a_closed_form() -> None:
+    """It is what a process with the same lengths misses, that does not know this run."""
+    places = qmc.Sobol(2, rng=2).random(16)
+    values = smooth(*places.T)[:, None]
+    whole = Gaussian(places, values)
+    inside = [k for k in range(16) if in_hull(np.delete(places, k, axis=0), places[k])]
+    assert len(whole.misses) == len(inside)
+    for number, k in enumerate(inside):
+        others = np.delete(np.arange(16), k)
+        part = Gaussian.__new__(Gaussian)
+        part.fit(places[others], values[others], whole.lengths, whole.roughness)
+        weights, _ = part.weights(places[k])
+        assert values[k, 0] - weights @ values[others, 0] == pytest.approx(
+            whole.misses[number, 0], rel=1e-5, abs=1e-9
+        )
+
+
+@pytest.mark.parametrize("number", [rough, wavy])
+def test_the_error_beside_is_that_at_unseen_places(number: Any) -> None:
+    dataset = sampled(number)
+    off, told = [], []
+    for x, y in np.random.default_rng(3).uniform(0.15, 0.85, (12, 2)):
+        found = predict(dataset, "number", x=x, y=y)
+        off.append(found["number"].item() - number(x, y))
+        told.append(found["number_error"].item())
+    true = np.sqrt(np.mean(np.square(off)))
+    assert 0.4 < np.sqrt(np.mean(np.square(told))) / true < 2.5
+    assert found["number_error"].attrs["leave_one_out"] > true / 1.5
+    if number is rough:  # of smooth numbers the hole that a run leaves counts more
+        assert found["number_error"].attrs["leave_one_out"] < 2.0 * true
+
+
+def test_at_a_run_its_own_number_is_predicted_and_lines_are_too() -> None:
+    dataset = sampled(smooth)
+    run = dataset.isel(point=7)
+    found = predict(dataset, ["number", "line"], x=run.x.item(), y=run.y.item())
+    assert found["number"].item() == pytest.approx(run["number"].item(), abs=1e-3)
+    assert found["line"].dims == ("depth",)
+    assert np.allclose(found["line"], run["line"], atol=1e-3)
+    assert found["number"].attrs["units"] == found["number_error"].attrs["units"] == "MPa"
+    assert found["number_error"].item() < 1e-2
+    between = predict(dataset, "line", x=0.5, y=0.5)
+    assert np.allclose(between["line"], smooth(0.5, 0.5) * np.exp(-dataset["depth"]), atol=1e-2)
+
+
+def test_a_place_outside_the_hull_or_across_failed_runs_is_refused() -> None:
+    dataset = sampled(smooth)
+    with pytest.raises(StudyError, match="outside the hull of the runs"):
+        predict(dataset, "number", x=dataset.x.min().item(), y=dataset.y.max().item())
+    with pytest.raises(StudyError, match=r"x = 2\.0: must be between"):
+        predict(dataset, "number", x=2.0, y=0.5)
+    near = int(np.hypot(dataset["x"] - 0.5, dataset["y"] - 0.5).to_numpy().argmin())
+    dataset["status"][near] = "limit_load"
+    with pytest.raises(StudyError, match="is across a failed run: limit_load"):
+        predict(dataset, "number", x=0.5, y=0.5)
+    for wrong, told in [
+        ({"x": 0.5}, "y = '': must be given, because it varies"),
+        ({"x": 0.5, "z": 0.5}, "z = 0.5: must be one of"),
+        ({"x": "a", "y": 0.5}, "x = 'a': must be a number"),
+    ]:
+        with pytest.raises(StudyError, match=told):
+            predict(dataset, "number", **wrong)
+    with pytest.raises(StudyError, match="did you mean number"):
+        predict(dataset, "numbr", x=0.5, y=0.5)
+    with pytest.raises(StudyError, match="by = 'cells': must be one of gaussian"):
+        predict(dataset, "number", by="cells", x=0.5, y=0.5)
+
+
+def test_a_refinement_is_predicted_in_its_cells_and_the_run_of_a_place_is_exact(
+    store: Store,
+) -> None:
+    asked = study(sweep=AXES | {"hardening": ["none", "isotropic"]}, trouble="limit")
+    search_here(asked, store)
+    at = {"load_ratio": 0.77, "friction": 0.11, "hardening": "none"}
+    with open_study(store.directory) as dataset:
+        found = predict(dataset, **at)
+        exact = 2.0 * (0.77 - 0.4 - 0.11)
+        assert abs(found[OF].item() - exact) <= found[f"{OF}_error"].item() + 1e-9
+        half = predict(dataset, **at | {"hardening": "isotropic"})[OF].item()
+        assert half == pytest.approx(found[OF].item() / 2.0, abs=0.05)
+        whole = predict(dataset, "residual_stress", **at)["residual_stress"]
+        assert whole.dims == ("component", "y", "x")
+        assert np.isfinite(whole.isel(y=0)).all()
+        with pytest.raises(StudyError, match="is across failed runs: its cell is"):
+            predict(dataset, **at | {"load_ratio": 0.98, "friction": 0.39})
+        told = answer(dataset, asked, store, OF, at, within=0.0)
+        assert (told.by, told.enough) == ("cells", told.error == 0.0)
+        compute_here(told.run, store, asked.problem)
+        again = answer(dataset, asked, store, OF, at, within=0.0)
+        assert (again.by, again.error, again.enough) == ("run", 0.0, True)
+        assert again.value == pytest.approx(exact)
+        with pytest.raises(StudyError, match="of = 'residual_stress': must be one of"):
+            answer(dataset, asked, store, "residual_stress", at)
+
+
+def test_a_grid_is_predicted_by_a_process(store: Store) -> None:
+    grid = fake_study(sweep={"load_ratio": [0.2, 0.4, 0.6, 0.8], "friction": [0.0, 0.2, 0.4]})
+    compute_here(grid, store)
+    with open_study(store.directory) as dataset:
+        found = predict(dataset, load_ratio=0.5, friction=0.1, hardening="none")
+        assert found["peak_contact_pressure"].item() == pytest.approx(50.0 + 50.0 * 1.1, rel=1e-3)
+        with pytest.raises(StudyError, match="must be one of none"):
+            predict(dataset, load_ratio=0.5, friction=0.1, hardening="isotropic")
