@@ -87,7 +87,7 @@ class Column:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Table:
+class RunTable:
     """The runs of a study in the order of its cases.
 
     Attributes
@@ -156,10 +156,10 @@ class Tables:
 
     def __init__(self, jobs: Jobs, store: Store) -> None:
         self.jobs, self.store = jobs, store
-        self.kept: OrderedDict[str, tuple[object, Table]] = OrderedDict()
+        self.kept: OrderedDict[str, tuple[object, RunTable]] = OrderedDict()
         self.one = Lock()
 
-    def get(self, study_id: str) -> Table:
+    def get(self, study_id: str) -> RunTable:
         """Return the table of a study."""
         with self.one:
             job = self.jobs.get(study_id)
@@ -173,7 +173,7 @@ class Tables:
                 self.kept.popitem(last=False)
             return table
 
-    def _made(self, job: Job) -> Table:
+    def _made(self, job: Job) -> RunTable:
         study, runs = self.jobs.study(job.id), self.jobs.runs(job.id)
         rows, allow = self.store.catalogue.rows(runs), study.get("allow", [])
         scene = scene_of_study(self.store, job.scene)
@@ -191,7 +191,7 @@ class Tables:
         columns.append(_column(RUN, np.array(runs, dtype=object), "run"))
         said = [row["message"] if row else "" for row in found]
         columns.append(_column(MESSAGE, np.array(said, dtype=object), "run"))
-        return Table(axes=axes, columns={each.name: each for each in columns})
+        return RunTable(axes=axes, columns={each.name: each for each in columns})
 
 
 def group_of(name: str) -> str:

@@ -25,7 +25,7 @@ OF = re.compile(r"(?:(?:parameters|sweep)\.)?(?P<name>\w+)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
+class FormField:
     """One field of the form.
 
     Attributes
@@ -57,16 +57,16 @@ class Entry:
 
 def entries(
     scene: Scene, given: Mapping[str, Sequence[str]], wrong: Mapping[str, str]
-) -> list[Entry]:
+) -> list[FormField]:
     """Return the fields of the parameters of a scene with what is in them."""
     found = []
     for name, parameter in parameters_of(scene).items():
         choices = choices_of(parameter)
         texts = [each for each in given.get(PREFIX + name, ()) if each.strip()]
-        usual = Entry(parameter=parameter, texts=(), choices=choices).usual
+        usual = FormField(parameter=parameter, texts=(), choices=choices).usual
         texts = texts or ([usual] if choices else [])
         found.append(
-            Entry(parameter=parameter, texts=texts, choices=choices, wrong=wrong.get(name, ""))
+            FormField(parameter=parameter, texts=texts, choices=choices, wrong=wrong.get(name, ""))
         )
     return found
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from service.table import MESSAGE, NUMBERS, RUN, STATUS, Column, Table, group_of
+from service.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, group_of
 from studies.definition.vocabulary import OK
 from studies.views.tables import FIGURES
 
@@ -23,7 +23,7 @@ WHERE = "where."
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class TablePart:
     """A part of a table.
 
     Attributes
@@ -43,14 +43,14 @@ class Part:
     where: Mapping[str, str]
 
 
-def varied(table: Table) -> list[Column]:
+def varied(table: RunTable) -> list[Column]:
     """Return the columns of the sweep that are not the same in all runs."""
     sweep = [each for each in table.columns.values() if each.group == "sweep"]
     several = [each for each in sweep if len(set(each.values.tolist())) > 1]
     return several or sweep
 
 
-def usual(table: Table) -> list[Column]:
+def usual(table: RunTable) -> list[Column]:
     """Return the columns of numbers that some run has, the main ones first."""
     return sorted(
         (each for each in table.numbers if not np.isnan(each.values).all()),
@@ -70,7 +70,7 @@ def rank(name: str) -> tuple[int, int]:
     return NUMBERS.index(group_of(name)), main.index(name) if name in main else len(main)
 
 
-def part(table: Table, query: Mapping[str, str]) -> Part:
+def part(table: RunTable, query: Mapping[str, str]) -> TablePart:
     """Return the part of a table that the address of a page names.
 
     Raises
@@ -96,10 +96,10 @@ def part(table: Table, query: Mapping[str, str]) -> Part:
     names = dict.fromkeys([*first, *named, *fresh])
     rows = found[(page - 1) * ROWS : page * ROWS].tolist()
     columns = [table.columns[name] for name in names]
-    return Part(columns, rows, len(found), page, pages, sort, where)
+    return TablePart(columns, rows, len(found), page, pages, sort, where)
 
 
-def chosen_run(table: Table, wanted: str, number: str) -> int | None:
+def chosen_run(table: RunTable, wanted: str, number: str) -> int | None:
     """Return the position of a run: of this id, or the one with the largest number.
 
     Without any that succeeded it is the first that has been computed, if there is one.
@@ -118,7 +118,7 @@ def chosen_run(table: Table, wanted: str, number: str) -> int | None:
     return int(computed[0]) if len(computed) else None
 
 
-def described(table: Table) -> dict[str, Any]:
+def described(table: RunTable) -> dict[str, Any]:
     """Return what the scripts of the page need to know of a table."""
     own = {each.name: each for each in table.columns.values()}
     return {

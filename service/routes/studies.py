@@ -22,13 +22,15 @@ from service.dependencies import (
     TheJob,
     TheJobs,
     TheKeeper,
+    ThePictures,
     TheRunner,
     TheSettings,
     TheStore,
 )
 from service.errors import REFUSED, Busy, Conflict, NotFound, QueueLost
 from service.files import NETCDF, netcdf
-from service.job import StudyState
+from service.job import Job, StudyState
+from service.jobs import Jobs
 from service.schemas import (
     ContentId,
     Prediction,
@@ -40,7 +42,7 @@ from service.schemas import (
     Window,
 )
 from service.strict import StrictRoute
-from studies import Study, StudyError
+from studies import Store, Study, StudyError
 from studies.errors import FileDamaged, StoreFull
 
 log = logging.getLogger(__name__)
@@ -166,8 +168,12 @@ async def events(
 
 
 @router.get("/{study_id}/predict", responses=REFUSED)
-def predict(
-    job: TheJob, query: Annotated[PredictQuery, Query()], jobs: TheJobs, store: TheStore
+async def predict(
+    job: TheJob,
+    query: Annotated[PredictQuery, Query()],
+    jobs: TheJobs,
+    store: TheStore,
+    pictures: ThePictures,
 ) -> Prediction:
     """Tell a number between the runs of a study, with its error.
 
@@ -175,10 +181,15 @@ def predict(
     `?of=peak_residual_tension&load_ratio=0.62&friction=0.21`. A place outside of the runs, or
     across failed ones, is refused.
     """
+    return await pictures.alone(_predicted, job, query, jobs, store)
+
+
+def _predicted(job: Job, query: PredictQuery, jobs: Jobs, store: Store) -> Prediction:
+    """Return what `predict` tells."""
     from studies import open_netcdf  # xarray takes half a second to import
     from studies.views.answers import answer
 
-    path, asked = dataset(job, jobs, store).path, query.model_dump()
+    path, asked = Path(dataset(job, jobs, store).path), query.model_dump()
     at = {name: asked.pop(name) for name in query.model_extra or {}}
     study = Study.known(jobs.study(job.id), store.scene)
     with open_netcdf(path) as runs:
@@ -189,13 +200,20 @@ def predict(
 
 
 @router.get("/{study_id}/sensitivity", responses=REFUSED)
-def tell_sensitivity(job: TheJob, jobs: TheJobs, store: TheStore, of: str) -> dict[str, Any]:
+async def tell_sensitivity(
+    job: TheJob, jobs: TheJobs, store: TheStore, pictures: ThePictures, of: str
+) -> dict[str, Any]:
     """Tell which parameter matters for a number of the runs: indices of sensitivity.
 
     Of `parameters` each has `first` and `total`, the share of the variance of `of` that it makes
     alone, and with others, and how well they are known. A sample that does not bear it is refused
     with the reason.
     """
+    return await pictures.alone(_indices, job, jobs, store, of)
+
+
+def _indices(job: Job, jobs: Jobs, store: Store, of: str) -> dict[str, Any]:
+    """Return what `tell_sensitivity` tells."""
     from studies import open_netcdf, sensitivity  # xarray takes half a second to import
     from studies.views.sensitivity import told
 

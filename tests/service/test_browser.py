@@ -87,21 +87,21 @@ def test_no_page_has_a_serious_barrier(
         "/ui/sign-in": "form.stack",
     }
     for path, there in waited.items():
-        if scheme == "dark" and path.startswith(("/ui/runs", "/ui/compare")):
-            continue  # they have the colours of the page of a study
+        if scheme == "dark" and "/studies/" not in path and "new" not in path:
+            continue  # the others have the same colours
         with opened(context, base(service) + path, scheme) as page:
             page.wait_for_selector(there)
             assert not barriers(page), path
 
 
 def test_no_page_is_wider_than_a_phone(context: Any, service: Server, study: str) -> None:
-    for path in ("/ui", f"/ui/studies/{study}", f"/ui/runs/{runs(service, study)[0]}"):
+    for path in ("/ui/new", f"/ui/studies/{study}"):
         with opened(context, base(service) + path, width=390) as page:
             page.wait_for_timeout(300)
             assert page.evaluate("document.documentElement.scrollWidth") == 390, path
 
 
-def test_the_value_under_the_pointer_is_that_of_the_data_set(
+def test_values_under_the_pointer_and_of_a_clicked_run_are_those_of_the_data_set(
     context: Any, service: Server, study: str, dataset: xr.Dataset
 ) -> None:
     with opened(context, base(service) + f"/ui/studies/{study}?number={NUMBER}") as page:
@@ -113,14 +113,6 @@ def test_the_value_under_the_pointer_is_that_of_the_data_set(
         said = page.locator(".hoverlayer .hovertext").text_content()
         value = stored.sel(friction=0.3, load_ratio=0.8).item()
         assert float(re.search(r"[\d.]+", said)[0]) == float(f"{value:.4g}")
-
-
-def test_a_click_on_a_cell_shows_that_run(
-    context: Any, service: Server, study: str, dataset: xr.Dataset
-) -> None:
-    with opened(context, base(service) + f"/ui/studies/{study}?number={NUMBER}") as page:
-        page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
-        page.wait_for_selector(DRAWN.format("map"))
         run = chosen_id(service, study, 0.4, 0.0)
         with page.expect_response(f"**/runs/{run}/values?field=residual_stress**"):
             page.mouse.click(*cell(page, 0.0, 0.4))
@@ -145,17 +137,6 @@ def chosen_id(server: Server, study: str, load: float, friction: float) -> str:
     return run
 
 
-def test_the_arrow_keys_move_to_the_next_run(context: Any, service: Server, study: str) -> None:
-    first = chosen_id(service, study, 0.4, 0.0)
-    with opened(context, base(service) + f"/ui/studies/{study}?run={first}") as page:
-        page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
-        page.focus("[data-chart=sweep]")
-        page.keyboard.press("ArrowUp")
-        page.wait_for_url(f"**run={chosen_id(service, study, 0.8, 0.0)}**")
-        page.keyboard.press("ArrowRight")
-        page.wait_for_url(f"**run={chosen_id(service, study, 0.8, 0.3)}**")
-
-
 def test_the_table_is_sorted_and_filtered(context: Any, service: Server, study: str) -> None:
     with opened(context, base(service) + f"/ui/studies/{study}") as page:
         page.fill("[name='where.friction']", "0.1..0.4")
@@ -168,12 +149,18 @@ def test_the_table_is_sorted_and_filtered(context: Any, service: Server, study: 
         assert "sort=-load_ratio" in page.url and "where.friction=0.1..0.4" in page.url
 
 
-def test_runs_are_added_to_a_comparison(context: Any, service: Server, study: str) -> None:
-    with opened(context, base(service) + f"/ui/studies/{study}") as page:
+def test_runs_are_chosen_by_keys_and_compared(context: Any, service: Server, study: str) -> None:
+    first, other, last = (
+        chosen_id(service, study, *at) for at in ((0.4, 0.0), (0.8, 0.0), (0.8, 0.3))
+    )
+    with opened(context, f"{base(service)}/ui/studies/{study}?run={first}") as page:
         page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
         page.click("[data-compare]")
-        page.click("a[data-choose='0']")
-        page.wait_for_url(f"**run={runs(service, study)[0]}**")
+        page.focus("[data-chart=sweep]")
+        page.keyboard.press("ArrowUp")
+        page.wait_for_url(f"**run={other}**")
+        page.keyboard.press("ArrowRight")
+        page.wait_for_url(f"**run={last}**")
         page.click("[data-compare]")
         page.click("[data-comparison]")
         page.wait_for_selector(DRAWN.format("difference"))
