@@ -172,8 +172,11 @@ class Candidates:
             with np.errstate(invalid="ignore"):
                 now = np.stack([gap - old.gap, slip])
             now[:, ~np.isfinite(now).all(axis=0) | (span == 0)] = np.nan
-            past = {"gap": gap, "moved": np.stack([now, old.moved[0]]), "span": span}
-            out.append(replace(new, touching=new.status != OPEN, slipped=slipped, **past))
+            past = {"gap": gap, "moved": np.stack([now, old.moved[0]])}
+            touching = new.status != OPEN
+            out.append(
+                replace(new, touching=touching, slipped=slipped, span=span or old.span, **past)
+            )
         return tuple(out)
 
 

@@ -152,10 +152,15 @@ class Timing:
         return replace(self, friction=friction, normal=normal)
 
     def then(self, now: Timing) -> Timing:
-        """Return the timing after one more increment."""
+        """Return the timing after one more increment.
+
+        Of a contact that moves on, vertices leave with their uncertain friction.
+        """
         closed = now.normal > 0
+        stays = 1 - np.minimum(now.passed / np.where(closed, now.normal, 1.0), 1.0)
+        before = np.minimum(stays * self.untimed, now.stuck)
         return Timing(
-            untimed=np.where(closed, np.minimum(self.untimed, now.stuck) + now.untimed, 0.0),
+            untimed=np.where(closed, before + now.untimed, 0.0),
             friction=np.where(closed, np.maximum(self.friction, now.friction), 0.0),
             passed=np.maximum(self.passed, now.passed),
             normal=np.maximum(self.normal, now.normal),
