@@ -16,7 +16,7 @@ from solver.loading.refinement import StepRefinement
 from solver.model.model import Model
 from solver.results.audit.figures import AUDIT
 from solver.results.mesh_fields import mesh_fields
-from solver.results.quantities import Quantity
+from solver.results.quantities import QUANTITIES, Quantity
 from solver.results.record import Record, Status
 from solver.results.run import FinishedRun, Output, Values
 from solver.results.singular_points import singular_points
@@ -116,6 +116,11 @@ class Scene:
         for each, run in zip(runs, method(self, runs, monitor), strict=True):
             yield replace(self.record(run), parameters=each)
         monitor(1.0)
+
+    @property
+    def known_quantities(self) -> Mapping[str, Quantity]:
+        """The quantities that its runs may have, by name."""
+        return QUANTITIES | {each.name: each for each in self.quantities}
 
     @property
     def goes_on(self) -> bool:

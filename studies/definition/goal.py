@@ -432,9 +432,9 @@ def _ends(content: Any, parameter: Parameter) -> tuple[float, float]:
 
 def _threshold(field_: str, value: Any, of: Any, scene: Scene) -> float:
     """Return the threshold of a number; of flags it may be a word."""
-    quantity = number_of_a_run("goal.of", of, scene)
-    if isinstance(value, str) and quantity.flags is not None:
-        words = {each.name.lower(): float(each) for each in quantity.flags}
+    flags = number_of_a_run("goal.of", of, scene)
+    if isinstance(value, str) and flags is not None:
+        words = {each.name.lower(): float(each) for each in flags}
         if value not in words:
             raise StudyError(field_, value, one_of(value, words))
         return words[value]

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.parameters import is_number
-from solver.results.quantities import QUANTITIES, Quantity
 from solver.scenes import Scene
 from studies.errors import StudyError, nearest, one_of
 
@@ -231,7 +230,7 @@ def _checked(field: str, content: Any, scene: Scene, axes: Collection[str]) -> M
     at = given.get("at", {})
     if not isinstance(at, Mapping):
         raise StudyError(f"{field}.at", at, "must be a table: a place on each other dimension")
-    quantity = _quantities(scene)[of]
+    quantity = scene.known_quantities[of]
     for name, value in at.items():
         if name not in axes and name not in quantity.dims:
             raise StudyError(f"{field}.at.{name}", value, one_of(name, [*axes, *quantity.dims]))
@@ -254,7 +253,7 @@ def content_of(line: MeasuredLine) -> dict[str, Any]:
 def _columns(field: str, rows: Any, scene: Scene) -> dict[str, Any]:
     """Return a line of the rows of a file: the columns are `over`, `of` and `SIGMA`."""
     headings = list(dict.fromkeys(key for row in rows for key in row))
-    names, known = [], _quantities(scene)
+    names, known = [], scene.known_quantities
     for heading in headings:
         match = _HEADING.fullmatch(heading)
         name, unit = (match["name"], match["unit"]) if match else (heading, None)
@@ -284,12 +283,8 @@ def _number(field: str, heading: str, text: Any) -> float:
         raise StudyError(f"{field}.{heading}", text, "must be a number in every row") from None
 
 
-def _quantities(scene: Scene) -> Mapping[str, Quantity]:
-    return QUANTITIES | {each.name: each for each in scene.quantities}
-
-
 def _known(field: str, name: Any, scene: Scene) -> str:
-    known = _quantities(scene)
+    known = scene.known_quantities
     if not isinstance(name, str) or name not in known:
         raise StudyError(field, name, f"must be a variable of the runs{nearest(name, known)}")
     return name
