@@ -39,7 +39,7 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("path", type=_path, metavar="DIR|RUN")
 
     one = add("plot", commands.plot)
-    one.add_argument("path", type=_path, metavar="RUN|DIR")
+    one.add_argument("path", type=_place, metavar="RUN|DIR")
     one.add_argument(
         "--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
         help="of the sweep, or of the field's own dimensions, such as pass=2",
@@ -70,7 +70,7 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
 
-    for more in (_add_numbers, _add_access, _add_remote):
+    for more in (_add_cluster, _add_numbers, _add_access, _add_remote):
         more(add)
     return whole
 
@@ -86,7 +86,16 @@ def _add_run(one: argparse.ArgumentParser) -> None:
     one.add_argument("study", type=_path, metavar="STUDY.toml")
     one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
     one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one per core)")
-    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
+    where = one.add_mutually_exclusive_group()
+    where.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
+    where.add_argument(
+        "--scheduler-file", type=_path, metavar="FILE",
+        help="the same, by the file to which it writes its address",
+    )  # fmt: skip
+    where.add_argument(
+        "--part", type=_part, metavar="I/N",
+        help="compute as one of N processes that share the directory, and combine nothing",
+    )  # fmt: skip
     for name, what in (("ca", "authority"), ("cert", "own certificate"), ("key", "own key")):
         one.add_argument(f"--tls-{name}", metavar="PEM", help=f"{what} for a tls:// scheduler")
     one.add_argument(
@@ -103,9 +112,33 @@ def _add_run(one: argparse.ArgumentParser) -> None:
     one.add_argument("--dry-run", action="store_true", help="print the estimated cost, and end")
 
 
+def _add_cluster(add: Callable[..., argparse.ArgumentParser]) -> None:
+    one = add("slurm", commands.slurm)
+    one.add_argument("study", type=_path, metavar="STUDY.toml")
+    one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
+    one.add_argument("--tasks", type=_integer(1, 10**6), default=16, help="default: %(default)s")
+    one.add_argument("--time", default="04:00:00", help="limit of a task (default: %(default)s)")
+    one.add_argument("--memory", default="2G", help="of a task (default: %(default)s)")
+    one.add_argument(
+        "--with-scheduler", action="store_true",
+        help="the tasks are workers of a scheduler, in place of parts that share a directory",
+    )  # fmt: skip
+    one.add_argument("--script", type=_path, required=True, metavar="FILE", help="what is written")
+
+
 def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
+    one = add("diff", commands.diff)
+    one.add_argument("first", type=_place, metavar="A", help="a study: a folder, a file or a URL")
+    one.add_argument("second", type=_place, metavar="B", help="a study that may differ from it")
+    one.add_argument(
+        "--ignore", nargs="+", action="extend", default=[], metavar="NAME",
+        help="parameters that do not count, such as those of the mesh",
+    )  # fmt: skip
+    one.add_argument("--field", help="the number of the runs that is drawn")
+    one.add_argument("--out", type=_path, metavar="PNG", help="draw what differs")
+
     one = add("best", commands.best)
-    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("path", type=_place, metavar="DIR")
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
     one.add_argument(
         "--where", nargs="+", action="extend", default=[], metavar="CONDITION",
@@ -173,6 +206,18 @@ def _path(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError(f"{text!r}: must be the name of a file or a folder")
     return Path(text)
+
+
+def _place(text: str) -> Path | str:
+    """Return the path of a study, or its URL as it is: a path has no double slash."""
+    return text if text.startswith(("http://", "https://")) else _path(text)
+
+
+def _part(text: str) -> tuple[int, int]:
+    number, sign, count = text.partition("/")
+    if not (sign and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
+        raise argparse.ArgumentTypeError(f"{text!r}: must be I/N with 1 <= I <= N")
+    return int(number), int(count)
 
 
 def _integer(least: int, most: int) -> Callable[[str], int]:

@@ -41,9 +41,12 @@ class Service:
     def submit(self, path: Path) -> dict[str, Any]:
         """Send a study file, and before it the scene file it names; the service checks both."""
         content = read_study(path)
-        scene = content.get("scene")
-        if isinstance(scene, str) and scene.endswith(".toml"):
-            content["scene"] = self.post_scene(path.parent / scene)["id"]
+        tables: Any = content
+        while isinstance(tables, dict):
+            scene = tables.get("scene")
+            if isinstance(scene, str) and scene.endswith(".toml"):
+                tables["scene"] = self.post_scene(path.parent / scene)["id"]
+            tables = tables.get("extends")
         return self._ask("POST", "/studies", json=content).json()
 
     def post_scene(self, path: Path) -> dict[str, Any]:

@@ -9,10 +9,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from threading import Thread
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from residua.status import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
 from studies.errors import StudyError
+
+if TYPE_CHECKING:
+    from studies.definition.study import Study
 
 
 def run(options: argparse.Namespace) -> int:
@@ -31,14 +34,18 @@ def run(options: argparse.Namespace) -> int:
         stall_seconds=options.stall_seconds, path_seconds=options.path_seconds,
         memory=options.memory, patience=options.patience,
     )  # fmt: skip
-    access = options.scheduler and Access(
-        options.scheduler, options.tls_ca, options.tls_cert, options.tls_key
-    )
+    store = Store(options.out)
     measured = getattr(options, "measured", ())
-    study, store = Study.from_toml(options.study, measured), Store(options.out)
+    study = Study.from_toml(options.study, measured, store.definition, store.scene)
     if options.dry_run:
         print(dry_run(study, store))
         return OK
+    if options.part:
+        return _part(study, options)
+    certificates = options.tls_ca, options.tls_cert, options.tls_key
+    access = options.scheduler and Access(options.scheduler, *certificates)
+    if options.scheduler_file:
+        access = Access.of_file(options.scheduler_file, *certificates)
     if warning := long_run(study, store):
         print(warning, file=sys.stderr)
     progress, preparing = Progress(study), Thread(target=prepare)
@@ -71,6 +78,46 @@ def run(options: argparse.Namespace) -> int:
     if outcome.stopped:
         return INTERRUPTED
     return OK if outcome.ok else FAILED
+
+
+def _part(study: Study, options: argparse.Namespace) -> int:
+    """Compute as one of several processes."""
+    from residua.progress import Progress
+    from studies.execution.part import run_part
+
+    if options.workers not in (None, 1):
+        raise StudyError("--workers", options.workers, "a part is one process: leave it out")
+    progress = Progress(study)
+    with _interruption(signal.SIGTERM) as interrupted:
+        found = run_part(
+            study, options.out, options.part,
+            on_event=progress, should_stop=lambda: bool(interrupted),
+        )  # fmt: skip
+    progress.close()
+    number, count = options.part
+    left = "searches" if study.asks else "loading paths"
+    others = f", {found.left} {left} are left to others" if found.left else ""
+    print(f"{study.name}: part {number} of {count}: {len(found.computed)} runs computed{others}")
+    return INTERRUPTED if found.stopped else OK
+
+
+def slurm(options: argparse.Namespace) -> int:
+    """Write a script for sbatch, which computes a study on a cluster."""
+    from residua.slurm import script
+    from studies.definition.study import Study
+    from studies.storage.store import Store
+
+    store = Store(options.out)
+    study = Study.from_toml(options.study, (), store.definition, store.scene)
+    text = script(
+        study.name, options.study, options.out, options.script,
+        tasks=options.tasks, time=options.time, memory=options.memory,
+        scheduler=options.with_scheduler,
+    )  # fmt: skip
+    with _written("--script", options.script) as part:
+        part.write_text(text, encoding="utf-8")
+    print(f"wrote {options.script}; its head tells how to submit it")
+    return OK
 
 
 def fit(options: argparse.Namespace) -> int:
@@ -135,9 +182,25 @@ def best(options: argparse.Namespace) -> int:
     return OK
 
 
+def diff(options: argparse.Namespace) -> int:
+    """Tell what differs between two studies, also of two versions of the solver."""
+    from studies.views.differing import diff, difference_table
+    from studies.views.reading import open_study
+
+    with open_study(options.first) as first, open_study(options.second) as second:
+        found = diff(first, second, options.ignore)
+    print(difference_table(found))
+    if options.out is not None:
+        from studies.views.plots.differing import difference_figure
+
+        _save(difference_figure(found, options.field), options.out)
+        print(f"wrote {options.out}")
+    return OK
+
+
 def predict(options: argparse.Namespace) -> int:
     """Tell a number between the runs of a study, with its error."""
-    from studies.execution.run import run_study
+    from studies.execution.task import compute_here
     from studies.views.answers import answer
     from studies.views.picking import study_of
     from studies.views.reading import find_study, open_netcdf
@@ -148,7 +211,7 @@ def predict(options: argparse.Namespace) -> int:
     with open_netcdf(path) as dataset:
         found = answer(dataset, study, store, **asked)
         if not found.enough and options.compute:
-            run_study(found.run, store, workers=1)
+            compute_here(found.run, store)
             found = answer(dataset, study, store, **asked)
     unit = f" {found.unit}" if found.unit not in {"", "1"} else ""
     print(f"{found.of} = {found.value:.6g}{unit}, error {found.error:.2g}{unit} (by {found.by})")
@@ -230,7 +293,8 @@ def submit(service: Any, options: argparse.Namespace) -> str:
 def status(service: Any, options: argparse.Namespace) -> str:
     """Print the state of a study on a running service."""
     state = service.status(options.id)
-    return f"{state['status']}  {state['progress']:g} %"
+    stage = f"  {state['stage']}" if state.get("stage") else ""
+    return f"{state['status']}  {state['progress']:g} %{stage}"
 
 
 def cancel(service: Any, options: argparse.Namespace) -> str:
@@ -247,8 +311,8 @@ def fetch(service: Any, options: argparse.Namespace) -> str:
 
 
 @contextmanager
-def _interruption() -> Iterator[list[int]]:
-    """Give a list that is empty until Ctrl-C; a second Ctrl-C stops at once."""
+def _interruption(*others: signal.Signals) -> Iterator[list[int]]:
+    """Give a list that is empty until Ctrl-C, or another signal; a second one stops at once."""
     received: list[int] = []
 
     def receive(number: int, frame: object) -> None:
@@ -257,11 +321,12 @@ def _interruption() -> Iterator[list[int]]:
         received.append(number)
         print("\nstopping; finished runs are kept", file=sys.stderr)
 
-    before = signal.signal(signal.SIGINT, receive)
+    before = {each: signal.signal(each, receive) for each in (signal.SIGINT, *others)}
     try:
         yield received
     finally:
-        signal.signal(signal.SIGINT, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 def _save(drawn: Any, path: Path) -> None:

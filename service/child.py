@@ -41,7 +41,9 @@ def compute(order: Mapping[str, Any], outlet: Outlet, stop: threading.Event) -> 
         on_event=lambda event: tell(event, outlet),
         should_stop=stop.is_set,
     )
-    outlet.send("outcome", outcome.counts)
+    outlet.send("outcome", {
+        "counts": outcome.counts, "asked": outcome.asked, "stage": outcome.stage,
+    })  # fmt: skip
 
 
 def tell(event: StudyEvent, outlet: Outlet) -> None:

@@ -49,6 +49,7 @@ class Job:
     turn : the greater was accepted or retried later
     digest : checksum of the text of the study
     bytes : estimated size of the runs that it lacked, and of its data set
+    stage : of a study with a goal, how many of its searches have ended
     """
 
     id: str
@@ -67,6 +68,7 @@ class Job:
     turn: int
     digest: int
     bytes: float
+    stage: str
 
 
 COLUMNS = tuple(each.name for each in fields(Job))
@@ -112,10 +114,14 @@ def wanted(
     return (f"WHERE {' AND '.join(clauses)}" if clauses else ""), values
 
 
-def verdict(counts: Mapping[str, int]) -> tuple[StudyState, str]:
-    """Return the final state of a study from the number of its runs by status, and the reason."""
+def verdict(counts: Mapping[str, int], stage: str = "") -> tuple[StudyState, str]:
+    """Return the final state of a study from the number of its runs by status, and the reason.
+
+    Those of a study with a ``stage`` are the answers to its goal.
+    """
     others = {status: count for status, count in counts.items() if count and status != "ok"}
     if not others:
         return StudyState.SUCCESSFUL, ""
     listed = ", ".join(f"{count} {status}" for status, count in others.items())
-    return StudyState.FAILED, f"{sum(others.values())} of {sum(counts.values())} runs: {listed}"
+    what = "searches" if stage else "runs"
+    return StudyState.FAILED, f"{sum(others.values())} of {sum(counts.values())} {what}: {listed}"

@@ -30,6 +30,11 @@ NEXT_TURN = "SELECT COALESCE(MAX(turn), 0) + 1 FROM job"
 BEGUN = {"state": StudyState.RUNNING, "message": "", "finished": None}
 SHARED = """SELECT 1 FROM run AS mine JOIN run AS theirs ON theirs.run = mine.run
     WHERE mine.job = ? AND theirs.job IN (SELECT value FROM json_each(?)) LIMIT 1"""
+GOAL = "CASE WHEN json_valid({0}.study) THEN json_extract({0}.study, '$.goal') END IS NOT NULL"
+ALIKE = f"""SELECT 1 FROM job AS mine JOIN job AS theirs ON theirs.scene = mine.scene
+    WHERE mine.id = ? AND theirs.id IN (SELECT value FROM json_each(?))
+    AND {GOAL.format("mine")} AND {GOAL.format("theirs")} LIMIT 1"""
+BOTH = (SHARED, ALIKE)
 
 
 class Jobs(Database):
@@ -65,12 +70,15 @@ class Jobs(Database):
         runs: Iterable[str],
         priority: int = 0,
         size: float = 0.0,
+        most: int = 0,
+        stage: str = "",
     ) -> tuple[Job, bool]:
         """Return the job of this study, and whether it is new.
 
         ``runs`` are the ids of its runs in the order of its cases. They are stored, because a
-        changed solver would give other ids, and the study would not find its runs. ``size`` is what
-        it will write [bytes].
+        changed solver would give other ids, and the study would not find its runs. Those of a study
+        with a goal are not known yet: they are at most ``most``, and its ``stage`` tells of its
+        searches. ``size`` is what it will write [bytes].
 
         Raises
         ------
@@ -94,11 +102,11 @@ class Jobs(Database):
             ).rowcount
             text = json.dumps(study)
             job = Job(
-                id=job_id, name=study["name"], scene=study["scene"], size=max(count, 0),
+                id=job_id, name=study["name"], scene=study["scene"], size=max(count, most, 0),
                 state=StudyState.ACCEPTED, message="", progress=0.0, since=0, stood="",
                 priority=priority, submitted=now(), started=None, finished=None,
                 turn=connection.execute(NEXT_TURN).fetchone()[0], digest=checksum([text]),
-                bytes=float(size),
+                bytes=float(size), stage=stage,
             )  # fmt: skip
             connection.execute(
                 f"INSERT INTO job ({ALL}, study) VALUES ({MARKS}, ?)", [*row_of(job), text]
@@ -129,6 +137,28 @@ class Jobs(Database):
                 (job_id, offset, limit),
             )
             return [row["run"] for row in rows]
+
+    def asked(self, job_id: str, runs: Collection[str], stage: str) -> None:
+        """Add runs that a search has asked for, and write how many of the searches have ended."""
+        with self.transaction() as connection, suppress(NotFound):
+            job = self.read(connection, job_id)
+            rows = connection.execute("SELECT run FROM run WHERE job = ?", (job_id,))
+            known = {row["run"] for row in rows}
+            more = [run for run in runs if run not in known]
+            connection.executemany(
+                "INSERT INTO run VALUES (?, ?, ?)",
+                ((job_id, position, run) for position, run in enumerate(more, len(known))),
+            )
+            put(connection, job, stage=stage)
+
+    def searches(self) -> dict[str, str]:
+        """Return, by id, the scene of each waiting or running job that searches."""
+        with self.transaction("BEGIN") as connection:
+            rows = connection.execute(
+                f"SELECT id, scene FROM job WHERE state IN (?, ?) AND {GOAL.format('job')}",
+                (StudyState.RUNNING, StudyState.ACCEPTED),
+            )
+            return dict(rows.fetchall())
 
     def page(self, *, limit: int, offset: int, **which: Any) -> tuple[list[Job], int]:
         """Return a page of jobs, the latest first, and the number of all; filters: `wanted`."""
@@ -172,7 +202,8 @@ class Jobs(Database):
         """Mark the next job as running, and return it; None if there is none.
 
         It has at most ``largest`` runs, and shares no run with ``busy``, the jobs that are being
-        computed, so that common runs are computed once.
+        computed, so that common runs are computed once. Two searches in one scene may ask for the
+        same runs: one of them waits.
         """
         others = json.dumps(list(busy))
         with self.transaction() as connection:
@@ -183,7 +214,7 @@ class Jobs(Database):
                 (StudyState.RUNNING, StudyState.ACCEPTED, largest, others),
             ).fetchall()
             for row in waiting:
-                if connection.execute(SHARED, (row["id"], others)).fetchone():
+                if any(connection.execute(each, (row["id"], others)).fetchone() for each in BOTH):
                     continue
                 try:
                     job = self.read(connection, row["id"])

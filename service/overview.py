@@ -15,7 +15,7 @@ from service.job import Job
 from service.jobs import Jobs
 from service.schemas import StudyDetail, StudyRun, StudySummary, Window
 from studies import Store
-from studies.definition.sweep import labels
+from studies.definition.sweep import labels, positions
 from studies.definition.vocabulary import taken
 from studies.storage.seal import state_of
 
@@ -84,15 +84,23 @@ class Details:
         counts = Counter[str]()
         for status, number in self.store.catalogue.counts(self.jobs.runs(job.id)).items():
             counts[taken(status, allow)] += number
-        if pending := job.size - sum(counts.values()):
+        goal = study.get("goal", {})
+        if not goal and (pending := job.size - sum(counts.values())):
             counts[PENDING] = pending
         axes = {name: labels(name, axis) for name, axis in study["sweep"].items()}
         page = self.jobs.runs(job.id, window.limit, window.offset)
         rows = self.store.catalogue.rows(page)
+
+        def at(run_id: str, position: int) -> dict[str, Any]:
+            if not goal:
+                return point(axes, position)
+            return searched_at(study, rows[run_id]["parameters"]) if run_id in rows else {}
+
         return StudyDetail(
             **_columns(job),
             parameters=study["parameters"],
             sweep=study["sweep"],
+            goal=goal,
             **{"note": "", "tags": [], "keep": "", "allow": [], **_own_words(study)},
             counts=counts,
             runs=[
@@ -100,7 +108,7 @@ class Details:
                     id=run_id,
                     status=taken(rows[run_id]["status"], allow) if run_id in rows else PENDING,
                     message=rows[run_id]["message"] if run_id in rows else "",
-                    at=point(axes, position),
+                    at=at(run_id, position),
                 )
                 for position, run_id in enumerate(page, window.offset)
             ],
@@ -114,6 +122,18 @@ def point(axes: dict[str, list[Any]], position: int) -> dict[str, Any]:
         position, index = divmod(position, len(axis))
         values[name] = axis[index]
     return dict(reversed(values.items()))
+
+
+def searched_at(study: dict[str, Any], parameters: dict[str, Any]) -> dict[str, Any]:
+    """Return where a search has asked for a run: values on the axes, and that of its parameter."""
+    values = {
+        name: each.at
+        for name, axis in study["sweep"].items()
+        for each in positions(name, axis)
+        if all(parameters.get(key) == value for key, value in each.sets.items())
+    }
+    name = study["goal"]["parameter"]
+    return values | {name: parameters[name]}
 
 
 def _own_words(study: dict[str, Any]) -> dict[str, Any]:

@@ -75,15 +75,20 @@ def _add(study_id: str, jobs: Jobs, store: Store, begun: bool = True) -> None:
         if getattr(error, "value", None) != study_id:  # that is of another version of the solver
             log.warning("studies/%s: not restored: %s", study_id, error)
         return
-    if study.asks:  # no study of the queue
-        return
     counts = store.outcomes(study.id)
     if not (counts or begun):
         return
-    jobs.accept(study.id, study.to_dict(), study.run_ids())
-    there = sum(store.run_path(run).is_file() for run in study.run_ids()) if begun else study.size
-    if counts and there >= counts.total() - counts[MISSING]:
-        jobs.finish(study.id, *verdict(counts), standing=StudyState.ACCEPTED)
+    if study.asks:
+        asked = store.asked(study)
+        ended = asked is not None and all(store.run_path(run).is_file() for run in asked)
+        stage = study.stage(study.expansion.size if ended else 0)
+        jobs.accept(study.id, study.to_dict(), sorted(asked or ()), most=study.size, stage=stage)
+    else:
+        jobs.accept(study.id, study.to_dict(), study.run_ids())
+        there = (store.run_path(run).is_file() for run in study.run_ids())
+        ended = not begun or sum(there) >= counts.total() - counts[MISSING]
+    if counts and (ended or not begun):
+        jobs.finish(study.id, *verdict(counts, study.stage()), standing=StudyState.ACCEPTED)
 
 
 class Mender:

@@ -14,7 +14,7 @@ import shutil
 import sqlite3
 import threading
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Collection, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
@@ -75,7 +75,21 @@ class Keeper:
                 if user["state"] in ("accepted", "running") or self.computes(user["id"]):
                     needed = f"the study {user['id']} needs this run"
                     raise Conflict(f"{needed}: dismiss it first, or wait for its end")
+            if self._searched([run_id]):
+                needed = "a study searches in the scene of this run, and may need it"
+                raise Conflict(f"{needed}: dismiss it first, or wait for its end")
             self.store.discard([run_id])
+
+    def _searched(self, runs: Collection[str]) -> set[str]:
+        """Return those runs in whose scene a waiting or running study searches.
+
+        What a search asks for is known at its end.
+        """
+        scenes = set(self.jobs.searches().values())
+        described = (self.store.scene(each, whole=False) for each in scenes)
+        scenes.update(each.name for each in described if each)
+        rows = self.store.catalogue.rows(runs) if scenes else {}
+        return {run_id for run_id, row in rows.items() if row["scene"] in scenes}
 
     def accept(self, found: Examined, priority: int) -> tuple[Job, bool]:
         """Store a study, and put it into the queue; its scene is not deleted in between.
@@ -89,7 +103,10 @@ class Keeper:
         with self._one:
             self.check_room(found)
             self.store.save_study(study)
-            return self.jobs.accept(study.id, study.to_dict(), found.runs, priority, size)
+            content, most = study.to_dict(), study.size
+            return self.jobs.accept(
+                study.id, content, found.runs, priority, size, most, study.stage()
+            )
 
     def check_room(self, found: Examined) -> None:
         """Raise `NoRoom` if a study does not fit on the disk beside those that have not ended."""
@@ -176,6 +193,7 @@ class Keeper:
                 (study_id,),
             )
             unneeded = {row["run"] for row in own} - elsewhere
+            unneeded -= self._searched(unneeded)
             freed = size(directory) + sum(size(self.store.run_path(run)) for run in unneeded)
             self.store.discard(unneeded)
             with suppress(FileNotFoundError):

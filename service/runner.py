@@ -47,6 +47,8 @@ class Attempt:
     heard : time of the last message of its process [s]
     waiting : reason for which the study waits; empty if it does not
     runs : number of runs that were finished
+    asked, stage : of a study with a goal, the runs that its searches have asked for, and how many
+        of these have ended
     counts : number of runs by status at the end of the study; None if it did not end
     reason : why it did not end
     patient : whether waiting helps: no scheduler answers, or another process uses the directory
@@ -57,6 +59,8 @@ class Attempt:
     heard: float = field(default_factory=time.monotonic)
     waiting: str = ""
     runs: int = 0
+    asked: set[str] = field(default_factory=set)
+    stage: str = ""
     counts: dict[str, int] | None = None
     reason: str = "its process ended without a result or an error message; see the service's log"
     patient: bool = False
@@ -165,10 +169,13 @@ class Runner:
             return
         while True:
             attempt = await self._attempt(job, progress)
+            if attempt.stage:
+                await self._write(self.jobs.asked, job.id, attempt.asked, attempt.stage)
             if await self._unwanted(job):
                 return
             if attempt.counts is not None:
-                await asyncio.to_thread(self.jobs.finish, job.id, *verdict(attempt.counts))
+                end = verdict(attempt.counts, attempt.stage)
+                await asyncio.to_thread(self.jobs.finish, job.id, *end)
                 return
             progress = attempt.progress
             barren = 0 if attempt.runs or attempt.patient else barren + 1
@@ -194,7 +201,7 @@ class Runner:
             return Attempt(progress, reason=f"its process cannot be started: {error.strerror}")
         except Conflict as error:  # its row is damaged
             return Attempt(progress, reason=str(error), hopeless=True)
-        attempt, reported = Attempt(progress), (progress, "")
+        attempt, reported, stage = Attempt(progress), (progress, ""), (0, "")
         events = asyncio.create_task(follow(child, attempt))
         try:
             while not events.done() and not await self._unwanted(job):
@@ -204,6 +211,8 @@ class Runner:
                 if silence > max(self.settings.stall_seconds or math.inf, 2 * SILENCE_SECONDS):
                     attempt.reason = SILENT
                     break
+                if stage != (stage := (len(attempt.asked), attempt.stage)):
+                    await self._write(self.jobs.asked, job.id, set(attempt.asked), attempt.stage)
                 now = attempt.progress, self._plain(waiting)
                 if reported != now and await self._write(self.jobs.note, job.id, *now):
                     reported = now
@@ -277,10 +286,13 @@ async def follow(child: Process, attempt: Attempt) -> None:
                 attempt.waiting = content["message"]
             case "event":
                 attempt.waiting = ""
-                attempt.progress = 100 * content["progress"]
+                attempt.progress, attempt.stage = 100 * content["progress"], content["stage"]
                 attempt.runs += content["kind"] == "run"
+                if attempt.stage and content["run"]:
+                    attempt.asked.add(content["run"])
             case "outcome":
-                attempt.counts = content
+                attempt.counts, attempt.stage = content["counts"], content["stage"]
+                attempt.asked.update(content["asked"])
             case "refused" | "wait" | "error" as kind:
                 attempt.reason = content["reason"]
                 attempt.hopeless = kind == "refused"

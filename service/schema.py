@@ -8,7 +8,7 @@ from service.job import COLUMNS
 from studies.errors import StudyError
 from studies.storage.database import checksum
 
-VERSION = 3
+VERSION = 4
 
 JOB = """CREATE TABLE job (
     id TEXT PRIMARY KEY,
@@ -28,6 +28,7 @@ JOB = """CREATE TABLE job (
     turn INTEGER NOT NULL,
     digest INTEGER,
     bytes REAL NOT NULL,
+    stage TEXT NOT NULL,
     checksum INTEGER
 )"""
 RUN = """CREATE TABLE IF NOT EXISTS run (
@@ -49,6 +50,7 @@ ADDED = {
     "priority": "0",
     "digest": "checksum(study)",
     "bytes": "0.0",
+    "stage": "''",
 }
 """Columns that earlier forms have not, and what takes their place. The first had no table of runs
 but a text of all its runs in each row, and was the only one without ``since``."""

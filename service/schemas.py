@@ -125,7 +125,8 @@ class StudySummary(BaseModel):
         description="why it failed; while it runs, what it waits for or why it was started again"
     )
     progress: float = Field(ge=0, le=100, description="percentage of the work that is done")
-    size: int = Field(description="number of runs")
+    size: int = Field(description="number of runs; of a study with a goal the largest possible one")
+    stage: str = Field(description="of a study with a goal, how many of its searches have ended")
     priority: int = Field(description="the greater is computed first")
     submitted: str
     started: str | None
@@ -146,6 +147,7 @@ class StudyDetail(StudySummary):
 
     parameters: dict[str, Any]
     sweep: Axes
+    goal: dict[str, Any] = Field(description="what is searched at each place of the axes")
     note: str = Field(description="what its author wrote of it")
     tags: list[str]
     keep: str = Field(description="``fields`` where the runs keep the fields at the nodes")
@@ -153,7 +155,9 @@ class StudyDetail(StudySummary):
         description="``large_strain`` where runs outside small-strain theory are taken as ok"
     )
     counts: dict[str, int] = Field(description="runs by status, as the study takes them")
-    runs: list[StudyRun] = Field(description="a page of its runs")
+    runs: list[StudyRun] = Field(
+        description="a page of its runs; of a study with a goal those that it has asked for"
+    )
 
 
 class Run(BaseModel):

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
     from studies.storage.store import Store
+    from studies.views.differing import Difference, diff
     from studies.views.fits import fit
     from studies.views.grids import to_grid
     from studies.views.predict import predict
@@ -39,12 +40,14 @@ _HOMES = {
     "Case": "definition.cases",
     "Limits": "execution.limits",
     "Bounds": "execution.estimate",
+    "Difference": "views.differing",
     "Estimate": "execution.estimate",
     "LoadingPath": "definition.cases",
     "Store": "storage.store",
     "Study": "definition.study",
     "StudyEvent": "execution.run",
     "StudyOutcome": "execution.run",
+    "diff": "views.differing",
     "estimate": "execution.estimate",
     "fit": "views.fits",
     "open_netcdf": "views.reading",
@@ -64,6 +67,7 @@ __all__ = [
     "Bounds",
     "Case",
     "CatalogueDamaged",
+    "Difference",
     "Estimate",
     "FileDamaged",
     "GridLost",
@@ -76,6 +80,7 @@ __all__ = [
     "StudyError",
     "StudyEvent",
     "StudyOutcome",
+    "diff",
     "estimate",
     "fit",
     "open_netcdf",

@@ -197,7 +197,9 @@ class Expansion:
             if error.field in position.sets:
                 field = position.field if name in known else f"{position.field}.{error.field}"
         parameter = known.get(error.field)
-        if parameter is not None and not parameter.in_range(error.value):
+        # of a list the scene tells what in it is wrong
+        a_list = isinstance(self._case(index).values.get(error.field), list)
+        if parameter is not None and not a_list and not parameter.in_range(error.value):
             allowed = parameter.refusal(field, error.value).allowed
         else:
             allowed = f"{error.allowed} (at {', '.join(at)})" if at else error.allowed

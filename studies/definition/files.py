@@ -23,7 +23,8 @@ def read_study(path: Path | str, measured: Sequence[Path] = ()) -> dict[str, Any
     ``[points] file = "tests.csv"`` names a table beside the study, and so does an axis of the sweep
     that has this entry: see `read_table`. A value of a parameter that ends in ``.csv`` or ``.txt``
     names the points of a curve, one with the ending of a mesh file (`FORMATS`) the mesh of a
-    section. ``[fit] measured`` names tables of measured lines. What is in the files takes their
+    section. ``[fit] measured`` names tables of measured lines. The study that this one ``extends``
+    may be a file. What is in the files takes their
     place, so that the content of a study needs no other file.
 
     Parameters
@@ -53,6 +54,11 @@ def read_study(path: Path | str, measured: Sequence[Path] = ()) -> dict[str, Any
             fit["measured"] = [
                 _with_rows(each, f"fit.measured[{k}]", folder) for k, each in enumerate(lines)
             ]
+    before = tables.get("extends")
+    if isinstance(before, str) and before.endswith(".toml"):
+        tables["extends"] = theirs = read_study(folder / before)
+        if str(theirs.get("scene", "")).endswith(".toml"):
+            theirs["scene"] = str(Path(before).parent / theirs["scene"])
     for table in _MAY_NAME_FILES:
         if table in tables:
             tables[table] = _with_files(tables[table], table, folder)

@@ -137,7 +137,7 @@ class Fit:
         }  # fmt: skip
 
 
-class Key(NamedTuple):
+class Evaluation(NamedTuple):
     """A run of a fit: values of the parameters, and the position on the axes of the study."""
 
     values: tuple[float, ...]
@@ -172,7 +172,7 @@ def standings(axes: Axes) -> list[Standing]:
     return found
 
 
-class Answer(NamedTuple):
+class Fitted(NamedTuple):
     """What a fit has found.
 
     Attributes
@@ -192,7 +192,7 @@ class Answer(NamedTuple):
 class _Lacking(Exception):
     """The method needs runs that are not known yet."""
 
-    def __init__(self, keys: list[Key]) -> None:
+    def __init__(self, keys: list[Evaluation]) -> None:
         super().__init__()
         self.keys = keys
 
@@ -219,13 +219,13 @@ class Fitting:
     fit: Fit
     positions: list[Standing]
     read: Callable[[Mapping[str, Any]], Read]
-    rows: dict[Key, Mapping[str, Any] | None] = field(default_factory=dict)
-    refusals: dict[Key, str] = field(default_factory=dict)
+    rows: dict[Evaluation, Mapping[str, Any] | None] = field(default_factory=dict)
+    refusals: dict[Evaluation, str] = field(default_factory=dict)
     reason: str = ""
     message: str = ""
-    answer: Answer | None = None
-    _wants: list[Key] = field(default_factory=list)
-    _seen: dict[Key, list[Numbers] | None] = field(default_factory=dict)
+    answer: Fitted | None = None
+    _wants: list[Evaluation] = field(default_factory=list)
+    _seen: dict[Evaluation, list[Numbers] | None] = field(default_factory=dict)
     _numbers: dict[str, int] = field(default_factory=dict)
     _of: list[list[int]] = field(default_factory=list)
 
@@ -238,7 +238,7 @@ class Fitting:
         self._go_on()
 
     @property
-    def wants(self) -> list[Key]:
+    def wants(self) -> list[Evaluation]:
         """The runs that it lacks."""
         return [] if self.reason else [key for key in self._wants if key not in self._seen]
 
@@ -266,24 +266,26 @@ class Fitting:
     def limit(self) -> None:
         """What tells the last run on a path: nothing, all are needed."""
 
-    def sets(self, key: Key) -> dict[str, Any]:
+    def sets(self, key: Evaluation) -> dict[str, Any]:
         """Return the parameters that a run sets."""
         own = dict(zip(self.fit.free, key.values, strict=True))
         return {**self.positions[key.position].sets, **own}
 
-    def key(self, parameters: Mapping[str, Any]) -> Key:
+    def key(self, parameters: Mapping[str, Any]) -> Evaluation:
         """Return the key of a run with these parameters."""
         own = {name: parameters[name] for name in self.positions[0].sets}
-        return Key(tuple(parameters[name] for name in self.fit.free), self._numbers[_position(own)])
+        return Evaluation(
+            tuple(parameters[name] for name in self.fit.free), self._numbers[_position(own)]
+        )
 
-    def tell(self, key: Key, row: Mapping[str, Any]) -> None:
+    def tell(self, key: Evaluation, row: Mapping[str, Any]) -> None:
         """Tell it of a run that it lacked."""
         self.rows[key] = row
         self._seen[key] = self._lines(key, row)
         if not self.wants:
             self._go_on()
 
-    def refuse(self, key: Key, refusal: str) -> bool:
+    def refuse(self, key: Evaluation, refusal: str) -> bool:
         """Tell it that the scene refuses a run, which counts as one that failed."""
         self._seen[key], self.refusals[key] = None, refusal
         if not self.wants:
@@ -298,7 +300,7 @@ class Fitting:
             return math.nan
         return math.nan if seen is None else float(np.mean(self._over_sigma(seen) ** 2))
 
-    def _lines(self, key: Key, row: Mapping[str, Any]) -> list[Numbers] | None:
+    def _lines(self, key: Evaluation, row: Mapping[str, Any]) -> list[Numbers] | None:
         """Return what a run says at the measured places of its lines; None if it failed."""
         if row["status"] not in SOLVED:
             self.refusals[key] = ": ".join(filter(None, (row["status"], row["message"])))
@@ -326,7 +328,7 @@ class Fitting:
             values = self._values(found.x)
             seen = self._all(values)
             assert seen is not None
-            self.answer = Answer(np.array(values), found.x.round(_DIGITS), seen, found.jac)
+            self.answer = Fitted(np.array(values), found.x.round(_DIGITS), seen, found.jac)
             self.answer = self.answer._replace(jacobian=self._central(found.x, found.jac))
             self.reason = FOUND
         except _Lacking as lacking:
@@ -341,7 +343,7 @@ class Fitting:
         seen = self._all(values)
         if seen is None:
             if self.answer is None:
-                keys = (Key(values, k) for k in range(len(self.positions)))
+                keys = (Evaluation(values, k) for k in range(len(self.positions)))
                 why = next(self.refusals[key] for key in keys if key in self.refusals)
                 raise _Ends(f"the run of the first values has no line: {why}")
             return np.full(len(self.fit.values), np.nan)  # the method goes half as far
@@ -349,7 +351,7 @@ class Fitting:
         best = self.answer
         if best is None or np.sum(found**2) < np.sum(self._over_sigma(best.seen) ** 2):
             last = best.jacobian if best else None
-            self.answer = Answer(np.array(values), shares.round(_DIGITS), seen, last)
+            self.answer = Fitted(np.array(values), shares.round(_DIGITS), seen, last)
         return found
 
     def _jacobian(self, shares: Numbers, *_: Any) -> Numbers:
@@ -411,7 +413,7 @@ class Fitting:
 
     def _ask(self, every: list[tuple[float, ...]]) -> None:
         """Ask for the runs of several places together."""
-        keys = [Key(values, k) for values in every for k in range(len(self.positions))]
+        keys = [Evaluation(values, k) for values in every for k in range(len(self.positions))]
         lacking = list(dict.fromkeys(key for key in keys if key not in self._seen))
         if lacking and len(self._seen) + len(lacking) > self.fit.most:
             raise _Ends
@@ -425,7 +427,7 @@ class Fitting:
         self._ask([values])
         found: list[Numbers] = [np.empty(0)] * len(self.fit.measured)
         for k, of in enumerate(self._of):
-            seen = self._seen[Key(values, k)]
+            seen = self._seen[Evaluation(values, k)]
             if seen is None:
                 return None
             for line, own in zip(of, seen, strict=True):
@@ -453,7 +455,7 @@ class Certainty(NamedTuple):
     warning: str
 
 
-def certainty(fit: Fit, answer: Answer) -> Certainty:
+def certainty(fit: Fit, answer: Fitted) -> Certainty:
     """Return how well the parameters of an answer with a Jacobian matrix are known.
 
     Where not all standard deviations were given, they are scaled so that the differences have them.

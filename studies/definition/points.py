@@ -63,11 +63,6 @@ SCHEMAS = {
 """JSON Schemas of the entries `ENTRIES`."""
 
 
-def described(schema: dict[str, Any]) -> None:
-    """Add the entries of points to the JSON Schema of a study."""
-    schema["properties"] |= SCHEMAS
-
-
 def with_points(content: Mapping[str, Any], known: Mapping[str, Parameter]) -> Any:
     """Return the sweep of a study, in which ``points`` or ``sample`` of the study is an axis.
 

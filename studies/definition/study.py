@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -20,13 +20,14 @@ from pydantic import (
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
+from studies.definition.extending import EXTENDS, SCHEMA, Extended, extended
 from studies.definition.files import read_study
 from studies.definition.fit import Fit, checked_fit
 from studies.definition.goal import Goal, checked_goal
 from studies.definition.identity import content_id
 from studies.definition.labels import checked_labels
 from studies.definition.parameters import build, parameters_of
-from studies.definition.points import ENTRIES, POINT, Points, described, with_points
+from studies.definition.points import ENTRIES, POINT, SCHEMAS, Points, with_points
 from studies.definition.refine import Refine, checked_refine
 from studies.definition.sweep import (
     Axes,
@@ -40,6 +41,19 @@ from studies.definition.sweep import (
 from studies.definition.vocabulary import taken
 from studies.errors import StudyError, one_of
 from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
+
+Kept = Callable[[str], Mapping[str, Any] | None]
+"""Returns the content of a study that is known by its name or its id; None if there is none."""
+
+
+def _none(name: str) -> None:
+    """Know no study."""
+    return
+
+
+def _described(schema: dict[str, Any]) -> None:
+    """Add entries that are not kept to the JSON Schema of a study."""
+    schema["properties"] |= SCHEMAS | {EXTENDS: SCHEMA}
 
 
 class Study(BaseModel):
@@ -67,7 +81,7 @@ class Study(BaseModel):
         (`studies.definition.fit`); empty if the runs are those of the axes
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=described)
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_described)
 
     name: str
     scene: str
@@ -83,18 +97,36 @@ class Study(BaseModel):
     _problem: Scene = PrivateAttr()
 
     @classmethod
-    def from_toml(cls, path: Path | str, measured: Sequence[Path] = ()) -> Self:
+    def from_toml(
+        cls,
+        path: Path | str,
+        measured: Sequence[Path] = (),
+        studies: Kept = _none,
+        scenes: Find = nothing,
+    ) -> Self:
         """Read a study file; the scene may be a file beside it: ``scene = "pin.toml"``.
 
-        So may be the points of a curve: ``wheel_profile = "worn.csv"``. Files ``measured`` are the
-        lines of its fit.
+        So may be the points of a curve: ``wheel_profile = "worn.csv"``; and the study that it
+        extends: ``extends = "before.toml"``.
+
+        Parameters
+        ----------
+        path : the file
+        measured : files of the lines of its fit
+        studies, scenes : find what the file names that is no file, such as a study of a store
         """
-        content = read_study(path, measured)
-        return cls.from_dict(content, scenes=beside(Path(path).parent))
+        content, files = read_study(path, measured), beside(Path(path).parent)
+        return cls.from_dict(
+            content, scenes=lambda name: files(name) or scenes(name), studies=studies
+        )
 
     @classmethod
     def from_dict(
-        cls, content: Mapping[str, Any], scene: Scene | None = None, scenes: Find = nothing
+        cls,
+        content: Mapping[str, Any],
+        scene: Scene | None = None,
+        scenes: Find = nothing,
+        studies: Kept = _none,
     ) -> Self:
         """Check and normalise the content of a study file (or of its JSON equivalent).
 
@@ -105,14 +137,17 @@ class Study(BaseModel):
         content : name, scene, parameters and sweep
         scene : the user's own scene, in place of the name of a scene
         scenes : finds scenes that are neither built in nor installed
+        studies : finds the study that this one extends, such as `Store.definition`
         """
         if scene is not None:
             own = scene
             content, scenes = {**content, "scene": name_of(own)}, lambda name: own
-        return cls.known(content, scenes).checked()
+        return cls.known(content, scenes, studies).checked()
 
     @classmethod
-    def known(cls, content: Mapping[str, Any], scenes: Find = nothing) -> Self:
+    def known(
+        cls, content: Mapping[str, Any], scenes: Find = nothing, studies: Kept = _none
+    ) -> Self:
         """Return the study without checking its combinations; the rest is checked.
 
         Use it for content that `from_dict` has accepted before, and to get the size of a study
@@ -120,6 +155,8 @@ class Study(BaseModel):
         """
         if not isinstance(content, Mapping):
             raise StudyError("study", content, "must be a table with name, scene and sweep")
+        if EXTENDS in content:
+            content = cls._extended(content, scenes, studies)
         try:
             return cls.model_validate(dict(content), context={"scenes": scenes})
         except ValidationError as error:
@@ -129,6 +166,25 @@ class Study(BaseModel):
                 raise cause from None
             field = ".".join(str(part) for part in first["loc"])
             raise StudyError(field, first["input"], first["msg"]) from None
+
+    @classmethod
+    def _extended(cls, content: Mapping[str, Any], scenes: Find, studies: Kept) -> dict[str, Any]:
+        """Return the content of a study that extends another one, in full."""
+        named = content[EXTENDS]
+        theirs = studies(named) if isinstance(named, str) else named
+        if not isinstance(theirs, Mapping):
+            allowed = "must be a study file, or name or id of a study of the output directory"
+            raise StudyError(EXTENDS, named, allowed)
+        base = cls.known(theirs, scenes, studies)
+        if base.asks and not base.goal:
+            raise StudyError(EXTENDS, base.name, "chooses its runs itself: extend another study")
+        own = content.get("scene", base.scene)
+        if own != base.scene and name_of(scene_named(own, scenes)) != base.scene:
+            allowed = f"must be that of {base.name}, which is extended, or left out"
+            raise StudyError("scene", own, allowed)
+        before = Extended(base.name, base.scene, base.parameters, base.sweep, base.goal, base.fixed)
+        full: dict[str, Any] = extended(content, before, parameters_of(base.problem))
+        return full
 
     def checked(self) -> Self:
         """Return the study after a check of all its combinations.
@@ -285,6 +341,10 @@ class Study(BaseModel):
         if isinstance(self.asks, Refine | Fit):
             return self.asks.most
         return self.expansion.size * (self.asks.most[1] if self.asks else 1)
+
+    def stage(self, ended: int = 0) -> str:
+        """Return how many of its searches have ended, as text; empty without a goal."""
+        return f"{ended} of {self.expansion.size} searches ended" if self.goal else ""
 
     def run_ids(self) -> Iterator[str]:
         """Yield the ids of the runs, in the order of `cases`, without building the cases.

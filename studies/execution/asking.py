@@ -48,17 +48,27 @@ class Asking:
     study : a study that chooses its runs
     store : the runs that are there are not computed again
     resume, since : as in `run_study`: which failed runs are taken as they are
+    only : number of the one program that is to be carried out; by default all are
 
     Attributes
     ----------
     places : the programs with their runs: of a goal in the order of the cases of the study
     """
 
-    def __init__(self, study: Study, store: Store, resume: bool = False, since: int = 0) -> None:
-        self._store = store
+    def __init__(
+        self,
+        study: Study,
+        store: Store,
+        resume: bool = False,
+        since: int = 0,
+        only: int | None = None,
+    ) -> None:
+        self._study, self._store = study, store
         self._at: list[list[str]] = []
         self.places: list[Place[Any]] = []
-        for at, fixed, program in _programs(study, store):
+        for number, (at, fixed, program) in enumerate(_programs(study, store)):
+            if only not in (None, number):
+                continue
             self._at.append(at)
             self.places.append(
                 Place(
@@ -80,6 +90,19 @@ class Asking:
     def ended(self) -> bool:
         """Whether all programs have ended."""
         return all(place.program.reason for place in self.places)
+
+    @property
+    def asked(self) -> list[str]:
+        """Ids of the runs that the searches of a goal have asked for, as far as they are known."""
+        if not self._study.goal:
+            return []
+        rows = (row for place in self.places for row in place.program.rows.values())
+        return sorted({str(row["id"]) for row in rows})
+
+    @property
+    def stage(self) -> str:
+        """How many of the searches of a goal have ended, as text; empty for others."""
+        return self._study.stage(sum(bool(place.program.reason) for place in self.places))
 
     @property
     def progress(self) -> float:
@@ -110,6 +133,15 @@ class Asking:
         if not wanted or place.refusal(wanted[0]):
             return None
         return next(place.runs(wanted[:1]).cases())
+
+    def stored(self, path: str, since: int) -> list[Mapping[str, Any]]:
+        """Return the rows of the runs of a program that have been stored since a time [ns].
+
+        Some may have been stored by a worker that died before it told of them.
+        """
+        program = self.places[self._paths[path][0]].program
+        rows = program.rows.values() if program.goes_on else ()
+        return [row for row in rows if row["modified"] >= since]
 
     def closed(self, path: str) -> None:
         """Ask again for runs of which a path that has ended told nothing."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import signal
@@ -12,6 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from multiprocessing import resource_tracker
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from studies.errors import GridLost, StudyError, Unusable
@@ -22,13 +24,15 @@ from studies.scratch import scratch
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
+_APPEARS = 60.0
+"""Seconds within which a scheduler must write its file."""
 _CONNECT = 10.0
 """Seconds within which a scheduler must answer."""
 
 _ABSENT = 30.0
 """Seconds without a sign of life of a worker started here until it is replaced."""
 
-_FROM_THE_START: Mapping[str, int] = {
+FROM_THE_START: Mapping[str, int] = {
     # Runs share the cores: several threads of one would wait for each other.
     "OMP_NUM_THREADS": 1,
     "MKL_NUM_THREADS": 1,
@@ -45,7 +49,7 @@ CONFIGURATION: Mapping[str, Any] = {
     "distributed.scheduler.allowed-failures": 1,
     # A task waits at the scheduler until a worker is free, so that cancelling reaches it.
     "distributed.scheduler.worker-saturation": 1.0,
-    "distributed.nanny.pre-spawn-environ": _FROM_THE_START,
+    "distributed.nanny.pre-spawn-environ": FROM_THE_START,
     # Every study has its own topic of events, and dask keeps the messages of each topic.
     "distributed.admin.low-level-log-length": 1,
     # dask's pages are closed. Without the statistics for them processes that wait take a quarter of
@@ -96,6 +100,34 @@ class Access:
             allowed = "must begin with tls:// if certificates are given"
             raise StudyError("scheduler", self.address, allowed)
 
+    @classmethod
+    def of_file(cls, path: Path, ca: str | None, cert: str | None, key: str | None) -> Self:
+        """Return the access to the scheduler that has written its address to a file.
+
+        Parameters
+        ----------
+        path : the file, which ``dask scheduler --scheduler-file`` writes; it is waited for
+        ca, cert, key : as the attributes
+
+        Raises
+        ------
+        GridLost
+            if the file does not appear within a minute
+        StudyError
+            if it tells no address
+        """
+        deadline = time.monotonic() + _APPEARS
+        while not path.exists():
+            if time.monotonic() > deadline:
+                raise GridLost(f"no scheduler has written the file {path} in {_APPEARS:g} s")
+            time.sleep(0.2)
+        try:
+            address = json.loads(path.read_text(encoding="utf-8"))["address"]
+        except (OSError, ValueError, LookupError, TypeError):
+            allowed = "must be a file that `dask scheduler --scheduler-file` has written"
+            raise StudyError("scheduler-file", str(path), allowed) from None
+        return cls(str(address), ca, cert, key)
+
     def to_dict(self) -> dict[str, str | None]:
         """Return the content, to be sent to another process through a pipe."""
         return asdict(self)
@@ -114,7 +146,7 @@ def prepare_workers(more: Sequence[str] = ()) -> str:
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [])
     _ignore_interrupts()
     try:
-        return prepare(_FROM_THE_START, more)
+        return prepare(FROM_THE_START, more)
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
@@ -178,7 +210,7 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
                     dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
                     scheduler_kwargs={"dashboard": False},
                     local_directory=str(folder),
-                    env={**os.environ, **_FROM_THE_START},  # through a pipe
+                    env={**os.environ, **FROM_THE_START},  # through a pipe
                     silence_logs=logging.CRITICAL,
                     memory_limit=memory or MEMORY_LIMIT // max(workers, 1),
                 ).result()

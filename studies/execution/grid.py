@@ -107,8 +107,8 @@ class Grid:
         others who use it get their turn, and `tasks` may be a long generator. If it yields None
         there is no task for now, and it is asked again when another one ends. A report with a
         ``path`` and its ``fraction`` says which loading path of the task is computed; limits hold
-        for each path. A `function` that raises `Unfit` is called again later, on whichever worker
-        is free.
+        for each path, and anew after a report with ``follows``. A `function` that raises `Unfit` is
+        called again later, on whichever worker is free.
 
         When `should_stop` turns true, waiting tasks are dropped and running ones stopped;
         the iteration ends when these have, or soon.
@@ -191,8 +191,8 @@ class _HandedOut:
                 ticket.starts += 1
             elif content and ticket.worker:
                 ticket.computing = True
-                if "fraction" in content:
-                    ticket.walks(content["path"])
+                if "fraction" in content or "follows" in content:
+                    ticket.walks(content["path"], anew="follows" in content)
                 yield from self._watch.goes_on()
         if content:
             yield Message(content)

@@ -16,7 +16,8 @@ class Limits:
     ----------
     stall_seconds : longest time of a loading path without progress on a worker [s]; after it its
         runs are stored as ``error`` and the worker is replaced
-    path_seconds : longest total time of a loading path on a worker [s], with the same consequence
+    path_seconds : longest total time of a loading path on a worker, or of each run of a search [s],
+        with the same consequence
     memory : largest memory of each worker process started here, such as ``"2GB"``; by default its
         share of the machine's. A worker that needs more is killed and replaced
     patience : longest time to wait for a worker [s]; after it `GridLost` is raised

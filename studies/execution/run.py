@@ -62,6 +62,7 @@ class StudyEvent:
     fraction : fraction of this path that is done, 0 to 1
     run, status, message : id, status and message of the run, or the reason of waiting
     place : of a study that chooses its runs, where the run is and the round of what asked for it
+    stage : of a study with a goal, how many of its searches have ended
     """
 
     kind: str
@@ -72,6 +73,7 @@ class StudyEvent:
     status: str = ""
     message: str = ""
     place: str = ""
+    stage: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +86,8 @@ class StudyOutcome:
     counts : number of runs by status in the data set, with ``missing``
     failed : (run id, status, message) of every run that is neither ``ok`` nor ``missing``
     computed : ids of the runs computed this time
+    asked, stage : of a study with a goal, ids of the runs that its searches have asked for, and
+        how many of these have ended
     dataset : the combined data set
     anew : whether the data set was written; it is kept if it was made of the same runs
     wall_seconds : duration
@@ -94,6 +98,8 @@ class StudyOutcome:
     counts: Mapping[str, int]
     failed: Sequence[tuple[str, str, str]]
     computed: Sequence[str]
+    asked: Sequence[str]
+    stage: str
     dataset: Path
     anew: bool
     wall_seconds: float
@@ -204,6 +210,8 @@ def run_study(
         counts=combined.counts,
         failed=combined.failed,
         computed=sorted(work.computed),
+        asked=asking.asked if asking else (),
+        stage=asking.stage if asking else "",
         dataset=combined.path,
         anew=combined.anew,
         wall_seconds=time.monotonic() - started,
@@ -228,6 +236,7 @@ class _Work:
     priority: int
     emit: Callable[[StudyEvent], None]
     asking: Asking | None = None
+    begun: int = field(default_factory=time.time_ns)
     computed: set[str] = field(default_factory=set)
     _left: deque[PathTask] = field(default_factory=deque)
     _walked: int = 0
@@ -324,7 +333,8 @@ class _Work:
             )  # fmt: skip
 
     def _tell(self, kind: str, **content: Any) -> None:
-        self.emit(StudyEvent(kind=kind, progress=self._progress(), **content))
+        stage = self.asking.stage if self.asking else ""
+        self.emit(StudyEvent(kind=kind, progress=self._progress(), stage=stage, **content))
 
     def _close(self, task: PathTask, error: Exception | None, at_fault: str = "") -> None:
         """Record the runs of a task without a report.
@@ -352,6 +362,7 @@ class _Work:
                 if owed is not None:
                     self._keep(path.id, [self.store.write_run(owed, str(error))])
                 self.asking.closed(path.id)
+                self._keep(path.id, self.asking.stored(path.id, self.begun))
 
     def _progress(self) -> float:
         """Return the completed fraction of the study, including runs found in the store."""

@@ -17,6 +17,7 @@ from studies.definition.cases import Case, LoadingPath
 from studies.definition.goal import PathLimit, Search
 from studies.definition.identity import solver_hash
 from studies.definition.place import Place
+from studies.definition.study import Study
 from studies.errors import StoreFull, StudyError, without_folders
 from studies.execution.proof import Proof, Unfit
 from studies.storage.store import Store
@@ -118,6 +119,22 @@ def walk(
                 release()
 
 
+def compute_here(study: Study, store: Store) -> None:
+    """Compute the runs of a small study in this process; nothing but the runs is stored.
+
+    Raises
+    ------
+    StoreBusy
+        when another process computes into the same store
+    """
+    with store.writing():
+        directory = store.directory.resolve()
+        for path in study.paths():
+            task = PathTask(study.problem, (path,), directory, solver_hash(), study.keep)
+            walk(task, lambda _: None, lambda: False)
+        store.sound(study.run_ids())
+
+
 def _walk(
     task: PathTask,
     path: LoadingPath,
@@ -127,10 +144,11 @@ def _walk(
     should_stop: Callable[[], bool],
 ) -> None:
     """Compute those runs of a loading path that are not stored; see `walk`."""
+    follows = {} if task.place is None else {"follows": True}  # the path of a search goes on
 
     def keep(row: dict[str, Any]) -> None:
         with contextlib.suppress(Exception):  # the file has the row too
-            report({"path": path.id, "row": row})
+            report({"path": path.id, "row": row, **follows})
 
     reported, since = -1.0, 0.0
 

@@ -51,9 +51,12 @@ class Ticket:
     starts: int = 0
     rounds: int = 0
 
-    def walks(self, path: str) -> None:
-        """Note that a path of the task is computed; time and starts count from its begin."""
-        if self.path and path != self.path:
+    def walks(self, path: str, anew: bool = False) -> None:
+        """Note that a path of the task is computed; time and starts count from its begin.
+
+        They count ``anew`` at each run of a search, which asks for one after the other.
+        """
+        if anew or (self.path and path != self.path):
             self.begun, self.starts, self.rounds = self.heard, 1, 0
         self.path = path
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from studies.errors import StoreBusy
 
 
-def lock(path: Path, busy: str, patience: float = 0.0) -> int:
+def lock(path: Path, busy: str, patience: float = 0.0, shared: bool = False) -> int:
     """Return the descriptor of a lock, valid until its last copy is closed.
 
     Parameters
@@ -19,6 +19,7 @@ def lock(path: Path, busy: str, patience: float = 0.0) -> int:
     path : the lock file, which contains the id of the process
     busy : what another one does in the directory, and what helps, for the error
     patience : how long to wait for another owner of the lock [s]
+    shared : whether others may have it at the same time, if they share it too
 
     Raises
     ------
@@ -29,7 +30,7 @@ def lock(path: Path, busy: str, patience: float = 0.0) -> int:
     deadline = time.monotonic() + patience
     while True:
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
         except BlockingIOError:
             if time.monotonic() < deadline:
                 time.sleep(0.1)

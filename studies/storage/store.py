@@ -6,6 +6,7 @@ scenes/<scene id>/             scenes of files: scene.json, the meshes and their
 studies/<study id>/study.json
 studies/<study id>/dataset.nc the runs of a study combined
 studies/<study id>/made.json  digests of its inputs, and of files made from it
+claims/                        what processes that share the directory compute now
 catalogue.sqlite              made again from the files if it is missing or damaged
 scenes.sqlite                 index of the scenes, likewise
 unreadable/                   what was damaged or in a wrong place
@@ -200,13 +201,23 @@ class Store:
         """
         if not study.asks:
             return set(study.run_ids())
+        asked = self.asked(study)
+        if asked is not None:
+            return asked
+        return {row["id"] for row in self.catalogue.runs(scene=study.problem.name, limit=-1)[0]}
+
+    def asked(self, study: Study) -> set[str] | None:
+        """Return the ids of the runs that a study has asked for; None before the end of its search.
+
+        They are in its data set.
+        """
         import h5py
 
         with suppress(FileDamaged), h5py.File(self.dataset(study.id), "r") as file:
             ended, runs = ("cell_state", "run") if study.refine else ("message", "tried_run")
             if not {STOPPED, OPEN} & set(file[ended].asstr()[...].ravel()):
                 return {each for each in file[runs].asstr()[...].ravel() if each}
-        return {row["id"] for row in self.catalogue.runs(scene=study.problem.name, limit=-1)[0]}
+        return None
 
     def study(self, study_id: str) -> Study:
         """Return the study of this id, as it was saved.
@@ -228,6 +239,28 @@ class Store:
             allowed = "was computed by another version of the solver"
             raise StudyError("study", study_id, allowed)
         return study
+
+    def definition(self, name: str) -> Mapping[str, Any] | None:
+        """Return the content of the study of this id or name; None if there is none.
+
+        Raises
+        ------
+        StudyError
+            if several studies have the name
+        """
+        found: dict[str, Mapping[str, Any]] = {}
+        for study_id in [name] if is_id(name) else self.study_ids():
+            path = self.study_directory(study_id) / _STUDY
+            with suppress(FileDamaged):
+                content = seal.content_of(path, f"study {study_id}")
+                if name in (study_id, content.get("name")):
+                    found[study_id] = content
+        if len(found) > 1:
+            ids = ", ".join(found)
+            raise StudyError(
+                "extends", name, f"is the name of several studies: give an id of {ids}"
+            )
+        return next(iter(found.values()), None)
 
     def save_study(self, study: Study) -> Path:
         """Store the definition of the study and its scene, and return its directory."""
@@ -409,14 +442,9 @@ class Store:
         if self.held:
             yield
             return
-        with self._writable():
-            for name in ("runs", "studies"):
-                (self.directory / name).mkdir(parents=True, exist_ok=True)
-                with tempfile.TemporaryFile(dir=self.directory / name):
-                    pass  # a directory may exist and still not be writable
-            busy = "computes here; wait until it has ended, or name another directory"
-            held = lock(self.directory / ".lock", busy)
+        held = self._locked()
         try:
+            self.remove_claims()
             patterns = ("*/**/*.part", "catalogue*.part") if tidy else ()  # not those of keys
             for part in filter(_left, chain.from_iterable(map(self.directory.glob, patterns))):
                 part.unlink(missing_ok=True)
@@ -424,6 +452,36 @@ class Store:
             yield
         finally:
             os.close(held)
+
+    @contextmanager
+    def sharing(self) -> Iterator[None]:
+        """Lock the directory against those who are its only writer, together with others.
+
+        Raises
+        ------
+        StoreBusy
+            if a process that does not share has the lock
+        StudyError
+            if the directory is not writable
+        """
+        held = self._locked(shared=True)
+        try:
+            yield
+        finally:
+            os.close(held)
+
+    def _locked(self, shared: bool = False) -> int:
+        with self._writable():
+            for name in ("runs", "studies"):
+                (self.directory / name).mkdir(parents=True, exist_ok=True)
+                with tempfile.TemporaryFile(dir=self.directory / name):
+                    pass  # a directory may exist and still not be writable
+            busy = "computes here; wait until it has ended, or name another directory"
+            return lock(self.directory / ".lock", busy, shared=shared)
+
+    def remove_claims(self) -> None:
+        """Delete what processes that shared the directory, and have ended, have claimed."""
+        shutil.rmtree(self.directory / "claims", ignore_errors=True)
 
     @contextmanager
     def _writable(self) -> Iterator[None]:

@@ -96,7 +96,7 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
         ok.tolist(), key=lambda at: [i if n else -i for i, n in zip(at, numeric, strict=True)]
     )
     run = chosen.isel(dict(zip(axes, best, strict=True)))
-    return _own_grid(run, [str(name) for name in run.dims])
+    return own_grid(run)
 
 
 def runs_over(
@@ -124,7 +124,7 @@ def runs_over(
     for name in own:
         grid = chosen[name].isel({axis: 0}) if axis in chosen[name].dims else chosen[name]
         chosen = chosen.drop_vars(name).assign_coords({name: (name, grid.to_numpy(), grid.attrs)})
-    return _own_grid(chosen, own)
+    return own_grid(chosen, own)
 
 
 def _same(grid: xr.DataArray, axis: str) -> bool:
@@ -204,9 +204,12 @@ def positions(axis: xr.DataArray, value: str | float) -> np.ndarray:
     return np.flatnonzero(same)
 
 
-def _own_grid(runs: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
-    """Return runs with a grid of their own as the index of these dimensions, if grids differ."""
-    for name in names:
+def own_grid(runs: xr.Dataset, names: Sequence[str] | None = None) -> xr.Dataset:
+    """Return runs with a grid of their own as the index of these dimensions, if grids differ.
+
+    By default it is done for all dimensions of a single run.
+    """
+    for name in map(str, runs.dims) if names is None else names:
         if name in runs.coords and name not in runs.indexes:
             there = runs[name].notnull().to_numpy()
             runs = runs.drop_vars(f"{name}{FRACTION}", errors="ignore")

@@ -137,25 +137,25 @@ def _in_cells(dataset: xr.Dataset, between: _Between, names: Sequence[str]) -> x
     place, runs = between.place, between.runs
     inside = np.ones(dataset.sizes["cell"], dtype=bool)
     size = np.ones(len(inside))
-    for name, value in place.items():
-        low, high = (dataset[f"cell_{name}_{end}"].to_numpy() for end in ("low", "high"))
-        inside &= (low <= value) & (value <= high)
-        size *= high - low
-    for name, value in between.fixed.items():
+    for name, at in place.items():
+        below, above = (dataset[f"cell_{name}_{end}"].to_numpy() for end in ("low", "high"))
+        inside &= (below <= at) & (at <= above)
+        size *= above - below
+    for name, at in between.fixed.items():
         if f"cell_{name}" in dataset:
-            inside &= dataset[f"cell_{name}"].to_numpy().astype(str) == str(value)
+            inside &= dataset[f"cell_{name}"].to_numpy().astype(str) == str(at)
     known = between.known(names)
     columns = [runs[name].to_numpy() for name in place]
     where = {tuple(column[k] for column in columns): k for k in np.flatnonzero(known)}
     for number in sorted(np.flatnonzero(inside), key=lambda k: size[k]):
-        corners = [
+        low, high = (
             tuple(
                 dataset[f"cell_{name}_{end}"].to_numpy()[number].astype(column.dtype).item()
                 for name, column in zip(place, columns, strict=True)
             )
             for end in ("low", "high")
-        ]
-        parts = weights(*corners, tuple(place.values()))
+        )
+        parts = weights(low, high, tuple(place.values()))
         if parts.keys() <= where.keys():
             break
     else:
@@ -166,17 +166,18 @@ def _in_cells(dataset: xr.Dataset, between: _Between, names: Sequence[str]) -> x
     for name in names:
         each = runs[name]
         values = {at: each.isel({_RUN: where[at]}) for at in parts}
-        value = sum(weight * values[at] for at, weight in parts.items())
+        terms = [weight * values[at] for at, weight in parts.items()]
+        inner: xr.DataArray = sum(terms[1:], start=terms[0])
         if f"cell_error_{name}" in dataset:
-            error = xr.zeros_like(value) + dataset[f"cell_error_{name}"].item(number)
+            error = xr.zeros_like(inner) + dataset[f"cell_error_{name}"].item(number)
         else:
             worst: dict[int, Any] = {}
-            for axis, low, high, mid in edges(*corners):
-                share = (mid[axis] - low[axis]) / (high[axis] - low[axis])
-                miss = abs(values[mid] - values[low] * (1.0 - share) - values[high] * share)
+            for axis, first, last, mid in edges(low, high):
+                share = (mid[axis] - first[axis]) / (last[axis] - first[axis])
+                miss = abs(values[mid] - values[first] * (1.0 - share) - values[last] * share)
                 worst[axis] = np.maximum(worst.get(axis, 0.0), miss)
-            error = xr.zeros_like(value) + KINK * sum(worst.values())
-        found[name] = value.assign_attrs(each.attrs)
+            error = xr.zeros_like(inner) + KINK * sum(worst.values())
+        found[name] = inner.assign_attrs(each.attrs)
         found[f"{name}_error"] = error.assign_attrs(_error_of(each))
     return xr.Dataset(found)
 

@@ -22,8 +22,8 @@ LAYERS = {
         "views",
     ),
     "residua": (
-        "neighbours", "status", "client", "cost", "progress", "keys", "commands", "arguments",
-        "cli", "__main__",
+        "neighbours", "status", "client", "cost", "progress", "keys", "slurm", "commands",
+        "arguments", "cli", "__main__",
     ),
 }  # fmt: skip
 

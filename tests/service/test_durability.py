@@ -37,6 +37,13 @@ def long_study(name: str) -> dict[str, Any]:
     return study
 
 
+def search(name: str) -> dict[str, Any]:
+    """Return a study that searches at six places for some seconds."""
+    goal = {"of": "max_plastic_strain", "at": 0.6, "between": [0.2, 1.0]}
+    sweep = {"friction": long_study(name)["sweep"]["friction"]}
+    return fake_study(name, seconds=0.1) | {"sweep": sweep, "goal": goal}
+
+
 def stored(server: Server) -> set[Path]:
     """Return the files of the finished runs."""
     return set((server.data / "runs").glob("*.nc"))
@@ -127,6 +134,26 @@ def test_a_study_of_the_punch_outlives_a_service_that_is_killed(mortal: Server) 
     with open_netcdf(mortal.data / "studies" / study_id / "dataset.nc") as dataset:
         assert dataset["residual_stress"].sizes["friction"] == 6
         assert bool(dataset["max_plastic_strain"].notnull().all())
+
+
+def test_a_search_outlives_a_service_that_is_killed_and_a_caller_who_stops_it(
+    mortal: Server,
+) -> None:
+    mortal.start()
+    study_id = mortal.post(search("search"))
+    wait_until(lambda: 2 <= len(mortal.study(study_id)["runs"]))
+    family = children(mortal)
+    mortal.kill()
+    wait_until(lambda: not alive(family))
+    mortal.start()
+    wait_until(lambda: mortal.study(study_id)["stage"].startswith("2 of 6"))
+    assert 0.0 < mortal.study(study_id)["progress"] < 100.0
+    assert mortal.client.delete(f"/studies/{study_id}").json()["status"] == "dismissed"
+    assert mortal.client.post(f"/studies/{study_id}/retry").status_code == 202
+    found = mortal.finished(study_id)
+    assert (found["status"], found["stage"]) == ("successful", "6 of 6 searches ended")
+    assert {path.stem for path in stored(mortal)} == {run["id"] for run in found["runs"]}
+    assert repeated(mortal, stored(mortal)) == []
 
 
 def test_the_death_of_a_study_leaves_the_service_alive_and_is_made_good(lively: Server) -> None:

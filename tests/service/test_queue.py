@@ -22,6 +22,7 @@ from studies import Store, StoreBusy, Study, StudyError
 from studies.storage.database import checksum
 from studies.storage.lock import lock
 from studies.storage.seal import seal
+from tests.studies.test_goal import search_here
 
 STUDY = {"name": "a", "scene": "fake", "parameters": {}, "sweep": {}}
 
@@ -264,7 +265,7 @@ def test_a_queue_without_checksums_gets_them(tmp_path: Path) -> None:
     jobs = Jobs(tmp_path / "jobs.sqlite")
     before, _ = jobs.accept("a", STUDY, ["x", "y"], 3)
     with closing(sqlite3.connect(jobs.path)) as connection, connection:
-        for column in ("digest", "checksum"):
+        for column in ("digest", "stage", "checksum"):
             connection.execute(f"ALTER TABLE job DROP COLUMN {column}")
         connection.execute("PRAGMA user_version = 1")
     again = Jobs(jobs.path)
@@ -276,8 +277,9 @@ def test_a_damaged_row_of_an_earlier_form_stays_damaged(tmp_path: Path) -> None:
     before = [jobs.accept(name, STUDY, [name])[0] for name in "ab"]
     with closing(sqlite3.connect(jobs.path)) as connection, connection:
         connection.execute("ALTER TABLE job DROP COLUMN bytes")
+        connection.execute("ALTER TABLE job DROP COLUMN stage")
         for job in before:
-            *values, _, _ = row_of(job)
+            *values, _, _, _ = row_of(job)
             found = (checksum(values), job.id)
             connection.execute("UPDATE job SET checksum = ? WHERE id = ?", found)
         connection.execute("UPDATE job SET message = 'other' WHERE id = 'b'")
@@ -286,6 +288,43 @@ def test_a_damaged_row_of_an_earlier_form_stays_damaged(tmp_path: Path) -> None:
     assert again.get("a") == before[0]
     with pytest.raises(NotFound):
         again.get("b")
+
+
+def test_of_two_searches_in_a_scene_one_waits(jobs: Jobs) -> None:
+    goal = STUDY | {"goal": {"parameter": "load_ratio"}}
+    jobs.accept("a", goal, [], most=12, stage="0 of 1 searches ended")
+    jobs.accept("b", goal, [], most=12)
+    jobs.accept("c", goal | {"scene": "punch"}, [], most=12)
+    jobs.accept("d", STUDY, ["run"])
+    assert [taken(jobs), taken(jobs, "a"), taken(jobs, "a", "c")] == ["a", "c", "d"]
+    assert taken(jobs, "a", "c", "d") is None
+    assert jobs.searches() == {"a": "fake", "b": "fake", "c": "punch"}
+    for runs in (["x", "y"], ["y", "z"]):
+        jobs.asked("a", runs, "1 of 1 searches ended")
+    assert (jobs.runs("a"), jobs.get("a").stage) == (["x", "y", "z"], "1 of 1 searches ended")
+    jobs.finish("a", StudyState.SUCCESSFUL, "")
+    assert taken(jobs, "c", "d") == "b"
+
+
+def test_a_search_without_the_service_is_found_when_it_starts(tmp_path: Path) -> None:
+    path, store = tmp_path / "jobs.sqlite", Store(tmp_path)
+    goal = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}
+    ended = Study.from_dict({"name": "ended", "scene": "fake", "goal": goal})
+    begun = Study.from_dict({"name": "begun", "scene": "fake", "goal": goal | {"at": 200.0}})
+    Jobs(path)
+    tried = search_here(ended, store)
+    search_here(begun, store, most=2)
+    for damaged in (False, True):
+        if damaged:
+            path.write_text("no queue" * 1000)
+        jobs = open_queue(path, store, None)
+        job = jobs.get(ended.id)
+        assert (job.state, job.stage) == (StudyState.SUCCESSFUL, "1 of 1 searches ended")
+        assert {*jobs.runs(ended.id)} == {*tried}
+        job = jobs.get(begun.id)
+        assert job.stage == "0 of 1 searches ended"
+        asked_for = StudyState.ACCEPTED if damaged else StudyState.FAILED
+        assert job.state is asked_for, "nobody posted it to the queue that was there"
 
 
 def test_a_queue_of_a_later_form_is_left_alone(tmp_path: Path) -> None:

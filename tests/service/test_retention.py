@@ -116,6 +116,25 @@ def test_runs_of_a_search_by_the_command_line_are_kept(place: Place, most: int) 
     assert place.runs() == {*tried, *(ids(other) if most == 3 else [])}
 
 
+def test_runs_that_a_search_of_the_queue_may_need_are_kept(place: Place) -> None:
+    goal = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}
+    search = Study.from_dict({"name": "goal", "scene": "fake", "goal": goal})
+    tried = search_here(search, place.store)
+    place.jobs.accept(search.id, search.to_dict(), [], most=search.size, stage=search.stage())
+    sweep = {"load_ratio": [place.store.run(each)["parameters"]["load_ratio"] for each in tried]}
+    shared = Study.from_dict({"name": "shared", "scene": "fake", "sweep": sweep})
+    place.jobs.accept(shared.id, shared.to_dict(), ids(shared))
+    place.jobs.finish(shared.id, StudyState.FAILED, "", standing=StudyState.ACCEPTED)
+    with pytest.raises(Conflict, match="a study searches in the scene of this run"):
+        place.keeper().delete_run(tried[0])
+    place.keeper().purge(shared.id)
+    assert place.runs() == {*tried}
+    place.jobs.asked(search.id, tried, search.stage(1))
+    place.jobs.finish(search.id, StudyState.SUCCESSFUL, "", standing=StudyState.ACCEPTED)
+    place.keeper().purge(search.id)
+    assert place.runs() == set()
+
+
 @pytest.mark.parametrize("end", ["accepted", "running", "stopping"])
 def test_what_is_at_work_is_not_deleted(place: Place, end: str) -> None:
     study = place.computed("busy", [0.1])

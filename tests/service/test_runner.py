@@ -25,9 +25,16 @@ from service.runner import SILENT, Runner
 from service.settings import Settings
 from tests.architecture.sources import ROOT
 
-RUN = {"kind": "event", "content": {"kind": "run", "progress": 0.5}}
+RUN = {"kind": "event", "content": {"kind": "run", "progress": 0.5, "stage": "", "run": "b"}}
 AWAY = {"kind": "wait", "content": {"reason": "the store is busy"}}
-ALL_FAILED = {"kind": "outcome", "content": {"error": 2}}
+
+
+def outcome(counts: dict[str, int], stage: str = "", asked: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return the last message of a child."""
+    return {"kind": "outcome", "content": {"counts": counts, "stage": stage, "asked": asked}}
+
+
+ALL_FAILED = outcome({"error": 2})
 GIBBERISH = "gibberish"
 ENDLESS = "x" * 1_100_000
 
@@ -93,7 +100,7 @@ def test_a_child_that_cannot_be_understood_brought_nothing(tmp_path: Path, line:
 
 def test_time_of_work_is_no_time_of_waiting(tmp_path: Path) -> None:
     """The first child computes for longer than the service is patient."""
-    script = [[RUN] * 3, [RUN], [AWAY], [{"kind": "outcome", "content": {"ok": 2}}]]
+    script = [[RUN] * 3, [RUN], [AWAY], [outcome({"ok": 2})]]
     job, orders = carried_out(tmp_path, *script, patience_seconds=1.0, poll_seconds=0.05)
     assert len(orders) == 4 and job.state is StudyState.SUCCESSFUL
 

@@ -11,9 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from fastapi.testclient import TestClient
 
-from studies import StudyError, open_study
-from tests.service.servers import Server, fake_study, wait_until
+from service.app import create_app
+from service.settings import Settings
+from solver.mesh.rail import rail_60e1
+from solver.mesh.section_mesh import SectionMesh
+from solver.mesh.zone import Zone, rail_mesh
+from studies import Study, StudyError, open_study
+from studies.definition.files import read_study
+from tests.architecture.sources import ROOT
+from tests.service.servers import NOWHERE, Server, fake_study, wait_until
 
 
 @pytest.fixture(scope="module")
@@ -296,13 +304,79 @@ def test_a_sample_is_answered_by_its_points_and_is_what_a_list_of_them_is(servic
     assert refused.json()["errors"][0]["field"] == "points[0].friction"
 
 
-def test_a_study_with_a_goal_is_refused(service: Server) -> None:
-    goal = {"find": "limit_load", "between": [0.25, 1.0]}
-    study = {"name": "goal", "scene": fake_study("goal")["scene"], "goal": goal}
-    for path in ("/studies", "/estimate"):
-        answer = service.client.post(path, json=study)
-        assert answer.status_code == 422
-        assert "is searched by `residua run`" in answer.json()["errors"][0]["allowed"]
+def test_a_goal_is_estimated_searched_and_answered(service: Server) -> None:
+    """Of the fake scene the largest plastic strain is the load ratio."""
+    goal = {"of": "max_plastic_strain", "at": 0.6, "between": [0.2, 1.0]}
+    tests = {"A": {"friction": 0.0}, "B": {"friction": 0.3, "hardening": "isotropic"}}
+    study = fake_study("goal") | {"goal": goal, "sweep": {"test": tests}}
+    most = service.client.post("/estimate", json=study).json()
+    study_id = service.post(study)
+    detail = service.finished(study_id)
+    assert (detail["status"], detail["message"]) == ("successful", "")
+    assert detail["stage"] == "2 of 2 searches ended"
+    assert detail["goal"] == {"parameter": "load_ratio", "within": 0.01, **goal}
+    assert detail["counts"] == {"ok": len(detail["runs"])}
+    assert 4 < len(detail["runs"]) <= detail["size"] == most["runs"] == most["to_compute"]
+    content = io.BytesIO(service.client.get(f"/studies/{study_id}/dataset.nc").content)
+    found = xr.load_dataset(content, engine="h5netcdf")
+    assert found.load_ratio.to_numpy().ravel() == pytest.approx([0.6, 0.6], rel=1e-9)
+    tried = found.sel(test="B").squeeze()
+    at = {run["id"]: run["at"] for run in detail["runs"]}
+    assert set(at) == {each for each in found.tried_run.to_numpy().ravel() if each}
+    for run, value in zip(tried.tried_run.values, tried.tried_load_ratio.values, strict=True):
+        if run:
+            assert at[run] == {"test": "B", "load_ratio": value}
+    page = service.client.get(f"/studies/{study_id}", params={"limit": 2, "offset": 1}).json()
+    assert page["runs"] == detail["runs"][1:3]
+
+
+def test_a_goal_that_is_not_reached_fails_with_the_reason(service: Server) -> None:
+    goal = {"of": "max_plastic_strain", "at": 5.0, "between": [0.2, 1.0]}
+    detail = service.finished(service.post(fake_study("far") | {"goal": goal, "sweep": {}}))
+    assert (detail["status"], detail["message"]) == ("failed", "1 of 1 searches: 1 missing")
+    assert detail["stage"] == "1 of 1 searches ended"
+
+
+def test_a_study_extends_one_that_is_known(service: Server, done: dict[str, Any]) -> None:
+    for named in (done["id"], fake_study("done")):
+        more = {"name": "more", "extends": named, "sweep": {"friction": [0.1]}}
+        study_id = service.post(more)
+    sweep = fake_study("more")["sweep"] | {"friction": [0.0, 0.1, 0.3]}
+    assert service.post(fake_study("more") | {"sweep": sweep}) == study_id
+    detail = service.finished(study_id)
+    assert detail["counts"] == {"ok": 6}
+    assert {run["id"] for run in done["runs"]} < {run["id"] for run in detail["runs"]}
+    refused = service.client.post("/studies", json={"name": "more", "extends": "0" * 32})
+    assert refused.json()["errors"][0]["field"] == "extends"
+
+
+def test_a_goal_has_the_same_id_everywhere(tmp_path: Path) -> None:
+    file = ROOT / "data" / "studies" / "limit-load.toml"
+    settings = Settings(data=tmp_path, scheduler=NOWHERE["RESIDUA_SCHEDULER"])
+    with TestClient(create_app(settings), base_url="http://localhost") as client:
+        posted = client.post("/studies", json=read_study(file)).json()
+        assert posted["stage"] == "0 of 1 searches ended"
+        refused = client.post("/studies", json=read_study(file) | {"goal": {"find": "peace"}})
+    study = Study.from_toml(file)
+    assert (posted["id"], posted["size"]) == (study.id, study.size)
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["field"] == "goal.find"
+
+
+def test_a_study_holds_the_mesh_of_a_rail(service: Server) -> None:
+    """It is data of the study as points are: no file is sent."""
+    mesh = SectionMesh.of(rail_mesh(rail_60e1(), Zone(at=0, half_width=20, depth=14, size=2.0)))
+    study = {
+        "name": "own-rail", "scene": "wheel_rail",
+        "parameters": {"accuracy": "draft", "rail_profile": mesh},
+    }  # fmt: skip
+    answer = service.client.post("/estimate", json=study)
+    assert answer.status_code == 200, answer.text
+    study["parameters"] = {"rail_profile": mesh._replace(foot=())}
+    refused = service.client.post("/estimate", json=study)
+    assert refused.status_code == 422
+    told = "must have a line foot of edges of elements, on the outside"
+    assert told in refused.json()["errors"][0]["allowed"]
 
 
 def test_studies_are_found_by_a_tag(service: Server) -> None:

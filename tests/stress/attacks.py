@@ -179,7 +179,7 @@ def attacks(server: Server, count: int = ATTACKS, seed: int = 7) -> list[Figure]
             attacked.go_on()
             attacked.post()
             stored = len(attacked.runs())
-            wait_until(lambda: len(attacked.runs()) > stored, 60.0)  # noqa: B023, called at once
+            wait_until(lambda: len(attacked.runs()) > stored, 300.0)  # noqa: B023, called at once
         attacked.attack()
         time.sleep(attacked.chance.uniform(0.2, 1.2))
         if number % 2:

@@ -97,6 +97,9 @@ def test_limits_and_starts_count_for_each_path() -> None:
     assert ticket.starts == 1
     ticket.walks("second")
     assert ticket.begun == ticket.heard
+    ticket.begun, ticket.starts = now - 6.0, 2
+    ticket.walks("second", anew=True)
+    assert (ticket.overdue(limits), ticket.starts) == ("", 1), "the next run of a search"
 
 
 def test_a_stopped_bundle_begins_no_other_path(store: Store, tmp_path: Path) -> None:

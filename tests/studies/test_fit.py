@@ -22,7 +22,7 @@ from residua.cli import main
 from solver.errors import ModelError
 from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, estimate, fit, open_study, run_study
-from studies.definition.fit import Answer, Fitting, certainty, checked_fit, standings
+from studies.definition.fit import Fitted, Fitting, certainty, checked_fit, standings
 from studies.definition.identity import solver_hash
 from studies.definition.measured import Line, checked_measured, pieces
 from studies.execution.asking import Asking
@@ -360,7 +360,7 @@ def test_deviations_that_are_not_told_are_those_of_the_differences() -> None:
     covariances = []
     for one in (told, free):
         off = 5.0 * one.sigma * np.where(np.arange(len(one.sigma)) % 2, 1.0, -1.0)
-        answer = Answer(np.array([380.0, 30.0]), np.array([0.5, 0.3]), one.values + off, jacobian)
+        answer = Fitted(np.array([380.0, 30.0]), np.array([0.5, 0.3]), one.values + off, jacobian)
         covariances.append(certainty(one, answer).covariance)
     count = len(told.values)
     assert covariances[1] == pytest.approx(covariances[0] * 25.0 * count / (count - 2))

@@ -306,13 +306,17 @@ def test_a_run_that_a_dead_worker_wrote_and_did_not_tell_is_kept(store: Store) -
         asked.problem, (first.path,), store.directory, solver_hash(), place=first.place
     )
     silent: list[Any] = []
+    before = time.time_ns() - 10**9
     walk(begun, silent.append, lambda: sum("row" in each for each in silent) > 0)
     low, *others = (each["row"] for each in silent if "row" in each)
+    assert all(("follows" in each) == ("row" in each) for each in silent)
     assert (low["parameters"]["load_ratio"], others) == (0.1, [])
-    work = _Work(asked, store, set(), Limits(), 0, lambda event: None, goals)
+    work = _Work(asked, store, set(), Limits(), 0, lambda event: None, goals, before)
     work._walking[first.path.id] = 0, 0.0
     work._close(begun, RuntimeError("the worker died"))
     assert store.run(low["id"]) == low
+    assert low["id"] in work.computed
+    assert len(work.computed) == 2
     (search,) = (place.program for place in goals.places)
     assert [row["status"] for row in search.rows.values()] == ["ok", "error"]
     assert search.reason == "failed"

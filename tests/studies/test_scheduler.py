@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import socket
 import subprocess
@@ -28,7 +29,7 @@ from studies import (
     StudyOutcome,
     run_study,
 )
-from studies.execution.cluster import connect
+from studies.execution.cluster import connect, own_workers
 from tests.studies.conftest import fake_study
 
 pytestmark = pytest.mark.processes
@@ -124,6 +125,30 @@ def test_a_running_scheduler_computes_the_study(cluster: tuple[str, Process], st
     outcome = answered(fake_study(), store, address, on_event=events.append)
     assert outcome.counts == {"ok": 4}
     assert len([event for event in events if event.kind == "run"]) == 4
+
+
+def test_a_goal_is_searched_by_workers_that_find_the_scheduler_by_a_file(tmp_path: Path) -> None:
+    file, store = tmp_path / "scheduler.json", Store(tmp_path / "out")
+    goal = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0], "within": 0.1}
+    study = Study.from_dict({"name": "goal", "scene": "fake", "goal": goal})
+    with own_workers(1) as access:
+        file.write_text(json.dumps({"type": "Scheduler", "address": access.address}))
+        found = Access.of_file(file, access.ca, access.cert, access.key)
+        assert found == access
+        outcome = run_study(study, store, scheduler=found)
+    assert outcome.counts == {"ok": 1}
+    assert {*outcome.computed} == {*outcome.asked}
+
+
+def test_a_file_without_a_scheduler_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("studies.execution.cluster._APPEARS", 0.1)
+    with pytest.raises(GridLost, match="no scheduler has written the file"):
+        Access.of_file(tmp_path / "none.json", None, None, None)
+    (tmp_path / "odd.json").write_text("[]")
+    with pytest.raises(StudyError, match=r"scheduler-file = .*must be a file that `dask"):
+        Access.of_file(tmp_path / "odd.json", None, None, None)
 
 
 def test_a_lost_scheduler_is_told_apart_from_failed_runs(

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solver.results.quantities import QUANTITIES
-from studies.views.plots.captions import capitalised, value_text, words
+from studies.views.plots.captions import capitalised, words
 
 _PANEL = (4.6, 4.4)
 """Width and height of a line with its differences [in]."""
@@ -69,7 +69,9 @@ def _named(name: str) -> str:
 
 def _sure(dataset: xr.Dataset, name: str) -> str:
     """Return the value of a parameter and its standard deviation."""
-    return f"{value_text(dataset[name])} ± {dataset[f'{name}_sigma'].item():.2g}"
+    value, sigma = dataset[name].item(), dataset[f"{name}_sigma"].item()
+    unit = dataset[name].attrs.get("units", "1")
+    return f"{value:.4g} ± {sigma:.2g}" + ("" if unit == "1" else f" {unit}")
 
 
 def _plain(axes: Axes) -> None:

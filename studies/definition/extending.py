@@ -1,0 +1,147 @@
+"""A study that extends another one: it keeps the runs of that one, and adds values or points.
+
+An axis gets the values or labels that it did not have. A parameter that did not vary becomes an
+axis, which has the value that it had. Points are added behind those that are there; if there are
+none, the runs of the other study become the first points. What results is an ordinary study: it has
+the id that it has if it is written in full.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from studies.definition.identity import canonical
+from studies.definition.parameters import Parameter
+from studies.definition.points import MOST_POINTS, field_of, is_points, with_points
+from studies.definition.sweep import Axes, checked_axes, owners, positions
+from studies.errors import StudyError
+from studies.toml import CASE
+
+EXTENDS = "extends"
+"""Entry of a study that names the one that it extends."""
+
+SCHEMA = {
+    "type": ["string", "object"],
+    "description": "name, id or content of a study whose runs are kept; the axes and points add to "
+    "them",
+}
+"""JSON Schema of the entry."""
+
+
+class Extended(NamedTuple):
+    """The study that is extended.
+
+    Attributes
+    ----------
+    name, scene, parameters, sweep, goal : as those of `Study`
+    fixed : all parameters that are not swept
+    """
+
+    name: str
+    scene: str
+    parameters: Mapping[str, Any]
+    sweep: Axes
+    goal: Mapping[str, Any]
+    fixed: Mapping[str, Any]
+
+
+def extended(content: Mapping[str, Any], base: Extended, known: Mapping[str, Parameter]) -> Any:
+    """Return the content of a study that has the runs of `base` and those that it adds.
+
+    Parameters
+    ----------
+    content : of the study, with `EXTENDS`
+    base : the study that is extended
+    known : the parameters of its scene
+
+    Raises
+    ------
+    StudyError
+        if the study changes a parameter of `base`, adds nothing, or adds what does not fit
+    """
+    if parameters := content.get("parameters"):
+        allowed = "are those of the study that is extended: what shall vary goes to the sweep"
+        raise StudyError("parameters", parameters, allowed)
+    added = checked_axes(with_points(content, known), known)
+    if not added:
+        raise StudyError(EXTENDS, base.name, "nothing is added: give axes, points or a sample")
+    rest = {key: value for key, value in content.items() if key not in _ADDED}
+    goal = {"goal": base.goal} if base.goal else {}
+    axes = _with_points(base, added) if any(map(is_points, added.values())) else dict(base.sweep)
+    for name, axis in added.items():
+        if not is_points(axis):
+            axes[name] = _longer(name, axis, base)
+    fixed = {key: value for key, value in base.parameters.items() if key not in owners(axes)}
+    return goal | rest | {"scene": base.scene, "parameters": fixed, "sweep": axes}
+
+
+_ADDED = (EXTENDS, "points", "sample", "sweep", "parameters", "scene")
+
+
+def _longer(name: str, axis: list[Any] | dict[str, Any], base: Extended) -> Any:
+    """Return an axis of `base` with the values or labels that it did not have."""
+    field, before = f"sweep.{name}", base.sweep.get(name)
+    if isinstance(axis, dict):
+        if not isinstance(before, dict):
+            allowed = f"must be an axis of labels of {base.name}, which is extended; or points"
+            raise StudyError(field, axis, allowed)
+        for label in axis.keys() & before.keys():
+            if any(before[label].get(key, value) != value for key, value in axis[label].items()):
+                allowed = f"is a label of {base.name}, which is extended: use another one"
+                raise StudyError(f"{field}.{label}", axis[label], allowed)
+        return before | {label: axis[label] for label in axis if label not in before}
+    if before is None:
+        if (other := owners(base.sweep).get(name)) is not None:
+            allowed = f"is set by {other} of {base.name}, which is extended: add to {other}"
+            raise StudyError(field, axis, allowed)
+        before = [base.fixed[name]] if name in base.fixed else []  # of a goal it is no parameter
+    assert isinstance(before, list)
+    seen = {canonical(value) for value in before}
+    values = [*before, *(value for value in axis if canonical(value) not in seen)]
+    rising = all(isinstance(each, int | float) for each in values) and before == sorted(before)
+    return sorted(values) if rising else values
+
+
+def _with_points(base: Extended, added: Axes) -> dict[str, Any]:
+    """Return the axes of `base` with more points; its runs become points if it has none."""
+    (name, more), *others = [(name, axis) for name, axis in added.items() if is_points(axis)]
+    if others:
+        allowed = "is a second set of points: add one of them, then extend the study again"
+        raise _refused(others[0][0], others[0][1], allowed)
+    axes, theirs = dict(base.sweep), f"{base.name}, which is extended,"
+    own = next((key for key, axis in axes.items() if is_points(axis)), None)
+    if own is not None and own != name:
+        raise _refused(name, more, f"{theirs} has its points in {own}: add to these")
+    kept = {name: axes.pop(name)} if own else axes
+    if math.prod(map(len, kept.values())) > MOST_POINTS:
+        raise _refused(name, more, f"{theirs} has more than {MOST_POINTS} runs")
+    every = [list(positions(axis, values)) for axis, values in kept.items()]
+    points = [
+        {key: v for at in run for key, v in at.sets.items()} for run in itertools.product(*every)
+    ]
+    axes = axes if own else {}
+    for key in more[0].keys() & owners(axes).keys():
+        raise _refused(name, more, f"{key} is swept by {owners(axes)[key]} of {theirs} too")
+    if missing := points[0].keys() - more[0].keys():
+        listed = ", ".join(sorted(missing))
+        raise _refused(name, more, f"must set {listed}, which {base.name} sweeps")
+    usual = {key: base.fixed[key] for key in more[0] if key in base.fixed}
+    there = [{**usual, **each} for each in points]
+    if own and (cases := [at.case for at in every[0] if at.case]):
+        there = [{CASE: case, **each} for case, each in zip(cases, there, strict=True)]
+    elif CASE in more[0]:
+        there = [{CASE: f"{base.name}-{k}", **each} for k, each in enumerate(there)]
+    seen = {canonical(_set(each)) for each in there}
+    return {name: [*there, *(each for each in more if canonical(_set(each)) not in seen)], **axes}
+
+
+def _set(point: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parameters that a point sets, in order of their names."""
+    return {key: point[key] for key in sorted(point) if key != CASE}
+
+
+def _refused(name: str, points: Any, allowed: str) -> StudyError:
+    return StudyError(field_of(name), f"{len(points)} points", allowed)

@@ -1,0 +1,236 @@
+"""Compute a part of a study: one process of many, which meet in the directory alone.
+
+Each process goes through all loading paths of the study, or all searches of its goal, from a place
+of its own, and computes those that lack runs and that it can claim (`studies.storage.claims`). It
+ends when nothing is left that it can claim. What one that was killed has left is claimed by another
+one, or computed by `run_study` at the end, which combines the runs.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from studies.definition.cases import LoadingPath
+from studies.definition.identity import solver_hash
+from studies.definition.study import Study
+from studies.errors import StudyError
+from studies.execution.asking import Asking
+from studies.execution.run import StudyEvent
+from studies.execution.task import PathTask, walk
+from studies.scratch import scratch
+from studies.storage.catalogue import Catalogue
+from studies.storage.claims import Claims
+from studies.storage.store import Store
+
+_MOST_DEATHS = 2
+"""Number of processes that died with a path, after which it is blamed and not tried again."""
+_LOOK = 2.0
+"""Seconds after which the files of runs are listed again."""
+_DIED = (
+    "the processes that computed this loading path died; if memory ran out, give each more, or "
+    "more time if a limit of the cluster ended them"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartOutcome:
+    """What a part has done.
+
+    Attributes
+    ----------
+    computed : ids of the runs that it has computed
+    left : number of loading paths, or of searches, that lack runs at its end: others have claimed
+        them, or it was stopped
+    stopped : whether it was stopped
+    """
+
+    computed: list[str]
+    left: int
+    stopped: bool
+
+
+def run_part(
+    study: Study,
+    directory: Any,
+    part: tuple[int, int],
+    *,
+    on_event: Callable[[StudyEvent], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> PartOutcome:
+    """Compute runs of `study` that a directory lacks, as one of several processes.
+
+    Stored runs are not computed again, also those that failed. Nothing is combined: `run_study`
+    does this at the end.
+
+    Parameters
+    ----------
+    study : the study
+    directory : the directory of the store, which all processes see
+    part : number of this process, from 1 on, and the number of processes
+    on_event : called with every event
+    should_stop : called several times a second; if it returns true the work stops
+
+    Raises
+    ------
+    StoreBusy
+        if a process that is no part computes into the directory
+    StudyError
+        if the part is none, or the directory is not writable
+    StoreFull
+        if the disk is full
+    """
+    number, count = part
+    if not 1 <= number <= count:
+        raise StudyError("part", f"{number}/{count}", "must be i/n with 1 <= i <= n")
+    if study.asks and not study.goal:
+        allowed = "parts cannot share this study, which chooses its runs: use a scheduler"
+        raise StudyError("part", f"{number}/{count}", allowed)
+    with scratch() as folder:
+        store = Store(directory)
+        # SQLite is not made for directories that machines share
+        store.catalogue = Catalogue(folder / "catalogue.sqlite")
+        with store.sharing():
+            store.save_study(study)
+            emit = on_event or (lambda event: None)
+            work = _PartWork(study, store, emit, should_stop or (lambda: False))
+            return work.done((number - 1) / count)
+
+
+@dataclass(slots=True)
+class _PartWork:
+    """The work of one process."""
+
+    study: Study
+    store: Store
+    emit: Callable[[StudyEvent], None]
+    stop: Callable[[], bool]
+    computed: list[str] = field(default_factory=list)
+    _there: set[str] = field(default_factory=set)
+    _looked: float = -1e9
+    _share: float = 0.0
+
+    def done(self, begin: float) -> PartOutcome:
+        """Go through all units, from a place between 0 and 1 on, until none can be claimed."""
+        claims = Claims(self.store.directory / "claims")
+        units = self._units()
+        first = round(begin * len(units))
+        left, count, claimed = units[first:] + units[:first], len(units), True
+        while claimed and left and not self.stop():
+            claimed = False
+            waiting: list[_PathUnit | _SearchUnit] = []
+            for at, unit in enumerate(left):
+                self._share = 1.0 - (len(left) - at + len(waiting)) / count
+                if self.stop():
+                    waiting += left[at:]
+                    break
+                if self._complete(unit):
+                    continue
+                with claims.held(unit.name) as claim:
+                    if claim is None:
+                        waiting.append(unit)
+                        continue
+                    claimed = True
+                    unit.compute(self, claim.deaths >= _MOST_DEATHS)
+                    claim.done = not self.stop()
+                    if not claim.done:
+                        waiting.append(unit)
+            left = waiting
+        return PartOutcome(computed=self.computed, left=len(left), stopped=self.stop())
+
+    def _units(self) -> list[_PathUnit | _SearchUnit]:
+        if self.study.asks:
+            return [_SearchUnit(case.id, k) for k, case in enumerate(self.study.cases())]
+        return [_PathUnit(path.id, path) for path in self.study.paths()]
+
+    def _complete(self, unit: _PathUnit | _SearchUnit) -> bool:
+        """Whether the runs of a unit were there when the files were listed last."""
+        if time.monotonic() - self._looked > _LOOK:
+            with os.scandir(self.store.directory / "runs") as files:
+                self._there = {each.name.removesuffix(".nc") for each in files}
+            self._looked = time.monotonic()
+        return isinstance(unit, _PathUnit) and all(
+            case.id in self._there for case in unit.path.cases
+        )
+
+    def walk(self, task: PathTask, hear: Callable[[str, dict[str, Any]], str]) -> None:
+        """Compute the runs of a task."""
+
+        def report(content: dict[str, Any]) -> None:
+            path = content["path"]
+            if "row" not in content:
+                self._tell("path", path=path, fraction=content["fraction"])
+                return
+            row = content["row"]
+            place = hear(path, row)
+            self.computed.append(row["id"])
+            self._tell(
+                "run", path=path, run=row["id"], status=self.study.taken(row["status"]),
+                message=row["message"], place=place,
+            )  # fmt: skip
+
+        walk(task, report, self.stop)
+
+    def task(self, path: LoadingPath, **more: Any) -> PathTask:
+        """Return the task of a loading path."""
+        directory = self.store.directory.resolve()
+        return PathTask(
+            self.study.problem, (path,), directory, solver_hash(), self.study.keep, **more
+        )
+
+    def _tell(self, kind: str, **content: Any) -> None:
+        self.emit(StudyEvent(kind=kind, progress=self._share, **content))
+
+
+@dataclass(frozen=True, slots=True)
+class _PathUnit:
+    """A loading path of a sweep."""
+
+    name: str
+    path: LoadingPath
+
+    def compute(self, part: _PartWork, hopeless: bool) -> None:
+        """Compute its runs that are not there; or store that those who tried have died."""
+        cases = tuple(case for case in self.path.cases if not part.store.run_path(case.id).exists())
+        if hopeless:
+            for case in cases:
+                part.store.write_run(case, _DIED)
+        elif cases:
+            path = LoadingPath(self.path.id, self.path.parameters, cases)
+            part.walk(part.task(path), lambda path, row: "")
+
+
+@dataclass(frozen=True, slots=True)
+class _SearchUnit:
+    """The search at one place of the axes of a study with a goal."""
+
+    name: str
+    number: int
+
+    def compute(self, part: _PartWork, hopeless: bool) -> None:
+        """Search to the end; or store that those who tried have died."""
+        asking = Asking(part.study, part.store, resume=True, only=self.number)
+
+        def hear(path: str, row: dict[str, Any]) -> str:
+            place = asking.about(path, row)
+            asking.heard(path, row)
+            return place
+
+        for asked in self._asked(asking, part):
+            if hopeless:
+                owed = asking.owed(asked.path.id) or asked.path.cases[0]
+                part.store.write_run(owed, _DIED)
+                hopeless = False
+            else:
+                part.walk(part.task(asked.path, limit=asked.limit, place=asked.place), hear)
+            asking.closed(asked.path.id)
+
+    @staticmethod
+    def _asked(asking: Asking, part: _PartWork) -> Iterator[Any]:
+        for asked in asking.paths():
+            if asked is None or part.stop():
+                return
+            yield asked

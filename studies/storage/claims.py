@@ -1,0 +1,153 @@
+"""Claims of processes that compute in one directory, on whichever machines, without talking.
+
+A claim is a file ``claims/<name>.<deaths>``. It appears at once, with its content, by a hard link,
+which fails if there is one; so one process has it. Its owner holds a lock on it, and changes its
+time now and then. A claim is dead if its lock is free, for processes of the same machine; for those
+of another one, whose locks may not be seen, if its time is too old. The next number is then
+claimed: that of a dead claim is never used again, so that two processes that find it dead cannot
+both take it over.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import threading
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+BEAT = 20.0
+"""Seconds after which an owner changes the time of its claim."""
+STALE = 300.0
+"""Age of a claim of another machine at which it is dead [s]."""
+
+
+@dataclass(slots=True)
+class Claim:
+    """A claim that this process has.
+
+    Attributes
+    ----------
+    deaths : number of owners that have died with it
+    done : whether nothing is left to do: then the file stays, for machines that do not see yet what
+        was done, as those that keep for a while what they know of a directory
+    """
+
+    deaths: int
+    done: bool = False
+
+
+class Claims:
+    """The claims in a directory.
+
+    Parameters
+    ----------
+    directory : the directory; made if it is missing
+    stale : age of a claim of another machine at which it is dead [s]
+    """
+
+    def __init__(self, directory: Path, stale: float = STALE) -> None:
+        self._directory, self._stale = directory, stale
+        directory.mkdir(parents=True, exist_ok=True)
+
+    @contextmanager
+    def held(self, name: str) -> Iterator[Claim | None]:
+        """Claim a name, until the end of the context; None if another owner may be alive."""
+        deaths, own = 0, self._own()
+        try:
+            while self._path(name, deaths + 1).exists():
+                deaths += 1
+            while not self._linked(own, self._path(name, deaths)):
+                if not self._dead(self._path(name, deaths)):
+                    yield None
+                    return
+                deaths += 1
+            claim = Claim(deaths)
+            try:
+                with _beating(own):
+                    yield claim
+            finally:
+                for number in range(0 if claim.done else deaths + 1):
+                    self._path(name, number).unlink(missing_ok=True)
+        finally:
+            own.unlink(missing_ok=True)
+            os.close(self._descriptor)
+
+    def _own(self) -> Path:
+        """Make the file that will be the claim, and lock it."""
+        path = self._directory / f"{uuid.uuid4().hex}.own"
+        self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+        fcntl.flock(self._descriptor, fcntl.LOCK_EX)
+        text = json.dumps({"machine": _machine(), "process": os.getpid()})
+        os.write(self._descriptor, text.encode())
+        return path
+
+    def _path(self, name: str, deaths: int) -> Path:
+        return self._directory / f"{name}.{deaths}"
+
+    @staticmethod
+    def _linked(own: Path, claim: Path) -> bool:
+        try:
+            os.link(own, claim)
+        except FileExistsError:
+            return False
+        return True
+
+    def _dead(self, claim: Path) -> bool:
+        """Whether the owner of a claim has died; a claim that is gone is none that died."""
+        try:
+            with claim.open("rb") as file:
+                if json.loads(file.read())["machine"] == _machine():
+                    return _free(file.fileno())
+                age = self._now() - os.fstat(file.fileno()).st_mtime
+                return age > self._stale
+        except FileNotFoundError:
+            return False
+        except (ValueError, LookupError, TypeError):  # no claim of ours
+            return True
+
+    def _now(self) -> float:
+        """Return the time of the file system, which alone is that of all machines."""
+        os.utime(self._descriptor)
+        return os.fstat(self._descriptor).st_mtime
+
+
+def _free(descriptor: int) -> bool:
+    """Whether nobody holds a lock on a file."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+@contextmanager
+def _beating(path: Path) -> Iterator[None]:
+    """Change the time of a file now and then."""
+    ending = threading.Event()
+
+    def beat() -> None:
+        while not ending.wait(BEAT):
+            with suppress(OSError):  # such as a file server that is away for a moment
+                os.utime(path)
+
+    thread = threading.Thread(target=beat, name="claim", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ending.set()
+        thread.join()
+
+
+@cache
+def _machine() -> str:
+    """Return what tells this machine from others: its name alone may be that of all."""
+    with suppress(OSError):
+        return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+    return f"{os.uname().nodename}-{os.getpid()}"  # its locks are not trusted

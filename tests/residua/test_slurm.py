@@ -1,0 +1,44 @@
+"""Scripts for sbatch."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from residua.cli import main
+from tests.studies.conftest import write_study
+
+
+@pytest.mark.processes
+def test_a_script_has_the_tasks_and_is_one_for_the_shell(tmp_path: Path) -> None:
+    study, out, file = write_study(tmp_path), tmp_path / "o ut", tmp_path / "job.sbatch"
+    command = ["slurm", str(study), "--out", str(out), "--script", str(file), "--tasks", "8"]
+    for more, words in (
+        (
+            [],
+            [
+                "--array=1-8",
+                f"--out '{out}' --part \"$SLURM_ARRAY_TASK_ID/8\"",
+                "OMP_NUM_THREADS=1",
+            ],
+        ),
+        (["--with-scheduler"], ["--ntasks=8", "--scheduler-file", "DASK_DISTRIBUTED__COMM__TLS__"]),
+    ):
+        assert main([*command, *more]) == 0
+        text = file.read_text()
+        assert text.startswith("#!/bin/sh\n#SBATCH --job-name=fake\n")
+        assert all(word in text for word in words)
+        subprocess.run(["sh", "-n", str(file)], check=True)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("option", [["--time", "soon"], ["--memory", "2 GB"]])
+def test_what_sbatch_does_not_take_is_refused(
+    tmp_path: Path, option: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    study, file = write_study(tmp_path), tmp_path / "job.sbatch"
+    assert main(["slurm", str(study), "--script", str(file), *option]) == 2
+    assert f"{option[0]} = {option[1]!r}: must be" in capsys.readouterr().err
+    assert not file.exists()
