@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver import LimitLoad, Model, PathControl, Solution, solve
+from solver import LimitLoad, Model, ModelError, PathControl, Solution, solve
 from solver.materials import Elasticity, TrescaMaterial, Voce
 from solver.model.body import Body
 from solver.model.loads import BodyForce, Centrifugal, Gravity, Pressure, Traction
@@ -159,3 +160,16 @@ def test_a_pressure_may_be_a_function_of_position() -> None:
         assert solution.audit().passed
     assert np.allclose(*found, rtol=0, atol=1e-9)
     assert np.ptp(found[0][0]) > 20.0
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"axis": "x"}, "centrifugal.axis = 'x': must be y or z"),
+        ({"centre": (1.0, 2.0, 3.0)}, "centrifugal.centre = .*: must be two numbers"),
+    ],
+)
+def test_an_axis_that_is_none_is_refused(given: dict[str, Any], told: str) -> None:
+    with pytest.raises(ModelError, match=told):
+        sector(np.linspace(INNER, OUTER, 3), 2, kinematics="plane_stress", material=steel(),
+               loads=(Centrifugal(density=DENSITY, speed=1.0, **given),))  # fmt: skip
