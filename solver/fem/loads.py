@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 _DEGREE = 7
 """Polynomial degree up to which forces per volume are integrated exactly, and tractions on straight
 edges."""
+_PIECES = 64
+"""Parts of an edge over which tractions are integrated: the ends of an ellipse bend steeply."""
 _SAME = 1e-9
 """Ratio of a difference to the larger of two prescribed values; below it they are equal."""
 
@@ -72,7 +74,7 @@ def nodal_forces(part: Nodes) -> Superposed:
     """Return the nodal forces (n,) of the loads on a body [N]."""
     each: list[tuple[Load, Array]] = []
     for load in part.body.every_load:
-        own = [_tractions(part, b, load.push, (_DEGREE + 1) // 2) for b in load.boundaries]
+        own = [_tractions(part, b, load.push, (_DEGREE + 1) // 2, _PIECES) for b in load.boundaries]
         own.append(_body_forces(part, load))
         given = [force for force in own if force is not None]
         if given:
@@ -85,7 +87,7 @@ def _body_forces(part: Nodes, load: Load) -> Array | None:
 
     They are integrated with more points than the stress.
     """
-    if load.body_force(part.X) is None:
+    if load.body_force(part.X[:, :0]) is None:
         return None
     basis = CellBasis(part.body.mesh, part.basis.elem, intorder=_DEGREE)
     x = np.asarray(basis.global_coordinates())
@@ -222,23 +224,32 @@ def travelling_forces(part: Nodes, travelling: TravellingPressure, time: float) 
     return np.zeros(part.n) if force is None else force
 
 
-def _tractions(part: Nodes, boundary: str, push: Push, points: int) -> Array | None:
+def _tractions(
+    part: Nodes, boundary: str, push: Push, points: int, pieces: int = 1
+) -> Array | None:
     """Return the nodal forces (n,) of a traction [N]; None if ``push`` returns None.
 
-    ``push`` takes positions (2, n) and tangents (2, n), which have the body on their left, and
-    returns the force per area times the length of the tangent (2, n).
+    Parameters
+    ----------
+    push : takes positions (2, n) and tangents (2, n), which have the body on their left, and
+        returns the force per area times the length of the tangent (2, n)
+    points, pieces : Gauss points of each of the equal pieces of an edge
     """
     edges = edges_of(part, boundary)
     X, edges = part.X[:, edges], part.same[edges]
+    at, weights = np.polynomial.legendre.leggauss(points)
+    middles = (2 * np.arange(pieces) + 1) / pieces - 1
+    xi, weights = (middles[:, None] + at / pieces).ravel(), np.tile(weights / pieces, pieces)
+    N = shape_functions(xi, edges.shape[1])
+    x, t = (
+        (X @ each.T).reshape(2, -1) for each in (N, shape_derivatives(xi, edges.shape[1]))
+    )
+    given = push(x, t)
+    if given is None:
+        return None
+    pushed = checked(f"push on {boundary}", given, t.shape, "N/mm") * part.measure(x)
+    nodal = (pushed.reshape(2, len(edges), -1) * weights) @ N
     force = np.zeros((2, part.X.shape[1]))
-    for xi, weight in zip(*np.polynomial.legendre.leggauss(points), strict=True):
-        N = shape_functions(np.array(xi), edges.shape[1])
-        x, t = X @ N, X @ shape_derivatives(np.array(xi), edges.shape[1])
-        given = push(x, t)
-        if given is None:
-            return None
-        pushed = weight * checked(f"push on {boundary}", given, t.shape, "N/mm") * part.measure(x)
-        for k, value in enumerate(N):
-            for component in (0, 1):
-                np.add.at(force[component], edges[:, k], pushed[component] * value)
+    for component in (0, 1):
+        np.add.at(force[component], edges, nodal[component])
     return np.asarray(force.T.ravel())

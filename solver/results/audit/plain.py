@@ -33,8 +33,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-_CHORDS = 64
-"""Number of chords into which an edge is divided."""
+_CHORDS, _GAUSS = 256, 3**-0.5
+"""Number of chords into which an edge is divided; Gauss points of each on [-1, 1], plus and minus:
+a load may have no value at the ends of edges."""
 _VOLUME_DEGREE = 10
 """Polynomial degree up to which forces per volume are integrated exactly."""
 
@@ -232,17 +233,17 @@ class PlainBody:
         return np.asarray(np.vstack([np.ones_like(arm[:1]), arm]) @ force.T)
 
     def _on_boundary(self, load: Load, boundary: str) -> Array:
-        """Return the moments (3, 2) of the forces on a boundary, by Simpson's rule on chords."""
+        """Return the moments (3, 2) of the forces on a boundary, by Gauss's rule on chords."""
         edges = self.part.X[:, edges_of(self.part, boundary)]
-        places = np.linspace(-1.0, 1.0, 1 + 2 * _CHORDS)
-        points = edges @ shape_functions(places, edges.shape[-1]).T
-        along = (points[..., 2::2] - points[..., :-2:2]).reshape(2, -1)
+        ends = np.linspace(-1.0, 1.0, 1 + _CHORDS)
+        middles = (ends[1:] + ends[:-1]) / 2
+        along = np.diff(edges @ shape_functions(ends, edges.shape[-1]).T).reshape(2, -1)
         total = np.zeros((3, 2))
-        for first, share in ((0, 1 / 6), (1, 2 / 3), (2, 1 / 6)):
-            x = points[..., first : first + 2 * _CHORDS - 1 : 2].reshape(2, -1)
+        for place in (middles - _GAUSS / _CHORDS, middles + _GAUSS / _CHORDS):
+            x = (edges @ shape_functions(place, edges.shape[-1]).T).reshape(2, -1)
             force = load.push(x, along)
             if force is not None:
-                total += share * self.moments(self._depth(x) * np.broadcast_to(force, x.shape), x)
+                total += self.moments(self._depth(x) * np.broadcast_to(force, x.shape), x) / 2
         return total
 
     def _on_volume(self, load: Load) -> Array:
