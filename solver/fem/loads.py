@@ -241,9 +241,7 @@ def _tractions(
     middles = (2 * np.arange(pieces) + 1) / pieces - 1
     xi, weights = (middles[:, None] + at / pieces).ravel(), np.tile(weights / pieces, pieces)
     N = shape_functions(xi, edges.shape[1])
-    x, t = (
-        (X @ each.T).reshape(2, -1) for each in (N, shape_derivatives(xi, edges.shape[1]))
-    )
+    x, t = ((X @ each.T).reshape(2, -1) for each in (N, shape_derivatives(xi, edges.shape[1])))
     given = push(x, t)
     if given is None:
         return None

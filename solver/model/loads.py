@@ -233,7 +233,7 @@ class Centrifugal(Load):
         _density("centrifugal", self.density)
         _finite("centrifugal.speed", self.speed, "rad/s")
         if self.axis not in get_args(Axis):
-            raise ModelError("centrifugal.axis", self.axis, f"must be {' or '.join(get_args(Axis))}")
+            raise ModelError("centrifugal.axis", self.axis, "must be y or z")
         if np.shape(self.centre) != (2,):
             raise ModelError("centrifugal.centre", self.centre, "must be two numbers [mm]")
         for value in self.centre:
