@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.integrate import quad_vec
 from skfem import CellBasis
 
 from solver.errors import ModelError
@@ -27,10 +28,10 @@ if TYPE_CHECKING:
     Push = Callable[[Array, Array], Array | None]
 
 _DEGREE = 7
-"""Polynomial degree up to which forces per volume are integrated exactly, and tractions on straight
-edges."""
-_PIECES = 64
-"""Parts of an edge over which tractions are integrated: the ends of an ellipse bend steeply."""
+"""Polynomial degree up to which forces per volume are integrated exactly."""
+_ACCURATE, _MOST = 1e-7, 1000
+"""Error of the nodal forces of tractions, over the largest, and largest number of parts into which
+edges are divided for it: a traction may bend and jump."""
 _SAME = 1e-9
 """Ratio of a difference to the larger of two prescribed values; below it they are equal."""
 
@@ -74,7 +75,7 @@ def nodal_forces(part: Nodes) -> Superposed:
     """Return the nodal forces (n,) of the loads on a body [N]."""
     each: list[tuple[Load, Array]] = []
     for load in part.body.every_load:
-        own = [_tractions(part, b, load.push, (_DEGREE + 1) // 2, _PIECES) for b in load.boundaries]
+        own = [_tractions(part, b, load.push) for b in load.boundaries]
         own.append(_body_forces(part, load))
         given = [force for force in own if force is not None]
         if given:
@@ -224,29 +225,35 @@ def travelling_forces(part: Nodes, travelling: TravellingPressure, time: float) 
     return np.zeros(part.n) if force is None else force
 
 
-def _tractions(
-    part: Nodes, boundary: str, push: Push, points: int, pieces: int = 1
-) -> Array | None:
+def _tractions(part: Nodes, boundary: str, push: Push, points: int = 0) -> Array | None:
     """Return the nodal forces (n,) of a traction [N]; None if ``push`` returns None.
 
     Parameters
     ----------
     push : takes positions (2, n) and tangents (2, n), which have the body on their left, and
         returns the force per area times the length of the tangent (2, n)
-    points, pieces : Gauss points of each of the equal pieces of an edge
+    points : Gauss points of each edge; 0 for as many as are needed
     """
     edges = edges_of(part, boundary)
     X, edges = part.X[:, edges], part.same[edges]
-    at, weights = np.polynomial.legendre.leggauss(points)
-    middles = (2 * np.arange(pieces) + 1) / pieces - 1
-    xi, weights = (middles[:, None] + at / pieces).ravel(), np.tile(weights / pieces, pieces)
-    N = shape_functions(xi, edges.shape[1])
-    x, t = ((X @ each.T).reshape(2, -1) for each in (N, shape_derivatives(xi, edges.shape[1])))
-    given = push(x, t)
-    if given is None:
+
+    def pushed(xi: float) -> Array | None:
+        """Return the forces (2, n_edges, n_nodes) of edges at a place on them."""
+        N = shape_functions(np.array(xi), edges.shape[1])
+        x, t = X @ N, X @ shape_derivatives(np.array(xi), edges.shape[1])
+        given = push(x, t)
+        if given is None:
+            return None
+        given = checked(f"push on {boundary}", given, t.shape, "N/mm") * part.measure(x)
+        return np.asarray(given[..., None] * N)
+
+    if pushed(0.0) is None:
         return None
-    pushed = checked(f"push on {boundary}", given, t.shape, "N/mm") * part.measure(x)
-    nodal = (pushed.reshape(2, len(edges), -1) * weights) @ N
+    if points:
+        each = zip(*np.polynomial.legendre.leggauss(points), strict=True)
+        nodal = sum(weight * pushed(xi) for xi, weight in each)
+    else:
+        nodal, _ = quad_vec(pushed, -1.0, 1.0, epsrel=_ACCURATE, norm="max", limit=_MOST)
     force = np.zeros((2, part.X.shape[1]))
     for component in (0, 1):
         np.add.at(force[component], edges, nodal[component])

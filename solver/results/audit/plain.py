@@ -33,9 +33,13 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-_CHORDS, _GAUSS = 256, 3**-0.5
-"""Number of chords into which an edge is divided; Gauss points of each on [-1, 1], plus and minus:
-a load may have no value at the ends of edges."""
+_CHORDS, _HALVINGS, _BENT = 64, 40, 1e-7
+"""Number of chords into which an edge is divided, and of times that chords are halved on which the
+mean force at the middle, or at the ends, is not that at the Gauss points, to this share of the whole
+force: loads may bend and jump."""
+_GAUSS = (0.5 - 0.75**0.5 / 3, 0.5 + 0.75**0.5 / 3)
+_INSIDE = (0.5, 1e-6, 1 - 1e-6)
+"""Gauss points of a chord; its middle, and its ends, where neighbours may have other loads."""
 _VOLUME_DEGREE = 10
 """Polynomial degree up to which forces per volume are integrated exactly."""
 
@@ -235,15 +239,35 @@ class PlainBody:
     def _on_boundary(self, load: Load, boundary: str) -> Array:
         """Return the moments (3, 2) of the forces on a boundary, by Gauss's rule on chords."""
         edges = self.part.X[:, edges_of(self.part, boundary)]
-        ends = np.linspace(-1.0, 1.0, 1 + _CHORDS)
-        middles = (ends[1:] + ends[:-1]) / 2
-        along = np.diff(edges @ shape_functions(ends, edges.shape[-1]).T).reshape(2, -1)
-        total = np.zeros((3, 2))
-        for place in (middles - _GAUSS / _CHORDS, middles + _GAUSS / _CHORDS):
-            x = (edges @ shape_functions(place, edges.shape[-1]).T).reshape(2, -1)
-            force = load.push(x, along)
-            if force is not None:
-                total += self.moments(self._depth(x) * np.broadcast_to(force, x.shape), x) / 2
+        row = np.repeat(np.arange(edges.shape[1]), _CHORDS)
+        start, width = (
+            np.tile(np.linspace(-1.0, 1.0, _CHORDS + 1)[:-1], edges.shape[1]),
+            2 / _CHORDS,
+        )
+        total, whole = np.zeros((3, 2)), 0.0
+        for left in reversed(range(_HALVINGS)):
+
+            def at(share: float) -> Array:
+                shapes = shape_functions(start + share * width, edges.shape[-1])  # noqa: B023
+                return np.asarray((edges[:, row] * shapes).sum(axis=-1))  # noqa: B023
+
+            along, forces = at(1.0) - at(0.0), []
+            for x in map(at, (*_GAUSS, *_INSIDE)):
+                force = load.push(x, along)
+                if force is None:
+                    return total
+                forces.append(self._depth(x) * np.broadcast_to(force, x.shape))
+            first, last, middle, one, other = forces
+            mean = (first + last) / 2
+            bent = np.abs([mean - middle, mean - (one + other) / 2]).max(axis=(0, 1))
+            whole = whole or np.abs(mean).sum()
+            halved = (bent > _BENT * whole) & (left > 0)
+            for force, share in zip((first, last), _GAUSS, strict=True):
+                total += self.moments(force[:, ~halved], at(share)[:, ~halved]) / 2
+            if not halved.any():
+                break
+            row, start, width = np.tile(row[halved], 2), start[halved], width / 2
+            start = np.concatenate([start, start + width])
         return total
 
     def _on_volume(self, load: Load) -> Array:

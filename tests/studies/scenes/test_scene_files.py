@@ -398,7 +398,9 @@ def test_the_work_of_a_run_is_told_from_its_meshes(path: Path) -> None:
 
 def test_a_temperature_may_have_no_value_outside_its_body() -> None:
     tables = blocks()
-    heat = {"body": "lower", "kind": "temperature", "rise": "10*log(-y)", "expansion": 1e-5}
+    for body in tables["bodies"].values():
+        body["shape"]["x"] = [1.0, 5.0]
+    heat = {"body": "lower", "kind": "temperature", "rise": "10*log(x)", "expansion": 1e-5}
     tables["loads"].append(heat | {"yield_drop": 1e-5})
     scene = built(tables)
     assert scene.effort is not None
