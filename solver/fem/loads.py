@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import quad_vec
 from skfem import CellBasis
 
 from solver.errors import ModelError
@@ -237,22 +236,22 @@ def _tractions(part: Nodes, boundary: str, push: Push, points: int = 0) -> Array
     edges = edges_of(part, boundary)
     X, edges = part.X[:, edges], part.same[edges]
 
-    def pushed(xi: float) -> Array | None:
+    if push(X.mean(axis=2), X[..., 1] - X[..., 0]) is None:
+        return None
+
+    def pushed(xi: float) -> Array:
         """Return the forces (2, n_edges, n_nodes) of edges at a place on them."""
         N = shape_functions(np.array(xi), edges.shape[1])
         x, t = X @ N, X @ shape_derivatives(np.array(xi), edges.shape[1])
-        given = push(x, t)
-        if given is None:
-            return None
-        given = checked(f"push on {boundary}", given, t.shape, "N/mm") * part.measure(x)
+        given = checked(f"push on {boundary}", push(x, t), t.shape, "N/mm") * part.measure(x)
         return np.asarray(given[..., None] * N)
 
-    if pushed(0.0) is None:
-        return None
     if points:
-        each = zip(*np.polynomial.legendre.leggauss(points), strict=True)
-        nodal = sum(weight * pushed(xi) for xi, weight in each)
+        at, weights = np.polynomial.legendre.leggauss(points)
+        nodal = np.tensordot(weights, [pushed(xi) for xi in at], axes=1)
     else:
+        from scipy.integrate import quad_vec
+
         nodal, _ = quad_vec(pushed, -1.0, 1.0, epsrel=_ACCURATE, norm="max", limit=_MOST)
     force = np.zeros((2, part.X.shape[1]))
     for component in (0, 1):

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
 _CHORDS, _HALVINGS, _BENT = 64, 40, 1e-7
 """Number of chords into which an edge is divided, and of times that chords are halved on which the
-mean force at the middle, or at the ends, is not that at the Gauss points, to this share of the whole
-force: loads may bend and jump."""
+force at the middle, or the mean at the ends, is not the mean at the Gauss points, to this share of
+the whole force: loads may bend and jump."""
 _GAUSS = (0.5 - 0.75**0.5 / 3, 0.5 + 0.75**0.5 / 3)
 _INSIDE = (0.5, 1e-6, 1 - 1e-6)
 """Gauss points of a chord; its middle, and its ends, where neighbours may have other loads."""
