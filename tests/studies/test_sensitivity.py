@@ -16,7 +16,7 @@ from annotated_types import Interval, Unit
 from residua.cli import main
 from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, open_study, sensitivity
-from studies.views.chaos import fitted
+from studies.views.chaos import bears, candidates, fitted
 from studies.views.plots.sensitivity import sensitivity_figure
 from studies.views.sensitivity import sensitivity_table, told
 from tests.studies.conftest import compute_here, fake_study
@@ -257,3 +257,8 @@ def test_the_command_prints_and_draws(
     with open_study(out) as dataset:
         words = json.loads(json.dumps(told(sensitivity(dataset, OF))))
     assert words["parameters"]["y"]["total"] == pytest.approx(TOTAL[1], abs=0.01)
+
+
+def test_many_parameters_take_little_memory() -> None:
+    assert not bears(1000, 40, 14)
+    assert len(candidates(40, 14, most=100)) < 2000
