@@ -71,7 +71,7 @@ def shown(
     Raises
     ------
     StudyError
-        if the run has no such field, component or stage
+        if the run has no such field, component or stage, or the map of the other is over other axes
     """
     if field in map_fields(run):
         return _map(run, field, component, stage, minus)
@@ -90,6 +90,9 @@ def _map(
     across, up = map_axes(values)
     if minus is not None:
         other = mapped(minus, field, component, stage=stage).values
+        if map_axes(other) != (across, up):
+            own, its = (", ".join(each) for each in ((across, up), map_axes(other)))
+            raise StudyError("minus", field, f"is over {its} in the other run, and over {own} here")
         there = {name: values[name] for name in (across, up)}
         same = all(np.array_equal(other[name], each) for name, each in there.items())
         values = values - (other if same else other.interp(there))
@@ -100,7 +103,7 @@ def _map(
         "across": _axis(run, across),
         "up": _axis(run, up),
         "signed": signed,
-        "high": high or 1.0,
+        "high": high if high > 0.0 else 1.0,  # it is NaN where the two have no place in common
         "note": "" if minus is not None else drawn.note,
         "edge": edge if edge > 0.0 and across == "x" else None,
     }
