@@ -93,17 +93,18 @@ def _map(
         if map_axes(other) != (across, up):
             own, its = (", ".join(each) for each in ((across, up), map_axes(other)))
             raise StudyError("minus", field, f"is over {its} in the other run, and over {own} here")
-        there = {name: values[name] for name in (across, up)}
-        same = all(np.array_equal(other[name], each) for name, each in there.items())
-        values = values - (other if same else other.interp(there))
-        signed, high = True, float(abs(values).quantile(0.998))
+        places = {name: values[name] for name in (across, up)}
+        same = all(np.array_equal(other[name], each) for name, each in places.items())
+        values = values - (other if same else other.interp(places))
+        there = values.notnull().any()  # or the two have no place in common
+        signed, high = True, float(abs(values).quantile(0.998)) if there else 1.0
     edge = float(run["contact_half_width"]) if "contact_half_width" in run else 0.0
     head = _described(run, field) | {
         "kind": "map",
         "across": _axis(run, across),
         "up": _axis(run, up),
         "signed": signed,
-        "high": high if high > 0.0 else 1.0,  # it is NaN where the two have no place in common
+        "high": high or 1.0,
         "note": "" if minus is not None else drawn.note,
         "edge": edge if edge > 0.0 and across == "x" else None,
     }

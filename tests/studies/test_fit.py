@@ -244,12 +244,6 @@ def test_a_fit_is_found_where_no_runs_are_left_for_its_deviations(tmp_path: Path
             assert other[f"{name}_sigma"].item() == pytest.approx(one[f"{name}_sigma"].item(), 0.2)
 
 
-def test_the_data_set_of_a_fit_tells_no_run_to_export(store: Store) -> None:
-    fit_here(study(), store)
-    with pytest.raises(StudyError, match=r"a search found: .* such as that of tried_run"):
-        run_file(store.directory, {})
-
-
 def test_a_study_without_a_fit_is_not_fitted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -452,6 +446,8 @@ def test_the_command_fits_prints_draws_and_keeps(
     with fit(Study.from_toml(file), Store(out), workers=1) as dataset:
         product = dataset["load_ratio"].item() * (1.0 + dataset["friction"].item())
         assert product == pytest.approx(0.7, rel=1e-3)
+    with pytest.raises(StudyError, match=r"a search found: .* such as that of tried_run"):
+        run_file(out, {})
     assert main([*run, "--measured", str(tmp_path / "none.csv")]) == 2
     assert "--measured" in capsys.readouterr().err
 

@@ -162,7 +162,7 @@ def test_a_number_that_was_not_refined_tells_a_branch(store: Store) -> None:
     with open_study(store.directory) as dataset:
         found = predict(dataset, **at, half_width=20.0)
         assert found[OF].item() == pytest.approx(0.9, abs=0.05)
-        with pytest.raises(StudyError, match=r"half_width = 30\.0: must be one of 20\.0, 50\.0"):
+        with pytest.raises(StudyError, match=r"half_width = 30\.0: must be one of 50\.0, 20\.0"):
             predict(dataset, **at, half_width=30.0)
 
 
@@ -183,3 +183,10 @@ def test_what_a_search_found_is_no_number_of_runs(store: Store) -> None:
     asked = Study.from_dict({"name": "goal", "scene": "fake", "goal": goal})
     with pytest.raises(StudyError, match="study = 'goal': has what a search found"):
         answer(xr.Dataset(), asked, store, "load_ratio", {})
+
+
+def test_runs_of_many_parameters_have_no_corners_that_count() -> None:
+    places = qmc.Sobol(12, rng=0).random(256)
+    process = Gaussian.__new__(Gaussian)
+    process.fit(places, places[:, :1], np.ones(12), 1e-6)
+    assert len(process.misses) == 256
