@@ -223,7 +223,7 @@ def test_methods_of_the_library_order_the_parameters_too(method: str) -> None:
     before = np.random.get_state()[2]  # noqa: NPY002
     found = sensitivity(dataset, OF, method=method)
     assert np.random.get_state()[2] == before  # noqa: NPY002
-    name = {"delta": "delta_raw", "pawn": "median", "rbd_fast": "S1"}[method]
+    name = {"delta": "delta_balanced", "pawn": "median", "rbd_fast": "S1"}[method]
     assert found.equals(sensitivity(dataset, OF, method=method))
     x, y, z = found[name].values
     assert min(x, y) > z
