@@ -64,7 +64,8 @@ def read_study(
         if not chain:
             allowed = f"extends a study that extends it, or more than {_LONGEST_CHAIN}"
             raise StudyError("extends", before, allowed)
-        tables["extends"] = theirs = read_study(folder / before, (), chain - 1)
+        theirs: Any = read_study(folder / before, (), chain - 1)
+        tables["extends"] = theirs
         while isinstance(theirs, dict):  # the scenes of all are beside their files
             if str(theirs.get("scene", "")).endswith(".toml"):
                 theirs["scene"] = str(Path(before).parent / theirs["scene"])

@@ -110,8 +110,8 @@ def diff(first: xr.Dataset, second: xr.Dataset, ignore: Sequence[str] = ()) -> D
     if scenes[0] != scenes[1]:
         raise StudyError("scene", scenes[1], f"must be that of the other study, {scenes[0]}")
     every = [list(_runs(each)) for each in sides]
-    for side, runs in zip(sides, every, strict=True):
-        if not runs:
+    for side, there in zip(sides, every, strict=True):
+        if not there:
             raise StudyError("runs", _name(side), "has none yet: compute it first")
     keys = [set(runs[0][1]) for runs in every]
     for name in ignore:
