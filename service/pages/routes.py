@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import gzip
 import json
+from collections.abc import Mapping
+from contextlib import suppress
 from http import HTTPStatus
 from typing import Annotated, Any
 from urllib.parse import urlencode
@@ -28,9 +30,10 @@ from service.dependencies import (
     TheStore,
     TheTables,
 )
-from service.errors import NoRoom, NotFound
+from service.errors import Conflict, NoRoom, NotFound
 from service.examiner import Examined
-from service.job import StudyState
+from service.job import Job, StudyState
+from service.jobs import Jobs
 from service.pages import form
 from service.pages import study as chosen
 from service.pages.assets import asset
@@ -39,9 +42,10 @@ from service.pages.rendering import COOKIE, ROOT, PageRoute, page
 from service.pages.run import audited, numbers_shown, parameters_shown
 from service.routes.health import health
 from service.schemas import ContentId, StudyFilter, Window
-from service.table import MESSAGE, RUN, STATUS, scene_of_study
+from service.table import MESSAGE, RUN, STATUS, Tables, scene_of_study
 from solver.scenes import Scene
 from studies import Store, StudyError
+from studies.definition.identity import is_id
 from studies.scenes.registry import known_names, known_scenes
 from studies.views.columns import value_text
 
@@ -92,7 +96,7 @@ def studies_page(
     window = StudyFilter(limit=LISTED, offset=(page_number - 1) * LISTED)
     wanted = {"state" if name == "status" else name: value for name, value in which.items()}
     found, total = jobs.page(limit=window.limit, offset=window.offset, **wanted)
-    items = [(overview.summary(job), jobs.study(job.id)) for job in found]
+    items = [(overview.summary(job), _said(jobs, job)) for job in found]
     return page(
         request,
         "studies",
@@ -107,16 +111,29 @@ def studies_page(
     )
 
 
+def _said(jobs: Jobs, job: Job) -> Mapping[str, Any]:
+    """Return the study of a job; nothing if it cannot be read, or has just been deleted."""
+    with suppress(Conflict, NotFound):
+        return jobs.study(job.id)
+    return {}
+
+
 @router.get("/studies/{study_id}")
 async def study_page(
     study_id: ContentId, request: Request, details: TheDetails, tables: TheTables
 ) -> Response:
     """Show a study: numbers over its sweep, one of its runs, a part of its table."""
     study = json.loads(await details.get(study_id, Window(limit=1)))
-    table = await run_in_threadpool(tables.get, study_id)
+    return await run_in_threadpool(_study, request, study, tables)
+
+
+def _study(request: Request, study: Mapping[str, Any], tables: Tables) -> Response:
+    table = tables.get(study["id"])
     query = dict(request.query_params)
-    numbers = chosen.usual(table)
-    number = query.get("number", numbers[0].name if numbers else "")
+    numbers = [each.name for each in chosen.usual(table)]
+    number = query.get("number", "")
+    if number not in numbers:
+        number = next(iter(numbers), "")
     at = chosen.chosen_run(table, query.get("run", ""), number)
 
     def turn(**other: Any) -> str:
@@ -146,7 +163,7 @@ async def study_page(
         csv=f"?{csv}" if csv else "",
         live=study["status"] in POLLED,
         data={
-            "id": study_id,
+            "id": study["id"],
             "live": study["status"] in POLLED,
             "number": number,
             "run": run["id"] if run else None,
@@ -189,7 +206,7 @@ def compare_page(
         raise StudyError("run", f"{len(ids)} runs", f"at most {MOST} runs are compared")
     rows = []
     for each in ids:
-        row = store.run(each) if len(each) == 32 else None
+        row = store.run(each) if is_id(each) else None
         if row is None:
             raise NotFound(f"no run has the id {each[:40]}")
         rows.append(row)
@@ -240,11 +257,13 @@ async def make(
         given.setdefault(name, []).append(str(value))
     scene_name = given.get("scene", [""])[0]
     scene = await run_in_threadpool(known_scene, store, scene_name)
-    content, wrong = form.study_of(scene_name, scene, given)
+    content, wrong = await run_in_threadpool(form.study_of, scene_name, scene, given)
     found: Examined | None = None
     if not wrong:
         try:
-            found = await examiner.examine(content)
+            examined = await examiner.examine(content)
+            await run_in_threadpool(keeper.check_room, examined)
+            found = examined
         except StudyError as error:
             name, allowed = form.beside(error, scene)
             wrong[name] = allowed

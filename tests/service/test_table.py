@@ -8,16 +8,23 @@ import io
 import json
 import math
 import time
+import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
+from service.errors import Busy, Conflict
+from service.jobs import Jobs
 from service.maps import Pictures
+from service.pages.form import as_toml, study_of
 from service.settings import Settings
+from service.table import RunTable, _column
 from studies import Store, open_netcdf, open_study
 from tests.studies.conftest import compute_here, fake_study
+from tests.studies.fakes import FAKE
 
 AXES = {"load_ratio": [0.3, 0.9], "friction": [0.0, 0.2, 0.4], "hardening": ["none", "isotropic"]}
 FIELDS = {"content-type": "application/x-www-form-urlencoded"}
@@ -168,6 +175,7 @@ def test_pages_have_a_strict_policy_and_their_files_are_kept_for_good(seen: Seen
         ("?where.friction=much", 422),
         ("?page=99&sort=-friction&where.status=ok", 200),
         ("?run=nonsense&number=nonsense&page=x", 200),
+        ("?page=" + "9" * 5000, 200),
     ],
 )
 def test_any_address_of_a_study_is_a_page(seen: Seen, query: str, status: int) -> None:
@@ -177,12 +185,51 @@ def test_any_address_of_a_study_is_a_page(seen: Seen, query: str, status: int) -
 
 
 @pytest.mark.parametrize(
-    "path", ["/ui/studies/" + "0" * 32, "/ui/runs/1", "/ui/x", "/ui/compare?run=1"]
+    "path",
+    [
+        "/ui/studies/" + "0" * 32,
+        "/ui/runs/1",
+        "/ui/x",
+        "/ui/compare?run=1",
+        "/ui/compare?run=" + "z" * 32,
+    ],
 )
 def test_what_is_not_there_is_told_by_a_page(seen: Seen, path: str) -> None:
     answer = seen.client.get(path)
     assert answer.status_code in (404, 422)
     assert "<h1>" in answer.text
+
+
+def test_a_program_to_copy_has_no_text_of_the_address(seen: Seen) -> None:
+    page = seen.client.get(f"/ui{seen.study}", params={"number": "x; import os"}).text
+    assert "dataset.x" not in page and "dataset.peak_residual_tension" in page
+
+
+def test_a_study_that_cannot_be_read_leaves_the_list(
+    seen: Seen, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def damaged(self: Jobs, job_id: str) -> dict:
+        raise Conflict("its row cannot be read")
+
+    monkeypatch.setattr(Jobs, "study", damaged)
+    answer = seen.client.get("/ui")
+    assert answer.status_code == 200 and seen.id in answer.text
+
+
+@pytest.mark.parametrize("text", ["0 .. 1 in " + "9" * 5000, "." * 60_000, "1," * 60_000])
+def test_a_long_text_in_a_field_is_told_soon(text: str) -> None:
+    began = time.process_time()
+    _, wrong = study_of("fake", FAKE, {"p.friction": [text]})
+    assert "friction" in wrong
+    assert time.process_time() - began < 1.0, "a square of its length would take a minute"
+
+
+def test_a_form_tells_that_there_is_no_room(seen: Seen, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=10))
+    fields = {"scene": "punch", "name": "large", "p.friction": "0.11"}
+    for more in ({}, {"submit": "yes"}):
+        answer = seen.client.post("/ui/new", data=fields | more)
+        assert answer.status_code == 422 and "free on the disk" in answer.text
 
 
 def test_studies_are_found_by_scene_and_text(seen: Seen) -> None:
@@ -223,6 +270,13 @@ def test_after_signing_in_a_caller_stays_here(seen: Seen, then: str, kept: bool)
     page = seen.client.get("/ui/sign-in", params={"then": then}).text
     wanted = then if kept else "/ui"
     assert f'name="then" value="{wanted}"' in page
+
+
+def test_a_copied_study_file_says_the_same() -> None:
+    said = '\x7f\n"\\é'
+    study, wrong = study_of("fake", FAKE, {"name": ["a"], "note": [said], "p.friction": ["0, 0.1"]})
+    assert not wrong and study["note"] == said
+    assert {"parameters": {}, **tomllib.loads(as_toml(study))} == study
 
 
 def test_a_study_of_one_run_has_a_table_and_a_page(seen: Seen) -> None:
