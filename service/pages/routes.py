@@ -65,9 +65,9 @@ def lead(request: Request) -> Response:
 
 
 @router.get("/static/{version}/{name}")
-def get_asset(name: str, request: Request) -> Response:
+def get_asset(version: str, name: str, request: Request) -> Response:
     """Return a static file."""
-    found = asset(name)
+    found = asset(version, name)
     if found is None:
         raise NotFound("no such file")
     if "gzip" in request.headers.get("accept-encoding", ""):

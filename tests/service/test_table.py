@@ -166,6 +166,7 @@ def test_pages_have_a_strict_policy_and_their_files_are_kept_for_good(seen: Seen
     charts = seen.client.get(style.replace("style.css", "plotly.js"))
     assert b"plotly.js v" in charts.content[:200]
     assert seen.client.get(style.replace("style.css", "..%2Froutes.py")).status_code == 404
+    assert seen.client.get("/ui/static/other/style.css").status_code == 404, "kept for good"
 
 
 @pytest.mark.parametrize(
