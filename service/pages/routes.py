@@ -335,7 +335,7 @@ def sign_in(request: Request, then: str = "") -> Response:
 
 
 @router.post("/sign-in")
-def enter(
+async def enter(
     request: Request,
     keys: TheKeys,
     key: Annotated[str, Form(max_length=200)] = "",
@@ -343,7 +343,7 @@ def enter(
 ) -> Response:
     """Keep a key in a cookie that scripts cannot read."""
     where = inside(request, then)
-    if keys.owner(key.strip()) is None:
+    if await keys.known(key.strip()) is None:
         status = HTTPStatus.UNAUTHORIZED
         return page(request, "sign-in", status, then=where, refused=True)
     answer = RedirectResponse(where, HTTPStatus.SEE_OTHER)
