@@ -6,6 +6,7 @@ import asyncio
 import math
 import time
 from collections import Counter, OrderedDict
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -124,7 +125,7 @@ def point(axes: dict[str, list[Any]], position: int) -> dict[str, Any]:
     return dict(reversed(values.items()))
 
 
-def searched_at(study: dict[str, Any], parameters: dict[str, Any]) -> dict[str, Any]:
+def searched_at(study: Mapping[str, Any], parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Return where a search has asked for a run: values on the axes, and that of its parameter."""
     values = {
         name: each.at

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 from concurrent.futures import ThreadPoolExecutor
@@ -328,6 +329,14 @@ def test_a_goal_is_estimated_searched_and_answered(service: Server) -> None:
             assert at[run] == {"test": "B", "load_ratio": value}
     page = service.client.get(f"/studies/{study_id}", params={"limit": 2, "offset": 1}).json()
     assert page["runs"] == detail["runs"][1:3]
+    table = service.client.get(f"/studies/{study_id}/table.csv", params={"test": "A,B"})
+    rows = {row["run"]: row for row in csv.DictReader(io.StringIO(table.text))}
+    assert {
+        run: {"test": row["test"], "load_ratio": float(row["load_ratio"])}
+        for run, row in rows.items()
+    } == at
+    shown = service.client.get(f"/ui/studies/{study_id}")
+    assert shown.status_code == 200 and all(run in shown.text for run in at)
 
 
 def test_a_goal_that_is_not_reached_fails_with_the_reason(service: Server) -> None:

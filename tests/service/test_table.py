@@ -89,8 +89,18 @@ def test_a_table_is_filtered_and_sorted(seen: Seen) -> None:
     assert {row["hardening"] for row in rows} == {"isotropic"}
     assert len(seen.lines(friction="0.2,0.4", load_ratio="..0.5")) == 4
     assert not seen.lines(status="error")
+    assert len(seen.lines(status="error,ok")) == 12
     (first, *_) = seen.lines(sort="load_ratio", columns="run,load_ratio")
     assert list(first) == ["run", "load_ratio"] and first["load_ratio"] == "0.3"
+    (header, *_) = seen.client.get(f"{seen.study}/table.csv?columns=run,run").text.splitlines()
+    assert header == "run"
+
+
+@pytest.mark.parametrize(("condition", "kept"), [("1e-12..", 2), ("..1e-12", 1), ("1e-12", 0)])
+def test_a_range_of_small_numbers_has_small_ends(condition: str, kept: int) -> None:
+    column = _column("audit_small", np.array([2e-13, 3e-12, 4e-11, math.nan]), "audit")
+    table = RunTable(axes={}, columns={"run": column, "audit_small": column})
+    assert len(table.chosen(where={"audit_small": condition})) == kept
 
 
 @pytest.mark.parametrize(
@@ -100,6 +110,7 @@ def test_a_table_is_filtered_and_sorted(seen: Seen) -> None:
         ({"sort": "nothing"}, "sort"),
         ({"columns": "run,nothing"}, "columns"),
         ({"nothing": "1"}, "nothing"),
+        ({"friction": "1," * 100 + "1"}, "friction"),
     ],
 )
 def test_a_wrong_query_of_a_table_is_refused(seen: Seen, query: dict[str, str], field: str) -> None:

@@ -60,7 +60,7 @@ async function columnsOf(names) {
 async function drawSweep() {
   const what = number();
   if (!what || !several.length) {
-    fail(chart, what ? "Nothing is swept: the study has one run." : "No run has a number yet.");
+    fail(chart, what ? study.size > 1 ? "A search has no grid of runs: the table has them." : "Nothing is swept: the study has one run." : "No run has a number yet.");
     return;
   }
   const [values, codes] = await columnsOf([what.name, "status"]);
@@ -237,13 +237,15 @@ function step() {
 async function choose(at) {
   chosen = at;
   const found = await json(`${address}?limit=1&offset=${at}`);
+  if (chosen !== at) return; // another run has been chosen meanwhile
   const run = found.runs[0];
   keep({ run: run.status === "pending" ? null : run.id });
   const place = document.querySelector("[data-run-head]");
-  const list = element("dl", { className: "place" }, ...several.map((axis) => {
-    const k = axisOf(axis.name);
+  const shown = several.length ? several : Object.keys(run.at).map((name) => ({ name, unit: "" }));
+  const list = element("dl", { className: "place" }, ...shown.map((axis) => {
     const title = element("dt", {}, words(axis.name), axis.unit ? element("span", { className: "unit" }, ` ${axis.unit}`) : "");
-    return element("div", {}, title, element("dd", {}, label(axis, places(at)[k])));
+    const said = several.length ? label(axis, places(at)[axisOf(axis.name)]) : text(run.at[axis.name]);
+    return element("div", {}, title, element("dd", {}, said));
   }));
   const parts = [list];
   if (run.status !== "ok" || run.message) {
