@@ -19,6 +19,9 @@ from service.schemas import MapQuery
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
 
+WAITING = 200
+"""Number of readings and pictures that may wait for their turn."""
+
 Read = TypeVar("Read")
 
 
@@ -62,7 +65,15 @@ class Pictures:
         return await asyncio.shield(self.underway[tag])
 
     async def alone(self, read: Callable[..., Read], *arguments: Any) -> Read:
-        """Return what ``read`` returns, called in a thread while no other one reads or draws."""
+        """Return what ``read`` returns, called in a thread while no other one reads or draws.
+
+        Raises
+        ------
+        Busy
+            If too many others wait.
+        """
+        if self.pencil.statistics().tasks_waiting >= WAITING:
+            raise Busy(f"{WAITING} readings of runs wait already")
         return await run_sync(read, *arguments, limiter=self.pencil)
 
     async def _draw(self, tag: str, path: Path, query: MapQuery) -> bytes:

@@ -316,3 +316,15 @@ def test_files_are_read_one_at_a_time() -> None:
 
     asyncio.run(all_at_once())
     assert most == 1
+
+
+def test_readings_that_would_wait_long_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.maps.WAITING", 2)
+
+    async def all_at_once() -> list[object]:
+        pictures = Pictures(8, 1000)
+        each = (pictures.alone(time.sleep, 0.02) for _ in range(6))
+        return await asyncio.gather(*each, return_exceptions=True)
+
+    found = asyncio.run(all_at_once())
+    assert [type(each) for each in found] == [type(None)] * 3 + [Busy] * 3
