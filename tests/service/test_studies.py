@@ -130,6 +130,12 @@ def test_sensitivity_is_told_or_refused_with_the_reason(
     assert found["q2"] > 0.99
     parameters = found["parameters"]
     assert parameters["load_ratio"]["total"] > 0.99 > parameters["friction"]["total"]
+    url, at = f"/studies/{grid['id']}/predict", {"load_ratio": 0.4, "friction": 0.1}
+    told = service.client.get(url, params={"of": "max_plastic_strain", **at}).json()
+    assert (told["value"], told["error"], told["by"]) == (0.4, 0.0, "run")
+    for name in ("nothing", "dataset"):
+        refused = service.client.get(url, params={"of": "max_plastic_strain", name: "1", **at})
+        assert refused.json()["errors"][0]["field"] == name
 
 
 @pytest.mark.parametrize(
