@@ -40,7 +40,7 @@ class Pictures:
     def __init__(self, queue: int, memory: int) -> None:
         self.queue = queue
         self.memory = memory
-        self.size = 0
+        self.size = self.present = 0
         self.pencil = CapacityLimiter(1)
         self.kept: OrderedDict[str, bytes] = OrderedDict()
         self.underway: dict[str, asyncio.Task[bytes]] = {}
@@ -72,9 +72,13 @@ class Pictures:
         Busy
             If too many others wait.
         """
-        if self.pencil.statistics().tasks_waiting >= WAITING:
+        if self.present > WAITING:
             raise Busy(f"{WAITING} readings of runs wait already")
-        return await run_sync(read, *arguments, limiter=self.pencil)
+        self.present += 1
+        try:
+            return await run_sync(read, *arguments, limiter=self.pencil)
+        finally:
+            self.present -= 1
 
     async def _draw(self, tag: str, path: Path, query: MapQuery) -> bytes:
         try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import csv
+import dataclasses
 import io
 import json
 import math
@@ -101,6 +102,14 @@ def test_a_range_of_small_numbers_has_small_ends(condition: str, kept: int) -> N
     column = _column("audit_small", np.array([2e-13, 3e-12, 4e-11, math.nan]), "audit")
     table = RunTable(axes={}, columns={"run": column, "audit_small": column})
     assert len(table.chosen(where={"audit_small": condition})) == kept
+
+
+def test_numbers_that_stand_for_words_are_filtered_by_words() -> None:
+    column = _column("mode", np.array([0.0, 1.0, math.nan]), "result")
+    column = dataclasses.replace(column, flags={0: "rolls", 1: "slides"})
+    table = RunTable(axes={}, columns={"run": column, "mode": column})
+    assert table.chosen(where={"mode": "slides, nothing"}).tolist() == [1]
+    assert table.chosen(where={"mode": "slides,rolls"}).tolist() == [0, 1]
 
 
 @pytest.mark.parametrize(
