@@ -26,7 +26,6 @@ from service.dependencies import (
     TheProbe,
     TheRun,
     TheRunner,
-    TheSettings,
     TheStore,
     TheTables,
 )
@@ -223,7 +222,6 @@ async def health_page(
     store: TheStore,
     probe: TheProbe,
     caller: TheCaller,
-    settings: TheSettings,
 ) -> Response:
     """Show the queue and whether the service can do its work."""
     state = await health(runner, jobs, store, probe, caller, Response())
@@ -233,9 +231,7 @@ async def health_page(
     for wanted in (StudyState.RUNNING, StudyState.ACCEPTED):
         found, _ = await run_in_threadpool(jobs.page, limit=50, offset=0, state=wanted)
         queue += [overview.summary(job) for job in found]
-    return page(
-        request, "health", health=state, states=states, runs=runs, queue=queue, settings=settings
-    )
+    return page(request, "health", health=state, states=states, runs=runs, queue=queue)
 
 
 @router.get("/new")
@@ -390,6 +386,8 @@ def _back(request: Request, study_id: str) -> Response:
 
 
 @router.get("/{rest:path}")
-def nothing(rest: str) -> Response:
+def nothing(rest: str, request: Request) -> Response:
     """Say that there is no such page."""
+    if not rest:
+        return lead(request)
     raise NotFound(f"there is no page {ROOT}/{rest[:100]}")

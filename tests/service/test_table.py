@@ -170,8 +170,9 @@ def test_a_map_less_itself_is_zero(seen: Seen) -> None:
 
 
 def test_pages_have_a_strict_policy_and_their_files_are_kept_for_good(seen: Seen) -> None:
-    answer = seen.client.get("/", follow_redirects=True)
-    assert answer.url.path == "/ui"
+    for address in ("/ui/", "/"):
+        answer = seen.client.get(address, follow_redirects=True)
+        assert answer.url.path == "/ui"
     policy = dict(
         part.strip().split(" ", 1) for part in answer.headers["content-security-policy"].split(";")
     )

@@ -1,6 +1,5 @@
 // What all pages share: where the resources are, the state in the address, parts that are renewed.
 
-export const here = new URL(".", document.location).pathname;
 const found = document.location.pathname.match(/^(.*)\/ui(?:\/|$)/);
 export const root = found ? found[1] : "";
 
