@@ -21,6 +21,7 @@ from service.errors import Busy, Conflict
 from service.jobs import Jobs
 from service.maps import Pictures
 from service.pages.form import as_toml, study_of
+from service.pages.run import audited
 from service.settings import Settings
 from service.table import RunTable, _column
 from studies import Store, open_netcdf, open_study
@@ -308,6 +309,14 @@ def test_a_study_of_one_run_has_a_table_and_a_page(seen: Seen) -> None:
     (row,) = csv.DictReader(io.StringIO(answer.text))
     assert row["status"] == "pending"
     assert seen.client.get(f"/ui/studies/{study_id}").status_code == 200
+
+
+def test_a_page_shows_only_limits_that_every_run_has() -> None:
+    """Of a wheel that rolls the reactions may be 5e-3: it does not fail by 1e-5."""
+    scalars = {"audit_energy": 1e-3, "audit_reactions": 1e-3, "audit_law": 1e-9, "gap": 1.0}
+    found = audited({"scalars": scalars}, None)
+    assert [(each.name, each.kept) for each in found["limited"]] == [("audit_law", True)]
+    assert [each.name for each in found["others"]] == ["audit_energy", "audit_reactions"]
 
 
 def test_files_are_read_one_at_a_time() -> None:
