@@ -166,6 +166,9 @@ def test_runs_are_chosen_by_keys_and_compared(context: Any, service: Server, stu
         page.wait_for_selector(DRAWN.format("difference"))
         rows = page.locator(".differ tbody th").all_inner_texts()
         assert {"friction", "load ratio"} <= {*rows} and "yield stress" not in rows
+        page.select_option("[data-controls=difference] select >> nth=-1", "0")
+        page.wait_for_url("**second=0**")
+        assert f"run={first}&run={last}" in page.url
 
 
 def test_charts_take_text_of_others_as_text(context: Any, service: Server, study: str) -> None:

@@ -320,9 +320,9 @@ chart.addEventListener("keydown", (event) => {
 // Links and the form of the table change the table alone.
 async function turn(where) {
   const wanted = new URL(where, document.location);
-  for (const name of [...state.keys()]) if (name === "sort" || name === "page" || name.startsWith("where.")) state.delete(name);
-  const given = [...wanted.searchParams].filter(([name, value]) => value && (name === "sort" || name === "page" || name.startsWith("where.")));
-  keep(Object.fromEntries(given));
+  const own = ([name]) => name === "sort" || name === "page" || name.startsWith("where.");
+  const before = [...state].filter(own).map(([name]) => [name, null]);
+  keep(Object.fromEntries([...before, ...[...wanted.searchParams].filter(own)]));
   await renew(document.location, ["table"]);
 }
 
