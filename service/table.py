@@ -1,8 +1,8 @@
 """The numbers of a study's runs as columns, from the catalogue: sorted, filtered, a page of them.
 
 They are there while the study runs. A run that is not in the catalogue has its values on the axes
-of the sweep, the status ``pending``, and no numbers. The runs of a study with a goal are those that
-it has asked for: they fill no grid, and have no axes.
+of the sweep, the status ``pending``, and no numbers. The runs of a study that searches, refines
+or fits are those that it has asked for: they fill no grid, and have no axes.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 
 from service.job import Job
 from service.jobs import Jobs
-from service.overview import PENDING, searched_at
+from service.overview import PENDING, chooses, searched_at
 from solver.results.audit.figures import AUDIT
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
@@ -167,7 +167,7 @@ class Tables:
         """Return the table of a study."""
         with self.one:
             job = self.jobs.get(study_id)
-            asked = job.state, job.stage  # of a study with a goal its runs are not all known yet
+            asked = job.state, job.stage  # its runs may not all be known yet
             state = job.turn, job.size, job.digest, asked, state_of(self.store.catalogue.path)
             known, table = self.kept.get(study_id, (None, None))
             if table is None or known != state:
@@ -184,7 +184,7 @@ class Tables:
         scene = scene_of_study(self.store, job.scene)
         found = [rows.get(each) for each in runs]
         axes = {name: labels(name, axis) for name, axis in study["sweep"].items()}
-        if study.get("goal"):
+        if chooses(study):
             axes, columns = {}, [*_asked(study, found, scene)]
         else:
             columns = [*_sweep(study["sweep"], axes, scene)]
@@ -231,9 +231,9 @@ def _sweep(
 def _asked(
     study: Mapping[str, Any], rows: Sequence[Mapping[str, Any] | None], scene: Scene | None
 ) -> Iterator[Column]:
-    """Yield the axes of a study with a goal, and the parameter it searches, over its runs."""
+    """Yield the axes of a study that chooses its runs, and what it searches, over these runs."""
     at = [searched_at(study, row["parameters"]) if row else {} for row in rows]
-    for name in dict.fromkeys([*study["sweep"], study["goal"]["parameter"]]):
+    for name in dict.fromkeys(name for each in at for name in each):
         yield _placed(name, _array([each.get(name) for each in at]), scene)
 
 

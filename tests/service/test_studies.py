@@ -342,7 +342,7 @@ def test_a_goal_is_estimated_searched_and_answered(service: Server) -> None:
         for run, row in rows.items()
     } == at
     shown = service.client.get(f"/ui/studies/{study_id}")
-    assert shown.status_code == 200 and all(run in shown.text for run in at)
+    assert shown.text.count("data-choose=") == min(len(at), 25)
 
 
 def test_a_goal_that_is_not_reached_fails_with_the_reason(service: Server) -> None:
