@@ -170,6 +170,26 @@ def test_runs_are_chosen_by_keys_and_compared(context: Any, service: Server, stu
         page.wait_for_selector(DRAWN.format("difference"))
         rows = page.locator(".differ tbody th").all_inner_texts()
         assert {"friction", "load ratio"} <= {*rows} and "yield stress" not in rows
+        page.select_option("[data-controls=difference] select >> nth=-1", "0")
+        page.wait_for_url("**second=0**")
+        assert f"run={first}&run={last}" in page.url
+
+
+def test_charts_take_text_of_others_as_text(context: Any, service: Server, study: str) -> None:
+    with opened(context, base(service) + f"/ui/studies/{study}") as page:
+        page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
+        title = page.evaluate(
+            """async () => {
+                const style = document.querySelector("link[rel=stylesheet]").href;
+                const { named } = await import(style.replace("style.css", "charts.js"));
+                const chart = document.querySelector("[data-chart=sweep]");
+                const text = named("<a href='/x'>a & b", "1/s");
+                await Plotly.relayout(chart, { "xaxis.title.text": text });
+                const drawn = chart.querySelector(".xtitle");
+                return [drawn.querySelectorAll("a").length, drawn.textContent];
+            }"""
+        )
+        assert title == [0, "<a href='/x'>a & b [1/s]"]
 
 
 def test_a_study_is_watched_to_its_end(context: Any, service: Server) -> None:
