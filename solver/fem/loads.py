@@ -28,9 +28,12 @@ if TYPE_CHECKING:
 
 _DEGREE = 7
 """Polynomial degree up to which forces per volume are integrated exactly."""
-_ACCURATE, _MOST = 1e-7, 1000
-"""Error of the nodal forces of tractions, over the largest, and largest number of parts into which
-edges are divided for it: a traction may bend and jump."""
+_ACCURATE, _HALVINGS = 1e-9, 40
+"""Error of the nodal force of a part of an edge, over the largest nodal force, above which the part
+is halved, and how often at most: tractions may bend and jump."""
+_LOBATTO = np.array([1e-9 - 1, -((3 / 7) ** 0.5), 0.0, (3 / 7) ** 0.5, 1 - 1e-9])
+_LOBATTO_WEIGHTS = np.array([1 / 10, 49 / 90, 32 / 45, 49 / 90, 1 / 10])
+"""Lobatto's rule, as exact as four Gauss points; its ends show jumps beyond these."""
 _SAME = 1e-9
 """Ratio of a difference to the larger of two prescribed values; below it they are equal."""
 
@@ -231,29 +234,39 @@ def _tractions(part: Nodes, boundary: str, push: Push, points: int = 0) -> Array
     ----------
     push : takes positions (2, n) and tangents (2, n), which have the body on their left, and
         returns the force per area times the length of the tangent (2, n)
-    points : Gauss points of each edge; 0 for as many as are needed
+    points : Gauss points of each edge; 0 for four of each of as many parts as are needed
     """
     edges = edges_of(part, boundary)
     X, edges = part.X[:, edges], part.same[edges]
-
     if push(X.mean(axis=2), X[..., 1] - X[..., 0]) is None:
         return None
 
-    def pushed(xi: float) -> Array:
-        """Return the forces (2, n_edges, n_nodes) of edges at a place on them."""
-        N = shape_functions(np.array(xi), edges.shape[1])
-        x, t = X @ N, X @ shape_derivatives(np.array(xi), edges.shape[1])
+    def pushed(
+        row: NDArray[np.int64], start: Array, width: float, at: Array, weights: Array
+    ) -> Array:
+        """Return the forces (2, n, n_nodes) of parts of edges by a rule on [-1, 1]."""
+        xi = start[:, None] + width * (1 + at) / 2
+        N = shape_functions(xi, edges.shape[1])
+        x, t = (
+            np.einsum("dmk,mqk->dmq", X[:, row], each).reshape(2, -1)
+            for each in (N, shape_derivatives(xi, edges.shape[1]))
+        )
         given = checked(f"push on {boundary}", push(x, t), t.shape, "N/mm") * part.measure(x)
-        return np.asarray(given[..., None] * N)
+        return np.einsum("dmq,q,mqk->dmk", given.reshape(2, *xi.shape), weights * width / 2, N)
 
-    if points:
-        at, weights = np.polynomial.legendre.leggauss(points)
-        nodal = np.tensordot(weights, [pushed(xi) for xi in at], axes=1)
-    else:
-        from scipy.integrate import quad_vec
-
-        nodal, _ = quad_vec(pushed, -1.0, 1.0, epsrel=_ACCURATE, norm="max", limit=_MOST)
-    force = np.zeros((2, part.X.shape[1]))
-    for component in (0, 1):
-        np.add.at(force[component], edges, nodal[component])
-    return np.asarray(force.T.ravel())
+    row, start, width = np.arange(len(edges)), np.full(len(edges), -1.0), 2.0
+    gauss = np.polynomial.legendre.leggauss(points or 4)
+    force, largest = np.zeros((part.X.shape[1], 2)), 0.0
+    for left in reversed(range(1 if points else _HALVINGS)):
+        found = pushed(row, start, width, *gauss)
+        halved = np.zeros(len(row), dtype=bool)
+        if left:
+            off = np.abs(found - pushed(row, start, width, _LOBATTO, _LOBATTO_WEIGHTS))
+            largest = largest or np.abs(found).max(initial=0.0)
+            halved = off.max(axis=(0, 2)) > _ACCURATE * largest
+        np.add.at(force, edges[row[~halved]], found[:, ~halved].transpose(1, 2, 0))
+        if not halved.any():
+            break
+        row, start, width = np.tile(row[halved], 2), start[halved], width / 2
+        start = np.concatenate([start, start + width])
+    return force.ravel()

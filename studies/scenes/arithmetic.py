@@ -313,7 +313,10 @@ class _Bound(ast.NodeTransformer):
         """Return the value of a parameter as an expression; other names stay."""
         if not node.id.startswith(_MARK):
             return node
-        value = _known(node.id.removeprefix(_MARK), self._values)
+        name = node.id.removeprefix(_MARK)
+        value = _known(name, self._values)
+        if isinstance(value, str) and not _WORD.fullmatch(repr(value)):
+            raise ExpressionError(f"${name} is {value!r}: only numbers can be computed with")
         return ast.parse(f"({1 if value else 0} == 1)" if isinstance(value, bool) else repr(value),
                          mode="eval").body  # fmt: skip
 

@@ -209,6 +209,11 @@ def test_what_is_no_function_of_position_is_refused(text: str, reason: str) -> N
         evaluated(text, VALUES)
 
 
+def test_fields_cannot_be_computed_with() -> None:
+    with pytest.raises(ExpressionError, match=r"\$f is '2 \* x': only numbers"):
+        evaluated("$f*y", {"f": "2 * x"})
+
+
 def test_a_field_has_a_largest_length() -> None:
     text = "x*(" + "+".join(["1"] * LONGEST_FIELD) + ")"
     with pytest.raises(ExpressionError, match=f"at most {LONGEST_FIELD} characters"):
