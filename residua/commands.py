@@ -22,6 +22,7 @@ def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
     from residua.cost import dry_run, long_run
     from residua.progress import Progress
+    from studies.definition.fit import NO_FIT
     from studies.definition.study import Study
     from studies.execution.cluster import Access
     from studies.execution.forking import FORK_HERE, variables
@@ -37,6 +38,8 @@ def run(options: argparse.Namespace) -> int:
     store = Store(options.out)
     measured = getattr(options, "measured", ())
     study = Study.from_toml(options.study, measured, store.definition, store.scene)
+    if options.command is fit and not study.fit:
+        raise StudyError("fit", None, NO_FIT)
     if options.dry_run:
         print(dry_run(study, store))
         return OK
@@ -105,10 +108,13 @@ def slurm(options: argparse.Namespace) -> int:
     """Write a script for sbatch, which computes a study on a cluster."""
     from residua.slurm import script
     from studies.definition.study import Study
+    from studies.execution.part import check_parts
     from studies.storage.store import Store
 
     store = Store(options.out)
     study = Study.from_toml(options.study, (), store.definition, store.scene)
+    if not options.with_scheduler:
+        check_parts(study)
     text = script(
         study.name, options.study, options.out, options.script,
         tasks=options.tasks, time=options.time, memory=options.memory,

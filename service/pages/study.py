@@ -10,7 +10,7 @@ import numpy as np
 
 from service.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, group_of
 from studies.definition.vocabulary import OK
-from studies.views.tables import FIGURES
+from studies.views.figures import FIGURES
 
 ROWS = 25
 """Number of runs on a page of the table."""

@@ -14,29 +14,34 @@ from studies.scenes.meshfile import FORMATS, MeshFile
 from studies.toml import CASE, read_bytes, read_toml
 
 _MAY_NAME_FILES, _OF_POINTS = ("parameters", "points", "sweep"), (".csv", ".txt")
+_LONGEST_CHAIN = 20
+"""Largest number of study files that extend one another."""
 _DECIMAL_COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
 
-def read_study(path: Path | str, measured: Sequence[Path] = ()) -> dict[str, Any]:
+def read_study(
+    path: Path | str, measured: Sequence[Path] = (), chain: int = _LONGEST_CHAIN
+) -> dict[str, Any]:
     """Return the tables of a study file.
 
     ``[points] file = "tests.csv"`` names a table beside the study, and so does an axis of the sweep
     that has this entry: see `read_table`. A value of a parameter that ends in ``.csv`` or ``.txt``
     names the points of a curve, one with the ending of a mesh file (`FORMATS`) the mesh of a
     section. ``[fit] measured`` names tables of measured lines. The study that this one ``extends``
-    may be a file. What is in the files takes their
-    place, so that the content of a study needs no other file.
+    may be a file. What is in the files takes their place, so that the content of a study needs no
+    other file.
 
     Parameters
     ----------
     path : of the study
     measured : tables of measured lines, in place of those that a fit names
+    chain : largest number of studies in files that it extends, one by the other
 
     Raises
     ------
     StudyError
         for ``file``, when the study cannot be read or is no TOML; for the place that names another
-        file which cannot be read
+        file which cannot be read; for ``extends``, when files extend one another in a circle
     """
     tables, folder = read_toml(path, "file"), Path(path).parent
     if "points" in tables:
@@ -56,9 +61,15 @@ def read_study(path: Path | str, measured: Sequence[Path] = ()) -> dict[str, Any
             ]
     before = tables.get("extends")
     if isinstance(before, str) and before.endswith(".toml"):
-        tables["extends"] = theirs = read_study(folder / before)
-        if str(theirs.get("scene", "")).endswith(".toml"):
-            theirs["scene"] = str(Path(before).parent / theirs["scene"])
+        if not chain:
+            allowed = f"extends a study that extends it, or more than {_LONGEST_CHAIN}"
+            raise StudyError("extends", before, allowed)
+        theirs: Any = read_study(folder / before, (), chain - 1)
+        tables["extends"] = theirs
+        while isinstance(theirs, dict):  # the scenes of all are beside their files
+            if str(theirs.get("scene", "")).endswith(".toml"):
+                theirs["scene"] = str(Path(before).parent / theirs["scene"])
+            theirs = theirs.get("extends")
     for table in _MAY_NAME_FILES:
         if table in tables:
             tables[table] = _with_files(tables[table], table, folder)

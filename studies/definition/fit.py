@@ -20,6 +20,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -39,6 +40,8 @@ from studies.toml import CASE
 
 FOUND, MOST, FAILED = "found", "most", "failed"
 """Reasons for the end of a fit."""
+NO_FIT = "is missing: tell what was measured, and the ranges"
+"""What a command of fits says of a study without one."""
 
 _KEYS = ("measured", "ranges", "first", "step", "most")
 _DIGITS = 6
@@ -105,7 +108,7 @@ class Fit:
 
     @cached_property
     def values(self) -> Numbers:
-        """MeasuredLine values of all lines."""
+        """Measured values of all lines."""
         return np.concatenate([each.values for each in self.measured])
 
     @cached_property
@@ -203,7 +206,7 @@ class _Ends(Exception):
 
 @dataclass(slots=True)
 class Fitting:
-    """The program of a fit; see `studies.definition.place.Program`.
+    """The program of a fit; see `studies.definition.place.Chooser`.
 
     Attributes
     ----------
@@ -329,7 +332,8 @@ class Fitting:
             seen = self._all(values)
             assert seen is not None
             self.answer = Fitted(np.array(values), found.x.round(_DIGITS), seen, found.jac)
-            self.answer = self.answer._replace(jacobian=self._central(found.x, found.jac))
+            with suppress(_Ends):  # no runs are left: differences to one side tell less well
+                self.answer = self.answer._replace(jacobian=self._central(found.x, found.jac))
             self.reason = FOUND
         except _Lacking as lacking:
             self._wants = lacking.keys
@@ -443,7 +447,7 @@ class Certainty(NamedTuple):
 
     Attributes
     ----------
-    covariance : (n, n) of the values; infinite where the lines say nothing
+    covariance : (n, n) of the values; NaN where the lines say nothing
     correlation : (n, n)
     condition : of the Jacobian matrix with columns of length 1
     warning : which parameters cannot be told apart, or change nothing; empty if there are none

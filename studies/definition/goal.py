@@ -28,7 +28,7 @@ from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.definition.parameters import Parameter, parameters_of
 from studies.definition.quantity import number_of_a_run
-from studies.definition.spaced import rounded
+from studies.definition.spaced import is_finite, rounded
 from studies.definition.vocabulary import NO_EQUILIBRIUM, SOLVED
 from studies.errors import StudyError, one_of
 
@@ -438,6 +438,6 @@ def _threshold(field_: str, value: Any, of: Any, scene: Scene) -> float:
         if value not in words:
             raise StudyError(field_, value, one_of(value, words))
         return words[value]
-    if not is_number(value) or not math.isfinite(value):
+    if not is_finite(value):
         raise StudyError(field_, value, "must be a finite number")
     return float(value)

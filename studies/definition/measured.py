@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from solver.parameters import is_number
 from solver.scenes import Scene
+from studies.definition.spaced import is_finite
 from studies.errors import StudyError, nearest, one_of
 
 Numbers = NDArray[np.float64]
@@ -176,7 +177,7 @@ def checked_measured(content: Any, scene: Scene, axes: Collection[str]) -> list[
     Parameters
     ----------
     content : a list of tables ``{of, values, over, places, sigma, at}``; or of the rows of a file
-        with the headings of `rows_of`, ``{rows, at}``
+        as `read_table` returns them, ``{rows, at}``
     scene : its variables are known
     axes : names by which `at` may tell a position on the axes of the study
 
@@ -204,11 +205,10 @@ def _checked(field: str, content: Any, scene: Scene, axes: Collection[str]) -> M
         if key not in _KEYS:
             raise StudyError(f"{field}.{key}", given[key], one_of(key, _KEYS))
     of = _known(f"{field}.of", given.get("of"), scene)
-    over = given.get("over", "")
+    over = _known(f"{field}.over", given["over"], scene) if given.get("over", "") != "" else ""
     values = _numbers(f"{field}.values", given.get("values"))
     places = _numbers(f"{field}.places", given.get("places", [])) if over else np.empty(0)
     if over:
-        _known(f"{field}.over", over, scene)
         if len(places) != len(values) or len(places) < 2 or not np.ptp(places) > 0.0:
             allowed = (
                 f"must be as many as the values, {len(values)}, and two different ones at least"
@@ -252,6 +252,9 @@ def content_of(line: MeasuredLine) -> dict[str, Any]:
 
 def _columns(field: str, rows: Any, scene: Scene) -> dict[str, Any]:
     """Return a line of the rows of a file: the columns are `over`, `of` and `SIGMA`."""
+    tables = isinstance(rows, list | tuple) and all(isinstance(row, Mapping) for row in rows)
+    if not tables or not rows:
+        raise StudyError(f"{field}.rows", rows, "must be a list of tables: the rows of a file")
     headings = list(dict.fromkeys(key for row in rows for key in row))
     names, known = [], scene.known_quantities
     for heading in headings:
@@ -291,7 +294,7 @@ def _known(field: str, name: Any, scene: Scene) -> str:
 
 
 def _numbers(field: str, values: Any) -> Numbers:
-    fits = isinstance(values, list | tuple) and len(values) <= _MOST and all(map(is_number, values))
-    if not fits or not all(map(math.isfinite, values)):
+    fits = isinstance(values, list | tuple) and len(values) <= _MOST and all(map(is_finite, values))
+    if not fits:
         raise StudyError(field, values, "must be a list of finite numbers")
     return np.array(values, dtype=float)

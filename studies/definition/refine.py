@@ -29,6 +29,7 @@ from solver.scenes import Scene
 from studies.definition.cells import KINK, Cell, Point, weights
 from studies.definition.parameters import parameters_of
 from studies.definition.quantity import number_of_a_run
+from studies.definition.spaced import is_finite
 from studies.definition.sweep import MAXIMUM_RUNS, Axes
 from studies.definition.vocabulary import NO_EQUILIBRIUM, OK, taken
 from studies.errors import StudyError, one_of
@@ -41,6 +42,8 @@ _KEYS = ("of", "until", "most", "halvings")
 _UNTIL, _MOST, _HALVINGS = 0.02, 200, 5
 """Entries that are left out."""
 _MOST_AXES, _MOST_HALVINGS = 4, 20
+_ROUNDING = 1e-12
+"""Part of a number that is rounding: it is the same in all runs if it varies by no more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -271,8 +274,10 @@ class Refinement:
         until, found = self.refine.until, [each for each in map(self.number, self.asked) if each]
         if isinstance(until, Mapping):
             return tuple(until[name] for name in self.refine.of)
-        spans = [max(each) - min(each) for each in zip(*found, strict=True)]
-        return tuple(until * span for span in spans) or (0.0,) * len(self.refine.of)
+        ends = [(min(each), max(each)) for each in zip(*found, strict=True)]
+        least = [_ROUNDING * max(map(abs, each)) for each in ends]
+        most = [until * (high - low) for low, high in ends]
+        return tuple(map(max, most, least)) or (0.0,) * len(self.refine.of)
 
     def _decide(self, cell: Cell) -> None:
         """Settle a cell whose runs are known, or keep it to be divided."""
@@ -446,7 +451,7 @@ def _until(until: Any, names: list[str]) -> float | dict[str, float]:
     if is_number(until) and 1e-6 <= until <= 1.0:
         return float(until)
     own = until if isinstance(until, Mapping) and until.keys() == set(names) else {}
-    if own and all(is_number(each) and 0.0 < each < math.inf for each in own.values()):
+    if own and all(is_finite(each) and each > 0.0 for each in own.values()):
         return {name: float(own[name]) for name in names}
     allowed = "must be a share of the range, >= 1e-06 and <= 1, or a number > 0 for each of `of`"
     raise StudyError("refine.until", until, allowed)

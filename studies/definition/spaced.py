@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from contextlib import suppress
+from typing import Any, TypeGuard
 
 from solver.parameters import is_number
 from studies.errors import StudyError
@@ -54,6 +55,13 @@ def between(start: float, stop: float, spacing: str, share: float) -> float:
     return start + (stop - start) * share
 
 
+def is_finite(value: object) -> TypeGuard[float]:
+    """Whether a value is a finite number; an integer of hundreds of digits is none."""
+    with suppress(OverflowError):
+        return is_number(value) and math.isfinite(value)
+    return False
+
+
 def rounded(value: float) -> float:
     """Return a value with as many digits as a study needs: 0.3, not 0.30000000000000004."""
     return float(f"{value:.{_DIGITS}g}")
@@ -61,7 +69,7 @@ def rounded(value: float) -> float:
 
 def _number(field: str, value: Any, spacing: str) -> float:
     least = "> 0" if spacing == "log" else ""
-    if not is_number(value) or not math.isfinite(value):
+    if not is_finite(value):
         raise StudyError(field, value, f"must be a finite number {least}".strip())
     if spacing == "log" and not value > 0:
         raise StudyError(field, value, "must be > 0 for spacing = log")

@@ -195,7 +195,13 @@ class Study(BaseModel):
             for the first combination that the scene refuses
         """
         if isinstance(self.asks, Fit):
-            Expansion(self.problem, self.parameters | self.asks.first, self.sweep).check()
+            try:
+                Expansion(self.problem, self.parameters | self.asks.first, self.sweep).check()
+            except StudyError as error:
+                entry, _, name = error.field.partition(".")
+                free = entry == "parameters" and name in self.asks.free
+                field = f"fit.first.{name}" if free else error.field
+                raise StudyError(field, error.value, error.allowed) from None
             return self
         if not isinstance(self.asks, Goal):
             self.expansion.check()
@@ -220,11 +226,12 @@ class Study(BaseModel):
         known = parameters_of(scene)
         fixed = checked_table("parameters", content.get("parameters", {}), known)
         axes = checked_axes(with_points(content, known), known)
-        own_points = scene.places and scene.places(build(scene, {})).points
-        if "refine" in content and own_points:
+        over_points = "refine" in content or POINT in axes
+        own_points = over_points and scene.places and scene.places(build(scene, {})).points
+        if own_points and "refine" in content:
             allowed = "the runs of this scene have a dimension `point`, that of a refinement"
             raise StudyError("refine", content["refine"], allowed)
-        if POINT in axes and own_points:
+        if own_points:
             allowed = (
                 "the runs of this scene have a dimension of this name, the points of the scene "
                 "file: give the points of the study another one, [sweep.NAME]"

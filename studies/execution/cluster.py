@@ -117,7 +117,7 @@ class Access:
             if it tells no address
         """
         deadline = time.monotonic() + _APPEARS
-        while not path.exists():
+        while not (path.exists() and path.stat().st_size):  # it is written after it appears
             if time.monotonic() > deadline:
                 raise GridLost(f"no scheduler has written the file {path} in {_APPEARS:g} s")
             time.sleep(0.2)

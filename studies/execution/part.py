@@ -79,16 +79,14 @@ def run_part(
     StoreBusy
         if a process that is no part computes into the directory
     StudyError
-        if the part is none, or the directory is not writable
+        if the part is none, as `check_parts`, or if the directory is not writable
     StoreFull
         if the disk is full
     """
     number, count = part
     if not 1 <= number <= count:
         raise StudyError("part", f"{number}/{count}", "must be i/n with 1 <= i <= n")
-    if study.asks and not study.goal:
-        allowed = "parts cannot share this study, which chooses its runs: use a scheduler"
-        raise StudyError("part", f"{number}/{count}", allowed)
+    check_parts(study)
     with scratch() as folder:
         store = Store(directory)
         # SQLite is not made for directories that machines share
@@ -98,6 +96,13 @@ def run_part(
             emit = on_event or (lambda event: None)
             work = _PartWork(study, store, emit, should_stop or (lambda: False))
             return work.done((number - 1) / count)
+
+
+def check_parts(study: Study) -> None:
+    """Raise `StudyError` if parts cannot share a study."""
+    if study.asks and not study.goal:
+        allowed = "chooses its runs, so that parts cannot share it: use a scheduler"
+        raise StudyError("part", study.name, allowed)
 
 
 @dataclass(slots=True)

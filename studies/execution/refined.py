@@ -54,9 +54,7 @@ def _beside(study: Study, program: Refinement, cases: list[Case], rounds: np.nda
             add(f"cell_{name}_{end}", "cell", values, f"{end} end of {name} of the cell", unit)
     for name in owners(study.sweep).keys() - refine.axes.keys():
         values = [program.branches[each.cell.branch][name] for each in cells]
-        kind = None if all(isinstance(each, int | float) for each in values) else object
-        texts = values if kind is None else [str(each) for each in values]
-        add(f"cell_{name}", "cell", np.array(texts, dtype=kind), f"{name} of the cell")
+        add(f"cell_{name}", "cell", layout.axis_array(values), f"{name} of the cell")
     states = np.array([each.state for each in cells], dtype=object)
     add("cell_state", "cell", states, "what became of the cell")
     for k, name in enumerate(refine.of):

@@ -1,11 +1,12 @@
 """Claims of processes that compute in one directory, on whichever machines, without talking.
 
-A claim is a file ``claims/<name>.<deaths>``. It appears at once, with its content, by a hard link,
+A claim is a file ``claims/<name>.<number>``. It appears at once, with its content, by a hard link,
 which fails if there is one; so one process has it. Its owner holds a lock on it, and changes its
 time now and then. A claim is dead if its lock is free, for processes of the same machine; for those
 of another one, whose locks may not be seen, if its time is too old. The next number is then
 claimed: that of a dead claim is never used again, so that two processes that find it dead cannot
-both take it over.
+both take it over. A claim that stays because all was done ends with a line that says so: its owner
+did not die of it.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ BEAT = 20.0
 """Seconds after which an owner changes the time of its claim."""
 STALE = 300.0
 """Age of a claim of another machine at which it is dead [s]."""
+_DONE = b"\ndone\n"
 
 
 @dataclass(slots=True)
@@ -58,22 +60,27 @@ class Claims:
     @contextmanager
     def held(self, name: str) -> Iterator[Claim | None]:
         """Claim a name, until the end of the context; None if another owner may be alive."""
-        deaths, own = 0, self._own()
+        number, own = 0, self._own()
         try:
-            while self._path(name, deaths + 1).exists():
-                deaths += 1
-            while not self._linked(own, self._path(name, deaths)):
-                if not self._dead(self._path(name, deaths)):
+            while self._path(name, number + 1).exists():
+                number += 1
+            while not self._linked(own, self._path(name, number)):
+                if not self._dead(self._path(name, number)):
                     yield None
                     return
-                deaths += 1
-            claim = Claim(deaths)
+                number += 1
+            before = [self._path(name, each) for each in range(number)]
+            claim = Claim(sum(not _done(each) for each in before))
             try:
                 with _beating(own):
                     yield claim
             finally:
-                for number in range(0 if claim.done else deaths + 1):
-                    self._path(name, number).unlink(missing_ok=True)
+                if claim.done:
+                    with suppress(OSError):  # then it counts as a death
+                        os.write(self._descriptor, _DONE)
+                else:
+                    for path in [*before, self._path(name, number)]:
+                        path.unlink(missing_ok=True)
         finally:
             own.unlink(missing_ok=True)
             os.close(self._descriptor)
@@ -87,8 +94,8 @@ class Claims:
         os.write(self._descriptor, text.encode())
         return path
 
-    def _path(self, name: str, deaths: int) -> Path:
-        return self._directory / f"{name}.{deaths}"
+    def _path(self, name: str, number: int) -> Path:
+        return self._directory / f"{name}.{number}"
 
     @staticmethod
     def _linked(own: Path, claim: Path) -> bool:
@@ -102,7 +109,7 @@ class Claims:
         """Whether the owner of a claim has died; a claim that is gone is none that died."""
         try:
             with claim.open("rb") as file:
-                if json.loads(file.read())["machine"] == _machine():
+                if json.loads(file.readline())["machine"] == _machine():
                     return _free(file.fileno())
                 age = self._now() - os.fstat(file.fileno()).st_mtime
                 return age > self._stale
@@ -115,6 +122,13 @@ class Claims:
         """Return the time of the file system, which alone is that of all machines."""
         os.utime(self._descriptor)
         return os.fstat(self._descriptor).st_mtime
+
+
+def _done(claim: Path) -> bool:
+    """Whether the owner of a claim has ended with nothing left to do."""
+    with suppress(FileNotFoundError):
+        return claim.read_bytes().endswith(_DONE)
+    return True
 
 
 def _free(descriptor: int) -> bool:

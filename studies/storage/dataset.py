@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from solver.parameters import is_number
 from solver.results.quantities import IN_SPACE, QUANTITIES
 from solver.results.record import Record
 from solver.scenes import Scene
@@ -45,6 +46,14 @@ def axis_attributes(scene: Scene, axis: str) -> dict[str, str]:
     known = parameters_of(scene)[axis]
     given = {"long_name": known.description, "units": known.unit}
     return {key: value for key, value in given.items() if value}
+
+
+def axis_array(values: Sequence[Any]) -> np.ndarray:
+    """Return numbers as numbers, None as NaN, and anything else as text."""
+    values = [np.nan if value is None else value for value in values]
+    if all(map(is_number, values)):
+        return np.asarray(values)
+    return np.array([v if isinstance(v, str) else json.dumps(v) for v in values], dtype=object)
 
 
 def attributes_of(name: str, scene: Scene | None = None) -> dict[str, str]:

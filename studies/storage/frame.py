@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
@@ -12,7 +11,6 @@ import h5netcdf
 import h5py
 import numpy as np
 
-from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.definition.vocabulary import MISSING
@@ -219,7 +217,7 @@ def axis_variables(
         attributes = _axis_attributes(scene, name)
         if sets := [parameter for parameter, (by, _) in linked.items() if by == name]:
             attributes |= {SETS: " ".join(sets)}
-        found[name] = layout.Variable((axis,), _axis_array(values), attributes)
+        found[name] = layout.Variable((axis,), layout.axis_array(values), attributes)
     return found
 
 
@@ -261,11 +259,3 @@ def _absent(name: str, kind: np.dtype[Any]) -> Any:
     if name == "status":
         return MISSING
     return {"f": np.nan, "i": layout.INTEGER_FILL, "O": ""}[kind.kind]
-
-
-def _axis_array(values: Sequence[Any]) -> np.ndarray:
-    """Return numbers as numbers, None as NaN, and anything else as text."""
-    values = [np.nan if value is None else value for value in values]
-    if all(map(is_number, values)):
-        return np.asarray(values)
-    return np.array([v if isinstance(v, str) else json.dumps(v) for v in values], dtype=object)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import xarray as xr
 
 from solver.parameters import is_number
-from studies.definition.parameters import parameters_of
+from studies.definition.parameters import Parameter, parameters_of
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError, one_of
@@ -66,8 +69,12 @@ def answer(
     Raises
     ------
     StudyError
-        as `predict`; if ``of`` is a line or a map, or ``within`` is no number >= 0
+        as `predict`; if ``of`` is a line or a map, ``within`` is no number >= 0, or the study has
+        what a search found in place of runs
     """
+    if study.goal or study.fit:
+        allowed = "has what a search found, not runs: predict tells numbers of runs"
+        raise StudyError("study", study.name, allowed)
     axes = sweep_axes(dataset)
     numbers = [
         str(name)
@@ -80,7 +87,11 @@ def answer(
         raise StudyError("within", within, "must be a number >= 0")
     found = predict(dataset, of, by=by, **at)
     known = parameters_of(study.problem)
-    place = {str(name): each.item() for name, each in found.coords.items() if name in known}
+    place = {
+        str(name): _json(each.item(), known[str(name)])
+        for name, each in found.coords.items()
+        if name in known
+    }
     value, error, way = found[of].item(), found[f"{of}_error"].item(), str(found.attrs["by"])
     content = {"name": study.name, "scene": study.scene, "parameters": study.parameters | place}
     run = Study.from_dict(content | {"allow": study.allow}, scenes=lambda _: study.problem)
@@ -92,3 +103,12 @@ def answer(
     return NumberBetween(
         of=of, value=value, error=error, unit=unit, by=way, at=place, run=run, enough=enough
     )
+
+
+def _json(value: Any, parameter: Parameter) -> Any:
+    """Return a value of a coordinate as that of its parameter, of which a data set has the JSON."""
+    if isinstance(value, str):
+        with suppress(StudyError):
+            return parameter.normalise(value, parameter.name)
+        value = json.loads(value)
+    return None if isinstance(value, float) and math.isnan(value) else value

@@ -115,17 +115,24 @@ def _pursued(columns: Numbers, values: Numbers) -> list[int]:
 
 def bears(runs: int, parameters: int, degree: int) -> bool:
     """Whether so many runs bear the search for polynomials of a degree."""
-    return len(candidates(parameters, degree)) <= _CANDIDATES * runs
+    most = _CANDIDATES * runs
+    return len(candidates(parameters, degree, most)) <= most
 
 
-def candidates(parameters: int, degree: int) -> NDArray[np.int64]:
-    """Return all degrees k (n_candidates, n_parameters) with sum k_i**q <= p**q, the mean first."""
+def candidates(parameters: int, degree: int, most: int | None = None) -> NDArray[np.int64]:
+    """Return all degrees k (n_candidates, n_parameters) with sum k_i**q <= p**q, the mean first.
+
+    If there are more than ``most``, those of the first few parameters are returned: of many there
+    are more than the memory holds.
+    """
     q = 1.0 if degree <= 2 else 0.75
-    most, rows = degree**q * (1.0 + 1e-12), np.zeros((1, 0), dtype=np.int64)
+    largest, rows = degree**q * (1.0 + 1e-12), np.zeros((1, 0), dtype=np.int64)
     for _ in range(parameters):
+        if most is not None and len(rows) > most:
+            break
         tall = np.repeat(rows, degree + 1, axis=0)
         rows = np.column_stack([tall, np.tile(np.arange(degree + 1), len(rows))])
-        rows = rows[(rows**q).sum(axis=1) <= most]
+        rows = rows[(rows**q).sum(axis=1) <= largest]
     return rows[np.argsort((rows**q).sum(axis=1), kind="stable")]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,8 +19,8 @@ from studies.toml import CASE
 from studies.views.columns import aligned, value_text
 from studies.views.picking import flags, own_grid, sweep_axes, sweep_coordinates
 
-_NOT_COMPARED = ("cpu_seconds",)
-"""Variables that differ from one computation to the next."""
+_NOT_COMPARED = ("cpu_seconds", "round")
+"""Variables that differ from one computation, or refinement, to the next; so do its cells."""
 _OF_THE_COMPUTATION = re.compile("audit_.*|.*(iterations|fallbacks|increments|of_freedom)")
 """Variables that tell of the computation, not of what is computed: they come last."""
 _SAME_GRID = 1e-9
@@ -101,14 +102,17 @@ def diff(first: xr.Dataset, second: xr.Dataset, ignore: Sequence[str] = ()) -> D
     Raises
     ------
     StudyError
-        if the studies are of two scenes, one has two runs of the same parameters, or neither has a
-        parameter that is to be ignored
+        if the studies are of two scenes, one has no runs, or two of the same parameters, or neither
+        has a parameter that is to be ignored
     """
-    sides = first, second
+    sides = [each.drop_dims("cell", errors="ignore") for each in (first, second)]
     scenes = [each.attrs.get("scene") for each in sides]
     if scenes[0] != scenes[1]:
         raise StudyError("scene", scenes[1], f"must be that of the other study, {scenes[0]}")
     every = [list(_runs(each)) for each in sides]
+    for side, there in zip(sides, every, strict=True):
+        if not there:
+            raise StudyError("runs", _name(side), "has none yet: compute it first")
     keys = [set(runs[0][1]) for runs in every]
     for name in ignore:
         if name not in keys[0] | keys[1]:
@@ -253,15 +257,17 @@ def _by_parameters(
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as it is, whichever type it has in the data set: 1.0 is 1; JSON is read."""
+    """Return a value whichever type it has in the data set: 1.0 is 1, NaN none; JSON is read."""
     if isinstance(value, str) and value[:1] in {"[", "{"}:
         try:
             return json.loads(value)
         except ValueError:
             return value
     if isinstance(value, bool):
-        return int(value)
-    return float(value) if isinstance(value, int) else value
+        return json.dumps(value)  # as a coordinate has it
+    if isinstance(value, int):
+        return float(value)
+    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def _varied(runs: Sequence[tuple[Any, Mapping[str, Any]]]) -> set[str]:

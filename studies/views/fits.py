@@ -7,6 +7,7 @@ from typing import Any
 
 import xarray as xr
 
+from studies.definition.fit import NO_FIT
 from studies.definition.study import Study
 from studies.errors import StudyError
 from studies.execution.run import run_study
@@ -31,7 +32,7 @@ def fit(study: Study | Mapping[str, Any], store: Store, **options: Any) -> xr.Da
     """
     own = study if isinstance(study, Study) else Study.from_dict(study, options.pop("scene", None))
     if not own.fit:
-        raise StudyError("fit", None, "is missing: tell what was measured, and the ranges")
+        raise StudyError("fit", None, NO_FIT)
     return open_study(run_study(own, store, **options).dataset)
 
 

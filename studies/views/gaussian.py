@@ -32,6 +32,9 @@ _SHORTEST, _LONGEST = 0.05, 20.0
 _ROUGHNESS = (1e-7, 1e-2)
 """Variance of what no smooth function explains, as a multiple of the whole: smallest, largest."""
 _STARTS = (0.3, 1.5)
+_HULL = 6
+"""Largest number of parameters of which corners are told: of more almost all runs are corners, and
+the sides of their hull are more than the memory holds."""
 _FITTED = 200
 """Largest number of runs by which lengths are chosen; of more, evenly spaced ones are taken."""
 
@@ -91,12 +94,15 @@ def in_hull(places: Array, place: Array) -> bool:
 
 
 def _corners(places: Array) -> NDArray[np.bool_]:
-    """Return which places are corners of the hull of all; none if all others would be too few."""
+    """Return which places are corners of the hull of all.
+
+    None of more than `_HULL` parameters, or if all others would be too few.
+    """
     count, dimensions = places.shape
     corner = np.zeros(count, dtype=bool)
     if dimensions == 1:
         corner[[places[:, 0].argmin(), places[:, 0].argmax()]] = True
-    else:
+    elif dimensions <= _HULL:
         with suppress(QhullError):  # the places do not fill their space
             corner[ConvexHull(places).vertices] = True
     return corner if count - corner.sum() > dimensions else np.zeros(count, dtype=bool)

@@ -147,8 +147,9 @@ def run_file(path: Path | str, selection: Mapping[str, str | float]) -> Path:
     if found.name != "dataset.nc" or not found.with_name("study.json").is_file():
         return found
     study, store = study_of(found)
-    if study.goal:
-        allowed = "holds what a search found: give the file of a run, such as that of run_high"
+    if study.goal or study.fit:
+        such = "run_high" if study.goal else "tried_run"
+        allowed = f"holds what a search found: give the file of a run, such as that of {such}"
         raise StudyError("path", str(path), allowed)
     with open_netcdf(found) as dataset:
         run = one_run(dataset, selection)

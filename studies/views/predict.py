@@ -58,8 +58,8 @@ def predict(
     ways = [way for way in WAYS if way == GAUSSIAN or "cell_state" in dataset]
     if by is not None and by not in ways:
         raise StudyError("by", by, one_of(by, ways))
-    names, between = _names(dataset, of), _placed(dataset, at)
     way = by or ways[0]
+    names, between = _names(dataset, of), _placed(dataset, at, whole=way == GAUSSIAN)
     found = (_in_cells if way == CELLS else _by_process)(dataset, between, names)
     return found.assign_coords(between.fixed | between.place).assign_attrs(by=way)
 
@@ -103,13 +103,17 @@ def _names(dataset: xr.Dataset, of: str | Sequence[str] | None) -> list[str]:
     return names
 
 
-def _placed(dataset: xr.Dataset, at: Mapping[str, Any]) -> _Between:
-    """Return the runs of the words that are given, and the numbers."""
+def _placed(dataset: xr.Dataset, at: Mapping[str, Any], whole: bool) -> _Between:
+    """Return the runs of the words that are given, and the numbers.
+
+    Numbers that were not refined count as words, unless all runs are taken as a ``whole``.
+    """
     coordinates, chosen = sweep_coordinates(dataset), dataset
     for name, value in at.items():
         if name not in coordinates:
             raise StudyError(name, value, one_of(name, list(coordinates)))
-        if dataset[name].dtype.kind not in "fiu":
+        words = dataset[name].dtype.kind not in "fiu"
+        if words or (not whole and f"cell_{name}" in dataset):
             chosen = select(chosen, {name: value})
     place, fixed = {}, {}
     for name in coordinates:

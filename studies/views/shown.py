@@ -71,7 +71,7 @@ def shown(
     Raises
     ------
     StudyError
-        if the run has no such field, component or stage
+        if the run has no such field, component or stage, or the map of the other is over other axes
     """
     if field in map_fields(run):
         return _map(run, field, component, stage, minus)
@@ -90,10 +90,14 @@ def _map(
     across, up = map_axes(values)
     if minus is not None:
         other = mapped(minus, field, component, stage=stage).values
-        there = {name: values[name] for name in (across, up)}
-        same = all(np.array_equal(other[name], each) for name, each in there.items())
-        values = values - (other if same else other.interp(there))
-        signed, high = True, float(abs(values).quantile(0.998))
+        if map_axes(other) != (across, up):
+            own, its = (", ".join(each) for each in ((across, up), map_axes(other)))
+            raise StudyError("minus", field, f"is over {its} in the other run, and over {own} here")
+        places = {name: values[name] for name in (across, up)}
+        same = all(np.array_equal(other[name], each) for name, each in places.items())
+        values = values - (other if same else other.interp(places))
+        there = values.notnull().any()  # or the two have no place in common
+        signed, high = True, float(abs(values).quantile(0.998)) if there else 1.0
     edge = float(run["contact_half_width"]) if "contact_half_width" in run else 0.0
     head = _described(run, field) | {
         "kind": "map",

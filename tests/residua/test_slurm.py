@@ -42,3 +42,15 @@ def test_what_sbatch_does_not_take_is_refused(
     assert main(["slurm", str(study), "--script", str(file), *option]) == 2
     assert f"{option[0]} = {option[1]!r}: must be" in capsys.readouterr().err
     assert not file.exists()
+
+
+def test_parts_of_a_study_that_chooses_its_runs_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refine = '[refine]\nof = ["peak_contact_pressure"]\n'
+    study = write_study(tmp_path)
+    study.write_text(study.read_text() + refine)
+    command = ["slurm", str(study), "--script", str(tmp_path / "job.sbatch")]
+    assert main(command) == 2
+    assert "parts cannot share it: use a scheduler" in capsys.readouterr().err
+    assert main([*command, "--with-scheduler"]) == 0

@@ -190,6 +190,14 @@ class Followed(Canned):
             yield from self.records(parameters, [value], monitor)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SwitchedParameters(FakeParameters):
+    """The same with values that are neither numbers nor words."""
+
+    hot: bool = described(False, "whether it is hot")
+    width: Annotated[float, Gt(0.0), Unit("mm")] | None = described(None, "width, if it is given")
+
+
 FAKE = Canned(
     name="fake",
     summary="a scene that costs nothing",
@@ -198,6 +206,13 @@ FAKE = Canned(
     records=path,
 )
 SCENES[FAKE.name] = FAKE
+SWITCHED = Canned(
+    name="switched",
+    summary="a scene with a switch",
+    parameters=SwitchedParameters,
+    branch="load_ratio",
+    records=path,
+)
 FOLLOWED = Followed(
     name="followed",
     summary="a scene that costs nothing, whose paths go on",

@@ -14,14 +14,17 @@ from studies import Store, Study, StudyError, diff, open_study
 from studies.storage.combine import combine
 from studies.views.differing import difference_table
 from studies.views.plots.differing import difference_figure
-from tests.studies.fakes import record
+from tests.studies import test_refine
+from tests.studies.fakes import SWITCHED, record
+from tests.studies.test_goal import search_here
 
 SWEEP = {"load_ratio": [0.25, 0.5], "friction": [0.0, 0.3]}
 
 
 def made(place: Path, change: Any = lambda run: run, **content: Any) -> Path:
     """Store a study of the fake scene whose records are changed; return its directory."""
-    study = Study.from_dict({"name": place.name, "scene": "fake", **content})
+    scene = content.pop("own", None)
+    study = Study.from_dict({"name": place.name, "scene": "fake", **content}, scene)
     store = Store(place)
     for case in study.cases():
         store.write_run(case, change(record(case.parameters)))
@@ -134,3 +137,21 @@ def test_the_picture_has_a_bar_for_each_change_and_a_mark_for_each_run(tmp_path:
     assert len(bars.patches) == 2
     before, after = pairs.lines[1].get_data()
     assert np.sum(before != after) == 1
+
+
+def test_cells_of_refinements_are_not_compared(tmp_path: Path) -> None:
+    for name, halvings in (("a", 1), ("b", 2)):
+        search_here(test_refine.study({"halvings": halvings}), Store(tmp_path / name))
+    different = found(tmp_path / "a", tmp_path / "b")
+    assert different.common > 9
+    assert (different.unlike, different.changes) == ({}, [])
+
+
+def test_switches_and_what_is_not_given_meet(tmp_path: Path) -> None:
+    points = [{"friction": 0.1, "width": 1.0, "hot": True}, {"friction": 0.2, "hot": True}]
+    first = made(tmp_path / "a", own=SWITCHED, points=points)
+    sweep = {"friction": [0.2, 0.3]}
+    second = made(tmp_path / "b", own=SWITCHED, parameters={"hot": True}, sweep=sweep)
+    different = found(first, second)
+    assert different.common == 1
+    assert [len(each) for each in different.only] == [1, 1]

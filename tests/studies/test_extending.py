@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from studies import Store, Study, StudyError
+from studies.definition.files import read_study
 from studies.definition.goal import checked_goal
 from tests.studies.conftest import compute_here
 from tests.studies.fakes import FAKE
@@ -158,3 +159,20 @@ def test_a_study_is_found_by_file_name_and_id(tmp_path: Path) -> None:
     store.save_study(Study.from_dict(BASE | {"note": "again"}))
     with pytest.raises(StudyError, match="is the name of several studies"):
         store.definition("base")
+
+
+def test_a_circle_of_files_is_refused(tmp_path: Path) -> None:
+    for name, other in (("a", "b"), ("b", "a")):
+        text = f'name = "{name}"\nextends = "{other}.toml"\n[sweep]\nfriction = [0.1]\n'
+        (tmp_path / f"{name}.toml").write_text(text)
+    with pytest.raises(StudyError, match=r"extends = '[ab].toml': extends a study that extends it"):
+        Study.from_toml(tmp_path / "a.toml")
+
+
+def test_a_scene_is_beside_the_first_of_three_study_files(tmp_path: Path) -> None:
+    (tmp_path / "one" / "two").mkdir(parents=True)
+    (tmp_path / "one" / "two" / "a.toml").write_text('name = "a"\nscene = "pin.toml"\n')
+    (tmp_path / "one" / "b.toml").write_text('name = "b"\nextends = "two/a.toml"\n')
+    (tmp_path / "c.toml").write_text('name = "c"\nextends = "one/b.toml"\n')
+    content = read_study(tmp_path / "c.toml")
+    assert content["extends"]["extends"]["scene"] == "one/two/pin.toml"

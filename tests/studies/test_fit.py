@@ -28,6 +28,8 @@ from studies.definition.measured import Line, checked_measured, pieces
 from studies.execution.asking import Asking
 from studies.execution.calibrated import calibrated
 from studies.execution.task import PathTask, walk
+from studies.views.picking import run_file
+from tests.studies.conftest import write_study
 from tests.studies.fakes import FAKE, Canned
 
 ROOT = Path(__file__).parents[2]
@@ -231,6 +233,24 @@ def test_a_fit_without_an_answer_says_why(
         assert dataset["runs"].item() <= 5
 
 
+def test_a_fit_is_found_where_no_runs_are_left_for_its_deviations(tmp_path: Path) -> None:
+    whole = fit_here(study(), Store(tmp_path / "whole"))
+    fit_here(study(most=len(whole) - 1), Store(tmp_path / "part"))
+    with open_study(tmp_path / "whole") as one, open_study(tmp_path / "part") as other:
+        assert other["runs"].item() == len(whole) - 2, "those of the central differences lack"
+        assert other["status"].item() == "ok"
+        for name in TRUTH:
+            assert other[name].item() == one[name].item()
+            assert other[f"{name}_sigma"].item() == pytest.approx(one[f"{name}_sigma"].item(), 0.2)
+
+
+def test_a_study_without_a_fit_is_not_fitted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fit", str(write_study(tmp_path)), "--out", str(tmp_path / "out")]) == 2
+    assert "fit = None: is missing" in capsys.readouterr().err
+
+
 def test_an_interrupted_fit_goes_on_and_asks_for_the_same_runs(tmp_path: Path) -> None:
     one = study(measured(0.02))
     at_once = fit_here(one, Store(tmp_path / "a"))
@@ -290,6 +310,10 @@ def test_a_line_is_compared_with_its_own_piece_and_a_little_beyond() -> None:
          "> 0"),
         ({"ranges": {}}, "fit.ranges", "bounds of each parameter"),
         ({"first": {"slope": 200.0}}, "fit.first.slope", "<= 100"),
+        (
+            {"ranges": {"slope": [0, 200]}, "first": {"slope": 195}},
+            "fit.first.slope", "at most 190",
+        ),
         ({"first": {"angle": 1.0}}, "fit.first.angle", "must be one of"),
         ({"step": 0.0}, "fit.step", ">= 0.0001"),
         ({"most": 2}, "fit.most", "must be at least 3, the runs of the first round"),
@@ -297,6 +321,12 @@ def test_a_line_is_compared_with_its_own_piece_and_a_little_beyond() -> None:
         ({"measured": []}, "fit.measured", "must be a list of measured lines"),
         ({"measured": ["a.csv"]}, "fit.measured[0]", "only a study file can"),
         ({"measured": [{"of": "forc", "values": [1, 2]}]}, "fit.measured[0].of", "of the runs"),
+        ({"measured": [{"rows": 5}]}, "fit.measured[0].rows", "the rows of a file"),
+        ({"measured": [{"rows": ["ab"]}]}, "fit.measured[0].rows", "the rows of a file"),
+        ({"measured": [{"of": "crater_depth", "over": [], "values": [1, 2]}]},
+         "fit.measured[0].over", "of the runs"),
+        ({"measured": [{"of": "crater_depth", "values": [10**400, 2]}]},
+         "fit.measured[0].values", "finite numbers"),
         ({"measured": [{"of": "crater_depth", "values": [1]}]}, "fit.measured", "2 at least"),
         (
             {"measured": [{"of": "crater_depth", "values": [1, 2], "places": [1, 2]}]},
@@ -416,6 +446,8 @@ def test_the_command_fits_prints_draws_and_keeps(
     with fit(Study.from_toml(file), Store(out), workers=1) as dataset:
         product = dataset["load_ratio"].item() * (1.0 + dataset["friction"].item())
         assert product == pytest.approx(0.7, rel=1e-3)
+    with pytest.raises(StudyError, match=r"a search found: .* such as that of tried_run"):
+        run_file(out, {})
     assert main([*run, "--measured", str(tmp_path / "none.csv")]) == 2
     assert "--measured" in capsys.readouterr().err
 

@@ -389,6 +389,7 @@ def test_the_estimate_is_the_most_that_the_search_may_take(store: Store, scene: 
         ({"of": "contact_pressure"}, "goal.of", "is over stage, s"),
         ({"of": ["status"]}, "goal.of", "one number a run"),
         ({"at": "high"}, "goal.at", "a finite number"),
+        ({"at": 10**400}, "goal.at", "a finite number"),
         ({"first_above": 1.0}, "goal", "one of at, first_above, first_below"),
         ({"find": "first_yield"}, "goal", "is what find = first_yield says"),
         ({"find": "yield"}, "goal.find", "did you mean first_yield?"),

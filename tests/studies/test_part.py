@@ -107,6 +107,15 @@ def test_a_goal_is_searched_by_a_part(tmp_path: Path) -> None:
     assert run_part(of, tmp_path / "out", (1, 1)).computed == []
 
 
+def test_parts_of_another_goal_are_not_blamed_for_those_that_have_ended(tmp_path: Path) -> None:
+    of = study(tmp_path, goal=GOAL, sweep={"friction": [0.0]})
+    for number in (1, 2, 3):
+        run_part(of, tmp_path / "out", (number, 3))
+    other = study(tmp_path, goal=GOAL | {"at": 200.0}, sweep={"friction": [0.0]})
+    run_part(other, tmp_path / "out", (1, 1))
+    assert run_study(other, Store(tmp_path / "out"), resume=True).counts == {"ok": 1}
+
+
 def test_a_part_that_is_stopped_releases_what_it_has(tmp_path: Path) -> None:
     of, out = study(tmp_path), tmp_path / "out"
     stopped = run_part(of, out, (1, 2), should_stop=lambda: len(runs(out)) >= 5)
@@ -162,6 +171,10 @@ def test_a_claim_has_one_owner_until_it_ends_or_dies(tmp_path: Path) -> None:
         assert claim is not None
         claim.done = True
     assert [path.name for path in (tmp_path / "claims").iterdir()] == ["f.0"]
+    for _ in range(3):
+        with other.held("f") as claim:
+            assert claim == Claim(0), "who has done all has not died"
+            claim.done = True
 
 
 def test_parts_and_a_writer_exclude_each_other(tmp_path: Path) -> None:

@@ -9,10 +9,11 @@ import pytest
 import xarray as xr
 from scipy.stats import qmc
 
-from studies import Store, StudyError, open_study, predict
+from studies import Store, Study, StudyError, open_study, predict
 from studies.views.answers import answer
 from studies.views.gaussian import Gaussian, in_hull
 from tests.studies.conftest import compute_here, fake_study
+from tests.studies.fakes import SWITCHED
 from tests.studies.test_goal import search_here
 from tests.studies.test_refine import AXES, OF, study
 
@@ -152,3 +153,40 @@ def test_a_grid_is_predicted_by_a_process(store: Store) -> None:
         assert found["peak_contact_pressure"].item() == pytest.approx(50.0 + 50.0 * 1.1, rel=1e-3)
         with pytest.raises(StudyError, match="must be one of none"):
             predict(dataset, load_ratio=0.5, friction=0.1, hardening="isotropic")
+
+
+def test_a_number_that_was_not_refined_tells_a_branch(store: Store) -> None:
+    pads = {"wide": {"half_width": 50.0}, "narrow": {"half_width": 20.0}}
+    search_here(study(sweep=AXES | {"pad": pads}), store)
+    at = {"load_ratio": 0.9, "friction": 0.05}
+    with open_study(store.directory) as dataset:
+        found = predict(dataset, **at, half_width=20.0)
+        assert found[OF].item() == pytest.approx(0.9, abs=0.05)
+        with pytest.raises(StudyError, match=r"half_width = 30\.0: must be one of 50\.0, 20\.0"):
+            predict(dataset, **at, half_width=30.0)
+
+
+def test_a_switch_tells_a_branch_and_is_one_of_the_run_to_add(store: Store) -> None:
+    refine = {"of": ["peak_contact_pressure"], "halvings": 1}
+    content = {"name": "hot", "sweep": AXES | {"hot": [False, True]}, "refine": refine}
+    asked = Study.from_dict(content, SWITCHED)
+    search_here(asked, store)
+    with open_study(store.directory) as dataset:
+        at = {"load_ratio": 0.5, "friction": 0.1, "hot": "true"}
+        told = answer(dataset, asked, store, "peak_contact_pressure", at, within=0.0)
+    assert told.value == pytest.approx(105.0)
+    assert told.run.parameters["hot"] is True
+
+
+def test_what_a_search_found_is_no_number_of_runs(store: Store) -> None:
+    goal = {"find": "limit_load", "between": [0.1, 2.0]}
+    asked = Study.from_dict({"name": "goal", "scene": "fake", "goal": goal})
+    with pytest.raises(StudyError, match="study = 'goal': has what a search found"):
+        answer(xr.Dataset(), asked, store, "load_ratio", {})
+
+
+def test_runs_of_many_parameters_have_no_corners_that_count() -> None:
+    places = qmc.Sobol(12, rng=0).random(256)
+    process = Gaussian.__new__(Gaussian)
+    process.fit(places, places[:, :1], np.ones(12), 1e-6)
+    assert len(process.misses) == 256

@@ -220,6 +220,12 @@ BENT = Canned(
 )  # fmt: skip
 
 
+def test_rounding_of_a_number_that_does_not_vary_is_not_refined() -> None:
+    found = refined_by(lambda x, y: 5.0 + 1e-15 * ((37.0 * x + 91.0 * y) % 1.0))
+    assert len(found.asked) == 9
+    assert {each.state for each in found.settled} == {"settled"}
+
+
 def study(asked: dict[str, Any] | None = None, sweep: Any = None, **fixed: Any) -> Study:
     refine = {"of": [OF], "until": 0.05, "halvings": 2} | (asked or {})
     content = {"name": "refined", "parameters": fixed, "sweep": sweep or AXES, "refine": refine}
@@ -298,6 +304,7 @@ def test_the_estimate_is_the_most_that_it_may_take(store: Store) -> None:
         ({"of": ["peak_residual_tensio"]}, "refine.of", "did you mean peak_residual_tension?"),
         ({"until": 0.0}, "refine.until", "a share of the range"),
         ({"until": {"other": 1.0}}, "refine.until", "for each of `of`"),
+        ({"until": {OF: 10**400}}, "refine.until", "for each of `of`"),
         ({"most": 5}, "refine.most", "at least 9, the runs of the first round"),
         ({"most": True}, "refine.most", "an integer"),
         ({"halvings": 0}, "refine.halvings", "an integer >= 1"),

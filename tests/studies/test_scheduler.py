@@ -146,6 +146,9 @@ def test_a_file_without_a_scheduler_is_told(
     monkeypatch.setattr("studies.execution.cluster._APPEARS", 0.1)
     with pytest.raises(GridLost, match="no scheduler has written the file"):
         Access.of_file(tmp_path / "none.json", None, None, None)
+    (tmp_path / "begun.json").touch()
+    with pytest.raises(GridLost):
+        Access.of_file(tmp_path / "begun.json", None, None, None)  # it is not written yet
     (tmp_path / "odd.json").write_text("[]")
     with pytest.raises(StudyError, match=r"scheduler-file = .*must be a file that `dask"):
         Access.of_file(tmp_path / "odd.json", None, None, None)

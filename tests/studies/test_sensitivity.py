@@ -16,7 +16,7 @@ from annotated_types import Interval, Unit
 from residua.cli import main
 from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, open_study, sensitivity
-from studies.views.chaos import fitted
+from studies.views.chaos import bears, candidates, fitted
 from studies.views.plots.sensitivity import sensitivity_figure
 from studies.views.sensitivity import sensitivity_table, told
 from tests.studies.conftest import compute_here, fake_study
@@ -223,7 +223,7 @@ def test_methods_of_the_library_order_the_parameters_too(method: str) -> None:
     before = np.random.get_state()[2]  # noqa: NPY002
     found = sensitivity(dataset, OF, method=method)
     assert np.random.get_state()[2] == before  # noqa: NPY002
-    name = {"delta": "delta_raw", "pawn": "median", "rbd_fast": "S1"}[method]
+    name = {"delta": "delta_balanced", "pawn": "median", "rbd_fast": "S1"}[method]
     assert found.equals(sensitivity(dataset, OF, method=method))
     x, y, z = found[name].values
     assert min(x, y) > z
@@ -257,3 +257,8 @@ def test_the_command_prints_and_draws(
     with open_study(out) as dataset:
         words = json.loads(json.dumps(told(sensitivity(dataset, OF))))
     assert words["parameters"]["y"]["total"] == pytest.approx(TOTAL[1], abs=0.01)
+
+
+def test_many_parameters_take_little_memory() -> None:
+    assert not bears(1000, 40, 14)
+    assert len(candidates(40, 14, most=100)) < 2000

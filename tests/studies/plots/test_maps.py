@@ -18,6 +18,7 @@ from studies.views.plots.captions import setting
 from studies.views.plots.mapped import whole
 from studies.views.plots.maps import map_figure
 from studies.views.plots.picture import picture
+from studies.views.shown import shown as values_shown
 from tests.studies.conftest import compute_here, fake_study
 
 ComputedStudy = tuple[Study, Store]
@@ -402,3 +403,15 @@ def test_a_section_is_drawn_with_the_wheel_above_it() -> None:
     assert axes.get_ylim() == (-4.5, 3.0)
     below, _ = mesh_of(map_figure(rolled(), "map_mises", window=(-5.0, 5.0, -4.0, -1.0)))
     assert below.get_legend() is None
+
+
+def test_the_map_of_another_run_is_subtracted_over_the_same_axes_only() -> None:
+    x, y = np.linspace(0.0, 1.0, 5), np.linspace(-1.0, 0.0, 4)
+    run = grid_map(x, y)
+    (field,) = (str(name) for name in run.data_vars if run[name].ndim == 2)
+    assert not values_shown(run, field, minus=run).arrays[field].any()
+    apart = values_shown(run, field, minus=grid_map(x + 10.0, y))
+    assert np.isnan(apart.arrays[field]).all()
+    assert apart.head["high"] == 1.0
+    with pytest.raises(StudyError, match="is over x, z in the other run, and over x, y here"):
+        values_shown(run, field, minus=run.rename(y="z"))
