@@ -6,8 +6,6 @@ import re
 from functools import partial
 from http import HTTPStatus
 
-from anyio import CapacityLimiter, fail_after
-from anyio.to_thread import run_sync
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.types import ASGIApp, Receive, Send
@@ -36,9 +34,6 @@ NEEDED = [
 ]
 """The scope that a request needs: the first match; requests without a match need ``admin``."""
 
-SECONDS = 2.0
-"""Longest time of reading the keys [s]."""
-
 HOST = re.compile(r"(?:\[([\da-f:.]+)\]|([^\s:/@\[\]]+))(?::\d*)?", re.IGNORECASE)
 FIELDS = re.compile(r"application/x-www-form-urlencoded\s*(?:;.*)?", re.IGNORECASE)
 FORM = re.compile(r"multipart/form-data\s*;.*", re.IGNORECASE)
@@ -64,7 +59,6 @@ class Gate:
         self.app = app
         self.keys_needed = settings.keys_required
         self.keys = keys
-        self.one = CapacityLimiter(1)
         self.names = {
             name.lower() for name in ("localhost", settings.host, *settings.allowed_hosts)
         }
@@ -120,15 +114,11 @@ class Gate:
         kind, _, text = header.partition(" ")
         given = text.strip() if kind.lower() == "bearer" else "" if header else kept
         try:
-            with fail_after(SECONDS):  # in a thread, which is left alone if the disk hangs
-                owner = await run_sync(
-                    self.keys.owner, given, limiter=self.one, abandon_on_cancel=True
-                )
-        except (KeysError, TimeoutError) as error:
+            owner = await self.keys.known(given)
+        except KeysError as error:
             if wanted is None:
                 return None
-            reason = str(error) or f"the keys cannot be read within {SECONDS:g} s"
-            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, reason) from None
+            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from None
         challenge = 'Bearer realm="residua"'
         name, scope = owner or ("", None)
         if scope is None and wanted is None and not header:  # a cookie of a key that was removed

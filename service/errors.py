@@ -15,6 +15,7 @@ from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
 from service.headers import HEADERS
+from service.keys import KeysError
 from service.logs import REQUEST
 from service.methods import offered
 from studies import StudyError
@@ -76,6 +77,7 @@ STATUS: dict[type[Exception], HTTPStatus] = {
     Conflict: HTTPStatus.CONFLICT,
     Busy: HTTPStatus.SERVICE_UNAVAILABLE,
     QueueLost: HTTPStatus.SERVICE_UNAVAILABLE,
+    KeysError: HTTPStatus.SERVICE_UNAVAILABLE,
     NoRoom: HTTPStatus.INSUFFICIENT_STORAGE,
     StoreFull: HTTPStatus.INSUFFICIENT_STORAGE,
     CatalogueDamaged: HTTPStatus.SERVICE_UNAVAILABLE,

@@ -18,6 +18,8 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 
+from anyio import CapacityLimiter, fail_after
+from anyio.to_thread import run_sync
 from pydantic import BaseModel, TypeAdapter
 
 from studies import FileDamaged, Store, StudyError
@@ -56,6 +58,9 @@ FILE = TypeAdapter(dict[str, Key])
 LARGEST = 1_000_000
 """Largest size of the file [bytes]."""
 
+SECONDS = 2.0
+"""Longest time of reading the keys for a request [s]."""
+
 _NAME = "keys service"
 
 
@@ -65,6 +70,7 @@ class Keys:
     def __init__(self, directory: Path) -> None:
         self.path = directory / "keys.json"
         self._read: tuple[State | None, dict[str, Key]] = None, {}
+        self._one = CapacityLimiter(1)
 
     def all(self) -> dict[str, Key]:
         """Return the keys by name; raise `KeysError` if the file exists and is not readable."""
@@ -93,6 +99,14 @@ class Keys:
         given, known = _digest(text).encode(), self.all().items()
         fits = [own for own in known if hmac.compare_digest(own[1].sha256.encode(), given)]
         return (fits[0][0], fits[0][1].scope) if fits else None
+
+    async def known(self, text: str) -> tuple[str, Scope] | None:
+        """Return what `owner` does; raise `KeysError` also if that takes more than `SECONDS`."""
+        try:
+            with fail_after(SECONDS):  # in a thread, which is left alone if the disk hangs
+                return await run_sync(self.owner, text, limiter=self._one, abandon_on_cancel=True)
+        except TimeoutError:
+            raise KeysError(f"the keys cannot be read within {SECONDS:g} s") from None
 
     def add(self, name: str, scope: Scope) -> str:
         """Make a key and return its text, which is not stored; the name must be new.

@@ -19,6 +19,9 @@ from service.schemas import MapQuery
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
 
+WAITING = 200
+"""Number of readings and pictures that may wait for their turn."""
+
 Read = TypeVar("Read")
 
 
@@ -37,7 +40,7 @@ class Pictures:
     def __init__(self, queue: int, memory: int) -> None:
         self.queue = queue
         self.memory = memory
-        self.size = 0
+        self.size = self.present = 0
         self.pencil = CapacityLimiter(1)
         self.kept: OrderedDict[str, bytes] = OrderedDict()
         self.underway: dict[str, asyncio.Task[bytes]] = {}
@@ -62,8 +65,20 @@ class Pictures:
         return await asyncio.shield(self.underway[tag])
 
     async def alone(self, read: Callable[..., Read], *arguments: Any) -> Read:
-        """Return what ``read`` returns, called in a thread while no other one reads or draws."""
-        return await run_sync(read, *arguments, limiter=self.pencil)
+        """Return what ``read`` returns, called in a thread while no other one reads or draws.
+
+        Raises
+        ------
+        Busy
+            If too many others wait.
+        """
+        if self.present > WAITING:
+            raise Busy(f"{WAITING} readings of runs wait already")
+        self.present += 1
+        try:
+            return await run_sync(read, *arguments, limiter=self.pencil)
+        finally:
+            self.present -= 1
 
     async def _draw(self, tag: str, path: Path, query: MapQuery) -> bytes:
         try:

@@ -6,6 +6,7 @@ import asyncio
 import math
 import time
 from collections import Counter, OrderedDict
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -84,15 +85,15 @@ class Details:
         counts = Counter[str]()
         for status, number in self.store.catalogue.counts(self.jobs.runs(job.id)).items():
             counts[taken(status, allow)] += number
-        goal = study.get("goal", {})
-        if not goal and (pending := job.size - sum(counts.values())):
+        goal, asks = study.get("goal", {}), chooses(study)
+        if not asks and (pending := job.size - sum(counts.values())):
             counts[PENDING] = pending
         axes = {name: labels(name, axis) for name, axis in study["sweep"].items()}
         page = self.jobs.runs(job.id, window.limit, window.offset)
         rows = self.store.catalogue.rows(page)
 
         def at(run_id: str, position: int) -> dict[str, Any]:
-            if not goal:
+            if not asks:
                 return point(axes, position)
             return searched_at(study, rows[run_id]["parameters"]) if run_id in rows else {}
 
@@ -115,6 +116,11 @@ class Details:
         )
 
 
+def chooses(study: Mapping[str, Any]) -> bool:
+    """Whether a study asks for runs by the outcomes of others: they do not fill its axes."""
+    return any(study.get(name) for name in ("goal", "refine", "fit"))
+
+
 def point(axes: dict[str, list[Any]], position: int) -> dict[str, Any]:
     """Return the values on the axes of the run at ``position``; the last axis runs fastest."""
     values = {}
@@ -124,16 +130,21 @@ def point(axes: dict[str, list[Any]], position: int) -> dict[str, Any]:
     return dict(reversed(values.items()))
 
 
-def searched_at(study: dict[str, Any], parameters: dict[str, Any]) -> dict[str, Any]:
-    """Return where a search has asked for a run: values on the axes, and that of its parameter."""
-    values = {
+def searched_at(study: Mapping[str, Any], parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return where a study has asked for a run: on its axes, and of parameters it searches or fits.
+
+    The runs of a refinement are between the values of its axes.
+    """
+    labelled = {
         name: each.at
         for name, axis in study["sweep"].items()
         for each in positions(name, axis)
         if all(parameters.get(key) == value for key, value in each.sets.items())
     }
-    name = study["goal"]["parameter"]
-    return values | {name: parameters[name]}
+    goal, fit = study.get("goal") or {}, study.get("fit") or {}
+    names = [*study["sweep"], *([goal["parameter"]] if goal else []), *fit.get("ranges", ())]
+    places = {name: labelled.get(name, parameters.get(name)) for name in names}
+    return {name: place for name, place in places.items() if place is not None}
 
 
 def _own_words(study: dict[str, Any]) -> dict[str, Any]:

@@ -19,7 +19,7 @@ import sys
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -30,8 +30,8 @@ from service import logs
 from solver.parts import SETTING, own_files
 from studies.execution.cluster import prepare_workers
 
-LONGEST_LINE = 1_000_000
-"""Largest size of a message of a process [bytes]."""
+LONGEST_LINE = 10_000_000
+"""Largest size of a message of a process [bytes]: of a search the ids of all runs are one."""
 
 BEAT_SECONDS = 5.0
 """Time between two signs of life [s]; a process counts as frozen only after a longer time."""
@@ -109,10 +109,12 @@ class Starter:
     """
 
     lock: int
+    _one: asyncio.Lock = field(default_factory=asyncio.Lock)
 
     async def prepare(self) -> str:
         """Start to load, unless it is done; return the method of `multiprocessing`."""
-        return await asyncio.to_thread(prepare_workers, LOADED)
+        async with self._one:  # meanwhile this process has variables of the other one
+            return await asyncio.to_thread(prepare_workers, LOADED)
 
     async def start(self, module: str, order: Mapping[str, Any]) -> Process:
         """Return a process that executes ``main()`` of a module, and has received its order.
@@ -141,6 +143,8 @@ class Starter:
                 await asyncio.to_thread(begin)
         except TimeoutError:
             raise OSError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT)) from None
+        except EOFError:  # the one to be forked has ended, as where no process can be started
+            raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN)) from None
         loop, reader = asyncio.get_running_loop(), asyncio.StreamReader(LONGEST_LINE)
         await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), stdout)
         writer, _ = await loop.connect_write_pipe(asyncio.BaseProtocol, stdin)

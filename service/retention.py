@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from service.errors import Conflict, NoRoom, NotFound
+from service.errors import Busy, Conflict, NoRoom, NotFound
 from service.examiner import Examined
 from service.job import Job, StudyState
 from service.jobs import Jobs, put
@@ -96,17 +96,24 @@ class Keeper:
 
         Raises
         ------
-        NoRoom
-            as `check_room`
+        NoRoom, Busy
+            as `check_room` and `Jobs.accept`; then nothing of the study stays
         """
         study, size = found.study, found.estimate.bytes
+        directory = self.store.study_directory(study.id)
         with self._one:
             self.check_room(found)
+            there = directory.exists()
             self.store.save_study(study)
             content, most = study.to_dict(), study.size
-            return self.jobs.accept(
-                study.id, content, found.runs, priority, size, most, study.stage()
-            )
+            try:
+                return self.jobs.accept(
+                    study.id, content, found.runs, priority, size, most, study.stage()
+                )
+            except Busy:  # or a queue that is made again from the studies would have it
+                if not there:
+                    shutil.rmtree(directory)
+                raise
 
     def check_room(self, found: Examined) -> None:
         """Raise `NoRoom` if a study does not fit on the disk beside those that have not ended."""

@@ -1,7 +1,8 @@
 """The numbers of a study's runs as columns, from the catalogue: sorted, filtered, a page of them.
 
 They are there while the study runs. A run that is not in the catalogue has its values on the axes
-of the sweep, the status ``pending``, and no numbers.
+of the sweep, the status ``pending``, and no numbers. The runs of a study that searches, refines
+or fits are those that it has asked for: they fill no grid, and have no axes.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 
 from service.job import Job
 from service.jobs import Jobs
-from service.overview import PENDING
+from service.overview import PENDING, chooses, searched_at
 from solver.results.audit.figures import AUDIT
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
@@ -36,6 +37,9 @@ KEPT = 8
 
 SAME = 1e-9
 """Relative difference below which a number is the one that a query names."""
+
+MOST_VALUES = 100
+"""Largest number of numbers that a query names of a column."""
 
 RANGE = re.compile(r"(?P<low>[^.]*(?:\.\d[^.]*)?)\.\.(?P<high>.*)", re.DOTALL)
 
@@ -92,7 +96,7 @@ class RunTable:
 
     Attributes
     ----------
-    axes : name of each axis of the sweep, with its values or labels
+    axes : name of each axis of the sweep, with its values or labels; the last runs fastest
     columns : all columns by name: the sweep, status, numbers, audit, id, message
     """
 
@@ -163,7 +167,8 @@ class Tables:
         """Return the table of a study."""
         with self.one:
             job = self.jobs.get(study_id)
-            state = job.turn, job.size, job.digest, state_of(self.store.catalogue.path)
+            asked = job.state, job.stage  # its runs may not all be known yet
+            state = job.turn, job.size, job.digest, asked, state_of(self.store.catalogue.path)
             known, table = self.kept.get(study_id, (None, None))
             if table is None or known != state:
                 table = self._made(job)
@@ -177,9 +182,12 @@ class Tables:
         study, runs = self.jobs.study(job.id), self.jobs.runs(job.id)
         rows, allow = self.store.catalogue.rows(runs), study.get("allow", [])
         scene = scene_of_study(self.store, job.scene)
-        axes = {name: labels(name, axis) for name, axis in study["sweep"].items()}
-        columns = [*_sweep(study["sweep"], axes, scene)]
         found = [rows.get(each) for each in runs]
+        axes = {name: labels(name, axis) for name, axis in study["sweep"].items()}
+        if chooses(study):
+            axes, columns = {}, [*_asked(study, found, scene)]
+        else:
+            columns = [*_sweep(study["sweep"], axes, scene)]
         outcome = [taken(row["status"], allow) if row else PENDING for row in found]
         columns.append(_column(STATUS, np.array(outcome, dtype=object), "run"))
         known = {each.name for each in columns}
@@ -216,13 +224,31 @@ def _sweep(
     places = np.unravel_index(np.arange(math.prod(shape)), shape) if shape else ()
     at = dict(zip(axes, places, strict=True))
     own = {name: (name, values) for name, values in axes.items()}
-    known = parameters_of(scene) if scene else {}
     for name, (axis, values) in {**own, **linked_values(dict(sweep))}.items():
-        plain = all(isinstance(each, int | float) and not isinstance(each, bool) for each in values)
-        every = np.array(values if plain else [str(each) for each in values], dtype=object)
-        every = every.astype(float) if plain else every
-        attributes = axis_attributes(scene, name) if scene and name in known else {}
-        yield _column(name, every[at[axis]], "sweep", words=attributes)
+        yield _placed(name, _array(values)[at[axis]], scene)
+
+
+def _asked(
+    study: Mapping[str, Any], rows: Sequence[Mapping[str, Any] | None], scene: Scene | None
+) -> Iterator[Column]:
+    """Yield the axes of a study that chooses its runs, and what it searches, over these runs."""
+    at = [searched_at(study, row["parameters"]) if row else {} for row in rows]
+    for name in dict.fromkeys(name for each in at for name in each):
+        yield _placed(name, _array([each.get(name) for each in at]), scene)
+
+
+def _array(values: Sequence[Any]) -> np.ndarray:
+    """Return numbers, NaN where there is none; texts if there is anything else."""
+    there = [each for each in values if each is not None]
+    if all(isinstance(each, int | float) and not isinstance(each, bool) for each in there):
+        return np.array([math.nan if each is None else each for each in values], dtype=float)
+    return np.array(["" if each is None else str(each) for each in values], dtype=object)
+
+
+def _placed(name: str, values: np.ndarray, scene: Scene | None) -> Column:
+    """Return a column that tells where runs are."""
+    known = axis_attributes(scene, name) if scene and name in parameters_of(scene) else {}
+    return _column(name, values, "sweep", words=known)
 
 
 def _column(
@@ -249,17 +275,23 @@ def _column(
 def _meets(column: Column, condition: str) -> np.ndarray:
     """Return which runs meet a condition."""
     if not column.number or column.flags:
-        wanted = [each.strip() for each in condition.split(",")]
-        codes = {word: code for code, word in column.flags.items()}
-        return np.isin(column.values, [codes.get(each, math.nan) for each in wanted] if codes
-                       else np.array(wanted, dtype=object))  # fmt: skip
+        wanted = {each.strip() for each in condition.split(",")}
+        said = column.values.tolist()
+        if column.flags:
+            said = [column.flags.get(each) for each in said]
+        return np.array([each in wanted for each in said], dtype=bool)
     values = column.values
     if match := RANGE.fullmatch(condition):
         low, high = (match[end].strip() for end in ("low", "high"))
-        above = values >= _number(column, low, condition) - SAME if low else True
-        below = values <= _number(column, high, condition) + SAME if high else True
+        least, most = (_number(column, end, condition) if end else None for end in (low, high))
+        above = least is None or values >= least - SAME * abs(least)
+        below = most is None or values <= most + SAME * abs(most)
         return ~np.isnan(values) & above & below
-    numbers = [_number(column, each, condition) for each in condition.split(",")]
+    named = condition.split(",")
+    if len(named) > MOST_VALUES:
+        allowed = f"must be at most {MOST_VALUES} numbers, or a range such as 0.1..0.4"
+        raise StudyError(column.name, f"{len(named)} numbers", allowed)
+    numbers = [_number(column, each, condition) for each in named]
     return np.any([np.isclose(values, each, rtol=SAME, atol=0.0) for each in numbers], axis=0)
 
 

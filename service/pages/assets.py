@@ -48,14 +48,16 @@ def version() -> str:
     return known.hexdigest()[:16]
 
 
+def asset(of: str, name: str) -> Asset | None:
+    """Return a static file of a version; None if this is another one, or has no such file."""
+    return _packed(name) if of == version() and name in {CHARTS, *own()} else None
+
+
 @cache
-def asset(name: str) -> Asset | None:
-    """Return a static file; None if there is none of this name."""
+def _packed(name: str) -> Asset:
     if name == CHARTS:
         content = files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()
-    elif name in own():
-        content = own()[name]
     else:
-        return None
+        content = own()[name]
     kind = MEDIA_TYPES[name.rpartition(".")[2]]
     return Asset(kind, gzip.compress(content, 6, mtime=0))

@@ -18,8 +18,16 @@ from studies.definition.parameters import Parameter, parameters_of, plain
 PREFIX = "p."
 """What precedes the name of a parameter in the name of its field."""
 
-RANGE = re.compile(r"(?P<start>\S+)\s*\.\.\s*(?P<stop>\S+)\s+in\s+(?P<num>\d+)(?P<log>\s+log)?")
+RANGE = re.compile(
+    r"(?P<start>\S+)\s*\.\.\s*(?P<stop>\S+)\s+in\s+(?P<num>[0-9]{1,9})(?P<log>\s+log)?"
+)
 """Values of equal steps: ``0 .. 0.4 in 5``."""
+
+LONGEST_RANGE = 200
+"""Largest length of such a text: the time to look for it grows with the square of its length."""
+
+LONGEST = 100_000
+"""Largest number of characters in the fields of a parameter."""
 
 OF = re.compile(r"(?:(?:parameters|sweep)\.)?(?P<name>\w+)")
 
@@ -117,7 +125,11 @@ def study_of(
 
 def _value(parameter: Parameter, texts: Sequence[str]) -> tuple[Any, bool]:
     """Return what texts say, and whether it is swept."""
-    if match := RANGE.fullmatch(texts[0]):
+    if (size := sum(map(len, texts))) > LONGEST:
+        allowed = f"must have at most {LONGEST} characters: write it as a study file"
+        raise StudyError(parameter.name, f"{size} characters", allowed)
+    match = RANGE.fullmatch(texts[0]) if len(texts[0]) <= LONGEST_RANGE else None
+    if match:
         ends = {key: _checked(parameter, match[key]) for key in ("start", "stop")}
         spacing = {"spacing": "log"} if match["log"] else {}
         return {**ends, "num": int(match["num"]), **spacing}, True
@@ -166,7 +178,7 @@ def _toml(value: Any) -> str:
         return "{" + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(map(_toml, value)) + "]"
-    return json.dumps(value, ensure_ascii=False)
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def as_curl(study: Mapping[str, Any], address: str) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import gzip
 import json
+from collections.abc import Mapping
+from contextlib import suppress
 from http import HTTPStatus
 from typing import Annotated, Any
 from urllib.parse import urlencode
@@ -24,13 +26,13 @@ from service.dependencies import (
     TheProbe,
     TheRun,
     TheRunner,
-    TheSettings,
     TheStore,
     TheTables,
 )
-from service.errors import NoRoom, NotFound
+from service.errors import Conflict, NoRoom, NotFound
 from service.examiner import Examined
-from service.job import StudyState
+from service.job import Job, StudyState
+from service.jobs import Jobs
 from service.pages import form
 from service.pages import study as chosen
 from service.pages.assets import asset
@@ -39,9 +41,10 @@ from service.pages.rendering import COOKIE, ROOT, PageRoute, page
 from service.pages.run import audited, numbers_shown, parameters_shown
 from service.routes.health import health
 from service.schemas import ContentId, StudyFilter, Window
-from service.table import MESSAGE, RUN, STATUS, scene_of_study
+from service.table import MESSAGE, RUN, STATUS, Tables, scene_of_study
 from solver.scenes import Scene
 from studies import Store, StudyError
+from studies.definition.identity import is_id
 from studies.scenes.registry import known_names, known_scenes
 from studies.views.columns import value_text
 
@@ -61,9 +64,9 @@ def lead(request: Request) -> Response:
 
 
 @router.get("/static/{version}/{name}")
-def get_asset(name: str, request: Request) -> Response:
+def get_asset(version: str, name: str, request: Request) -> Response:
     """Return a static file."""
-    found = asset(name)
+    found = asset(version, name)
     if found is None:
         raise NotFound("no such file")
     if "gzip" in request.headers.get("accept-encoding", ""):
@@ -92,7 +95,7 @@ def studies_page(
     window = StudyFilter(limit=LISTED, offset=(page_number - 1) * LISTED)
     wanted = {"state" if name == "status" else name: value for name, value in which.items()}
     found, total = jobs.page(limit=window.limit, offset=window.offset, **wanted)
-    items = [(overview.summary(job), jobs.study(job.id)) for job in found]
+    items = [(overview.summary(job), _said(jobs, job)) for job in found]
     return page(
         request,
         "studies",
@@ -107,16 +110,29 @@ def studies_page(
     )
 
 
+def _said(jobs: Jobs, job: Job) -> Mapping[str, Any]:
+    """Return the study of a job; nothing if it cannot be read, or has just been deleted."""
+    with suppress(Conflict, NotFound):
+        return jobs.study(job.id)
+    return {}
+
+
 @router.get("/studies/{study_id}")
 async def study_page(
     study_id: ContentId, request: Request, details: TheDetails, tables: TheTables
 ) -> Response:
     """Show a study: numbers over its sweep, one of its runs, a part of its table."""
     study = json.loads(await details.get(study_id, Window(limit=1)))
-    table = await run_in_threadpool(tables.get, study_id)
+    return await run_in_threadpool(_study, request, study, tables)
+
+
+def _study(request: Request, study: Mapping[str, Any], tables: Tables) -> Response:
+    table = tables.get(study["id"])
     query = dict(request.query_params)
-    numbers = chosen.usual(table)
-    number = query.get("number", numbers[0].name if numbers else "")
+    numbers = [each.name for each in chosen.usual(table)]
+    number = query.get("number", "")
+    if number not in numbers:
+        number = next(iter(numbers), "")
     at = chosen.chosen_run(table, query.get("run", ""), number)
 
     def turn(**other: Any) -> str:
@@ -146,7 +162,7 @@ async def study_page(
         csv=f"?{csv}" if csv else "",
         live=study["status"] in POLLED,
         data={
-            "id": study_id,
+            "id": study["id"],
             "live": study["status"] in POLLED,
             "number": number,
             "run": run["id"] if run else None,
@@ -189,7 +205,7 @@ def compare_page(
         raise StudyError("run", f"{len(ids)} runs", f"at most {MOST} runs are compared")
     rows = []
     for each in ids:
-        row = store.run(each) if len(each) == 32 else None
+        row = store.run(each) if is_id(each) else None
         if row is None:
             raise NotFound(f"no run has the id {each[:40]}")
         rows.append(row)
@@ -206,7 +222,6 @@ async def health_page(
     store: TheStore,
     probe: TheProbe,
     caller: TheCaller,
-    settings: TheSettings,
 ) -> Response:
     """Show the queue and whether the service can do its work."""
     state = await health(runner, jobs, store, probe, caller, Response())
@@ -216,9 +231,7 @@ async def health_page(
     for wanted in (StudyState.RUNNING, StudyState.ACCEPTED):
         found, _ = await run_in_threadpool(jobs.page, limit=50, offset=0, state=wanted)
         queue += [overview.summary(job) for job in found]
-    return page(
-        request, "health", health=state, states=states, runs=runs, queue=queue, settings=settings
-    )
+    return page(request, "health", health=state, states=states, runs=runs, queue=queue)
 
 
 @router.get("/new")
@@ -240,11 +253,13 @@ async def make(
         given.setdefault(name, []).append(str(value))
     scene_name = given.get("scene", [""])[0]
     scene = await run_in_threadpool(known_scene, store, scene_name)
-    content, wrong = form.study_of(scene_name, scene, given)
+    content, wrong = await run_in_threadpool(form.study_of, scene_name, scene, given)
     found: Examined | None = None
     if not wrong:
         try:
-            found = await examiner.examine(content)
+            examined = await examiner.examine(content)
+            await run_in_threadpool(keeper.check_room, examined)
+            found = examined
         except StudyError as error:
             name, allowed = form.beside(error, scene)
             wrong[name] = allowed
@@ -316,7 +331,7 @@ def sign_in(request: Request, then: str = "") -> Response:
 
 
 @router.post("/sign-in")
-def enter(
+async def enter(
     request: Request,
     keys: TheKeys,
     key: Annotated[str, Form(max_length=200)] = "",
@@ -324,7 +339,7 @@ def enter(
 ) -> Response:
     """Keep a key in a cookie that scripts cannot read."""
     where = inside(request, then)
-    if keys.owner(key.strip()) is None:
+    if await keys.known(key.strip()) is None:
         status = HTTPStatus.UNAUTHORIZED
         return page(request, "sign-in", status, then=where, refused=True)
     answer = RedirectResponse(where, HTTPStatus.SEE_OTHER)
@@ -371,6 +386,8 @@ def _back(request: Request, study_id: str) -> Response:
 
 
 @router.get("/{rest:path}")
-def nothing(rest: str) -> Response:
+def nothing(rest: str, request: Request) -> Response:
     """Say that there is no such page."""
+    if not rest:
+        return lead(request)
     raise NotFound(f"there is no page {ROOT}/{rest[:100]}")

@@ -15,6 +15,9 @@ from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.storage.dataset import attributes_of
 
+OTHER = ("audit_energy", "audit_reactions")
+"""Figures with another limit under finite sliding, and under a travelling load."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
@@ -54,7 +57,7 @@ def audited(run: Mapping[str, Any], scene: Scene | None) -> dict[str, list[Figur
             words=words_of(name, scene),
             unit=unit_of(name, scene),
             value=value,
-            limit=LIMITS.get(name),
+            limit=LIMITS.get(name) if name not in OTHER else None,
         )
         for name, value in run["scalars"].items()
         if group_of(name) == "audit"

@@ -10,7 +10,7 @@ import numpy as np
 
 from service.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, group_of
 from studies.definition.vocabulary import OK
-from studies.views.tables import FIGURES
+from studies.views.figures import FIGURES
 
 ROWS = 25
 """Number of runs on a page of the table."""
@@ -87,7 +87,7 @@ def part(table: RunTable, query: Mapping[str, str]) -> TablePart:
     found = table.chosen(sort, where)
     pages = max(1, -(-len(found) // ROWS))
     number = query.get("page", "1")
-    page = min(max(int(number), 1), pages) if number.isdecimal() else 1
+    page = min(max(int(number[:9]), 1), pages) if number.isdecimal() else 1
     differ = [each.name for each in usual(table) if varies(each)]
     named = differ[:SHOWN]
     extra = [sort.removeprefix("-"), query.get("number", ""), *where]

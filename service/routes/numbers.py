@@ -49,9 +49,9 @@ def table(
     """
     found = tables.get(study_id)
     at = found.chosen(which.sort, which.conditions)
-    names = which.columns.split(",") if which.columns else list(found.columns)
+    names = dict.fromkeys(which.columns.split(",") if which.columns else found.columns)
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(found.rows(at, names))
+    csv.writer(text, lineterminator="\n").writerows(found.rows(at, [*names]))
     named = {"content-disposition": 'attachment; filename="table.csv"'}
     return Response(text.getvalue(), media_type=CSV, headers=named)
 

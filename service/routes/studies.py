@@ -61,6 +61,8 @@ MOST_FITTED = 1000
 """Largest number of runs to which a request may fit polynomials, which takes seconds."""
 
 SUBMISSION = Study.model_json_schema() | {"examples": [EXAMPLE]}
+for _name in ("refine", "fit"):  # refused here
+    del SUBMISSION["properties"][_name]
 SUBMISSION["properties"]["priority"] = {
     "type": "integer",
     "minimum": PRIORITIES[0],

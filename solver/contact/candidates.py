@@ -22,12 +22,8 @@ if TYPE_CHECKING:
     from solver.contact.system import System
     from solver.fem.operators import Operator
 
-    Array = NDArray[np.float64]
-
 _MARGIN = 0.25
 """Vertices nearer than this many element lengths are candidates."""
-_POWER = 5 / 3
-"""Power of the gap in the slip of a vertex that comes near."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +38,7 @@ class Candidates:
     uncounted : (n,) slip before the vertex touched, not counted in ``motion`` [mm]
     forces : (n or 2n,) normal, and with friction tangential forces of the current iterate [N]
     status : (n,) of the current iterate, as in `solver.contact.problem`
-    unsure : (n,) the possible error of ``uncounted`` [mm]; inf if the time of touch is not known
+    untimed : (n,) whether the vertex touched since the last state, at a time that is not known
     rows : one per part, None for a part without contact surface
     covered : for each interface, the share of each candidate's hat function that faces the master
     gaps, slips : for each interface, gap and slip of all its vertices [mm]; the gap is inf where no
@@ -56,7 +52,7 @@ class Candidates:
     uncounted: NDArray[np.float64]
     forces: NDArray[np.float64]
     status: NDArray[np.int64]
-    unsure: NDArray[np.float64]
+    untimed: NDArray[np.bool_]
     rows: tuple[ContactRows | None, ...]
     covered: tuple[NDArray[np.float64], ...]
     gaps: tuple[NDArray[np.float64], ...]
@@ -169,14 +165,11 @@ class Candidates:
         for old, new, at, here, gap, slip in each:
             slipped = old.slipped.copy()
             slipped[at] += moved[here]
-            with np.errstate(invalid="ignore"):
-                now = np.stack([gap - old.gap, slip])
-            now[:, ~np.isfinite(now).all(axis=0) | (span == 0)] = np.nan
-            past = {"gap": gap, "moved": np.stack([now, old.moved[0]])}
+            with np.errstate(invalid="ignore", divide="ignore"):
+                rates = np.stack([gap - old.gap, slip]) / span
+            rates[:, ~np.isfinite(rates).all(axis=0)] = np.nan
             touching = new.status != OPEN
-            out.append(
-                replace(new, touching=touching, slipped=slipped, span=span or old.span, **past)
-            )
+            out.append(replace(new, touching=touching, gap=gap, rates=rates, slipped=slipped))
         return tuple(out)
 
 
@@ -195,8 +188,9 @@ def no_candidates(system: System) -> Candidates:
     gaps = tuple(np.full(len(i.slave_surface.edges) + 1, np.inf) for i in system.interfaces)
     slips = tuple(map(np.zeros_like, gaps))
     status = empty.astype(int)
+    known = empty.astype(bool)
     lines = BoundLines.none(0)
-    return Candidates(none, lines, *(empty,) * 3, status, empty, rows, covered, gaps, slips, np.inf)
+    return Candidates(none, lines, *(empty,) * 3, status, known, rows, covered, gaps, slips, np.inf)
 
 
 def find_candidates(
@@ -209,7 +203,7 @@ def find_candidates(
     """Return the candidates at displacements ``u``, a ``span`` of time after ``start``.
 
     Slips count from the state ``start`` or, where a vertex had no contact then, from the moment
-    it touched, if its approach is known from the last increments.
+    it touched, if the rates of its approach are known from the last increment.
     """
     time = start.time + span
     pairings = [
@@ -225,7 +219,7 @@ def find_candidates(
     m = 2 * n if frictional else n
     motion, uncounted, beyond = np.zeros(m), np.zeros(n), np.inf
     lines: list[BoundLines] = []
-    unsure = np.zeros(n)
+    untimed = np.zeros(n, dtype=bool)
     pieces: list[list[ContactRows]] = [[] for _ in system.parts]
     slips: list[NDArray[np.float64]] = []
     for pair, (interface, pairing, at, before, normal) in enumerate(
@@ -234,8 +228,9 @@ def find_candidates(
         tangent = slice(n + normal.start, n + normal.stop)
         motion[normal] = pairing.gap[at]
         beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
-        approach = np.where(before.touching, 0.0, _slip_before_contact(before, span))
-        uncounted[normal], unsure[normal] = approach[:, at]
+        uncounted[normal] = np.where(before.touching, 0.0, _slip_before_contact(before, span))[at]
+        untimed[normal] = np.isnan(uncounted[normal])
+        uncounted[normal] = np.nan_to_num(uncounted[normal])
         shear = system.bound(pair, pairing, start, time).at(at)
         lines.append(shear.over(pairing.area[at]))
         for side, (number, part, surface) in enumerate(interface.sides):
@@ -262,7 +257,7 @@ def find_candidates(
         uncounted=uncounted,
         forces=np.concatenate([forces, gather("tangential")]) if frictional else forces,
         status=gather("status").astype(np.int64),
-        unsure=unsure,
+        untimed=untimed,
         rows=tuple(joined(p) for p in pieces),
         covered=tuple(p.covered[v] for p, v in zip(pairings, vertices, strict=True)),
         gaps=tuple(p.gap for p in pairings),
@@ -271,29 +266,15 @@ def find_candidates(
     )
 
 
-def _slip_before_contact(before: ContactState, span: float) -> tuple[Array, Array]:
-    """Return the slip (n,) before contact, and its possible error [mm].
+def _slip_before_contact(before: ContactState, span: float) -> NDArray[np.float64]:
+    """Return the slip (n,) before contact, if gap and slip continue at their last rates [mm].
 
-    Slip continues as a function of the gap, ``a + b gap + c gap^(5/3)`` through the last three
-    states, or a line through the last two. Their difference is the possible error. Beyond the end
-    of a contact that grows, surfaces move with the root of the distance y to this end: gap and slip
-    are ``y^1.5`` times a series in y, and the change of slip with the gap is one in ``gap^(2/3)``.
-
-    The gap closes at its last rate; a vertex that would close later than ``span`` is taken to touch
-    at its end. Where the gap does not close, or its change is not known, the slip is 0 and its
-    possible error inf.
+    A vertex that would close later than ``span`` is taken to touch at its end. NaN where the gap
+    does not close, or its rates are not known.
     """
-    (change, slip), (earlier, slid) = before.moved
-    with np.errstate(invalid="ignore", divide="ignore"):
-        closing = change * (span / before.span)
-        last = before.gap - change
-        gaps = np.stack([before.gap + closing, before.gap, last, last - earlier]).clip(0.0)
-        steeper = np.diff(gaps**_POWER, axis=0) / np.diff(gaps, axis=0)
-        line, way = slip / change, gaps[0] - gaps[1]
-        bent = (line - slid / earlier) / (steeper[1] - steeper[2]) * (steeper[0] - steeper[1])
-        bent = np.where((change * earlier > 0) & np.isfinite(bent), bent, 0.0)
-        known = closing < 0
-        return np.where(known, (line + bent) * way, 0.0), np.where(known, bent * way, np.inf)
+    closing, sliding = before.rates * span
+    share = np.divide(before.gap, -closing, out=np.full_like(closing, np.nan), where=closing < 0)
+    return np.asarray(sliding * np.clip(share, 0.0, 1.0))
 
 
 def _near(pairing: Pairing, contact: ContactState, floating: bool) -> NDArray[np.int64]:

@@ -24,10 +24,9 @@ class ContactState:
     surface's tangent; ``status`` as in `solver.contact.problem`; ``touching`` says
     whether the vertex had contact, so that its friction has a history. ``gap`` is inf where no
     master faces the vertex [mm]; ``slipped`` is the accumulated length of its slip in contact since
-    the first increment, without regard to direction [mm]; ``moved`` (2, 2, n) are the changes of
-    gap and slip in the last increment and in the one before it, NaN where not known [mm], and
-    ``span`` is the time of the last. ``finite`` says whether the surfaces are paired in their
-    current positions, or always as before loading.
+    the first increment, without regard to direction [mm]; ``rates`` (2, n) are the rates of gap and
+    slip in the last increment, NaN where not known. ``finite`` says whether the surfaces are paired
+    in their current positions, or always as before loading.
     """
 
     normal: NDArray[np.float64]
@@ -35,8 +34,7 @@ class ContactState:
     status: NDArray[np.int64]
     touching: NDArray[np.bool_]
     gap: NDArray[np.float64]
-    moved: NDArray[np.float64]
-    span: float
+    rates: NDArray[np.float64]
     finite: bool
     slipped: NDArray[np.float64]
 
@@ -56,12 +54,12 @@ class ContactState:
         n = len(touching)
         slipped = np.zeros(n) if before is None else before.slipped
         status = np.where(touching, STICK, OPEN)
-        moved = np.full((2, 2, n), np.nan)
-        return cls(np.zeros(n), np.zeros(n), status, touching, gap, moved, 1.0, finite, slipped)
+        rates = np.full((2, n), np.nan)
+        return cls(np.zeros(n), np.zeros(n), status, touching, gap, rates, finite, slipped)
 
     def halted(self) -> ContactState:
-        """Return the state without its past: another motion begins."""
-        return replace(self, moved=np.full_like(self.moved, np.nan))
+        """Return the state without its rates: another motion begins."""
+        return replace(self, rates=np.full_like(self.rates, np.nan))
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,15 +150,10 @@ class Timing:
         return replace(self, friction=friction, normal=normal)
 
     def then(self, now: Timing) -> Timing:
-        """Return the timing after one more increment.
-
-        Of a contact that moves on, vertices leave with their uncertain friction.
-        """
+        """Return the timing after one more increment."""
         closed = now.normal > 0
-        stays = 1 - np.minimum(now.passed / np.where(closed, now.normal, 1.0), 1.0)
-        before = np.minimum(stays * self.untimed, now.stuck)
         return Timing(
-            untimed=np.where(closed, before + now.untimed, 0.0),
+            untimed=np.where(closed, np.minimum(self.untimed, now.stuck) + now.untimed, 0.0),
             friction=np.where(closed, np.maximum(self.friction, now.friction), 0.0),
             passed=np.maximum(self.passed, now.passed),
             normal=np.maximum(self.normal, now.normal),

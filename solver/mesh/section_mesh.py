@@ -74,6 +74,8 @@ class SectionMesh(NamedTuple):
         for rows in (self.cells, self.running, self.foot):
             if rows and not 0 <= np.min(rows) <= np.max(rows) < count:
                 raise refuse(f"must have points numbered from 0 to {count - 1}")
+        if any(len(set(each)) < len(each) for each in self.cells):
+            raise refuse("must have elements of different points")
         mesh, number = self._made
         for name in (RUNNING, FOOT):
             edges = getattr(self, name)
@@ -82,8 +84,11 @@ class SectionMesh(NamedTuple):
                 raise refuse(f"must have a line {name} of edges of elements, on the outside")
         try:
             ends = self._chain
+            around = len(ends) + len(self._rest) - 2
         except ValueError as error:
             raise refuse(str(error)) from None
+        if around != len(mesh.boundary_facets()):
+            raise refuse("must be one piece, without holes and cracks")
         z = np.array(self.points)[ends, 0]
         if not (np.diff(z) > 0).all():
             raise refuse(f"must have a line {RUNNING} along which z increases, without its sides")
@@ -108,6 +113,15 @@ class SectionMesh(NamedTuple):
         """The corners of the running line from small to large z."""
         ends = _walked(np.array(self.running))
         return ends if self.points[ends[0]][0] < self.points[ends[-1]][0] else ends[::-1]
+
+    @property
+    def _rest(self) -> list[int]:
+        """The corners of the outline from the first one of the running line below to its last."""
+        mesh, number = self._made
+        point = np.flatnonzero(number >= 0)
+        around = point[mesh.facets[:, mesh.boundary_facets()].T]
+        chain = self._chain
+        return _walked(around, start=chain[0], away=chain[1], end=chain[-1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,8 +154,17 @@ class MeshedRail(Rail):
 
     @classmethod
     def of(cls, section: SectionMesh) -> MeshedRail:
-        """Return the rail as it stands in the mesh."""
-        return cls(section, np.array(section.points))._on_top()
+        """Return the rail as it stands in the mesh.
+
+        Raises
+        ------
+        ModelError
+            for ``running``, if it is not above the section; for ``points``, if it has too few
+        """
+        found = cls(section, np.array(section.points))
+        if not found.outline.area > 0:
+            raise ModelError(RUNNING, section.told, "must be above the section")
+        return found._on_top()
 
     def canted(self, slope: float) -> MeshedRail:
         """Return the rail turned about its top, as `RailSection.canted` does."""
@@ -180,12 +203,7 @@ class MeshedRail(Rail):
     def outline(self) -> Outline:
         """The outline, counterclockwise; it begins below the left end of the running line."""
         joints, bends = self._surface
-        mesh, number = self.section._made
-        point = np.flatnonzero(number >= 0)
-        around = point[mesh.facets[:, mesh.boundary_facets()].T]
-        chain = self.section._chain
-        rest = _walked(around, start=chain[0], away=chain[1], end=chain[-1])
-        below = self._along(rest)[:, 1:-1]
+        below = self._along(self.section._rest)[:, 1:-1]
         return Outline(
             np.hstack([below, joints[:, ::-1]]),
             np.concatenate([np.zeros(below.shape[1]), -bends[::-1], [0.0]]),
@@ -213,8 +231,10 @@ class MeshedRail(Rail):
         side = np.hypot(*(X[:, 1] - X[:, 0]).T)
         right = self.running[1]
         s = right - np.cumsum(side) + side / 2
-        chosen = np.flatnonzero(abs(s - self.place(zone.at)) < zone.half_width)
-        for k in chosen[side[chosen] > largest][:1]:
+        away = abs(s - self.place(zone.at))
+        chosen = np.flatnonzero(away < zone.half_width)
+        reaches = away < zone.half_width + (side - largest) / 2
+        for k in np.flatnonzero(reaches & (side > largest))[:1]:
             raise ModelError(
                 "rail_profile", self.section.told,
                 f"must have elements at most {largest:g} mm wide where the wheel may touch, not "
@@ -223,8 +243,8 @@ class MeshedRail(Rail):
         under = mesh.f2t[0, facets_of(mesh, number[ends[chosen]])]
         cells = np.array(self.section.cells)
         centre = self.points[cells].mean(axis=1)
-        nearest, away = _nearest(centre, X[chosen])
-        inside = (away < zone.depth) & nearest
+        nearest, depth = _nearest(centre, X[chosen])
+        inside = (depth < zone.depth) & nearest
         inside[under] = True
         order = np.argsort(~inside, kind="stable")
         whole, number = mesh_of_cells(self.points, cells[order], 4)
@@ -270,6 +290,10 @@ def _walked(
     ValueError
         if they are no chain
     """
+    wrong = ValueError(
+        f"must have a line {RUNNING} that is one chain of edges" if start is None
+        else "must have an outline that does not touch itself"
+    )  # fmt: skip
     beside: dict[int, list[int]] = {}
     for one, other in edges.tolist():
         beside.setdefault(one, []).append(other)
@@ -277,15 +301,15 @@ def _walked(
     if start is None:
         ends = [corner for corner, others in beside.items() if len(others) == 1]
         if len(ends) != 2:
-            raise ValueError(f"must have a line {RUNNING} that is one chain of edges")
+            raise wrong
         start, end = ends
     found, before = [start], away
     while found[-1] != end:
         onward = [each for each in beside[found[-1]] if each != before]
         if len(onward) != 1 or len(found) > len(edges):
-            raise ValueError("must have an outline that does not touch itself")
+            raise wrong
         before = found[-1]
         found += onward
     if away is None and len(found) != len(edges) + 1:
-        raise ValueError(f"must have a line {RUNNING} that is one chain of edges")
+        raise wrong
     return found

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
 from annotated_types import Interval, Unit
@@ -177,6 +177,7 @@ class BodyForce(Load):
 
 
 Density = Annotated[float, Interval(gt=0.0), Unit("t/mm3")]
+Axis = Literal["y", "z"]
 
 
 @LOADS.word("gravity")
@@ -224,13 +225,17 @@ class Centrifugal(Load):
 
     density: Density
     speed: Annotated[float, Interval(ge=0.0), Unit("rad/s")]
-    axis: Literal["y", "z"] = "y"
+    axis: Axis = "y"
     centre: tuple[float, float] = (0.0, 0.0)
 
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a number that is not allowed, or another axis than its own."""
         _density("centrifugal", self.density)
         _finite("centrifugal.speed", self.speed, "rad/s")
+        if self.axis not in get_args(Axis):
+            raise ModelError("centrifugal.axis", self.axis, "must be y or z")
+        if np.shape(self.centre) != (2,):
+            raise ModelError("centrifugal.centre", self.centre, "must be two numbers [mm]")
         for value in self.centre:
             _finite("centrifugal.centre", value, "mm")
         if kinematics == "axisymmetric" and (self.axis != "y" or self.centre[0]):

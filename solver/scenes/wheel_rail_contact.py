@@ -11,7 +11,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.mesh.rail import rail_60e1
-from solver.mesh.section_mesh import MeshedRail, SectionMesh
+from solver.mesh.section_mesh import RUNNING, MeshedRail, SectionMesh
 from solver.mesh.wheel_profile import conical, crowned, measured, s1002
 from solver.prism.profiled_wheel import ProfiledWheel
 
@@ -280,9 +280,19 @@ def rail_of(parameters: WheelRailParameters | _Touching) -> Rail:
 
 @lru_cache(maxsize=16)
 def canted(profile: str | Points | SectionMesh, cant: float) -> RailSection | MeshedRail:
-    """Return the section of a canted rail."""
+    """Return the section of a canted rail.
+
+    Raises
+    ------
+    ModelError
+        for ``rail_profile``, if it is a mesh whose running line has too few points, or is too steep
+    """
     if isinstance(profile, SectionMesh):
-        return MeshedRail.of(profile).canted(cant)
+        try:
+            return MeshedRail.of(profile).canted(cant)
+        except ModelError as error:
+            allowed = f"must have a line {RUNNING} that fits the cant: it {error.allowed}"
+            raise ModelError("rail_profile", profile.told, allowed) from None
     section = rail_60e1()
     if not isinstance(profile, str):
         section = section.worn(np.array(profile).T)
@@ -295,4 +305,7 @@ def upper(section: Rail) -> tuple[float, float]:
     s = np.arange(right, left, _STEP)
     across, _ = section.outline.direction(s)
     flat = s[-across > math.cos(_STEEPEST)]
+    if not len(flat):
+        steepest = math.degrees(_STEEPEST)
+        raise ModelError("rail_profile", "a surface", f"must be flatter than {steepest:g} degrees")
     return float(flat[0]), float(flat[-1])

@@ -28,6 +28,9 @@ from solver.parameters import is_number
 LONGEST = 200
 """Largest number of characters of an expression."""
 
+LONGEST_FIELD = 20 * LONGEST
+"""Largest number of characters of a field, which has values in place of the parameters."""
+
 DEEPEST = 50
 """Largest number of operations and parentheses inside one another."""
 
@@ -111,6 +114,8 @@ class Field:
     text: str
 
     def __post_init__(self) -> None:
+        if len(self.text) > LONGEST_FIELD:
+            raise ExpressionError(f"must be at most {LONGEST_FIELD} characters long")
         self(np.zeros((2, 1)))
 
     def __call__(self, x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -41,7 +41,7 @@ def effort_of(
         elements += size.elements
         own = {boundary for of, boundary in sides if of == name}
         loads = [load_of(load) for load in scene.loads if load.body == name]
-        driven = any(each.components or each.softening(np.zeros((2, 1))) is not None
+        driven = any(each.components or each.softening(np.zeros((2, 0))) is not None
                      for each in loads)  # fmt: skip
         # an elastic body is condensed to its contact surfaces
         condensed = size.on(own) if own and not driven and is_elastic(scene, body) else None

@@ -68,6 +68,6 @@ class MeshData(NamedTuple):
                         found.nodes[name] = array
                     case _:
                         raise ValueError(f"{what} is no array of a mesh")
-        except (TypeError, RecursionError) as error:
+        except (TypeError, OverflowError, RecursionError) as error:
             raise ValueError(f"these are no arrays of a mesh: {error}") from None
         return found

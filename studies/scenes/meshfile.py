@@ -32,6 +32,8 @@ MOST_POINTS = 1_000_000
 _CELLS = {"quad": 4, "quad8": 4, "quad9": 4, "triangle": 3, "triangle6": 3}
 """Cells of meshio that a body may have -> number of their corners."""
 _LINES = ("line", "line3")
+_POINTS = {"quad": 4, "quad8": 8, "quad9": 9, "triangle": 3, "triangle6": 6, "line": 2, "line3": 3}
+"""Numbers of the points of these cells and lines."""
 _NUMBERS = ("gmsh:physical", "medit:ref", "nastran:ref")
 """Cell data of meshio that hold the number of the set of each cell."""
 
@@ -92,15 +94,24 @@ def _mesh(name: str, data: bytes, arrays: bytes, part: str | None) -> Mesh:
         raise ModelError("mesh", name, f"cannot be read: {error}") from None
     if len(points) > MOST_POINTS:
         raise ModelError("mesh", name, f"must have at most {MOST_POINTS} points, not {len(points)}")
-    if not np.isfinite(points).all():
+    if not (points.size and np.isfinite(points).all()):
         raise ModelError("mesh", name, "must have finite points")
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise ModelError("mesh", name, "must have points of two or three coordinates")
     if points.shape[1] == 3 and np.ptp(points[:, 2]) > 0:
         raise ModelError("mesh", name, "must lie in a plane: its z differ")
     for kind, each in blocks:
-        if each.size and not 0 <= each.min() <= each.max() < len(points):
+        if each.ndim != 2 or each.shape[1] != _POINTS.get(kind, each.shape[1]):
+            raise ModelError("mesh", name, f"has a {kind} of another number of points")
+        if not _exist(each, points):
             raise ModelError("mesh", name, f"has a {kind} of points that do not exist")
+    for key, numbers in nodes.items():
+        if not _exist(numbers, points):
+            raise ModelError("mesh", name, f"has a set {key} of points that do not exist")
+    for key, own in sets.items():
+        for k, rows in own.items():
+            if not (0 <= k < len(blocks) and _exist(rows, blocks[k][1])):
+                raise ModelError("mesh", name, f"has a set {key} of cells that do not exist")
     plane = [k for k, (kind, _) in enumerate(blocks) if kind in _CELLS]
     if not plane:
         listed = ", ".join(sorted({kind for kind, _ in blocks})) or "none"
@@ -116,6 +127,8 @@ def _mesh(name: str, data: bytes, arrays: bytes, part: str | None) -> Mesh:
             )
         chosen = {k: blocks[k][1][_rows(sets[part], k)] for k in plane}
     chosen = {k: cells for k, cells in chosen.items() if len(cells)}
+    if not chosen:
+        raise ModelError("mesh", name, f"must have cells {', '.join(_CELLS)}; it has none")
     kind, *others = sorted({blocks[k][0] for k in chosen})
     if others:
         raise ModelError(
@@ -170,6 +183,11 @@ def _sets(found: Any) -> dict[str, dict[int, Any]]:
                 name = names.get((int(number), block.dim), str(number))
                 sets.setdefault(name, {}).setdefault(k, np.flatnonzero(numbers == number))
     return sets
+
+
+def _exist(numbers: NDArray[np.int64], rows: NDArray[Any]) -> bool:
+    """Tell whether all numbers are those of rows of an array."""
+    return not numbers.size or 0 <= int(numbers.min()) <= int(numbers.max()) < len(rows)
 
 
 def _rows(own: dict[int, Any], block: int) -> NDArray[np.int64]:

@@ -24,7 +24,12 @@ _RUN = "run_between"
 
 
 def predict(
-    dataset: xr.Dataset, of: str | Sequence[str] | None = None, *, by: str | None = None, **at: Any
+    dataset: xr.Dataset,
+    /,
+    of: str | Sequence[str] | None = None,
+    *,
+    by: str | None = None,
+    **at: Any,
 ) -> xr.Dataset:
     """Return variables at a place between the runs, each with its error, ``<name>_error``.
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import io
 import json
+import logging
+import time
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,6 +24,12 @@ ENGINE: Literal["netcdf4"] = "netcdf4"
 """netCDF backend of xarray for files: it opens a run ten times as fast as h5netcdf, and its calls
 wait for those of other threads. It does not read a file in memory."""
 
+LATEST = "latest"
+"""In the place of a study's name, the study that was computed last."""
+
+_LOG = logging.getLogger("studies")
+_WIDEST = 200
+"""Largest number of characters of the line of a study."""
 _WAIT = 60.0
 """Timeout of a request to a service [s]."""
 
@@ -30,10 +39,11 @@ def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
 
     Parameters
     ----------
-    path : a ``dataset.nc``, the directory of a study, an output directory, or the URL of a study
-        of a service that requires no key, such as ``http://localhost:8000/studies/<id>``
+    path : a ``dataset.nc``, the directory of a study, an output directory, a study in it
+        (``out/punch``, see `find_datasets`), or the URL of a study of a service that requires no
+        key, such as ``http://localhost:8000/studies/<id>``
     name : name of the study, if the directory has several; of those with this name the one
-        computed last is opened
+        computed last is opened, and the logger ``studies`` says which there are
 
     Raises
     ------
@@ -57,9 +67,39 @@ def find_study(path: Path | str, name: str | None = None) -> Path:
         if not found:
             raise StudyError("name", name, f"must be one of {known}")
     elif len(set(names.values())) > 1:
-        allowed = f"holds several studies: give the directory of one, or its name ({known})"
+        one = Path(path) / sorted(set(names.values()))[0]
+        allowed = f"holds several studies: give one, such as {one}, or its name ({known})"
         raise StudyError("path", str(path), allowed)
-    return max(found, key=lambda each: each.stat().st_mtime)
+    found.sort(key=_written, reverse=True)
+    if len(found) > 1:
+        listed = "\n".join(f"  {each}" for each in _listed(found))
+        _LOG.warning("%s holds %d studies of this name, the first is taken:\n%s",
+                     path, len(found), listed)  # fmt: skip
+    return found[0]
+
+
+def _listed(found: list[Path]) -> Iterator[str]:
+    """Yield a line for each study of one name: its directory, date, and what differs."""
+    contents = [dict(_flat(_content(each))) for each in found]
+    keys = dict.fromkeys(key for each in contents for key in each)
+    unlike = [k for k in keys if any(each.get(k) != contents[0].get(k) for each in contents)]
+    for each, content in zip(found, contents, strict=True):
+        date = time.strftime("%Y-%m-%d %H:%M", time.localtime(_written(each)))
+        own = (f"{key} = {json.dumps(content[key])}" for key in unlike if key in content)
+        yield f"{each.parent}, {date}: {', '.join(own) or 'computed by another solver'}"[:_WIDEST]
+
+
+def _flat(content: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the entries of a study, and of its tables, by their names with dots."""
+    for key, value in content.items():
+        if isinstance(value, dict):
+            yield from ((f"{key}.{inner}", each) for inner, each in _flat(value))
+        else:
+            yield key, value
+
+
+def _written(path: Path) -> float:
+    return path.stat().st_mtime
 
 
 def _fetched(url: str) -> xr.Dataset:
@@ -87,11 +127,16 @@ def _refusal(answer: Any) -> str:
 
 def _name(dataset: Path) -> str:
     """Return the name of a data set's study, or of its directory if there is none."""
+    return str(_content(dataset).get("name", dataset.parent.name))
+
+
+def _content(dataset: Path) -> dict[str, Any]:
+    """Return the definition of a data set's study; empty if it cannot be read."""
     try:
         content = json.loads(dataset.with_name("study.json").read_text(encoding="utf-8"))
-        return str(content["name"])
-    except (OSError, ValueError, TypeError, KeyError):
-        return dataset.parent.name
+    except (OSError, ValueError):
+        return {}
+    return {k: v for k, v in content.items() if k != "seal"} if isinstance(content, dict) else {}
 
 
 def open_netcdf(path: Path | str) -> xr.Dataset:
@@ -150,6 +195,9 @@ def _indexed(dataset: xr.Dataset) -> xr.Dataset:
 def find_datasets(path: Path | str) -> list[Path]:
     """Return the data sets at `path`: itself, that of a study, or those of all studies in it.
 
+    A path within an output directory may be the name of a study, the beginning of its id, or
+    ``latest``: ``out/punch``, ``out/3fa9``, ``out/latest``.
+
     Raises
     ------
     StudyError
@@ -169,7 +217,15 @@ def present_datasets(path: Path | str) -> list[Path]:
     if path.is_file():
         return [path]
     own = path / "dataset.nc"
-    return [own] if own.is_file() else sorted(path.glob("studies/*/dataset.nc"))
+    if own.is_file():
+        return [own]
+    if path.is_dir():
+        return sorted(path.glob("studies/*/dataset.nc"))
+    found = sorted(path.parent.glob("studies/*/dataset.nc"))
+    if path.name == LATEST:
+        return [max(found, key=_written)] if found else []
+    named = [each for each in found if _name(each) == path.name]
+    return named or [each for each in found if each.parent.name.startswith(path.name)]
 
 
 def begun_studies(path: Path | str) -> list[str]:

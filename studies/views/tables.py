@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,38 +16,8 @@ from solver.tensors import AXES
 from studies.definition.vocabulary import LABEL_ATTRIBUTES, OK
 from studies.storage.ugrid import owns
 from studies.views.columns import aligned, in_blocks, stacked, value_text
+from studies.views.figures import FIGURES
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
-
-FIGURES: Mapping[str, str] = {
-    "surface_residual_max": "largest residual {component} surface {body}",
-    "surface_residual_x": "surface residual x",
-    "first_row_residual_x": "first row residual x",
-    "free_surface_residual_x": "free surface residual x",
-    "lowest_residual_x": "lowest residual x",
-    "depth_of_lowest_residual_x": "at depth",
-    "surface_residual_z": "surface residual z",
-    "first_row_residual_z": "first row residual z",
-    "free_surface_residual_z": "free surface residual z",
-    "lowest_residual_z": "lowest residual z",
-    "depth_of_lowest_residual_z": "at depth",
-    "surface_plastic_strain": "surface plastic strain",
-    "highest_plastic_strain": "mid-track plastic strain",
-    "depth_of_highest_plastic_strain": "at depth",
-    "stick_half_width": "stick half-width",
-    "singular_power": "singular power",
-    "singular_power_error": "its error",
-    "singular_intensity": "singular intensity",
-    "apparent_power": "apparent power",
-    "peak_contact_pressure": "peak contact pressure",
-    "max_plastic_strain": "largest plastic strain",
-    "audit_plastic_strain": "away from singular points",
-    "increments": "increments",
-    "cut_increments": "cut",
-    "cpu_seconds": "cpu",
-}
-"""Variables in a table of runs, if the scene has them, and their headings. A variable over bodies
-and components has a column for the first component of each body."""
-
 
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*[A-Za-z_])")
 """A number in a message, not the digits of a name."""

@@ -300,7 +300,7 @@ def test_plot_draws_any_field_of_any_run(
     capsys.readouterr()
     for wrong, named in [
         (["--select", "friction=0.3"], "friction = '0.3': must be one of 0.0, 0.4"),
-        (["--select", "friction=0", "friction=0.4"], "friction is selected already, as 0"),
+        (["--select", "friction=0", "friction=0.4"], "friction is given already, as 0"),
         (["--select", "friction"], "must be NAME=VALUE"),
         (["--field", "colour"], "must be one of residual_stress, plastic_strain"),
         (["--component", "zz"], "must be one of xx, yy, xy"),

@@ -109,11 +109,15 @@ def test_values_under_the_pointer_and_of_a_clicked_run_are_those_of_the_data_set
         shown = page.evaluate("document.querySelector('[data-chart=sweep]').data[0].z")
         stored = dataset[NUMBER].isel(hardening=0).transpose("load_ratio", "friction")
         assert np.array_equal(shown, stored)
+        page.wait_for_selector("[data-chart=sweep][data-ready]")
+        page.wait_for_selector(DRAWN.format("map"))
         page.mouse.move(*cell(page, 0.3, 0.8))
         said = page.locator(".hoverlayer .hovertext").text_content()
         value = stored.sel(friction=0.3, load_ratio=0.8).item()
         assert float(re.search(r"[\d.]+", said)[0]) == float(f"{value:.4g}")
         run = chosen_id(service, study, 0.4, 0.0)
+        page.mouse.move(*cell(page, 0.0, 0.4))
+        page.wait_for_selector(".hoverlayer .hovertext:has-text('load ratio 0.4')")
         with page.expect_response(f"**/runs/{run}/values?field=residual_stress**"):
             page.mouse.click(*cell(page, 0.0, 0.4))
         page.wait_for_selector("[data-chart=map]:not(.busy)")
@@ -166,6 +170,26 @@ def test_runs_are_chosen_by_keys_and_compared(context: Any, service: Server, stu
         page.wait_for_selector(DRAWN.format("difference"))
         rows = page.locator(".differ tbody th").all_inner_texts()
         assert {"friction", "load ratio"} <= {*rows} and "yield stress" not in rows
+        page.select_option("[data-controls=difference] select >> nth=-1", "0")
+        page.wait_for_url("**second=0**")
+        assert f"run={first}&run={last}" in page.url
+
+
+def test_charts_take_text_of_others_as_text(context: Any, service: Server, study: str) -> None:
+    with opened(context, base(service) + f"/ui/studies/{study}") as page:
+        page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
+        title = page.evaluate(
+            """async () => {
+                const style = document.querySelector("link[rel=stylesheet]").href;
+                const { named } = await import(style.replace("style.css", "charts.js"));
+                const chart = document.querySelector("[data-chart=sweep]");
+                const text = named("<a href='/x'>a & b", "1/s");
+                await Plotly.relayout(chart, { "xaxis.title.text": text });
+                const drawn = chart.querySelector(".xtitle");
+                return [drawn.querySelectorAll("a").length, drawn.textContent];
+            }"""
+        )
+        assert title == [0, "<a href='/x'>a & b [1/s]"]
 
 
 def test_a_study_is_watched_to_its_end(context: Any, service: Server) -> None:

@@ -358,6 +358,11 @@ def test_a_study_larger_than_the_free_disk_or_the_default_limits_is_refused(
     jobs.take()
     jobs.note(one.study.id, 80.0)
     assert jobs.promised("") == pytest.approx(0.6 * found.bytes)
+    jobs.longest = 0
+    with pytest.raises(Busy):
+        keeper.accept(two, 0)
+    assert keeper.store.study_ids() == [one.study.id], "what is refused does not stay"
+    jobs.longest = None
     keeper.accept(two, 0)
     jobs.dismiss(one.study.id)
     assert jobs.promised(two.study.id) == 0.0

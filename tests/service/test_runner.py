@@ -9,6 +9,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+import time
 from asyncio.subprocess import PIPE, Process
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -180,6 +181,39 @@ def test_what_the_next_study_needs_is_loaded_while_there_is_none(
 
     asyncio.run(work())
     assert set(asked) == {LOADED}
+
+
+def test_one_at_a_time_loads_what_processes_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Meanwhile this process has variables of the one that loads."""
+    now, most = 0, 0
+
+    def prepare(more: object) -> str:
+        nonlocal now, most
+        now += 1
+        most = max(most, now)
+        time.sleep(0.02)
+        now -= 1
+        return "forkserver"
+
+    async def work() -> None:
+        starter = Starter(0)
+        await asyncio.gather(*(starter.prepare() for _ in range(5)))
+
+    monkeypatch.setattr("service.processes.prepare_workers", prepare)
+    asyncio.run(work())
+    assert most == 1
+
+
+def test_a_process_that_cannot_be_forked_is_an_error_of_the_system(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def start(process: object) -> None:
+        raise EOFError("unexpected EOF")
+
+    monkeypatch.setattr("service.processes.prepare_workers", lambda more: "forkserver")
+    monkeypatch.setattr("multiprocessing.context.ForkServerProcess.start", start)
+    with (tmp_path / "lock").open("w") as lock, pytest.raises(OSError, match="unavailable"):
+        asyncio.run(Starter(lock.fileno()).start("service.child", {}))
 
 
 ECHO = """

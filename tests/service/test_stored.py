@@ -22,7 +22,7 @@ import h5py
 import httpx
 import pytest
 
-from service import access, retention
+from service import retention
 from service.app import create_app
 from service.errors import Conflict
 from service.examiner import Examined
@@ -412,6 +412,7 @@ def test_a_pipe_or_a_large_file_in_place_of_the_keys_holds_nobody_up(
         put()
         began = time.monotonic()
         problem(ask("GET", "/studies", headers=header), 503)
+        assert ask("POST", "/ui/sign-in", data={"key": "any"}).status_code == 503
         assert ask("GET", "/health").json() == {"status": "failing"}, "no runner is at work"
         assert ask("GET", "/health", headers=header).json() == {"status": "failing"}
         assert time.monotonic() - began < 5.0
@@ -425,12 +426,13 @@ def test_keys_on_a_disk_that_hangs_hold_nobody_up(
 ) -> None:
     ask, header = keyed
     answers = threading.Event()
-    monkeypatch.setattr(access, "SECONDS", 0.3)
+    monkeypatch.setattr("service.keys.SECONDS", 0.3)
     monkeypatch.setattr("service.keys.state_of", lambda path: answers.wait())
     try:
         for _ in range(2):
             assert "0.3 s" in problem(ask("GET", "/studies", headers=header), 503)["detail"]
             assert ask("GET", "/health").json() == {"status": "failing"}, "no runner is at work"
+            assert ask("POST", "/ui/sign-in", data={"key": "any"}).status_code == 503
     finally:
         answers.set()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 from concurrent.futures import ThreadPoolExecutor
@@ -129,6 +130,12 @@ def test_sensitivity_is_told_or_refused_with_the_reason(
     assert found["q2"] > 0.99
     parameters = found["parameters"]
     assert parameters["load_ratio"]["total"] > 0.99 > parameters["friction"]["total"]
+    url, at = f"/studies/{grid['id']}/predict", {"load_ratio": 0.4, "friction": 0.1}
+    told = service.client.get(url, params={"of": "max_plastic_strain", **at}).json()
+    assert (told["value"], told["error"], told["by"]) == (0.4, 0.0, "run")
+    for name in ("nothing", "dataset"):
+        refused = service.client.get(url, params={"of": "max_plastic_strain", name: "1", **at})
+        assert refused.json()["errors"][0]["field"] == name
 
 
 @pytest.mark.parametrize(
@@ -328,6 +335,14 @@ def test_a_goal_is_estimated_searched_and_answered(service: Server) -> None:
             assert at[run] == {"test": "B", "load_ratio": value}
     page = service.client.get(f"/studies/{study_id}", params={"limit": 2, "offset": 1}).json()
     assert page["runs"] == detail["runs"][1:3]
+    table = service.client.get(f"/studies/{study_id}/table.csv", params={"test": "A,B"})
+    rows = {row["run"]: row for row in csv.DictReader(io.StringIO(table.text))}
+    assert {
+        run: {"test": row["test"], "load_ratio": float(row["load_ratio"])}
+        for run, row in rows.items()
+    } == at
+    shown = service.client.get(f"/ui/studies/{study_id}")
+    assert shown.text.count("data-choose=") == min(len(at), 25)
 
 
 def test_a_goal_that_is_not_reached_fails_with_the_reason(service: Server) -> None:

@@ -4,20 +4,30 @@ from __future__ import annotations
 
 import asyncio
 import csv
+import dataclasses
 import io
 import json
 import math
 import time
+import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
+from service.errors import Busy, Conflict
+from service.jobs import Jobs
 from service.maps import Pictures
+from service.pages.form import as_toml, study_of
+from service.pages.run import audited
 from service.settings import Settings
+from service.table import RunTable, _column
 from studies import Store, open_netcdf, open_study
+from studies.definition.identity import content_id
 from tests.studies.conftest import compute_here, fake_study
+from tests.studies.fakes import FAKE
 
 AXES = {"load_ratio": [0.3, 0.9], "friction": [0.0, 0.2, 0.4], "hardening": ["none", "isotropic"]}
 FIELDS = {"content-type": "application/x-www-form-urlencoded"}
@@ -82,8 +92,50 @@ def test_a_table_is_filtered_and_sorted(seen: Seen) -> None:
     assert {row["hardening"] for row in rows} == {"isotropic"}
     assert len(seen.lines(friction="0.2,0.4", load_ratio="..0.5")) == 4
     assert not seen.lines(status="error")
+    assert len(seen.lines(status="error,ok")) == 12
     (first, *_) = seen.lines(sort="load_ratio", columns="run,load_ratio")
     assert list(first) == ["run", "load_ratio"] and first["load_ratio"] == "0.3"
+    (header, *_) = seen.client.get(f"{seen.study}/table.csv?columns=run,run").text.splitlines()
+    assert header == "run"
+
+
+@pytest.mark.parametrize(("condition", "kept"), [("1e-12..", 2), ("..1e-12", 1), ("1e-12", 0)])
+def test_a_range_of_small_numbers_has_small_ends(condition: str, kept: int) -> None:
+    column = _column("audit_small", np.array([2e-13, 3e-12, 4e-11, math.nan]), "audit")
+    table = RunTable(axes={}, columns={"run": column, "audit_small": column})
+    assert len(table.chosen(where={"audit_small": condition})) == kept
+
+
+@pytest.mark.parametrize(
+    ("sweep", "asks"),
+    [
+        ({"friction": [0.0, 0.4]}, {"refine": {"of": ["peak_residual_tension"]}}),
+        ({}, {"fit": {"ranges": {"friction": [0.0, 0.4]}}}),
+    ],
+)
+def test_runs_that_a_study_chooses_have_their_own_places(
+    seen: Seen, sweep: dict, asks: dict
+) -> None:
+    """Such studies come from the command line: more runs than corners, and between them."""
+    known = {row["run"]: row["friction"] for row in seen.lines()}
+    study = {"name": "own", "scene": "fake", "parameters": {}, "sweep": sweep, **asks}
+    study_id = content_id(study)
+    seen.client.app.state.jobs.accept(study_id, study, known, most=20, stage="1 of 1")
+    lines = seen.client.get(f"/studies/{study_id}/table.csv?friction=0.2..0.4").text
+    found = {row["run"]: row["friction"] for row in csv.DictReader(io.StringIO(lines))}
+    assert found == {run: at for run, at in known.items() if at != "0.0"}
+    detail = seen.client.get(f"/studies/{study_id}").json()
+    assert {run["id"]: str(run["at"]["friction"]) for run in detail["runs"]} == known
+    assert detail["counts"] == {"ok": 12}
+    assert seen.client.get(f"/ui/studies/{study_id}").status_code == 200
+
+
+def test_numbers_that_stand_for_words_are_filtered_by_words() -> None:
+    column = _column("mode", np.array([0.0, 1.0, math.nan]), "result")
+    column = dataclasses.replace(column, flags={0: "rolls", 1: "slides"})
+    table = RunTable(axes={}, columns={"run": column, "mode": column})
+    assert table.chosen(where={"mode": "slides, nothing"}).tolist() == [1]
+    assert table.chosen(where={"mode": "slides,rolls"}).tolist() == [0, 1]
 
 
 @pytest.mark.parametrize(
@@ -93,6 +145,7 @@ def test_a_table_is_filtered_and_sorted(seen: Seen) -> None:
         ({"sort": "nothing"}, "sort"),
         ({"columns": "run,nothing"}, "columns"),
         ({"nothing": "1"}, "nothing"),
+        ({"friction": "1," * 100 + "1"}, "friction"),
     ],
 )
 def test_a_wrong_query_of_a_table_is_refused(seen: Seen, query: dict[str, str], field: str) -> None:
@@ -143,8 +196,9 @@ def test_a_map_less_itself_is_zero(seen: Seen) -> None:
 
 
 def test_pages_have_a_strict_policy_and_their_files_are_kept_for_good(seen: Seen) -> None:
-    answer = seen.client.get("/", follow_redirects=True)
-    assert answer.url.path == "/ui"
+    for address in ("/ui/", "/"):
+        answer = seen.client.get(address, follow_redirects=True)
+        assert answer.url.path == "/ui"
     policy = dict(
         part.strip().split(" ", 1) for part in answer.headers["content-security-policy"].split(";")
     )
@@ -159,6 +213,7 @@ def test_pages_have_a_strict_policy_and_their_files_are_kept_for_good(seen: Seen
     charts = seen.client.get(style.replace("style.css", "plotly.js"))
     assert b"plotly.js v" in charts.content[:200]
     assert seen.client.get(style.replace("style.css", "..%2Froutes.py")).status_code == 404
+    assert seen.client.get("/ui/static/other/style.css").status_code == 404, "kept for good"
 
 
 @pytest.mark.parametrize(
@@ -168,6 +223,7 @@ def test_pages_have_a_strict_policy_and_their_files_are_kept_for_good(seen: Seen
         ("?where.friction=much", 422),
         ("?page=99&sort=-friction&where.status=ok", 200),
         ("?run=nonsense&number=nonsense&page=x", 200),
+        ("?page=" + "9" * 5000, 200),
     ],
 )
 def test_any_address_of_a_study_is_a_page(seen: Seen, query: str, status: int) -> None:
@@ -177,12 +233,52 @@ def test_any_address_of_a_study_is_a_page(seen: Seen, query: str, status: int) -
 
 
 @pytest.mark.parametrize(
-    "path", ["/ui/studies/" + "0" * 32, "/ui/runs/1", "/ui/x", "/ui/compare?run=1"]
+    "path",
+    [
+        "/ui/studies/" + "0" * 32,
+        "/ui/runs/1",
+        "/ui/x",
+        "/ui/compare?run=1",
+        "/ui/compare?run=" + "z" * 32,
+    ],
 )
 def test_what_is_not_there_is_told_by_a_page(seen: Seen, path: str) -> None:
     answer = seen.client.get(path)
     assert answer.status_code in (404, 422)
     assert "<h1>" in answer.text
+
+
+def test_a_program_to_copy_has_no_text_of_the_address(seen: Seen) -> None:
+    page = seen.client.get(f"/ui{seen.study}", params={"number": "x; import os"}).text
+    program = page.split("print(")[1].split("</pre>")[0]
+    assert program.startswith("dataset.") and "import" not in program
+
+
+def test_a_study_that_cannot_be_read_leaves_the_list(
+    seen: Seen, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def damaged(self: Jobs, job_id: str) -> dict:
+        raise Conflict("its row cannot be read")
+
+    monkeypatch.setattr(Jobs, "study", damaged)
+    answer = seen.client.get("/ui")
+    assert answer.status_code == 200 and seen.id in answer.text
+
+
+@pytest.mark.parametrize("text", ["0 .. 1 in " + "9" * 5000, "." * 60_000, "1," * 60_000])
+def test_a_long_text_in_a_field_is_told_soon(text: str) -> None:
+    began = time.process_time()
+    _, wrong = study_of("fake", FAKE, {"p.friction": [text]})
+    assert "friction" in wrong
+    assert time.process_time() - began < 1.0, "a square of its length would take a minute"
+
+
+def test_a_form_tells_that_there_is_no_room(seen: Seen, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=10))
+    fields = {"scene": "punch", "name": "large", "p.friction": "0.11"}
+    for more in ({}, {"submit": "yes"}):
+        answer = seen.client.post("/ui/new", data=fields | more)
+        assert answer.status_code == 422 and "free on the disk" in answer.text
 
 
 def test_studies_are_found_by_scene_and_text(seen: Seen) -> None:
@@ -225,6 +321,13 @@ def test_after_signing_in_a_caller_stays_here(seen: Seen, then: str, kept: bool)
     assert f'name="then" value="{wanted}"' in page
 
 
+def test_a_copied_study_file_says_the_same() -> None:
+    said = '\x7f\n"\\é'
+    study, wrong = study_of("fake", FAKE, {"name": ["a"], "note": [said], "p.friction": ["0, 0.1"]})
+    assert not wrong and study["note"] == said
+    assert {"parameters": {}, **tomllib.loads(as_toml(study))} == study
+
+
 def test_a_study_of_one_run_has_a_table_and_a_page(seen: Seen) -> None:
     posted = {"name": "alone", "scene": "punch"}
     study_id = seen.client.post("/studies", json=posted).json()["id"]
@@ -232,6 +335,14 @@ def test_a_study_of_one_run_has_a_table_and_a_page(seen: Seen) -> None:
     (row,) = csv.DictReader(io.StringIO(answer.text))
     assert row["status"] == "pending"
     assert seen.client.get(f"/ui/studies/{study_id}").status_code == 200
+
+
+def test_a_page_shows_only_limits_that_every_run_has() -> None:
+    """Of a wheel that rolls the reactions may be 5e-3: it does not fail by 1e-5."""
+    scalars = {"audit_energy": 1e-3, "audit_reactions": 1e-3, "audit_law": 1e-9, "gap": 1.0}
+    found = audited({"scalars": scalars}, None)
+    assert [(each.name, each.kept) for each in found["limited"]] == [("audit_law", True)]
+    assert [each.name for each in found["others"]] == ["audit_energy", "audit_reactions"]
 
 
 def test_files_are_read_one_at_a_time() -> None:
@@ -250,3 +361,15 @@ def test_files_are_read_one_at_a_time() -> None:
 
     asyncio.run(all_at_once())
     assert most == 1
+
+
+def test_readings_that_would_wait_long_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.maps.WAITING", 2)
+
+    async def all_at_once() -> list[object]:
+        pictures = Pictures(8, 1000)
+        each = (pictures.alone(time.sleep, 0.02) for _ in range(6))
+        return await asyncio.gather(*each, return_exceptions=True)
+
+    found = asyncio.run(all_at_once())
+    assert [type(each) for each in found] == [type(None)] * 3 + [Busy] * 3

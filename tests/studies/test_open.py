@@ -7,6 +7,7 @@ import os
 import pytest
 
 from studies import Store, StudyError, open_study
+from studies.views.reading import find_study
 from tests.studies.conftest import compute_here, fake_study
 
 
@@ -24,7 +25,7 @@ def test_a_study_is_opened_by_its_name_the_last_one_of_several(store: Store) -> 
         assert dataset["friction"].values.tolist() == [0.2]
     with pytest.raises(StudyError, match=r"name = 'tuor': must be one of other, tour"):
         open_study(store.directory, "tuor")
-    with pytest.raises(StudyError, match=r"give the directory of one, or its name \(other, tour\)"):
+    with pytest.raises(StudyError, match=r"give one, such as \S+, or its name \(other, tour\)"):
         open_study(store.directory)
 
 
@@ -36,3 +37,32 @@ def test_without_a_name_the_last_one_of_a_single_name_is_opened(store: Store) ->
         os.utime(path, (path.stat().st_mtime - age,) * 2)
     with open_study(store.directory) as dataset:
         assert dataset["friction"].values.tolist() == [0.3]
+
+
+def test_two_of_one_name_are_told_with_what_differs(
+    store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    studies = [fake_study("tour", {"friction": [friction]}) for friction in (0.3, 0.1)]
+    for study in studies:
+        compute_here(study, store)
+    open_study(store.directory, "tour").close()
+    (told,) = [text for text in caplog.messages if "of this name" in text]
+    first, *lines = told.splitlines()
+    assert first.endswith("holds 2 studies of this name, the first is taken:")
+    assert len(lines) == 2
+    for study, friction in zip(studies, ("[0.3]", "[0.1]"), strict=True):
+        (line,) = [each for each in lines if study.id in each]
+        assert f"sweep.friction = {friction}" in line
+        assert "hardening" not in line and "seal" not in line
+
+
+def test_a_study_in_a_directory_is_named_in_its_path(store: Store) -> None:
+    tour, other = fake_study("tour"), fake_study("other", {"friction": [0.2]})
+    for age, study in ((30, tour), (10, other)):
+        compute_here(study, store)
+        path = store.dataset_path(study.id)
+        os.utime(path, (path.stat().st_mtime - age,) * 2)
+    for name, study in (("tour", tour), (tour.id[:6], tour), ("latest", other), ("other", other)):
+        assert find_study(store.directory / name) == store.dataset_path(study.id)
+    with pytest.raises(StudyError, match="must be a data set, a study or an output directory"):
+        find_study(store.directory / "tuor")

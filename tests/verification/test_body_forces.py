@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver import LimitLoad, Model, PathControl, Solution, solve
+from solver import LimitLoad, Model, ModelError, PathControl, Solution, solve
+from solver.fem.loads import nodal_forces
 from solver.materials import Elasticity, TrescaMaterial, Voce
 from solver.model.body import Body
 from solver.model.loads import BodyForce, Centrifugal, Gravity, Pressure, Traction
@@ -159,3 +162,35 @@ def test_a_pressure_may_be_a_function_of_position() -> None:
         assert solution.audit().passed
     assert np.allclose(*found, rtol=0, atol=1e-9)
     assert np.ptp(found[0][0]) > 20.0
+
+
+@pytest.mark.parametrize(
+    ("pressure", "force"),
+    [
+        (lambda x: np.sqrt(np.maximum(1 - ((x - 5.0) / 3.3) ** 2, 0)), np.pi / 2 * 3.3),
+        (lambda x: np.where(x > 4.3, 1.0, 0.0), 5.7),
+    ],
+    ids=["ellipse", "jump"],
+)
+def test_a_pressure_may_bend_and_jump(pressure: Callable[[Array], Array], force: float) -> None:
+    """The ellipse ends inside edges, the jump is inside one."""
+    load = Pressure(boundary="top", value=lambda x: pressure(x[0]))
+    body = block("block", np.linspace(0, 10, 6), np.linspace(0, 10, 6), loads=(load,),
+                 supports={"bottom": "xy"})  # fmt: skip
+    solution = solve(Model(bodies=(body,)), control=PathControl(load_step=1.0))
+    assert solution.audit().passed
+    nodal = nodal_forces(solution.system.full("block")).at(1.0)
+    assert -nodal[1::2].sum() == pytest.approx(force * body.thickness, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"axis": "x"}, "centrifugal.axis = 'x': must be y or z"),
+        ({"centre": (1.0, 2.0, 3.0)}, "centrifugal.centre = .*: must be two numbers"),
+    ],
+)
+def test_an_axis_that_is_none_is_refused(given: dict[str, Any], told: str) -> None:
+    with pytest.raises(ModelError, match=told):
+        sector(np.linspace(INNER, OUTER, 3), 2, kinematics="plane_stress", material=steel(),
+               loads=(Centrifugal(density=DENSITY, speed=1.0, **given),))  # fmt: skip

@@ -154,6 +154,10 @@ def test_four_node_elements_become_those_of_eight_nodes(own: SectionMesh) -> Non
     assert (inside < zoned.elements).all()
 
 
+HIDDEN = 40
+"""Number of an element inside the section."""
+
+
 def changed(own: SectionMesh, change: str) -> SectionMesh:
     """The mesh with a mistake."""
     if change == "coarse":
@@ -163,6 +167,10 @@ def changed(own: SectionMesh, change: str) -> SectionMesh:
         "gap": own._replace(running=own.running[:8] + own.running[9:]),
         "inside": own._replace(foot=(own.cells[40][:2],)),
         "none": own._replace(running=()),
+        "hole": own._replace(cells=(*own.cells[:HIDDEN], *own.cells[HIDDEN + 1 :])),
+        "twice": own._replace(cells=((*own.cells[0][:7], own.cells[0][0]), *own.cells[1:])),
+        "below": own._replace(running=own.foot, foot=own.running),
+        "few": own._replace(running=own.running[:1], cells=tuple(c[:4] for c in own.cells)),
         "number": own._replace(cells=((0, 1, 2, 10**6, 0, 1, 2, 3), *own.cells[1:])),
         "mixed": own._replace(cells=(own.cells[0][:4], *own.cells[1:])),
         "sides": own._replace(running=own.running + own.foot),
@@ -182,6 +190,10 @@ def changed(own: SectionMesh, change: str) -> SectionMesh:
         ("none", "must have a line running of edges of elements, on the outside"),
         ("number", "must have points numbered from 0 to"),
         ("mixed", "must have elements of four points each, or of eight"),
+        ("twice", "must have elements of different points"),
+        ("hole", "must be one piece, without holes and cracks"),
+        ("below", "must have a line running that fits the cant: it must be above the section"),
+        ("few", "must have a line running that fits the cant: it must have at least 4 points"),
         ("folded", "is refused: .* folded"),
     ],
 )
@@ -189,6 +201,13 @@ def test_a_mesh_that_is_no_section_is_refused(own: SectionMesh, change: str, tol
     with pytest.raises(ModelError, match=f"rail_profile = 'a mesh of .*{told}"):
         p = SCENE.parameters(**DRAFT, rail_profile=changed(own, change))
         meshed(p, geometry(p))
+
+
+def test_edges_as_wide_as_the_zone_are_refused() -> None:
+    """No edge has its middle in the zone."""
+    coarse = MeshedRail.of(SectionMesh.of(rail_mesh(rail_60e1(), replace(WIDE, size=8.0))))
+    with pytest.raises(ModelError, match="at most 2 mm wide where the wheel may touch, not 8"):
+        coarse.zoned(Zone(at=-1.0, half_width=2.0, depth=2.0, size=1.0), 2.0)
 
 
 def test_a_file_without_the_lines_is_refused(tmp_path: Path) -> None:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from solver.linear.threads import one_thread
+from solver.mesh import grid, within
+from solver.prism import PrismTrack, Section
 from solver.results.audit import plain_prism
 from solver.results.audit.plain_prism import PlainPrism
 from solver.results.audit.prism import audit_prism
@@ -52,3 +54,12 @@ def test_yield_under_the_load_below_the_zone_is_told() -> None:
     with one_thread():
         found = passing(deep, PERFECT, ellipse(deep, 750.0), deep.virgin(PERFECT))
     assert audit_prism(deep, PERFECT, found, None).passed
+
+
+def test_a_section_that_may_yield_everywhere_has_nothing_outside() -> None:
+    mesh = within(grid(np.linspace(-12, 12, 13), np.linspace(-6, 0, 4)), "running", ["top"])
+    section = Section(mesh, HARDENS.elasticity, supports={"bottom": "xyz"})
+    track = PrismTrack(section, np.ones(36, dtype=bool), "running", length=64.0, spacing=2.0,
+                       ahead=20.0, behind=24.0, reach=10.0, levels=0)  # fmt: skip
+    found = passing(track, HARDENS, ellipse(track, 300.0), track.virgin(HARDENS))
+    assert audit_prism(track, HARDENS, found, None).figures["audit_yield"] < 1e-6

@@ -100,7 +100,10 @@ export function ordered(count) {
   });
 }
 
-export const named = (words, unit) => (unit ? `${words} [${unit}]` : words);
+// Charts take tags in a text, such as links: text of others stays text.
+export const plain = (said) => String(said).replaceAll("&", "&amp;").replaceAll("<", "&lt;");
+
+export const named = (words, unit) => plain(unit ? `${words} [${unit}]` : words);
 
 const redraw = () => [...drawn].forEach(([chart, make]) => draw(chart, make));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);

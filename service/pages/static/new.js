@@ -48,7 +48,11 @@ async function check() {
     const answer = await fetch(form.action, {
       method: "POST", body: new URLSearchParams(new FormData(form)), headers: { accept: "application/json" }, signal: asked.signal,
     });
-    if (!answer.ok) return;
+    if (!answer.ok || answer.redirected) {
+      costs(null);
+      told({ "": answer.redirected ? "sign in again" : `no estimate: ${answer.status} ${answer.statusText}` });
+      return;
+    }
     const found = await answer.json();
     told(found.wrong);
     costs(found.estimate);

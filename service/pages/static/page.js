@@ -1,6 +1,5 @@
 // What all pages share: where the resources are, the state in the address, parts that are renewed.
 
-export const here = new URL(".", document.location).pathname;
 const found = document.location.pathname.match(/^(.*)\/ui(?:\/|$)/);
 export const root = found ? found[1] : "";
 
@@ -9,12 +8,11 @@ export const data = () => JSON.parse(document.getElementById("data").textContent
 export const state = new Map(new URLSearchParams(document.location.search));
 
 export function keep(changes) {
+  const address = new URL(document.location); // other names may be there more than once
   for (const [name, value] of Object.entries(changes)) {
-    if (value === null || value === undefined || value === "") state.delete(name);
-    else state.set(name, String(value));
+    const none = value === null || value === undefined || value === "";
+    for (const each of [state, address.searchParams]) none ? each.delete(name) : each.set(name, String(value));
   }
-  const address = new URL(document.location);
-  address.search = new URLSearchParams([...state]).toString();
   history.replaceState(null, "", address);
 }
 

@@ -1,7 +1,7 @@
 // The pictures of a run: a map, depth profiles, contact pressure, any other line.
 
 import { octets, json, rows } from "./octets.js";
-import { bar, colour, draw, fail, KEYS, named, SEQUENTIAL, SIGNED, titled } from "./charts.js";
+import { bar, colour, draw, fail, KEYS, named, plain, SEQUENTIAL, SIGNED, titled } from "./charts.js";
 import { choice, element, keep, root, select, state, text, words } from "./page.js";
 
 const MOST_LINES = 8;
@@ -23,6 +23,7 @@ export class Pictures {
     this.stop = new AbortController();
     this.run = run;
     this.high = null;
+    this.asked = {};
   }
 
   async show(run) {
@@ -66,12 +67,14 @@ export class Pictures {
     title.textContent = field.words.charAt(0).toUpperCase() + field.words.slice(1);
     if (component) title.append(` ${GREEK}`, element("sub", {}, component));
     const { signal } = this.stop;
+    const asked = (this.asked[part] = valuesOf(this.run, { field: field.name, component, stage }));
     chart.classList.add("busy");
     try {
-      const found = await octets(valuesOf(this.run, { field: field.name, component, stage }), signal);
+      const found = await octets(asked, signal);
+      if (this.asked[part] !== asked) return; // something else has been chosen meanwhile
       await (part === "map" ? this.#map(chart, found) : drawLines(chart, [found]));
     } catch (error) {
-      if (!signal.aborted) fail(chart, error.message);
+      if (!signal.aborted && this.asked[part] === asked) fail(chart, error.message);
     }
   }
 
@@ -117,11 +120,11 @@ export function drawMap(chart, { head, arrays }, high) {
     traces: [{
       type: "heatmap", x, y, z, zmin: head.signed ? -high : 0, zmax: high, hoverongaps: false,
       colorscale: head.signed ? SIGNED : SEQUENTIAL, colorbar: bar(named(unit ? "" : head.words, unit).trim()),
-      hovertemplate: `${across.name} %{x:.4~g} ${across.unit}, ${up.name} %{y:.4~g} ${up.unit}<br><b>%{z:.4~g} ${unit}</b><extra></extra>`,
+      hovertemplate: `${across.name} %{x:.4~g} ${plain(across.unit)}, ${up.name} %{y:.4~g} ${plain(up.unit)}<br><b>%{z:.4~g} ${plain(unit)}</b><extra></extra>`,
     }, ...(head.edge ? [{
       type: "scatter", mode: "markers", x: [-head.edge, head.edge], y: [0, 0], cliponaxis: false,
       marker: { symbol: "triangle-down", size: 10, color: colour("ink"), line: { width: 1, color: colour("card") } },
-      hovertemplate: `edge of contact under load<br>${across.name} %{x:.4~g} ${across.unit}<extra></extra>`,
+      hovertemplate: `edge of contact under load<br>${across.name} %{x:.4~g} ${plain(across.unit)}<extra></extra>`,
     }] : [])],
     layout: {
       xaxis: { title: { text: named(across.words, across.unit) }, zeroline: false, showgrid: false, constrain: "domain" },
@@ -146,11 +149,11 @@ export function drawLines(chart, found, names = [], label = null) {
       const few = all.length > MOST_LINES ? spread(all.length, MOST_LINES) : all.map((_, i) => i);
       const shown = names.length ? [Math.max(labels.indexOf(label), 0)] : few;
       shown.forEach((i, k) => {
-        const name = names.length ? names[run] : labels[i] ?? "";
+        const name = plain(names.length ? names[run] : labels[i] ?? "");
         traces.push({
           type: "scatter", mode: "lines", x: xs.length === all.length ? xs[i] : xs[0], y: all[i], name,
           line: { color: keys[(names.length ? run : k) % keys.length], width: 2, dash: DASHES[names.length ? 0 : Math.floor(k / keys.length)] },
-          hovertemplate: `${name ? `${name}<br>` : ""}${along.words} %{x:.4~g} ${along.unit}<br><b>%{y:.4~g} ${own.unit}</b><extra></extra>`,
+          hovertemplate: `${name ? `${name}<br>` : ""}${plain(along.words)} %{x:.4~g} ${plain(along.unit)}<br><b>%{y:.4~g} ${plain(own.unit)}</b><extra></extra>`,
         });
       });
     });

@@ -1,7 +1,7 @@
 // The page of a study: a number over the sweep, the chosen run, the table.
 
 import { octets, json } from "./octets.js";
-import { bar, colour, draw, fail, KEYS, named, NUMBERS, ordered, SIGNED } from "./charts.js";
+import { bar, colour, draw, fail, KEYS, named, NUMBERS, ordered, plain, SIGNED } from "./charts.js";
 import { choice, data, element, keep, renew, root, select, state, text, words } from "./page.js";
 import { Pictures } from "./pictures.js";
 
@@ -20,7 +20,7 @@ const COMPARED = "residua-compared";
 const MOST_COMPARED = 6;
 const pictures = new Pictures(study.run);
 let statuses = [];
-const columns = new Map();
+let columns = new Map();
 let chosen = study.at;
 
 const places = (at) => axes.map(({ labels }, k) => Math.floor(at / strides[k]) % labels.length);
@@ -47,20 +47,21 @@ function held(x, y) {
 }
 
 async function columnsOf(names) {
-  const missing = names.filter((name) => !columns.has(name));
+  const known = columns; // a change of the study begins anew: an answer under way is of before
+  const missing = names.filter((name) => !known.has(name));
   if (missing.length) {
     const asked = new URLSearchParams(missing.map((name) => ["name", name]));
     const { head, arrays } = await octets(`${address}/numbers?${asked}`);
     statuses = head.statuses;
-    for (const name of missing) columns.set(name, arrays[name].values);
+    for (const name of missing) known.set(name, arrays[name].values);
   }
-  return names.map((name) => columns.get(name));
+  return names.map((name) => known.get(name));
 }
 
 async function drawSweep() {
   const what = number();
   if (!what || !several.length) {
-    fail(chart, what ? "Nothing is swept: the study has one run." : "No run has a number yet.");
+    fail(chart, what ? study.size > 1 ? "A search has no grid of runs: the table has them." : "Nothing is swept: the study has one run." : "No run has a number yet.");
     return;
   }
   const [values, codes] = await columnsOf([what.name, "status"]);
@@ -80,14 +81,14 @@ async function drawSweep() {
     const place = places(run);
     const lines = axes.filter(({ labels }) => labels.length > 1).map((axis) => {
       const k = axisOf(axis.name);
-      return `${words(axis.name)} ${label(axis, place[k])}${axis.unit ? ` ${axis.unit}` : ""}`;
+      return plain(`${words(axis.name)} ${label(axis, place[k])}${axis.unit ? ` ${axis.unit}` : ""}`);
     });
     const found = value(run);
     const said = Number.isNaN(found) ? (MARKS[statuses[codes[run]]] ?? ["", words(statuses[codes[run]])])[1]
       : flagged ? words(what.flags[found]) : `${text(found)}${what.unit ? ` ${what.unit}` : ""}`;
-    return `<b>${said}</b><br>${lines.join("<br>")}`;
+    return `<b>${plain(said)}</b><br>${lines.join("<br>")}`;
   };
-  const xs = x.number ? x.labels : x.labels.map(words);
+  const xs = x.number ? x.labels : x.labels.map((each) => plain(words(each)));
   const count = y ? y.labels.length : 1;
   const grid = Array.from({ length: count }, (_, j) => xs.map((_, i) => at(i, j)));
   const draws = kind === "cells" && y ? cells : lines;
@@ -136,7 +137,7 @@ function marks({ x, y, xs, grid, value, codes, told }, height) {
 
 function cells(shown) {
   const { what, x, y, xs, grid, value, told, flagged } = shown;
-  const ys = y.number ? y.labels : y.labels.map(words);
+  const ys = y.number ? y.labels : y.labels.map((each) => plain(words(each)));
   const all = grid.flat().map(value).filter((each) => !Number.isNaN(each));
   const low = Math.min(...all), high = Math.max(...all), signed = low < 0 && high > 0;
   const most = Math.max(-low, high);
@@ -156,7 +157,7 @@ function cells(shown) {
       type: "heatmap", x: xs, y: ys, z: grid.map((row) => row.map(value)), customdata: grid, text: grid.map((row) => row.map(told)),
       hovertemplate: "%{text}<extra></extra>", hoverongaps: false, xgap: 1, ygap: 1, zmin: range[0], zmax: range[1],
       colorscale: signed && !flagged ? SIGNED : NUMBERS,
-      colorbar: flagged ? { ...bar(""), tickvals: codes, ticktext: codes.map((each) => words(what.flags[each])) } : bar(what.unit ? `${what.unit}` : ""),
+      colorbar: flagged ? { ...bar(""), tickvals: codes, ticktext: codes.map((each) => words(what.flags[each])) } : bar(plain(what.unit)),
     }, ...marks(shown, (j) => ys[j]), ...mark],
     layout: { xaxis: axisLayout(x, x.labels), yaxis: axisLayout(y, y.labels), showlegend: true, margin: { r: 84, t: 26 } },
   };
@@ -168,7 +169,7 @@ function lines(shown) {
   const keys = y?.number ? ordered(some.length) : KEYS();
   const traces = some.map((row, k) => ({
     type: "scatter", mode: "lines+markers", x: xs, y: row.map(value), customdata: row, text: row.map(told),
-    name: y ? label(y, grid.indexOf(row)) : "", hovertemplate: "%{text}<extra></extra>", showlegend: Boolean(y),
+    name: y ? plain(label(y, grid.indexOf(row))) : "", hovertemplate: "%{text}<extra></extra>", showlegend: Boolean(y),
     line: { color: keys[k % keys.length], width: 2, dash: k < keys.length ? "solid" : "dash" }, marker: { size: row.length > 60 ? 3 : 7 },
   }));
   const known = grid.flat().map(value).filter((each) => !Number.isNaN(each));
@@ -237,13 +238,15 @@ function step() {
 async function choose(at) {
   chosen = at;
   const found = await json(`${address}?limit=1&offset=${at}`);
+  if (chosen !== at) return; // another run has been chosen meanwhile
   const run = found.runs[0];
   keep({ run: run.status === "pending" ? null : run.id });
   const place = document.querySelector("[data-run-head]");
-  const list = element("dl", { className: "place" }, ...several.map((axis) => {
-    const k = axisOf(axis.name);
+  const shown = several.length ? several : Object.keys(run.at).map((name) => ({ name, unit: "" }));
+  const list = element("dl", { className: "place" }, ...shown.map((axis) => {
     const title = element("dt", {}, words(axis.name), axis.unit ? element("span", { className: "unit" }, ` ${axis.unit}`) : "");
-    return element("div", {}, title, element("dd", {}, label(axis, places(at)[k])));
+    const said = several.length ? label(axis, places(at)[axisOf(axis.name)]) : text(run.at[axis.name]);
+    return element("div", {}, title, element("dd", {}, said));
   }));
   const parts = [list];
   if (run.status !== "ok" || run.message) {
@@ -317,9 +320,9 @@ chart.addEventListener("keydown", (event) => {
 // Links and the form of the table change the table alone.
 async function turn(where) {
   const wanted = new URL(where, document.location);
-  for (const name of [...state.keys()]) if (name === "sort" || name === "page" || name.startsWith("where.")) state.delete(name);
-  const given = [...wanted.searchParams].filter(([name, value]) => value && (name === "sort" || name === "page" || name.startsWith("where.")));
-  keep(Object.fromEntries(given));
+  const own = ([name]) => name === "sort" || name === "page" || name.startsWith("where.");
+  const before = [...state].filter(own).map(([name]) => [name, null]);
+  keep(Object.fromEntries([...before, ...[...wanted.searchParams].filter(own)]));
   await renew(document.location, ["table"]);
 }
 
@@ -352,7 +355,7 @@ function watch() {
     if (final) source.close();
     else if (Date.now() - last < 1000) return;
     last = Date.now();
-    columns.clear();
+    columns = new Map();
     const fresh = await renew(document.location, ["status", "progress", "table"]);
     if (fresh) study.numbers = JSON.parse(fresh.getElementById("data").textContent).numbers;
     const begun = chosen === null && fresh ? JSON.parse(fresh.getElementById("data").textContent).at : null;

@@ -33,8 +33,13 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-_CHORDS = 64
-"""Number of chords into which an edge is divided."""
+_CHORDS, _HALVINGS, _BENT = 64, 40, 1e-7
+"""Number of chords into which an edge is divided, and of times that chords are halved on which the
+force at the middle, or the mean at the ends, is not the mean at the Gauss points, to this share of
+the whole force: loads may bend and jump."""
+_GAUSS = (0.5 - 0.75**0.5 / 3, 0.5 + 0.75**0.5 / 3)
+_INSIDE = (0.5, 1e-6, 1 - 1e-6)
+"""Gauss points of a chord; its middle, and its ends, where neighbours may have other loads."""
 _VOLUME_DEGREE = 10
 """Polynomial degree up to which forces per volume are integrated exactly."""
 
@@ -232,17 +237,37 @@ class PlainBody:
         return np.asarray(np.vstack([np.ones_like(arm[:1]), arm]) @ force.T)
 
     def _on_boundary(self, load: Load, boundary: str) -> Array:
-        """Return the moments (3, 2) of the forces on a boundary, by Simpson's rule on chords."""
+        """Return the moments (3, 2) of the forces on a boundary, by Gauss's rule on chords."""
         edges = self.part.X[:, edges_of(self.part, boundary)]
-        places = np.linspace(-1.0, 1.0, 1 + 2 * _CHORDS)
-        points = edges @ shape_functions(places, edges.shape[-1]).T
-        along = (points[..., 2::2] - points[..., :-2:2]).reshape(2, -1)
-        total = np.zeros((3, 2))
-        for first, share in ((0, 1 / 6), (1, 2 / 3), (2, 1 / 6)):
-            x = points[..., first : first + 2 * _CHORDS - 1 : 2].reshape(2, -1)
-            force = load.push(x, along)
-            if force is not None:
-                total += share * self.moments(self._depth(x) * np.broadcast_to(force, x.shape), x)
+        row = np.repeat(np.arange(edges.shape[1]), _CHORDS)
+        start, width = (
+            np.tile(np.linspace(-1.0, 1.0, _CHORDS + 1)[:-1], edges.shape[1]),
+            2 / _CHORDS,
+        )
+        total, whole = np.zeros((3, 2)), 0.0
+        for left in reversed(range(_HALVINGS)):
+
+            def at(share: float) -> Array:
+                shapes = shape_functions(start + share * width, edges.shape[-1])  # noqa: B023
+                return np.asarray((edges[:, row] * shapes).sum(axis=-1))  # noqa: B023
+
+            along, forces = at(1.0) - at(0.0), []
+            for x in map(at, (*_GAUSS, *_INSIDE)):
+                force = load.push(x, along)
+                if force is None:
+                    return total
+                forces.append(self._depth(x) * np.broadcast_to(force, x.shape))
+            first, last, middle, one, other = forces
+            mean = (first + last) / 2
+            bent = np.abs([mean - middle, mean - (one + other) / 2]).max(axis=(0, 1))
+            whole = whole or np.abs(mean).sum()
+            halved = (bent > _BENT * whole) & (left > 0)
+            for force, share in zip((first, last), _GAUSS, strict=True):
+                total += self.moments(force[:, ~halved], at(share)[:, ~halved]) / 2
+            if not halved.any():
+                break
+            row, start, width = np.tile(row[halved], 2), start[halved], width / 2
+            start = np.concatenate([start, start + width])
         return total
 
     def _on_volume(self, load: Load) -> Array:

@@ -228,6 +228,8 @@ class PlainPrism:
         """
         track, C = self.track, self.track.elasticity.stiffness(6)
         modes, stations = track.modes, track.modes.stations
+        if not len(self._outside):
+            return np.zeros((0, 6))
         share = np.full(len(self._k), 2.0 / stations)
         share[[0, -1]] /= 2.0
         at_rim = share * np.abs(found.strain[track.rim] @ C).max(axis=(0, 2))

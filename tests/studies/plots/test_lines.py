@@ -133,7 +133,7 @@ def test_a_field_is_selected_along_its_own_dimensions(
         (["pas=5"], "case, element_size, advance_step, passes, pass, station; did you mean pass"),
         (["depth=5"], "depth = '5': must be one of load_ratio"),
         (["case=short", "pass=2"], "field = 'residual_profile': has no value in the run"),
-        (["pass=2", "pass=3"], "--select = 'pass=3': pass is selected already, as 2"),
+        (["pass=2", "pass=3"], "--select = 'pass=3': pass is given already, as 2"),
     ]:
         assert main([*plot, "--select", *wrong]) == 2
         assert named in capsys.readouterr().err

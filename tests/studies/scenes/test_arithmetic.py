@@ -10,6 +10,7 @@ import pytest
 
 from studies.scenes.arithmetic import (
     LONGEST,
+    LONGEST_FIELD,
     ExpressionError,
     Field,
     evaluated,
@@ -206,3 +207,9 @@ def test_an_expression_of_the_position_is_a_function_of_it(text: str, values: li
 def test_what_is_no_function_of_position_is_refused(text: str, reason: str) -> None:
     with pytest.raises(ExpressionError, match=reason):
         evaluated(text, VALUES)
+
+
+def test_a_field_has_a_largest_length() -> None:
+    text = "x*(" + "+".join(["1"] * LONGEST_FIELD) + ")"
+    with pytest.raises(ExpressionError, match=f"at most {LONGEST_FIELD} characters"):
+        Field(text)

@@ -214,11 +214,33 @@ def square() -> MeshFile:
         b'[[["points"], [4]]]\n' + bytes(32),
         b'[[["other"], [1, 1]]]\n' + bytes(8),
         b'[[["points"], [-1, 2]]]\n' + bytes(8),
+        b'[[["points"], [%d]]]\n' % 10**30,
     ],
 )
 def test_what_are_no_arrays_of_a_mesh_is_refused(arrays: bytes) -> None:
     with pytest.raises(ModelError, match=r"a\.msh"):
         MeshFile("a.msh", b"", arrays).mesh(None)
+
+
+CORNERS = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+QUAD = ("quad", np.array([[0, 1, 2, 3]]))
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        (MeshData(CORNERS, [("quad", QUAD[1][:, :3])], {}, {}), "quad of another number of points"),
+        (MeshData(CORNERS, [QUAD], {"low": {0: np.array([7])}}, {}), "set low of cells that"),
+        (MeshData(CORNERS, [QUAD], {"low": {5: np.array([0])}}, {}), "set low of cells that"),
+        (MeshData(CORNERS, [QUAD], {}, {"low": np.array([0, 4])}), "set low of points"),
+        (MeshData(CORNERS, [QUAD], {}, {"low": np.array([0, -1])}), "set low of points"),
+        (MeshData(CORNERS, [("quad", QUAD[1][:0])], {}, {}), "must have cells .*; it has none"),
+        (MeshData(CORNERS[:0], [], {}, {}), "must have finite points"),
+    ],
+)
+def test_arrays_that_do_not_fit_together_are_refused(data: MeshData, told: str) -> None:
+    with pytest.raises(ModelError, match=told):
+        MeshFile("a.msh", b"", data.packed()).mesh(None)
 
 
 def test_the_meshes_of_scenes_that_a_process_keeps_have_a_largest_size(

@@ -396,6 +396,18 @@ def test_the_work_of_a_run_is_told_from_its_meshes(path: Path) -> None:
     assert effort.increments == scene.program(parameters).count
 
 
+def test_a_temperature_may_have_no_value_outside_its_body() -> None:
+    tables = blocks()
+    for body in tables["bodies"].values():
+        body["shape"]["x"] = [1.0, 5.0]
+    heat = {"body": "lower", "kind": "temperature", "rise": "10*log(x)", "expansion": 1e-5}
+    tables["loads"].append(heat | {"yield_drop": 1e-5})
+    scene = built(tables)
+    assert scene.effort is not None
+    effort = scene.effort(scene.parameters(), [None])
+    assert effort.unknowns == System(scene.model(scene.parameters())).n_unknowns
+
+
 @pytest.mark.processes
 def test_numbers_in_another_unit_reach_the_user(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -1,0 +1,35 @@
+"""The numbers of a run that tables and pages show first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+FIGURES: Mapping[str, str] = {
+    "surface_residual_max": "largest residual {component} surface {body}",
+    "surface_residual_x": "surface residual x",
+    "first_row_residual_x": "first row residual x",
+    "free_surface_residual_x": "free surface residual x",
+    "lowest_residual_x": "lowest residual x",
+    "depth_of_lowest_residual_x": "at depth",
+    "surface_residual_z": "surface residual z",
+    "first_row_residual_z": "first row residual z",
+    "free_surface_residual_z": "free surface residual z",
+    "lowest_residual_z": "lowest residual z",
+    "depth_of_lowest_residual_z": "at depth",
+    "surface_plastic_strain": "surface plastic strain",
+    "highest_plastic_strain": "mid-track plastic strain",
+    "depth_of_highest_plastic_strain": "at depth",
+    "stick_half_width": "stick half-width",
+    "singular_power": "singular power",
+    "singular_power_error": "its error",
+    "singular_intensity": "singular intensity",
+    "apparent_power": "apparent power",
+    "peak_contact_pressure": "peak contact pressure",
+    "max_plastic_strain": "largest plastic strain",
+    "audit_plastic_strain": "away from singular points",
+    "increments": "increments",
+    "cut_increments": "cut",
+    "cpu_seconds": "cpu",
+}
+"""Variables in a table of runs, if the scene has them, and their headings. A variable over bodies
+and components has a column for the first component of each body."""
