@@ -9,6 +9,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+import tempfile
 import time
 from asyncio.subprocess import PIPE, Process
 from contextlib import closing
@@ -251,21 +252,21 @@ if __name__ == "__main__":
 
 
 @pytest.mark.parametrize("folder", ["short", "long" * 30])
-def test_a_process_starts_the_same_by_either_method(
-    folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_process_starts_the_same_by_either_method(folder: str, tmp_path: Path) -> None:
     """The name of the folder for temporary files may be too long for a socket."""
-    (tmp_path / folder).mkdir()
     (tmp_path / "echo_order.py").write_text(ECHO)
     (tmp_path / "program.py").write_text(PROGRAM)
-    done = subprocess.run(
-        [sys.executable, str(tmp_path / "program.py")],
-        env=os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path / folder)},
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=120,
-    )
+    with tempfile.TemporaryDirectory(dir="/tmp") as short:  # `tmp_path` itself may be too long
+        temporary = Path(short, folder)
+        temporary.mkdir()
+        done = subprocess.run(
+            [sys.executable, str(tmp_path / "program.py")],
+            env=os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(temporary)},
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=120,
+        )
     method, told, order, running, pid, code, killed = json.loads(done.stdout)
     assert method == ("forkserver" if folder == "short" else "spawn")
     assert told == [str(pid), "/", "told"], "a session of its own, and no folder of the service"
