@@ -29,6 +29,7 @@ Value = float | Field
 """A number, or a function of position: (positions (2, n) [mm]) -> (n,)."""
 
 _ALWAYS = Amplitude.constant(1.0)
+_VECTOR, _TENSOR = ("x", "y"), ("xx", "yy", "zz", "xy")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -130,7 +131,7 @@ class Pressure(BoundaryLoad):
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a pressure that is not finite."""
         del kinematics
-        _finite(f"pressure.{self.boundary}", self.value, "MPa")
+        _check_value(f"pressure.{self.boundary}", self.value, "MPa")
 
     def push(self, x: Array, along: Array) -> Array:
         """Return the forces (2, n) on pieces of the boundary [N/mm]."""
@@ -150,11 +151,12 @@ class Traction(BoundaryLoad):
         """Raise `ModelError` for a component that is not finite."""
         del kinematics
         for axis in ("x", "y"):
-            _finite(f"traction.{self.boundary}.{axis}", getattr(self, axis), "MPa")
+            _check_value(f"traction.{self.boundary}.{axis}", getattr(self, axis), "MPa")
 
     def push(self, x: Array, along: Array) -> Array:
         """Return the forces (2, n) on pieces of the boundary [N/mm]."""
-        return _vector(f"traction.{self.boundary}", self, x, "MPa") * np.linalg.norm(along, axis=0)
+        traction = _components(f"traction.{self.boundary}", self, _VECTOR, x, "MPa")
+        return traction * np.linalg.norm(along, axis=0)
 
 
 @LOADS.word("body_force")
@@ -169,11 +171,11 @@ class BodyForce(Load):
         """Raise `ModelError` for a component that is not finite."""
         del kinematics
         for axis in ("x", "y"):
-            _finite(f"body_force.{axis}", getattr(self, axis), "N/mm3")
+            _check_value(f"body_force.{axis}", getattr(self, axis), "N/mm3")
 
     def body_force(self, x: Array) -> Array:
         """Return the force per volume (2, n) at positions x [N/mm3]."""
-        return _vector("body_force", self, x, "N/mm3")
+        return _components("body_force", self, _VECTOR, x, "N/mm3")
 
 
 Density = Annotated[float, Interval(gt=0.0), Unit("t/mm3")]
@@ -299,7 +301,7 @@ class Temperature(Load):
         del kinematics
         for name in ("expansion", "modulus_drop", "yield_drop"):
             _finite(f"temperature.{name}", getattr(self, name), "1/K")
-        _finite("temperature.rise", self.rise, "K")
+        _check_value("temperature.rise", self.rise, "K")
 
     def at(self, x: Array) -> Array:
         """Return the rise of temperature (n,) at positions (2, n) [K]."""
@@ -374,9 +376,9 @@ class InitialStress(Load):
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` if the stress is neither components nor a function of position."""
         del kinematics
-        each = {name: getattr(self, name) for name in ("xx", "yy", "zz", "xy")}
+        each = {name: getattr(self, name) for name in _TENSOR}
         for name, value in each.items():
-            _finite(f"initial_stress.{name}", value, "MPa")
+            _check_value(f"initial_stress.{name}", value, "MPa")
         if self.stress is not None and not callable(self.stress):
             raise ModelError("initial_stress.stress", self.stress, "must be a function of position")
         if self.stress is not None and any(each.values()):
@@ -388,14 +390,16 @@ class InitialStress(Load):
         """Return xx, yy, zz, xy (4, n) at positions (2, n) [MPa]."""
         if self.stress is not None:
             return checked("initial_stress.stress", self.stress(x), (4, x.shape[1]), "MPa")
-        each = {name: getattr(self, name) for name in ("xx", "yy", "zz", "xy")}
-        return np.stack([_values(f"initial_stress.{n}", v, x, "MPa") for n, v in each.items()])
+        return _components("initial_stress", self, _TENSOR, x, "MPa")
+
+
+def _check_value(field: str, value: object, unit: str) -> None:
+    """Raise `ModelError` for a number that is not finite; functions are checked at the points."""
+    if not callable(value):
+        _finite(field, value, unit)
 
 
 def _finite(field: str, value: object, unit: str) -> None:
-    """Raise `ModelError` for a number that is not finite; functions are checked at the points."""
-    if callable(value):
-        return
     if not isinstance(value, int | float | np.number) or not np.isfinite(float(value)):
         raise ModelError(field, value, f"must be finite [{unit}]")
 
@@ -406,10 +410,9 @@ def _density(load: str, value: float) -> None:
         raise ModelError(f"{load}.density", value, "must be > 0 [t/mm3]")
 
 
-def _vector(field: str, load: Traction | BodyForce, x: Array, unit: str) -> Array:
-    """Return the components x and y of a load (2, n) at positions x."""
-    each = {axis: getattr(load, axis) for axis in ("x", "y")}
-    return np.stack([_values(f"{field}.{axis}", v, x, unit) for axis, v in each.items()])
+def _components(field: str, load: Load, names: tuple[str, ...], x: Array, unit: str) -> Array:
+    """Return the values of some entries of a load (n_names, n) at positions x."""
+    return np.stack([_values(f"{field}.{name}", getattr(load, name), x, unit) for name in names])
 
 
 def _values(field: str, value: Value, x: Array, unit: str) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +14,7 @@ from solver.loading.control import Control
 from solver.loading.program import Lap, Program, Stage
 from solver.mesh import grid
 from solver.model.amplitude import Amplitude
-from solver.model.loads import Displacement, InitialStress, Pressure, Temperature, Traction
+from solver.model.loads import Displacement, Gravity, InitialStress, Pressure, Temperature, Traction
 
 pytestmark = pytest.mark.solves
 
@@ -345,6 +346,8 @@ def test_a_condensed_elastic_body_expands_like_a_whole_one(heated: str) -> None:
         (Traction(boundary="top", x=np.inf), "traction.top.x = inf: must be finite"),
         (Displacement(boundary="top"), "displacement.top = None: must give x, y or both"),
         (Displacement(boundary="top", y=np.nan), "displacement.top.y = nan: must be finite"),
+        (Displacement(boundary="top", y=math.sin), r"displacement\.top\.y = .*: must be finite"),
+        (Gravity(density=7.85e-9, y=math.sin), r"gravity\.y = .*: must be finite"),
         (Temperature(rise=np.nan, expansion=1e-5), "temperature.rise = nan: must be finite"),
         (Temperature(rise=1.0, expansion=np.inf), "temperature.expansion = inf: must be finite"),
         (InitialStress(stress=100.0), "initial_stress.stress = 100.0: must be a function"),  # type: ignore[arg-type]
