@@ -32,9 +32,10 @@ from solver.scenes import Scene
 from studies.definition.identity import canonical
 from studies.definition.measured import MeasuredLine, Numbers, Read, checked_measured, content_of
 from studies.definition.parameters import Parameter, parameters_of
+from studies.definition.place import Chooser
 from studies.definition.spaced import SPACINGS, between, rounded
 from studies.definition.sweep import Axes, positions
-from studies.definition.vocabulary import NO_EQUILIBRIUM, SOLVED
+from studies.definition.vocabulary import SOLVED
 from studies.errors import StudyError, one_of
 from studies.toml import CASE
 
@@ -205,7 +206,7 @@ class _Ends(Exception):
 
 
 @dataclass(slots=True)
-class Fitting:
+class Fitting(Chooser):
     """The program of a fit; see `studies.definition.place.Chooser`.
 
     Attributes
@@ -254,20 +255,6 @@ class Fitting:
     def told(self) -> str:
         """How far it is, as text."""
         return f"run {len(self._seen) + 1} of at most {self.fit.most}"
-
-    @property
-    def decided(self) -> tuple[str, ...]:
-        """Statuses of runs that are not computed again."""
-        return NO_EQUILIBRIUM
-
-    @property
-    def goes_on(self) -> bool:
-        """Whether one loading path serves it to its end: no."""
-        return False
-
-    @property
-    def limit(self) -> None:
-        """What tells the last run on a path: nothing, all are needed."""
 
     def sets(self, key: Evaluation) -> dict[str, Any]:
         """Return the parameters that a run sets."""

@@ -12,7 +12,7 @@ from studies.definition.expansion import Expansion
 from studies.definition.parameters import build
 from studies.definition.points import POINT
 from studies.definition.sweep import Axes
-from studies.definition.vocabulary import KEEP, SOLVED
+from studies.definition.vocabulary import KEEP, NO_EQUILIBRIUM, SOLVED
 
 
 class Chooser(Protocol):
@@ -20,7 +20,12 @@ class Chooser(Protocol):
 
     What it asks for depends only on the runs that it has asked for, and not on the order in which
     they end. One that begins anew therefore asks for the same runs, which are in the store.
+
+    Where a class does not say otherwise, it asks for runs in rounds: no loading path serves it to
+    its end, and all runs of a path are needed.
     """
+
+    __slots__ = ()
 
     @property
     def wants(self) -> list[Any]:
@@ -41,14 +46,17 @@ class Chooser(Protocol):
     @property
     def decided(self) -> tuple[str, ...]:
         """Statuses without results that are not computed again."""
+        return NO_EQUILIBRIUM
 
     @property
     def goes_on(self) -> bool:
         """Whether one loading path serves it to its end, see `Scene.goes_on`."""
+        return False
 
     @property
     def limit(self) -> Any:
         """What tells the last run that is needed on a loading path; None if all are."""
+        return None
 
     def sets(self, key: Any) -> dict[str, Any]:
         """Return the parameters that a run sets."""

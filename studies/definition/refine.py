@@ -28,10 +28,11 @@ from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.definition.cells import KINK, Cell, Point, weights
 from studies.definition.parameters import parameters_of
+from studies.definition.place import Chooser
 from studies.definition.quantity import number_of_a_run
 from studies.definition.spaced import is_finite
 from studies.definition.sweep import MAXIMUM_RUNS, Axes
-from studies.definition.vocabulary import NO_EQUILIBRIUM, OK, taken
+from studies.definition.vocabulary import OK, taken
 from studies.errors import StudyError, one_of
 
 STATES = SETTLED, FAILED, SMALLEST, MOST, OPEN = "settled", "failed", "smallest", "most", "open"
@@ -134,7 +135,7 @@ Misses = Sequence[tuple[float, ...]]
 
 
 @dataclass(slots=True)
-class Refinement:
+class Refinement(Chooser):
     """The runs that a refinement asks for.
 
     Attributes
@@ -199,20 +200,6 @@ class Refinement:
         halved = (RefinedCell(each.cell, OPEN, each.left) for each in self._halvings)
         every = [*self.settled, *halved, *(RefinedCell(cell, OPEN) for cell in self._lacks)]
         return sorted(every, key=lambda each: (each.cell.branch, each.cell))
-
-    @property
-    def decided(self) -> tuple[str, ...]:
-        """Statuses without results that are not computed again."""
-        return NO_EQUILIBRIUM
-
-    @property
-    def goes_on(self) -> bool:
-        """Whether one loading path serves it to its end: it serves only a round."""
-        return False
-
-    @property
-    def limit(self) -> None:
-        """What tells the last run that is needed on a loading path: all are."""
 
     def sets(self, wanted: Wanted) -> dict[str, Any]:
         """Return the parameters that a run sets."""
