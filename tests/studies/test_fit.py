@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import csv
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import psutil
 import pytest
 from annotated_types import Interval, Unit
 from scipy.stats import chi2
@@ -31,8 +26,8 @@ from studies.execution.task import PathTask, walk
 from studies.views.picking import run_file
 from tests.studies.conftest import write_study
 from tests.studies.fakes import FAKE, Canned
+from tests.studies.killed import runs_before_a_kill
 
-ROOT = Path(__file__).parents[2]
 X = np.linspace(0.0, 2.0, 21)
 TRUTH = {"yield_stress": 380.0, "slope": 30.0}
 
@@ -478,19 +473,7 @@ def test_a_killed_fit_is_taken_up_and_computes_no_run_twice(tmp_path: Path) -> N
     marks.mkdir()
     (tmp_path / "p.csv").write_text(PRESSURE)
     file.write_text(FAKE_FIT.format(seconds=0.4, mark=marks) + LINES)
-    command = ["-m", "tests.residua.command", "fit", str(file), "--out", str(out), "--workers", "1"]
-    with subprocess.Popen(
-        [sys.executable, *command], cwd=ROOT, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-        start_new_session=True,
-    ) as parent:  # fmt: skip
-        deadline = time.monotonic() + 60.0
-        while len(list(out.glob("runs/*.nc"))) < 4:
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        family = psutil.Process(parent.pid).children(recursive=True)
-        parent.send_signal(signal.SIGKILL)
-    assert psutil.wait_procs(family, timeout=10)[1] == []
-    before = {path.stem for path in out.glob("runs/*.nc")}
+    before = runs_before_a_kill("fit", file, out, 4)
     outcome = run_study(Study.from_toml(file), Store(out), workers=1)
     assert outcome.ok
     assert not before & set(outcome.computed)

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from copy import copy
@@ -15,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import psutil
 import pytest
 
 from residua.cli import main
@@ -32,8 +28,8 @@ from studies.execution.run import _Work
 from studies.execution.task import PathTask, walk
 from tests.studies.conftest import fake_study
 from tests.studies.fakes import FAKE, Canned, FakeParameters, Followed, path
+from tests.studies.killed import runs_before_a_kill
 
-ROOT = Path(__file__).parents[2]
 PRESSURE = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}
 """Of the fake scene the pressure is 100 load_ratio (1 + friction) + half_width."""
 SWEEP = {"friction": [0.0, 0.4], "half_width": [20.0, 50.0]}
@@ -505,19 +501,7 @@ def test_a_killed_search_is_taken_up_and_computes_no_run_twice(tmp_path: Path, s
         "[sweep]\nfriction = [0.0, 0.1, 0.2, 0.3]\n"
         '[goal]\nof = "peak_contact_pressure"\nat = 120\nbetween = [0.1, 4.0]\n'
     )
-    command = ["-m", "tests.residua.command", "run", str(file), "--out", str(out), "--workers", "1"]
-    with subprocess.Popen(
-        [sys.executable, *command], cwd=ROOT, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-        start_new_session=True,
-    ) as parent:  # fmt: skip
-        deadline = time.monotonic() + 60.0
-        while len(list(out.glob("runs/*.nc"))) < 8:
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        family = psutil.Process(parent.pid).children(recursive=True)
-        parent.send_signal(signal.SIGKILL)
-    assert psutil.wait_procs(family, timeout=10)[1] == []
-    before = {path.stem for path in out.glob("runs/*.nc")}
+    before = runs_before_a_kill("run", file, out, 8)
     outcome = run_study(Study.from_toml(file), Store(out), workers=1)
     assert outcome.ok
     assert not before & set(outcome.computed)

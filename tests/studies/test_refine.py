@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-import signal
-import subprocess
-import sys
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -15,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import psutil
 import pytest
 
 from solver.results.record import Record, Status
@@ -24,7 +19,8 @@ from studies.definition.cells import weights
 from studies.definition.refine import Refine, Refinement, Wanted
 from studies.execution.asking import Asking
 from tests.studies.fakes import FAKE, Canned, FakeParameters, record
-from tests.studies.test_goal import ROOT, search_here
+from tests.studies.killed import runs_before_a_kill
+from tests.studies.test_goal import search_here
 
 OF = "peak_residual_tension"
 AXES = {"load_ratio": [0.1, 1.0], "friction": [0.0, 0.4]}
@@ -338,19 +334,7 @@ def test_a_killed_refinement_is_taken_up_and_computes_no_run_twice(tmp_path: Pat
         "[sweep]\nload_ratio = [0.1, 0.9]\nfriction = [0.0, 0.4]\n"
         '[refine]\nof = ["peak_contact_pressure"]\n'
     )
-    command = ["-m", "tests.residua.command", "run", str(file), "--out", str(out), "--workers", "1"]
-    with subprocess.Popen(
-        [sys.executable, *command], cwd=ROOT, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-        start_new_session=True,
-    ) as parent:  # fmt: skip
-        deadline = time.monotonic() + 60.0
-        while len(list(out.glob("runs/*.nc"))) < 4:
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        family = psutil.Process(parent.pid).children(recursive=True)
-        parent.send_signal(signal.SIGKILL)
-    assert psutil.wait_procs(family, timeout=10)[1] == []
-    before = {path.stem for path in out.glob("runs/*.nc")}
+    before = runs_before_a_kill("run", file, out, 4)
     outcome = run_study(Study.from_toml(file), Store(out), workers=1)
     assert outcome.ok
     assert not before & set(outcome.computed)
