@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import reprlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -155,6 +155,13 @@ def one_of(name: Any, names: Iterable[str]) -> str:
     more = len(known) - MOST_NAMES
     listed += f" and {more} more" if more > 0 else ""
     return f"must be one of {listed or '(there is none)'}{nearest(name, known)}"
+
+
+def check_entries(field: str, table: Mapping[str, Any], known: Collection[str]) -> None:
+    """Raise `StudyError` for an entry of a table that is not one of the known."""
+    for key in table:
+        if key not in known:
+            raise StudyError(f"{field}.{key}", table[key], one_of(key, known))
 
 
 def nearest(name: Any, names: Iterable[str]) -> str:

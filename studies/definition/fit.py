@@ -36,7 +36,7 @@ from studies.definition.place import Chooser
 from studies.definition.spaced import SPACINGS, between, rounded
 from studies.definition.sweep import Axes, positions
 from studies.definition.vocabulary import SOLVED
-from studies.errors import StudyError, one_of
+from studies.errors import StudyError, check_entries, one_of
 from studies.toml import CASE
 
 FOUND, MOST, FAILED = "found", "most", "failed"
@@ -514,9 +514,7 @@ def checked_fit(content: Any, scene: Scene, axes: Axes) -> Fit:
     """
     if not isinstance(content, Mapping):
         raise StudyError("fit", content, "must be a table")
-    for key in content:
-        if key not in _KEYS:
-            raise StudyError(f"fit.{key}", content[key], one_of(key, _KEYS))
+    check_entries("fit", content, _KEYS)
     known, ranges = parameters_of(scene), content.get("ranges")
     if not isinstance(ranges, Mapping) or not ranges:
         raise StudyError("fit.ranges", ranges, "must be a table: the bounds of each parameter")

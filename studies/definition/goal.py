@@ -30,7 +30,7 @@ from studies.definition.parameters import Parameter, parameters_of
 from studies.definition.quantity import number_of_a_run
 from studies.definition.spaced import is_finite, rounded
 from studies.definition.vocabulary import NO_EQUILIBRIUM, SOLVED
-from studies.errors import StudyError, one_of
+from studies.errors import StudyError, check_entries, one_of
 
 FOUND: Mapping[str, Mapping[str, Any]] = {
     "first_yield": {"of": "max_plastic_strain", "first_above": 0.0},
@@ -384,9 +384,7 @@ def checked_goal(content: Any, scene: Scene) -> Goal:
     if not content:
         allowed = "is empty: needs between, and find or of with a threshold; or take it out"
         raise StudyError("goal", {}, allowed)
-    for key in content:
-        if key not in _KEYS:
-            raise StudyError(f"goal.{key}", content[key], one_of(key, _KEYS))
+    check_entries("goal", content, _KEYS)
     known = parameters_of(scene)
     name = content.get("parameter", scene.branch)
     if not isinstance(name, str) or name not in known:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.definition.spaced import is_finite
-from studies.errors import StudyError, nearest, one_of
+from studies.errors import StudyError, check_entries, nearest, one_of
 
 Numbers = NDArray[np.float64]
 
@@ -201,9 +201,7 @@ def _checked(field: str, content: Any, scene: Scene, axes: Collection[str]) -> M
     given = dict(content)
     if "rows" in given:
         given |= _columns(field, given.pop("rows"), scene)
-    for key in given:
-        if key not in _KEYS:
-            raise StudyError(f"{field}.{key}", given[key], one_of(key, _KEYS))
+    check_entries(field, given, _KEYS)
     of = _known(f"{field}.of", given.get("of"), scene)
     over = _known(f"{field}.over", given["over"], scene) if given.get("over", "") != "" else ""
     values = _numbers(f"{field}.values", given.get("values"))

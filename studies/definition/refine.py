@@ -33,7 +33,7 @@ from studies.definition.quantity import number_of_a_run
 from studies.definition.spaced import is_finite
 from studies.definition.sweep import MAXIMUM_RUNS, Axes
 from studies.definition.vocabulary import OK, taken
-from studies.errors import StudyError, one_of
+from studies.errors import StudyError, check_entries
 
 STATES = SETTLED, FAILED, SMALLEST, MOST, OPEN = "settled", "failed", "smallest", "most", "open"
 """What became of a cell: its runs are as foreseen; all failed; it would be divided, but is as small
@@ -404,9 +404,7 @@ def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
     """
     if not isinstance(content, Mapping):
         raise StudyError("refine", content, "must be a table")
-    for key in content:
-        if key not in _KEYS:
-            raise StudyError(f"refine.{key}", content[key], one_of(key, _KEYS))
+    check_entries("refine", content, _KEYS)
     of = content.get("of")
     names = [of] if isinstance(of, str) else of
     if not isinstance(names, list | tuple) or not names or len(set(map(repr, names))) < len(names):

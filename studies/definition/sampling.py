@@ -25,7 +25,7 @@ from solver.parameters import is_number
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
 from studies.definition.spaced import SPACINGS, between, rounded
-from studies.errors import StudyError, nearest, one_of
+from studies.errors import StudyError, check_entries, nearest, one_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -71,9 +71,7 @@ def sampled(
     if not isinstance(content, Mapping):
         allowed = "must be a table {method, num, ranges, seed}; a list of points is `points`"
         raise StudyError(field, content, allowed)
-    for key in content:
-        if key not in _KEYS:
-            raise StudyError(f"{field}.{key}", content[key], one_of(key, _KEYS))
+    check_entries(field, content, _KEYS)
     method, seed = content.get(METHOD), content.get("seed", 0)
     if not isinstance(method, str) or method not in METHODS:
         raise StudyError(f"{field}.{METHOD}", method, one_of(method, METHODS))
