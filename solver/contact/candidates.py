@@ -29,7 +29,7 @@ _MARGIN = 0.25
 _POWER = 5 / 3
 """Power of the gap in the slip of a vertex that comes near."""
 _FELL = 0.5
-"""Ratio of forces that fell to forces that rose; up to it a contact grows, above it moves on."""
+"""Ratio of normal forces that fell to those that rose, up to which a contact grows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,7 +300,7 @@ def _slip_before_contact(before: ContactState, span: float) -> tuple[Array, Arra
 
 
 def _grew(before: Array, after: Array) -> bool:
-    """Whether normal forces (n,) of a contact grew nearly everywhere, so that it did not move."""
+    """Whether normal forces (n,) of a contact mostly grew: in one that moves on as many fell."""
     change = after - before
     return bool(-change.sum(where=change < 0) <= _FELL * change.sum(where=change > 0))
 
