@@ -74,8 +74,13 @@ class Interface:
         """Return gap, area and derivative rows at displacements ``u`` and a time.
 
         With ``finite`` the surfaces are paired in their current positions; without it a pair of
-        small sliding keeps the pairing before loading.
+        small sliding keeps the pairing before loading. Those of an absent pair face nowhere.
         """
+        found = self.facing(u, time, finite=finite)
+        return found.parted if self.declared.absent(time) else found
+
+    def facing(self, u: tuple[NDArray[np.float64], ...], time: float, *, finite: bool) -> Pairing:
+        """Return the pairing as if the pair were there."""
         as_meshed = self._as_meshed(u, finite)
         return replace(as_meshed, gap=as_meshed.gap + self.declared.offset(time))
 

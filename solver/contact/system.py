@@ -220,7 +220,8 @@ class System:
     def has_amplitude(self) -> bool:
         """Whether a load follows an amplitude of its own, not the time."""
         amplitudes = [load.amplitude for load in self._loads]
-        amplitudes += [contact.amplitude for contact in self.model.contacts]
+        for contact in self.model.contacts:
+            amplitudes += [contact.amplitude, contact.presence]
         return any(amplitude is not None for amplitude in amplitudes)
 
     @property
@@ -361,6 +362,17 @@ class System:
             contacts.append(
                 ContactState.at_rest(gap, touching, finite=interface.finite, before=before)
             )
+        return replace(state, contacts=tuple(contacts))
+
+    def joined(self, state: State, time: float) -> State:
+        """Return a state with the pairs at rest that come in before a time."""
+        contacts = list(state.contacts)
+        for k, interface in enumerate(self.interfaces):
+            pair = interface.declared
+            if pair.absent(state.time) and not pair.absent(time):
+                gap = interface.pairing(state.u, time, finite=contacts[k].finite).gap
+                touching, finite = gap <= self.touching, contacts[k].finite
+                contacts[k] = ContactState.at_rest(gap, touching, finite=finite, before=contacts[k])
         return replace(state, contacts=tuple(contacts))
 
     def moved(self, state: State, time: float) -> State:

@@ -204,6 +204,10 @@ class Builder:
         for side, (body, boundary) in (("slave", slave), ("master", master)):
             self._has_boundary(f"contacts[{k}].{side}", body, boundary)
         amplitude = self._amplitude(f"contacts[{k}]", table.amplitude)
+        presence = None
+        if table.active is not None and self.scene.passages:
+            there = [float(stage.name in table.active) for stage, *_ in self.scene.passages]
+            presence = Amplitude(np.arange(1.0 + len(there)), np.array([*there[:1], *there]))
         return self.attempt(
             f"contacts[{k}]",
             lambda: ContactPair(
@@ -214,6 +218,7 @@ class Builder:
                 gap=table.gap,
                 interference=table.interference,
                 amplitude=amplitude,
+                presence=presence,
             ),
         )
 

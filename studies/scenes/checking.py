@@ -169,6 +169,11 @@ def _contacts(scene: tables.SceneFile) -> Iterator[StudyError]:
         for side in ("slave", "master"):
             body = getattr(contact, side).partition(".")[0]
             yield from _one_of(f"contacts[{k}].{side}", body, bodies)
+        names = [stage.name for stage in scene.stages]
+        for stage in contact.active or () if names else ():
+            yield from _one_of(f"contacts[{k}].active", stage, names)
+        if contact.active and not names:
+            yield StudyError(f"contacts[{k}].active", list(contact.active), "needs stages")
 
 
 def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:

@@ -173,7 +173,11 @@ else:
 
 
 class PairTable(OpenTable):
-    """Two boundaries that may touch; see `solver.ContactPair`. Its label is ``name``."""
+    """Two boundaries that may touch; see `solver.ContactPair`. Its label is ``name``.
+
+    ``active`` are the stages in which the pair is there, by default all. Its forces go to zero in
+    the stage after these.
+    """
 
     name: Label
     slave: Side
@@ -182,6 +186,7 @@ class PairTable(OpenTable):
     gap: float = 0.0
     interference: float = 0.0
     amplitude: Amplitude | None = None
+    active: Annotated[tuple[Label, ...], Field(min_length=1)] | None = None
     friction_law: str
 
 

@@ -203,6 +203,11 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "loads[0].amplitude",
         "one of pressed",
     ),
+    "unknown stage of a pair": (
+        put("contacts", 0, "active", ["later"]),
+        "contacts[0].active",
+        "one of pressed",
+    ),
     "output nowhere": (
         without("outputs", "least", "body"),
         "outputs.least",
