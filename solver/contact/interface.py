@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.discretisation import Discretisation
-    from solver.fem.heat import Heat
     from solver.fem.part import Part
     from solver.fem.rigid import RigidPart
+    from solver.fem.softening import Softening
     from solver.fem.surface import Surface
     from solver.model.friction import FrictionLaw
     from solver.model.model import ContactPair, Model
@@ -40,7 +40,7 @@ class Interface:
     slave_surface: Surface
     master_surface: Surface
     law: FrictionLaw
-    hot: tuple[Heat | None, Heat | None]
+    hot: tuple[Softening | None, Softening | None]
     parts: tuple[Part, Part]
     reach: float
     reference: Pairing | None

@@ -61,7 +61,7 @@ def _part(whole: Discretisation | RigidPart, own: list[Surface], linear_solver: 
     body = whole.body
     if body.axle is not None:
         return Wheel(whole, own, linear_solver)
-    constant = not (whole.driven.cases or whole.heat)
+    constant = not (whole.driven.cases or whole.softening)
     if body.material.elastic and body.condense and own and constant:
         return Substructure(whole, own, linear_solver)
     return whole
@@ -338,13 +338,23 @@ class System:
         return self.full(name).points.reshape(2, -1)
 
     def response(self, name: str, converged: Converged) -> Response:
-        """Return stress and internal variables at the points of a whole body."""
+        """Return stress and internal variables at the points of a whole body.
+
+        Stress and accumulated plastic strain are NaN in elements that are removed.
+        """
         number = self.part(name)
         if not self.parts[number].meshed:
             whole = self.full(name)
             state = converged.state
             return whole.respond(self.displacement(name, state), whole.virgin(), state.time)
-        return converged.responses[number]
+        found, gone = converged.responses[number], self.full(name).gone(converged.state.time)
+        if gone is None or not gone.any():
+            return found
+        accumulated = np.where(gone, np.nan, found.state.accumulated)
+        return found._replace(
+            stress=np.where(gone, np.nan, found.stress),
+            state=replace(found.state, accumulated=accumulated),
+        )
 
     def initial(self) -> State:
         """Return the unloaded, undeformed state."""
