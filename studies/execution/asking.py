@@ -93,16 +93,15 @@ class Asking:
 
     @property
     def asked(self) -> list[str]:
-        """Ids of the runs that the searches of a goal have asked for, as far as they are known."""
-        if not self._study.goal:
-            return []
+        """Ids of the runs that the programs have asked for, as far as they are known."""
         rows = (row for place in self.places for row in place.program.rows.values())
-        return sorted({str(row["id"]) for row in rows})
+        return sorted({str(row["id"]) for row in rows if isinstance(row, Mapping)})
 
     @property
     def stage(self) -> str:
-        """How many of the searches of a goal have ended, as text; empty for others."""
-        return self._study.stage(sum(bool(place.program.reason) for place in self.places))
+        """How far the programs are, as text: see `Study.stage`."""
+        ended = sum(bool(place.program.reason) for place in self.places)
+        return self._study.stage(ended, self.places[0].program.told)
 
     @property
     def progress(self) -> float:
