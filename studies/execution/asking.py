@@ -48,7 +48,7 @@ class Asking:
     study : a study that chooses its runs
     store : the runs that are there are not computed again
     resume, since : as in `run_study`: which failed runs are taken as they are
-    only : number of the one program that is to be carried out; by default all are
+    only : number of the one search of a goal that is to be carried out; by default all are
 
     Attributes
     ----------
@@ -66,9 +66,7 @@ class Asking:
         self._study, self._store = study, store
         self._at: list[list[str]] = []
         self.places: list[Place[Any]] = []
-        for number, (at, fixed, program) in enumerate(_programs(study, store)):
-            if only not in (None, number):
-                continue
+        for at, fixed, program in _programs(study, store, only):
             self._at.append(at)
             self.places.append(
                 Place(
@@ -113,13 +111,15 @@ class Asking:
         while not self.ended:
             yield self._ready.popleft() if self._ready else None
 
-    def heard(self, path: str, row: Mapping[str, Any]) -> None:
-        """Tell the program of a loading path of the row of a run."""
+    def heard(self, path: str, row: Mapping[str, Any]) -> str:
+        """Tell the program of a loading path of the row of a run; return `about` of it."""
+        about = self.about(path, row)
         number = self._paths[path][0]
         place = self.places[number]
         self._waits[number].discard(place.program.key(row["parameters"]))
         if place.hear(row) and not place.program.goes_on:
             self._go_on(number)
+        return about
 
     def owed(self, path: str) -> Case | None:
         """Return the run that a path which goes on has to compute next; None if it owes none.
@@ -186,11 +186,13 @@ class Asking:
         return []
 
 
-def _programs(study: Study, store: Store) -> Iterator[tuple[list[str], dict[str, Any], Any]]:
+def _programs(
+    study: Study, store: Store, only: int | None
+) -> Iterator[tuple[list[str], dict[str, Any], Any]]:
     """Yield the programs of a study: where each is, as text, what is fixed there, and itself."""
     swept = owners(study.sweep)
     if isinstance(study.asks, Goal):
-        for case in study.cases():
+        for case in study.cases() if only is None else [study.expansion.case(only)]:
             at = [f"{axis} = {value}" for axis, value in study.place(case).items()]
             yield at, {name: case.values[name] for name in swept}, Search(study.asks)
     elif isinstance(study.asks, Fit):
