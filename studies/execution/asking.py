@@ -20,7 +20,7 @@ import numpy as np
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.fit import Fit, Fitting, standings
 from studies.definition.goal import Goal, PathLimit, Search
-from studies.definition.measured import Line, Read
+from studies.definition.line import Line, Read
 from studies.definition.place import Place
 from studies.definition.refine import Refinement
 from studies.definition.study import Study
@@ -197,18 +197,18 @@ def _programs(
             yield at, {name: case.values[name] for name in swept}, Search(study.asks)
     elif isinstance(study.asks, Fit):
         names = {name for line in study.asks.measured for name in (line.of, line.over)}
-        read = partial(_variables, store, names)
-        yield [], {}, Fitting(study.asks, standings(study.sweep), read)
+        yield [], {}, Fitting(study.asks, standings(study.sweep), partial(_read, store, names))
     elif study.asks:
         branches = {
             tuple(study.place(case)[axis] for axis in study.axes if axis not in study.asks.axes):
             {name: case.values[name] for name in swept if name not in study.asks.axes}
             for case in study.cases()
         }  # fmt: skip
-        yield [], {}, Refinement(study.asks, list(branches.values()), study.allow)
+        read = partial(_read, store, {each.of for each in study.asks.of})
+        yield [], {}, Refinement(study.asks, list(branches.values()), read, study.allow)
 
 
-def _variables(store: Store, names: Collection[str], row: Mapping[str, Any]) -> Read:
+def _read(store: Store, names: Collection[str], row: Mapping[str, Any]) -> Read:
     """Return what gives some variables of a run, and the values of their dimensions."""
     with runfile.opened(store.run_path(row["id"])) as run:
         found = {name: Line(*each) for name, each in runfile.lines(run, names).items()}
