@@ -204,6 +204,13 @@ class Tables:
         return RunTable(axes=axes, columns={each.name: each for each in columns})
 
 
+def varied(table: RunTable) -> list[Column]:
+    """Return the columns of the sweep that are not the same in all runs."""
+    sweep = [each for each in table.columns.values() if each.group == "sweep"]
+    several = [each for each in sweep if len(set(each.values.tolist())) > 1]
+    return several or sweep
+
+
 def group_of(name: str) -> str:
     """Return what a number of a run tells: ``result``, ``effort`` or ``audit``."""
     if name in AUDIT or name.startswith("audit_"):

@@ -22,12 +22,13 @@ from service.dependencies import ThePictures, TheRun, TheStore, TheTables
 from service.errors import CONTENT, REFUSED
 from service.files import TAGS, UNCHANGED
 from service.octets import MEDIA_TYPE, octets
-from service.schemas import ContentId, TableFilter
-from service.table import OUTCOMES, STATUS, RunTable
+from service.schemas import AuditFigure, ContentId, TableFilter
+from service.table import OUTCOMES, RUN, STATUS, RunTable, varied
 from service.written import FORMS, MISSING
 from studies import StudyError
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
+from studies.views.audited import Worst, worst
 
 router = APIRouter()
 
@@ -109,6 +110,27 @@ def numbers(
         else:
             raise StudyError("name", each, "must be a column of numbers, or status")
     return Response(octets({"statuses": OUTCOMES}, arrays), media_type=MEDIA_TYPE)
+
+
+@router.get("/studies/{study_id}/audit", tags=["studies"])
+def tell_audit(study_id: ContentId, tables: TheTables) -> list[AuditFigure]:
+    """Return the largest value of each figure of the audit, the nearest to its limit first.
+
+    Figures whose limit depends on the run are left out.
+    """
+    table = tables.get(study_id)
+    found = worst({each.name: each.values for each in table.numbers})
+    runs = table.columns[RUN].values
+    places = {each.name: each.values for each in varied(table)}
+
+    def told(each: Worst) -> AuditFigure:
+        words, run = table.columns[each.name].words, runs[each.at]
+        at = {name: values[each.at] for name, values in places.items()}
+        return AuditFigure(
+            name=each.name, words=words, value=each.value, limit=each.limit, run=run, at=at
+        )
+
+    return [*map(told, found)]
 
 
 @router.get("/runs/{run_id}/fields", tags=["runs"])

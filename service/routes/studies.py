@@ -10,7 +10,7 @@ from http import HTTPStatus
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query, Request, Response
-from fastapi.responses import FileResponse
+from fastapi.responses import FileResponse, PlainTextResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import WithJsonSchema
 from starlette.datastructures import Headers
@@ -32,6 +32,7 @@ from service.dependencies import (
 )
 from service.errors import REFUSED, Conflict, NotFound, QueueLost
 from service.files import NETCDF, TAGS, UNCHANGED, netcdf
+from service.history import log_of
 from service.job import Job
 from service.jobs import Jobs
 from service.octets import MEDIA_TYPE
@@ -173,6 +174,12 @@ async def events(
         if now and now.status.final:
             return
         await asyncio.sleep(settings.poll_seconds)
+
+
+@router.get("/{study_id}/log", response_class=PlainTextResponse)
+def tell_log(job: TheJob, jobs: TheJobs, store: TheStore) -> str:
+    """Return a line for each thing that happened: states, what was waited for, ends of runs."""
+    return log_of(job, jobs, store)
 
 
 @router.get("/{study_id}/predict", responses=REFUSED)
