@@ -44,7 +44,7 @@ WAITING = 8
 
 
 @dataclass(slots=True)
-class _Standing:
+class _Offered:
     """A data set: of which state of the catalogue, where it is, and until when it stays."""
 
     of: State | None = None
@@ -65,7 +65,7 @@ class Datasets:
     def __init__(self, jobs: Jobs, store: Store) -> None:
         self.jobs, self.store = jobs, store
         self.process = Guarded("data set", WAITING, SECONDS)
-        self.made: OrderedDict[str, _Standing] = OrderedDict()
+        self.made: OrderedDict[str, _Offered] = OrderedDict()
         self.folders = ExitStack()
         self.folder: Path | None = None
         self.layouts: dict[str, tuple[str, int]] = {}
@@ -126,7 +126,7 @@ class Datasets:
             raise NotFound(
                 f"no data set yet: what the study finds is known at its end, and it is {job.state}"
             )
-        made = self.made.setdefault(job.id, _Standing())
+        made = self.made.setdefault(job.id, _Offered())
         self.made.move_to_end(job.id)
         if made.task is None or made.task.done():
             made.task = asyncio.create_task(self._current(job.id, study, made))
@@ -135,7 +135,7 @@ class Datasets:
         except TimeoutError:
             raise Busy("the data set is being made of the runs that are there: ask later") from None
 
-    async def _current(self, study_id: str, content: dict[str, Any], made: _Standing) -> Path:
+    async def _current(self, study_id: str, content: dict[str, Any], made: _Offered) -> Path:
         of = await asyncio.to_thread(state_of, self.store.catalogue.path)
         if made.path and (made.of == of or time.monotonic() < made.until):
             return made.path
