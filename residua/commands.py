@@ -6,7 +6,7 @@ import argparse
 import signal
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING, Any
@@ -276,10 +276,11 @@ def remote(options: argparse.Namespace) -> int:
     """Talk to a running service."""
     import httpx
 
-    from residua.client import Refused, Service, api_key
+    from residua.keys import api_key
+    from studies.client import Client, Refused
 
     try:
-        with closing(Service(options.url, api_key(options.api_key_file))) as service:
+        with Client(options.url, api_key(options.api_key_file)) as service:
             print(options.talk(service, options))
     except Refused as error:
         return complain(error, BAD_INPUT)
@@ -290,27 +291,25 @@ def remote(options: argparse.Namespace) -> int:
 
 def submit(service: Any, options: argparse.Namespace) -> str:
     """Send a study to a running service and print its id."""
-    return str(service.submit(options.study)["id"])
+    return str(service.submit(options.study).id)
 
 
 def status(service: Any, options: argparse.Namespace) -> str:
     """Print the state of a study on a running service."""
-    state = service.status(options.id)
+    state = service.study(options.id).detail()
     stage = f"  {state['stage']}" if state.get("stage") else ""
     return f"{state['status']}  {state['progress']:g} %{stage}"
 
 
 def cancel(service: Any, options: argparse.Namespace) -> str:
     """Stop a study on a running service."""
-    service.cancel(options.id)
+    service.study(options.id).cancel()
     return f"cancelled {options.id}"
 
 
 def fetch(service: Any, options: argparse.Namespace) -> str:
     """Save the data set of a study on a running service."""
-    target = options.out or Path(f"{options.id}.nc")
-    service.fetch(options.id, target)
-    return f"wrote {target}"
+    return f"wrote {service.study(options.id).fetch(options.out or Path(f'{options.id}.nc'))}"
 
 
 @contextmanager

@@ -87,6 +87,17 @@ class TableFilter(BaseModel):
         return {name: str(value) for name, value in (self.model_extra or {}).items() if value != ""}
 
 
+class AuditFigure(BaseModel):
+    """The largest value of a figure of the audit among the runs of a study."""
+
+    name: str
+    words: str
+    value: float
+    limit: float = Field(description="a run with a larger value fails")
+    run: str = Field(description="id of the run that has it")
+    at: dict[str, Any] = Field(description="where the run is in the sweep")
+
+
 class MapQuery(BaseModel):
     """Which field of a run is drawn."""
 

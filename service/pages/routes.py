@@ -41,7 +41,7 @@ from service.pages.rendering import COOKIE, ROOT, PageRoute, page
 from service.pages.run import audited, numbers_shown, parameters_shown
 from service.routes.health import health
 from service.schemas import ContentId, StudyFilter, Window
-from service.table import MESSAGE, RUN, STATUS, Tables, scene_of_study
+from service.table import MESSAGE, RUN, STATUS, Tables, scene_of_study, varied
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
@@ -146,7 +146,7 @@ def _study(request: Request, study: Mapping[str, Any], tables: Tables) -> Respon
             "id": table.columns[RUN].values[at],
             "status": table.columns[STATUS].values[at],
             "message": table.columns[MESSAGE].values[at],
-            "at": [(each, _cell(each, at)) for each in chosen.varied(table)],
+            "at": [(each, _cell(each, at)) for each in varied(table)],
         }
     csv = urlencode({**part.where, **({"sort": part.sort} if part.sort else {})})
     return page(
