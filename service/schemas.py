@@ -73,18 +73,28 @@ class Prediction(BaseModel):
     )
 
 
-class TableFilter(BaseModel):
+class Conditions(BaseModel):
     """The runs of a study that are requested, by any column of its table."""
 
     model_config = ConfigDict(extra="allow")
-
-    sort: str = Field(default="", description="a column; with a minus, the largest first")
-    columns: str = Field(default="", description="names with commas between; all by default")
 
     @property
     def conditions(self) -> dict[str, str]:
         """The conditions by column."""
         return {name: str(value) for name, value in (self.model_extra or {}).items() if value != ""}
+
+
+class TableFilter(Conditions):
+    """The part of the table of a study that is requested."""
+
+    sort: str = Field(default="", description="a column; with a minus, the largest first")
+    columns: str = Field(default="", description="names with commas between; all by default")
+
+
+class NumbersFilter(Conditions):
+    """The columns of the table of a study that are requested."""
+
+    name: list[str] = Field(min_length=1, max_length=100, description="names of columns")
 
 
 class MapQuery(BaseModel):

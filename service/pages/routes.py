@@ -37,7 +37,7 @@ from service.pages import form
 from service.pages import study as chosen
 from service.pages.assets import asset
 from service.pages.compare import MOST, compared
-from service.pages.rendering import COOKIE, ROOT, PageRoute, page
+from service.pages.rendering import COOKIE, ROOT, PageRoute, number_text, page
 from service.pages.run import audited, numbers_shown, parameters_shown
 from service.routes.health import health
 from service.schemas import ContentId, StudyFilter, Window
@@ -46,7 +46,6 @@ from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
 from studies.scenes.registry import known_names, known_scenes
-from studies.views.columns import value_text
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
 home = APIRouter(include_in_schema=False)
@@ -177,7 +176,7 @@ def _cell(column: Any, at: int) -> str:
     value = column.values[at]
     if column.flags and value == value:
         return str(column.flags.get(int(value), value)).replace("_", " ")
-    return value_text(value)
+    return number_text(value)
 
 
 @router.get("/runs/{run_id}")

@@ -88,16 +88,18 @@ export function titled(chart, words, unit) {
   return { text: lines.join("<br>") };
 }
 
+// The colour of a scale at a share of its length.
+export function mixed(colours, share) {
+  const at = share * (colours.length - 1), low = Math.min(Math.floor(at), colours.length - 2);
+  const [a, b] = [colours[low][1], colours[low + 1][1]].map((each) => [1, 3, 5].map((i) => parseInt(each.slice(i, i + 2), 16)));
+  return `rgb(${a.map((each, i) => Math.round(each + (b[i] - each) * (at - low))).join(",")})`;
+}
+
 // Colours in an order, such as those of rising loads; all stand out from the page.
 export function ordered(count) {
   const dark = matchMedia("(prefers-color-scheme: dark)").matches;
-  const [first, last] = dark ? [3, 9] : [0, 7.4];
-  return Array.from({ length: count }, (_, k) => {
-    const at = first + ((last - first) * k) / Math.max(count - 1, 1);
-    const low = Math.floor(at), share = at - low;
-    const [a, b] = [VIRIDIS[low], VIRIDIS[Math.min(low + 1, 9)]].map((each) => [1, 3, 5].map((i) => parseInt(each.slice(i, i + 2), 16)));
-    return `rgb(${a.map((each, i) => Math.round(each + (b[i] - each) * share)).join(",")})`;
-  });
+  const [first, last] = dark ? [0.33, 1] : [0, 0.82];
+  return Array.from({ length: count }, (_, k) => mixed(NUMBERS, first + ((last - first) * k) / Math.max(count - 1, 1)));
 }
 
 // Charts take tags in a text, such as links: text of others stays text.
