@@ -120,7 +120,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.pictures = Pictures(settings.map_queue, settings.map_bytes)
     app.state.probe = Probe()
     # Each is outside of the previous ones, so that refused requests are measured and logged too.
-    longest = {"/scenes": settings.max_scene_bytes}
+    longest = dict.fromkeys(("/scenes", "/ui/scenes"), settings.max_scene_bytes)
     app.add_middleware(body_limit, limit=settings.max_body_bytes, longest=longest)
     app.add_middleware(Gate, settings=settings, keys=keys)
     app.add_middleware(head_is_get)

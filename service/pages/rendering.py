@@ -47,12 +47,13 @@ def templates() -> Environment:
 
 def number_text(value: Any) -> str:
     """Return a value as the pages show it: numbers with four digits and a minus, "–" for none."""
-    if isinstance(value, float | np.floating) and 1e4 <= abs(value) < 1e5:
-        return f"{value:.0f}".replace("-", "−")
+    real = isinstance(value, float | np.floating)
+    if real and 1e4 <= abs(float(value)) < 1e5:
+        return f"{float(value):.0f}".replace("-", "−")
     text = value_text(value)
     if text == "-":
         return "–"
-    return text.replace("-", "−") if isinstance(value, int | float | np.floating) else text
+    return text.replace("-", "−") if real or isinstance(value, int) else text
 
 
 def _data(content: Any) -> str:
