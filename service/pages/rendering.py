@@ -48,7 +48,7 @@ def templates() -> Environment:
 def number_text(value: Any) -> str:
     """Return a value as the pages show it: numbers with four digits and a minus, "–" for none."""
     real = isinstance(value, float | np.floating)
-    if real and 1e4 <= abs(float(value)) < 1e5:
+    if real and 1e4 <= abs(float(value)) < 1e6:
         return f"{float(value):.0f}".replace("-", "−")
     text = value_text(value)
     if text == "-":

@@ -15,7 +15,7 @@ export const KEYS = () => [1, 2, 3, 4, 5, 6].map((k) => colour(`k${k}`));
 
 const drawn = new Map();
 const sizes = new ResizeObserver((changes) => {
-  for (const { target } of changes) if (drawn.has(target) && target.data) Plotly.Plots.resize(target);
+  for (const { target } of changes) if (drawn.has(target) && target.data && target.clientWidth) draw(target, drawn.get(target));
 });
 
 function axis() {
@@ -42,7 +42,7 @@ export async function draw(chart, make) {
     chart.replaceChildren();
     sizes.observe(chart);
   }
-  const { traces, layout } = make();
+  const { traces, layout } = make(chart);
   const base = {
     font: { family: own().getPropertyValue("--sans"), size: 12.5, color: colour("soft") },
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
@@ -53,7 +53,8 @@ export async function draw(chart, make) {
     hovermode: "closest", dragmode: "zoom", separators: ".",
   };
   const buttons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]];
-  await Plotly.react(chart, traces, merged(base, layout), {
+  const size = { width: chart.clientWidth, height: chart.clientHeight };
+  await Plotly.react(chart, traces, { ...merged(base, layout), ...size }, {
     displaylogo: false, modeBarButtons: buttons, displayModeBar: "hover",
   });
   chart.classList.remove("busy");
@@ -107,5 +108,6 @@ export const plain = (said) => String(said).replaceAll("&", "&amp;").replaceAll(
 
 export const named = (words, unit) => plain(unit ? `${words} [${unit}]` : words);
 
+// In the colours of a new scheme, and in the size of a sheet of paper.
 const redraw = () => [...drawn].forEach(([chart, make]) => draw(chart, make));
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+for (const each of ["(prefers-color-scheme: dark)", "print"]) matchMedia(each).addEventListener("change", redraw);

@@ -84,8 +84,8 @@ export function text(value) {
   if (typeof value !== "number") return words(value);
   if (Number.isNaN(value)) return "–";
   const size = Math.abs(value);
-  if (value !== 0 && (size < 1e-4 || size >= 1e5)) return value.toExponential(3).replace(/\.?0+e/, "e").replace("-", "−");
-  return String(Number(value.toPrecision(4))).replace("-", "−");
+  if (value !== 0 && (size < 1e-4 || size >= 1e6)) return value.toExponential(3).replace(/\.?0+e/, "e").replace("-", "−");
+  return String(size < 1e4 ? Number(value.toPrecision(4)) : Math.round(value)).replace("-", "−");
 }
 
 for (const button of document.querySelectorAll("[data-copy]")) {
