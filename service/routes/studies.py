@@ -242,24 +242,24 @@ def _indices(job: Job, datasets: Datasets, of: str) -> dict[str, Any]:
 
 @router.get("/{study_id}/fit", responses=REFUSED)
 async def tell_fit(
-    job: TheJob, jobs: TheJobs, store: TheStore, pictures: ThePictures
+    job: TheJob, jobs: TheJobs, datasets: TheDatasets, pictures: ThePictures
 ) -> dict[str, Any]:
     """Tell what a fit has found: of `parameters` each has its `value`, `sigma` and bounds.
 
     `message` warns, such as of parameters that cannot be told apart. The lines over which it was
     fitted are in the data set.
     """
-    return await pictures.alone(_fitted, job, jobs, store)
+    return await pictures.alone(_fitted, job, jobs, datasets)
 
 
-def _fitted(job: Job, jobs: Jobs, store: Store) -> dict[str, Any]:
+def _fitted(job: Job, jobs: Jobs, datasets: Datasets) -> dict[str, Any]:
     """Return what `tell_fit` tells."""
     from studies import open_netcdf  # xarray takes half a second to import
     from studies.views.fits import told
 
     if not jobs.study(job.id).get("fit"):
         raise StudyError("fit", job.name, "is a study without a fit: submit one with an entry fit")
-    with open_netcdf(Path(dataset(job, jobs, store).path)) as found:
+    with open_netcdf(datasets.ended(job)) as found:
         return told(found)
 
 
