@@ -50,6 +50,10 @@ class Candidates:
     gaps, slips : for each interface, gap and slip of all its vertices [mm]; the gap is inf where no
         master faces them, the slip 0 without friction
     beyond : smallest gap of the vertices that are not candidates [mm]
+    leaving : for each interface that leaves, the normal and tangential forces (2, n) that are left
+        of its last ones [N]; None for the others. Its vertices are no candidates
+    pushes : nodal forces (n,) of these on each part [N]
+    holds : for each part, whether a pair is there that may hold its rigid motions
     """
 
     vertices: tuple[NDArray[np.int64], ...]
@@ -64,6 +68,9 @@ class Candidates:
     gaps: tuple[NDArray[np.float64], ...]
     slips: tuple[NDArray[np.float64], ...]
     beyond: float
+    leaving: tuple[NDArray[np.float64] | None, ...]
+    pushes: tuple[NDArray[np.float64], ...]
+    holds: tuple[bool, ...]
 
     @property
     def n(self) -> int:
@@ -87,6 +94,11 @@ class Candidates:
             nodal[rows.dofs] = forces @ rows.block
         return nodal
 
+    def all_on_part(self, part: int, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the same with the forces of pairs that leave [N]."""
+        pushes = self.pushes[part]
+        return self.on_part(part, forces, len(pushes)) + pushes
+
     def of_part(self, part: int, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the gaps and slips that displacements ``u`` (n, ...) of a part cause [mm]."""
         rows = self.rows[part]
@@ -96,8 +108,8 @@ class Candidates:
 
     def touched(self, part: int) -> NDArray[np.int64]:
         """Return the unknowns of a part on which contact forces may act."""
-        rows = self.rows[part]
-        return np.zeros(0, dtype=np.int64) if rows is None else rows.dofs
+        rows, pushed = self.rows[part], np.flatnonzero(self.pushes[part])
+        return pushed if rows is None else np.union1d(rows.dofs, pushed)
 
     def compliance(self, operators: Sequence[Operator]) -> NDArray[np.float64]:
         """Return the compliance W of the contact points: gaps and slips per force [mm/N]."""
@@ -131,10 +143,15 @@ class Candidates:
         at vertices that open or close within the increment, where the mean is not the true history.
         """
         normal, friction = 0.0, 0.0
-        each = zip(before, self.vertices, self.gaps, self.places, strict=True)
-        for state, vertices, gap, here in each:
+        each = zip(
+            before, self.vertices, self.gaps, self.places, self.leaving, self.slips, strict=True
+        )
+        for state, vertices, gap, here, left, slip in each:
             force = state.normal.copy()
             force[vertices] += self.forces[: self.n][here]
+            if left is not None:
+                force += left[0]
+                normal -= float((state.tangential + left[1]) @ slip) / 2
             moved = force > 0
             with np.errstate(invalid="ignore"):
                 opened = np.nan_to_num(gap - state.gap, posinf=0.0, neginf=0.0)
@@ -152,8 +169,9 @@ class Candidates:
     ) -> tuple[ContactState, ...]:
         """Return the contact states with these forces and statuses."""
         out = []
-        for state, vertices, here in zip(before, self.vertices, self.places, strict=True):
-            normal, tangential = np.zeros((2, len(state.normal)))
+        each = zip(before, self.vertices, self.places, self.leaving, strict=True)
+        for state, vertices, here, left in each:
+            normal, tangential = np.zeros((2, len(state.normal))) if left is None else left.copy()
             normal[vertices] = forces[: self.n][here]
             if len(forces) > self.n:
                 tangential[vertices] = forces[self.n :][here]
@@ -197,7 +215,11 @@ def no_candidates(system: System) -> Candidates:
     slips = tuple(map(np.zeros_like, gaps))
     status = empty.astype(int)
     lines = BoundLines.none(0)
-    return Candidates(none, lines, *(empty,) * 3, status, empty, rows, covered, gaps, slips, np.inf)
+    pushes = tuple(np.zeros(part.n) for part in system.parts)
+    return Candidates(
+        none, lines, *(empty,) * 3, status, empty, rows, covered, gaps, slips, np.inf,
+        leaving=(None,) * len(none), pushes=pushes, holds=(False,) * len(pushes),
+    )  # fmt: skip
 
 
 def find_candidates(
@@ -213,14 +235,27 @@ def find_candidates(
     it touched, if its approach is known from the last increments.
     """
     time = start.time + span
+    shares = [interface.declared.left(start.time, time) for interface in system.interfaces]
     pairings = [
-        interface.pairing(u, time, finite=before.finite)
-        for interface, before in zip(system.interfaces, start.contacts, strict=True)
+        interface.facing(u, time, finite=before.finite)
+        if share is None or before.normal.any()
+        else interface.pairing(u, time, finite=before.finite)
+        for interface, before, share in zip(system.interfaces, start.contacts, shares, strict=True)
     ]
     vertices = [
         _near(pairing, contact, interface.floating)
-        for pairing, contact, interface in zip(pairings, contacts, system.interfaces, strict=True)
+        if share is None
+        else np.zeros(0, dtype=np.int64)
+        for pairing, contact, interface, share in zip(
+            pairings, contacts, system.interfaces, shares, strict=True
+        )
     ]
+    leaving = tuple(
+        None if share is None else share * np.stack([before.normal, before.tangential])
+        for before, share in zip(start.contacts, shares, strict=True)
+    )
+    pushes = tuple(np.zeros(part.n) for part in system.parts)
+    holds = [False] * len(system.parts)
     n = sum(len(v) for v in vertices)
     frictional = any(interface.rough for interface in system.interfaces)
     m = 2 * n if frictional else n
@@ -234,7 +269,9 @@ def find_candidates(
     ):
         tangent = slice(n + normal.start, n + normal.stop)
         motion[normal] = pairing.gap[at]
-        beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
+        left = leaving[pair]
+        if left is None:
+            beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
         approach = np.where(before.touching, 0.0, _slip_before_contact(before, span))
         uncounted[normal], unsure[normal] = approach[:, at]
         shear = system.bound(pair, pairing, start, time).at(at)
@@ -245,6 +282,11 @@ def find_candidates(
             if frictional:
                 block[tangent] = pairing.tangent[side][at]
             pieces[number].append(ContactRows(*part.pull_back(surface, u[number], block, n)))
+            holds[number] |= left is None
+            if left is not None and left.any():
+                rows = left[:1] @ pairing.normal[side], left[1:] @ pairing.tangent[side]
+                dofs, both = part.pull_back(surface, u[number], np.vstack(rows), 1)
+                np.add.at(pushes[number], dofs, both.sum(axis=0))
         slip = np.zeros(len(pairing.gap))
         if frictional:
             slip = interface.slip(pairing, u, start.u)
@@ -269,6 +311,9 @@ def find_candidates(
         gaps=tuple(p.gap for p in pairings),
         slips=tuple(slips),
         beyond=float(beyond),
+        leaving=leaving,
+        pushes=pushes,
+        holds=tuple(holds),
     )
 
 

@@ -25,10 +25,10 @@ class ContactState:
     whether the vertex had contact, so that its friction has a history. ``gap`` is inf where no
     master faces the vertex [mm]; ``slipped`` is the accumulated length of its slip in contact since
     the first increment, without regard to direction [mm]; ``rates`` (2, n) are the rates of gap and
-    slip in the last increment, NaN where not known; ``earlier`` (3, n) are the gaps at its
-    beginning and at that of the increment before it, and the change of slip over that of the gap in
-    this one, NaN unless contact grew in both. ``finite`` says whether the surfaces are paired in
-    their current positions, or always as before loading.
+    slip in the last increment, NaN where not known; ``earlier`` (3, n) are the gaps before the last
+    increment and before the one before, and the change of slip over that of the gap in that one,
+    NaN unless contact grew in both. ``finite`` says whether the surfaces are paired in their
+    current positions, or always as before loading.
     """
 
     normal: NDArray[np.float64]

@@ -333,7 +333,7 @@ class Increment:
                     o.tangent(response, blend)
                     for o, response in zip(self.system.operators, responses, strict=True)
                 ]
-                step = newton_step(self.system, residuals, operators, candidates, self.contact)
+                step = newton_step(self.system, residuals, operators, candidates)
             except Singular:
                 continue
             if step and not blend and is_mechanism(self.system.parts, self.time, step.u, responses):
