@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.complementarity import solve_contact
+from solver.contact.links import eliminated
 from solver.contact.problem import ContactProblem
 
 if TYPE_CHECKING:
@@ -72,19 +73,25 @@ def newton_step(
     begun = [operator.begin(r) for operator, r in zip(operators, balanced, strict=True)]
     for i, part in enumerate(begun):
         motion += candidates.of_part(i, part.kept)
-    floating = [part.rigid if contact else part.rigid[:, :0] for part in system.parts]
-    solution = solve_contact(
-        ContactProblem(
-            W=W,
-            offset=motion,
-            lines=candidates.lines,
-            A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
-            balance=np.concatenate([R.T @ r for R, r in zip(floating, residuals, strict=True)]),
-        ),
-        candidates.status,
+    links = len(candidates.links)
+    moves = contact or links > 0
+    floating = [part.rigid if moves else part.rigid[:, :0] for part in system.parts]
+    last = np.arange(len(W))[candidates.linked]
+    W[last, last] += candidates.links.compliance
+    motion[candidates.linked] -= candidates.links.compliance * candidates.forces[candidates.linked]
+    problem = ContactProblem(
+        W=W,
+        offset=motion,
+        lines=candidates.lines,
+        A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
+        balance=np.concatenate([R.T @ r for R, r in zip(floating, residuals, strict=True)]),
     )
+    if links:
+        problem, whole = eliminated(problem, links, apart=not contact)
+    solution = solve_contact(problem, candidates.status)
     if solution is None:
         return None
+    solution = whole(solution) if links else solution
     change = on_parts(system, candidates, solution.forces - candidates.forces)
     rigid = np.split(solution.rigid, np.cumsum([R.shape[1] for R in floating])[:-1])
     u = tuple(

@@ -32,7 +32,7 @@ _LITTLE = 1e-4
 def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
     """Return the nodal forces (n_nodes, 2) of contact on each whole body, in its own frame [N]."""
     state = converged.state
-    candidates = find_candidates(system, state, state.u, state.contacts)
+    candidates = find_candidates(system, state, state.u, state.contacts, state.links)
     out = {}
     for body in system.model.bodies:
         i = system.part(body.name)
