@@ -49,10 +49,12 @@ class Links:
     ----------
     rows : for each part, the derivatives C (c, ...) on its unknowns; None if no link acts on it
     compliance : (c,) of springs [mm/N], 0 where a link is rigid
+    whose : (c,) number of the link of each condition
     """
 
     rows: tuple[ContactRows | None, ...]
     compliance: Array
+    whose: NDArray[np.int64]
 
     def __len__(self) -> int:
         """Return the number of conditions."""
@@ -159,10 +161,12 @@ def links_of(
         compliance.append(own.compliance)
         places.append(own.X)
         whose.append(np.full(len(own.compliance), k))
-    made = Links(tuple(joined(own) for own in pieces), np.concatenate(compliance))
-    kept = _independent(made, parts, np.concatenate(whose), np.hstack(places))
+    made = Links(
+        tuple(joined(own) for own in pieces), np.concatenate(compliance), np.concatenate(whose)
+    )
+    kept = _independent(made, parts, np.hstack(places))
     cut = tuple(r and ContactRows(r.dofs, r.block[kept]) for r in made.rows)
-    return Links(cut, made.compliance[kept])
+    return Links(cut, made.compliance[kept], made.whose[kept])
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +216,7 @@ def _conditions(
             motion, X = np.eye(3)[used], np.tile(X.mean(axis=1, keepdims=True), int(used.sum()))
             areas = np.full(len(block), np.inf)
         rows.append((reference, ContactRows(np.arange(3), -motion)))
-    elif link.master is None and np.isinf(link.stiffness):  # the slave moves as one
+    elif link.master is None and not link.grounded:  # the slave moves as one
         first = np.repeat(np.arange(len(link.axes)) * len(slave.nodes), len(slave.nodes))
         block = block - block[first]
         others_ = np.arange(len(block)) != first
@@ -225,9 +229,7 @@ def _conditions(
     return _Conditions(rows, 1 / (link.stiffness * areas[acts]), X[:, acts])
 
 
-def _independent(
-    made: Links, parts: Sequence[Part], whose: NDArray[np.int64], X: Array
-) -> NDArray[np.int64]:
+def _independent(made: Links, parts: Sequence[Part], X: Array) -> NDArray[np.int64]:
     """Return the conditions without those on unknowns that supports hold at rest.
 
     Raises `ModelError` for a condition that supports, motions or other conditions hold already.
@@ -254,7 +256,7 @@ def _independent(
     if len(wrong):
         x, y = X[:, wrong[0]]
         raise ModelError(
-            f"links[{whose[wrong[0]]}]", f"({x:g}, {y:g})",
+            f"links[{made.whose[wrong[0]]}]", f"({x:g}, {y:g})",
             "must not hold what supports, motions or other links hold already: shorten one of the "
             "boundaries by an element, or leave a component out",
         )  # fmt: skip

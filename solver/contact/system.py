@@ -211,9 +211,10 @@ class System:
             known = self._windows[number] = region.key, made, inverses
         return known[1]
 
-    def during(self, time: float) -> System:
-        """Return the system in an increment that begins at a time, some motions of it locked."""
-        parts = tuple(part.during(time) for part in self.parts)
+    def during(self, start: State) -> System:
+        """Return the system in an increment that begins at a state, some motions of it locked."""
+        each = zip(self.parts, start.u, strict=True)
+        parts = tuple(part.during(start.time, u) for part, u in each)
         unchanged = all(one is other for one, other in zip(parts, self.parts, strict=True))
         return self if unchanged else self.within(parts)
 

@@ -107,9 +107,9 @@ class Part(ABC):
         """Return a surface of the whole body in this part's numbering."""
         return surface
 
-    def during(self, time: float) -> Part:
-        """Return the part in an increment that begins at a time, some motions of it locked."""
-        del time
+    def during(self, time: float, u: NDArray[np.float64]) -> Part:
+        """Return the part in an increment that begins at a time with unknowns u, some locked."""
+        del time, u
         return self
 
     def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:

@@ -81,18 +81,21 @@ class RigidPart(Part):
                                        if not held))  # fmt: skip
         self.driven = Superposed.of(3, ((m, m.value * s) for m, held, _, s in each if held))
         self._held = np.array(moved)
+        self._locked = np.full(3, np.nan)
         self.free = np.flatnonzero(~self._held)
         self.active = np.zeros(0, dtype=np.int64)
         self.rigid = np.eye(3)[:, self.free]
         self.copied = np.arange(3)
 
-    def during(self, time: float) -> RigidPart:
+    def during(self, time: float, u: Array) -> RigidPart:
         """See `Part.during`."""
-        stay = [isinstance(m, Pushed) and m.locked <= time for m in self.body.every_load]
-        if not any(stay):
+        each = self.body.every_load
+        stays = np.array([isinstance(m, Pushed) and m.locked <= time for m in each])
+        if not stays.any():
             return self
         here = copy(self)
-        here.free = np.setdiff1d(self.free, np.flatnonzero(stay))
+        here._locked = np.where(stays, u, np.nan)
+        here.free = self.free[~stays[self.free]]
         here.rigid = np.eye(3)[:, here.free]
         return here
 
@@ -140,6 +143,7 @@ class RigidPart(Part):
 
     def moved(self, u: Array, time: float) -> Array:
         """Return ``u`` with prescribed motions at their values for a time."""
+        u = np.where(np.isnan(self._locked), u, self._locked)
         return np.where(self._held, self.driven.at(time), u)
 
     @property
@@ -151,9 +155,7 @@ class RigidPart(Part):
         """Return the prescribed rotation between two times [rad]; 0 if it is free to turn."""
         if not self._held[2]:
             return 0.0
-        return (
-            float(abs(self.driven.at(after)[2] - self.driven.at(before)[2])) / self.frame.radius
-        )
+        return float(abs(self.driven.at(after)[2] - self.driven.at(before)[2])) / self.frame.radius
 
     def start(self) -> Array:
         """Return the unknowns (3,) before any load."""

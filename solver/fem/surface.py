@@ -78,7 +78,8 @@ class Surface:
         N, xe = shape_functions(xi, count), self.X[:, self.edges]
         along = np.linalg.norm(xe @ shape_derivatives(xi, count).T, axis=0)
         each = (along * self.depth(xe @ N.T) * weights) @ N
-        return np.bincount(self.edges.ravel(), each.ravel(), len(self.nodes))
+        areas = np.bincount(self.edges.ravel(), each.ravel(), len(self.nodes))
+        return np.asarray(areas, dtype=float)
 
     @property
     def dofs(self) -> NDArray[np.int64]:

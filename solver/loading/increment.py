@@ -119,7 +119,7 @@ class Increment:
         tolerances: Tolerances | None = None,
         stiffness: dict[bytes, NDArray[np.float64]] | None = None,
     ) -> None:
-        self.system = system = system.during(start.time)
+        self.system = system = system.during(start)
         self.start = start
         self.time = time
         self.guess = guess

@@ -29,9 +29,10 @@ if TYPE_CHECKING:
 def timing(system: System, start: State, candidates: Candidates, stiffness: Array) -> Timing:
     """Return the timing of an increment from ``start``.
 
-    ``stiffness`` (n or 2n, and of links,) is that of the contact points, elastic [N/mm]. It bounds the uncertain
-    friction of a vertex: elastic stiffness times the slip without friction. A vertex that sticks
-    from the beginning of the increment has no slip; its tangential force is added instead.
+    ``stiffness`` (n or 2n, and of links,) is that of the contact points, elastic [N/mm]. It bounds
+    the uncertain friction of a vertex: elastic stiffness times the slip without friction. A vertex
+    that sticks from the beginning of the increment has no slip; its tangential force is added
+    instead.
     """
     n = candidates.n
     N = np.maximum(candidates.forces[:n], 0.0)

@@ -30,8 +30,8 @@ class Link:
         relative to the master, such as the shortening of a bolt. Rotations are small
     components : of the displacement; both where a master is given
     stiffness : of springs between the two, force per area and displacement [N/mm3]; inf is rigid
-    distributed : whether only the mean motion of the slave is that of ``rigid``: its force and moment
-        act on the slave by a linear traction, and it may deform
+    distributed : whether only the mean motion of the slave is that of ``rigid``: its force and
+        moment act on the slave by a linear traction, and it may deform
     """
 
     slave: Side
@@ -48,7 +48,9 @@ class Link:
             raise ModelError("stiffness", self.stiffness, "must be positive [N/mm3]")
         if self.master is not None and self.components != "xy":
             raise ModelError("components", self.components, "must be xy between two boundaries")
-        if self.distributed and (self.rigid is None or self.master or math.isfinite(self.stiffness)):
+        if self.distributed and (
+            self.rigid is None or self.master or math.isfinite(self.stiffness)
+        ):
             allowed = "needs a rigid body, and neither a master nor springs"
             raise ModelError("distributed", self.distributed, allowed)
 
@@ -56,6 +58,11 @@ class Link:
     def axes(self) -> tuple[int, ...]:
         """Its components: 0 (x), 1 (y)."""
         return tuple("xy".index(axis) for axis in self.components)
+
+    @property
+    def grounded(self) -> bool:
+        """Whether springs hold it to the ground."""
+        return self.rigid is None and self.master is None and math.isfinite(self.stiffness)
 
     @property
     def sides(self) -> tuple[Side, ...]:

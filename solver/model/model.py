@@ -152,7 +152,9 @@ class Model:
         if link.master is not None and self._overlap(*link.sides):
             allowed = f"shares facets with slave {link.slave}: must be another surface"
             raise ModelError(f"{name}.master", link.master, allowed)
-        if link.rigid is not None and not isinstance(self.body(link.rigid, f"{name}.rigid"), RigidBody):
+        if link.rigid is not None and not isinstance(
+            self.body(link.rigid, f"{name}.rigid"), RigidBody
+        ):
             raise ModelError(f"{name}.rigid", link.rigid, "must be a rigid body")
 
     def _check_pairs(self) -> None:
