@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from solver.materials.law import Law
     from solver.model.body import Body
     from solver.model.friction import FrictionLaw
+    from solver.model.link import Link
     from solver.model.loads import Load
     from solver.model.model import ContactPair, Model
     from solver.model.rigid import RigidBody
@@ -71,6 +72,7 @@ class Builder:
         bodies = [self._body(name, body, laws) for name, body in t.bodies.items()]
         rigid = [self._rigid(name, body) for name, body in t.rigid.items()]
         contacts = [self._contact(k, contact) for k, contact in enumerate(t.contacts)]
+        links = [self._link(k, link) for k, link in enumerate(t.links)]
         for side in t.results.surfaces:
             self._has_boundary("results.surfaces", *side.split("."))
         if self._is_incomplete():
@@ -81,6 +83,7 @@ class Builder:
                 bodies=tuple(filter(None, bodies)),
                 rigid=tuple(filter(None, rigid)),
                 contacts=tuple(filter(None, contacts)),
+                links=tuple(filter(None, links)),
                 singular=tuple(SingularPoint(**each.model_dump()) for each in t.singular),
             ),
         )
@@ -167,7 +170,8 @@ class Builder:
             motion: tables.MotionTable = getattr(table, axis)
             amplitude = self._amplitude(f"rigid.{name}.{axis}", motion.amplitude)
             if motion.pushed is not None:
-                motions[axis] = Pushed(value=motion.pushed, amplitude=amplitude)
+                locked = self.scene.end_of(motion.locked) if motion.locked else math.inf
+                motions[axis] = Pushed(value=motion.pushed, amplitude=amplitude, locked=locked)
             else:
                 motions[axis] = Moved(value=motion.moved or 0.0, amplitude=amplitude)
         return self.attempt(
@@ -214,6 +218,23 @@ class Builder:
                 gap=table.gap,
                 interference=table.interference,
                 amplitude=amplitude,
+            ),
+        )
+
+    def _link(self, k: int, table: tables.LinkTable) -> Link | None:
+        from solver.model.link import Link
+
+        sides = [(body, boundary) for body, _, boundary in (s.partition(".") for s in table.sides)]
+        for name, (body, boundary) in zip(("slave", "master"), sides, strict=False):
+            self._has_boundary(f"links[{k}].{name}", body, boundary)
+        given = table.model_dump(include={"rigid", "components", "distributed"})
+        return self.attempt(
+            f"links[{k}]",
+            lambda: Link(
+                slave=sides[0],
+                master=sides[1] if table.master else None,
+                stiffness=table.stiffness or math.inf,
+                **given,
             ),
         )
 

@@ -145,6 +145,12 @@ def _bodies(scene: tables.SceneFile, meshes: set[str] | None) -> Iterator[StudyE
             if motion.moved is not None and motion.pushed is not None:
                 allowed = "must be moved or pushed, not both"
                 yield StudyError(f"rigid.{name}.{axis}", "both", allowed)
+            if motion.locked is None:
+                continue
+            if motion.pushed is None:
+                yield StudyError(f"rigid.{name}.{axis}.locked", motion.locked, "needs pushed")
+            stages = [stage.name for stage in scene.stages]
+            yield from _one_of(f"rigid.{name}.{axis}.locked", motion.locked, stages)
 
 
 def _loads(scene: tables.SceneFile) -> Iterator[StudyError]:
@@ -169,6 +175,11 @@ def _contacts(scene: tables.SceneFile) -> Iterator[StudyError]:
         for side in ("slave", "master"):
             body = getattr(contact, side).partition(".")[0]
             yield from _one_of(f"contacts[{k}].{side}", body, bodies)
+    for k, link in enumerate(scene.links):
+        for side, boundary in zip(("slave", "master"), link.sides, strict=False):
+            yield from _one_of(f"links[{k}].{side}", boundary.partition(".")[0], scene.bodies)
+        if link.rigid is not None:
+            yield from _one_of(f"links[{k}].rigid", link.rigid, scene.rigid)
 
 
 def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:

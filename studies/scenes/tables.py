@@ -24,6 +24,7 @@ from pydantic import Field, StringConstraints, create_model
 
 from solver.errors import ModelError
 from solver.mesh.lines import closer
+from solver.model.link import Components
 from solver.model.loads import LOADS, Load
 from solver.parameters import Accuracy, Length, Stress
 from solver.parts import Declared, declared
@@ -108,20 +109,23 @@ Amplitude = dict[Label, float]
 
 
 class MotionTable(SceneTable):
-    """A motion of a rigid body: prescribed (``moved``), or free under a force (``pushed``)."""
+    """A motion of a rigid body: prescribed (``moved``), or free under a force (``pushed``).
+
+    From the end of the stage ``locked`` on, a free motion stays as it is then.
+    """
 
     moved: float | None = None
     pushed: float | None = None
     amplitude: Amplitude | None = None
+    locked: Label | None = None
 
 
 class RigidTable(SceneTable):
     """A rigid body: its surfaces by name, its centre and motions."""
 
-    surfaces: Annotated[
-        dict[Label, Annotated[LineTable | GradedTable | ArcTable, Field(discriminator="kind")]],
-        Field(min_length=1),
-    ]
+    surfaces: dict[
+        Label, Annotated[LineTable | GradedTable | ArcTable, Field(discriminator="kind")]
+    ] = Field(default_factory=dict)
     centre: Place = (0.0, 0.0)
     x: MotionTable = MotionTable()
     y: MotionTable = MotionTable()
@@ -196,6 +200,22 @@ if TYPE_CHECKING:
     ContactTable = PairTable
 else:
     ContactTable = _contact()
+
+
+class LinkTable(SceneTable):
+    """A boundary that is tied, kept rigid, or held by springs; see `solver.Link`."""
+
+    slave: Side
+    master: Side | None = None
+    rigid: str | None = None
+    components: Components = "xy"
+    stiffness: Annotated[float, Interval(gt=0.0)] | None = None
+    distributed: bool = False
+
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """The boundaries that it joins."""
+        return (self.slave,) if self.master is None else (self.slave, self.master)
 
 
 class SingularTable(SceneTable):
@@ -468,6 +488,7 @@ class SceneFile(SceneTable):
     bodies: Annotated[dict[Label, BodyTable], Field(min_length=1)]
     rigid: dict[Label, RigidTable] = Field(default_factory=dict)
     contacts: tuple[ContactTable, ...] = ()
+    links: tuple[LinkTable, ...] = ()
     singular: tuple[SingularTable, ...] = ()
     allow: tuple[Literal["large_strain"], ...] = ()
     loads: tuple[AnyLoad, ...] = ()
@@ -525,6 +546,10 @@ class SceneFile(SceneTable):
                     cycle = self.repeat.times - left
                     found += map(Passage, group, kept, [cycle] * len(group))
         return found
+
+    def end_of(self, stage: str) -> float:
+        """Return the time at the end of a stage, the first time that it is gone through."""
+        return 1.0 + next(k for k, each in enumerate(self.passages) if each.stage.name == stage)
 
     @property
     def stage_names(self) -> list[str]:

@@ -18,7 +18,7 @@ from solver.mesh.edges import shape_functions
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.contact.state import Converged
+    from solver.contact.state import Converged, State
     from solver.contact.system import System
     from solver.model.link import Link, Side
 
@@ -66,10 +66,20 @@ def _places(system: System, side: Side, converged: Converged) -> _Places:
     return _Places(X.reshape(2, -1), at(middle, moved).reshape(2, -1), area.ravel())
 
 
+def linked(system: System, state: State, name: str) -> Array:
+    """Return the resultant (2,) of the forces of all links on a body [N]."""
+    return _resultant(system, state.links, name)[0]
+
+
 def _forces(system: System, k: int, converged: Converged, name: str) -> tuple[Array, Array]:
     """Return the forces of a link on a body, resultant (2,) [N], and their moment [N mm]."""
+    own = np.where(system.links.whose == k, converged.state.links, 0.0)
+    return _resultant(system, own, name)
+
+
+def _resultant(system: System, own: Array, name: str) -> tuple[Array, Array]:
+    """Return resultant (2,) [N] and moment [N mm] on a body of forces of conditions (c,)."""
     links, number = system.links, system.part(name)
-    own = np.where(links.whose == k, converged.state.links, 0.0)
     part = system.parts[number]
     force = links.on_part(number, own, part.n)
     if isinstance(part, RigidPart):
