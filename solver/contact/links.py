@@ -72,6 +72,19 @@ class Links:
         """Return the energy of the springs [N mm]."""
         return float(self.compliance @ forces**2) / 2
 
+    def clamped(self, parts: Sequence[Part], time: float) -> tuple[float, float]:
+        """Return the force [N] and energy [N mm] of prescribed motions on linked nodes alone."""
+        moved, force, energy = np.zeros(len(self)), 0.0, 0.0
+        each = [(p, rows) for p, rows in zip(parts, self.rows, strict=True) if rows is not None]
+        for part, rows in each:
+            if part.driven.cases:
+                moved += rows.block @ part.driven.at(time)[rows.dofs]
+        for part, rows in each if moved.any() else ():
+            nodal, stiffness = np.abs(rows.block).T @ np.abs(moved), part.diagonal[rows.dofs]
+            force = float(np.hypot(force, np.linalg.norm(stiffness * nodal)))
+            energy += float(stiffness @ nodal**2) / 2
+        return force, energy
+
     def on_part(self, part: int, forces: Array, size: int) -> Array:
         """Return the forces (size,) that forces of the conditions (c,) exert on a part [N]."""
         nodal, rows = np.zeros(size), self.rows[part]

@@ -183,7 +183,8 @@ class System:
         """
         at, found = self._least
         if at != time:  # an increment asks for it, and then its energy
-            force, energy = np.array([part.clamped(time) for part in self.parts]).T
+            each = [part.clamped(time) for part in self.parts]
+            force, energy = np.array([*each, self.links.clamped(self.parts, time)]).T
             found = LEAST * float(np.linalg.norm(force)), LEAST_ENERGY * float(energy.sum())
             self._least = time, found
         return found

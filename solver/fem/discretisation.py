@@ -217,8 +217,8 @@ class Discretisation(Nodes, Part):
             nodal += np.bincount(self.dofs.ravel(), each.sum(axis=1).ravel(), self.n)
         if self.driven.cases:
             moved = self.driven.at(time)
-            nodal += np.abs(self._diagonal * moved)
-            energy += float(moved @ (self._diagonal * moved)) / 2
+            nodal += np.abs(self.diagonal * moved)
+            energy += float(moved @ (self.diagonal * moved)) / 2
         return float(np.linalg.norm(nodal)), energy
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:

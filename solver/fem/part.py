@@ -171,7 +171,7 @@ class Part(ABC):
         return self.loads.grows(before, after)
 
     @cached_property
-    def _diagonal(self) -> NDArray[np.float64]:
+    def diagonal(self) -> NDArray[np.float64]:
         """The diagonal (n,) of the elastic stiffness [N/mm]."""
         return np.asarray(self.elastic_matrix().diagonal())
 
@@ -181,7 +181,7 @@ class Part(ABC):
         Internal forces are differences of stiffness times displacement. Both may be large where
         forces are small: in long thin elements, and in a stiff body on a soft one.
         """
-        return _ROUNDING * float(np.linalg.norm(self._diagonal * u))
+        return _ROUNDING * float(np.linalg.norm(self.diagonal * u))
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Return the unknowns with prescribed motions at their values for a time."""
