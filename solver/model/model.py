@@ -132,6 +132,10 @@ class Model:
         self._check_pairs()
         for k, link in enumerate(self.links):
             self._check_link(f"links[{k}]", link)
+        for body in self.rigid:
+            if not body.surfaces and all(link.rigid != body.name for link in self.links):
+                allowed = "must be 1 or more, unless a link moves a boundary with the body"
+                raise ModelError(f"rigid.{body.name}.surfaces", {}, allowed)
 
     def _check_link(self, name: str, link: Link) -> None:
         """Refuse bodies that a link cannot join, and surfaces that something else holds too."""
