@@ -417,7 +417,11 @@ def _components(field: str, load: Load, names: tuple[str, ...], x: Array, unit: 
 
 def _values(field: str, value: Value, x: Array, unit: str) -> Array:
     """Return a number or a function of position at positions x (n,), or raise `ModelError`."""
-    return checked(field, value(x) if callable(value) else value, (x.shape[1],), unit)
+    try:
+        found = value(x) if callable(value) else value
+    except ModelError as error:  # of a table
+        raise ModelError(field, error.value, error.allowed) from None
+    return checked(field, found, (x.shape[1],), unit)
 
 
 def checked(field: str, value: object, shape: tuple[int, ...], unit: str) -> Array:

@@ -21,6 +21,7 @@ from studies.errors import StudyError, nearest
 from studies.scenes import tables
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.shape_tables import ArcTable, mesh_of
+from studies.scenes.table import TabulatedTable
 
 if TYPE_CHECKING:
     from skfem import Mesh
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from solver.model.loads import Load
     from solver.model.model import ContactPair, Model
     from solver.model.rigid import RigidBody
+    from solver.model.tabulated import Tabulated
 
 T = TypeVar("T")
 _NOT_OF_MODEL = (
@@ -197,9 +199,11 @@ class Builder:
     # -- loads and contact -------------------------------------------------------------------
 
     def _load(self, k: int, table: tables.LoadTable) -> Load | None:
-        where = f"loads[{k}]"
+        where, files = f"loads[{k}]", self.meshes
+        if files is not None and any(t.file not in files for t in table.tabulated.values()):
+            return None  # reported already
         amplitude = self._amplitude(where, getattr(table, "amplitude", None))
-        return self.attempt(where, lambda: load_of(table, amplitude))
+        return self.attempt(where, lambda: load_of(table, amplitude, files))
 
     def _contact(self, k: int, table: tables.ContactTable) -> ContactPair | None:
         from solver.model.model import ContactPair
@@ -303,11 +307,28 @@ def friction_of(table: tables.PairTable) -> FrictionLaw:
     return FRICTION.made(table.friction_law, table)
 
 
-def load_of(table: Any, amplitude: Amplitude | None = None) -> Load:
-    """Return the load of a table."""
+def load_of(
+    table: Any,
+    amplitude: Amplitude | None = None,
+    files: Mapping[str, MeshFile] | None = None,
+) -> Load:
+    """Return the load of a table; ``files`` are those beside the scene, None if not at hand."""
     kind = LOADS[table.kind]
     given = {n: getattr(table, n) for n in table.model_fields_set - {"kind", "body", "amplitude"}}
+    for name, each in table.tabulated.items():
+        given[name] = _table_of(f"{name}.file", each, files)
     return kind(**given, **{"amplitude": amplitude} if kind.varies else {})
+
+
+def _table_of(field: str, given: TabulatedTable, files: Mapping[str, MeshFile] | None) -> Tabulated:
+    """Return a table of values of a load."""
+    if files is None:
+        raise ModelError(field, given.file, "is not at hand: read the scene from its file")
+    try:
+        return files[given.file].table(given.column).times(given.times)
+    except ModelError as error:
+        allowed = f"{error.allowed}; it has {error.value}"
+        raise ModelError(field, given.file, allowed) from None
 
 
 def default_element(mesh: Mesh) -> str:

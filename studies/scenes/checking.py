@@ -30,10 +30,11 @@ def contradictions(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Ite
 
     Parameters
     ----------
-    meshes : names of the mesh files beside the scene file; None leaves this check out
+    meshes : names of the files beside the scene file; None leaves this check out
     """
-    yield from _bodies(scene, None if meshes is None else set(meshes))
-    yield from _loads(scene)
+    files = None if meshes is None else set(meshes)
+    yield from _bodies(scene, files)
+    yield from _loads(scene, files)
     yield from _contacts(scene)
     yield from _stages(scene)
     yield from _results(scene)
@@ -153,9 +154,13 @@ def _bodies(scene: tables.SceneFile, meshes: set[str] | None) -> Iterator[StudyE
             yield from _one_of(f"rigid.{name}.{axis}.locked", motion.locked, stages)
 
 
-def _loads(scene: tables.SceneFile) -> Iterator[StudyError]:
+def _loads(scene: tables.SceneFile, files: set[str] | None) -> Iterator[StudyError]:
     for k, load in enumerate(scene.loads):
         yield from _one_of(f"loads[{k}].body", load.body, scene.bodies)
+        for name, each in load.tabulated.items():
+            if files is not None and each.file not in files:
+                allowed = "there is no such file beside the scene"
+                yield StudyError(f"loads[{k}].{name}.file", each.file, allowed)
     amplitudes = [(f"loads[{k}]", getattr(a, "amplitude", None)) for k, a in enumerate(scene.loads)]
     amplitudes += [(f"contacts[{k}]", a.amplitude) for k, a in enumerate(scene.contacts)]
     amplitudes += [

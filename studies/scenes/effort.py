@@ -42,7 +42,7 @@ def effort_of(
         size = _size_of(description, name, body)
         elements += size.elements
         own = {boundary for of, boundary in sides if of == name}
-        loads = [load_of(load) for load in scene.loads if load.body == name]
+        loads = [load_of(load.plain) for load in scene.loads if load.body == name]
         driven = any(each.components or each.softening(np.zeros((2, 0))) is not None
                      for each in loads)  # fmt: skip
         # an elastic body is condensed to its surfaces in contact and links

@@ -11,6 +11,7 @@ from typing import (
     Any,
     Literal,
     NamedTuple,
+    Self,
     TypeAlias,
     Union,
     get_args,
@@ -32,7 +33,17 @@ from solver.results.outputs import outputs
 from solver.results.requested import OF_CONTACT, RequestedNumber, of_body
 from solver.scenes.material_parameters import ContactParameters, MaterialParameters
 from studies.scenes.shape_tables import ArcTable, GradedTable, LineTable, Shape
-from studies.scenes.table import Count, FieldText, FileName, Label, Place, SceneTable, Side, Span
+from studies.scenes.table import (
+    Count,
+    FieldText,
+    FileName,
+    Label,
+    Place,
+    SceneTable,
+    Side,
+    Span,
+    TabulatedTable,
+)
 
 # -- bodies ------------------------------------------------------------------------------------
 
@@ -140,6 +151,17 @@ class LoadTable(SceneTable):
 
     body: str
 
+    @property
+    def tabulated(self) -> dict[str, TabulatedTable]:
+        """Its entries that are tables of values."""
+        each = ((name, getattr(self, name)) for name in type(self).model_fields)
+        return {name: entry for name, entry in each if isinstance(entry, TabulatedTable)}
+
+    @property
+    def plain(self) -> Self:
+        """The load with zero in the place of tables of values, which needs no files."""
+        return self.model_copy(update=dict.fromkeys(self.tabulated, 0.0))
+
 
 def _load(word: str, kind: type[Load]) -> type[LoadTable]:
     """Return the table of a kind of load: its parameters."""
@@ -157,13 +179,13 @@ def _load(word: str, kind: type[Load]) -> type[LoadTable]:
 def _in_file(hint: Any) -> Any:
     """Return the type of a parameter in a file; None if it is a function of another kind.
 
-    A number that may be a function of position is an expression there.
+    A number that may be a function of position is an expression or a table of values there.
     """
     if get_origin(hint) not in (Union, UnionType):
         return None if get_origin(hint) is Callable else hint
     kept = tuple(each for each in get_args(hint) if get_origin(each) is not Callable)
     if len(kept) < len(get_args(hint)) and float in kept:
-        kept += (FieldText,)
+        kept += (FieldText, TabulatedTable)
     return None if kept == (NoneType,) else Union[kept]  # noqa: UP007
 
 
