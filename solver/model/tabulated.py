@@ -73,8 +73,10 @@ class Tabulated:
         """
         rows = [row for row in csv.reader(io.StringIO(text)) if any(map(str.strip, row))]
         names = [name.strip() for name in rows[0]] if rows else []
+        if any(len(row) != len(names) for row in rows):
+            raise ModelError("table", "a line of another length", _WORDS)
         columns: Mapping[str, list[str]] = dict(
-            zip(names, map(list, zip(*rows[1:], strict=False)), strict=False)
+            zip(names, map(list, zip(*rows[1:], strict=True)), strict=bool(rows[1:]))
         )
         axes = [axis for axis in ("x", "y") if axis in columns]
         if column not in columns or not axes or column in axes:
@@ -84,8 +86,6 @@ class Tabulated:
             found = {name: np.array(columns[name], dtype=float) for name in (*axes, column)}
         except ValueError as error:
             raise ModelError("table", str(error), _WORDS) from None
-        if any(len(row) != len(names) for row in rows):
-            raise ModelError("table", "a line of another length", _WORDS)
         return cls(found.get("x"), found.get("y"), found[column])
 
     @classmethod

@@ -185,7 +185,7 @@ def _in_file(hint: Any) -> Any:
         return None if get_origin(hint) is Callable else hint
     kept = tuple(each for each in get_args(hint) if get_origin(each) is not Callable)
     if len(kept) < len(get_args(hint)) and float in kept:
-        kept += (FieldText, TabulatedTable)
+        kept += (TabulatedTable, FieldText)  # a wrong text is told last
     return None if kept == (NoneType,) else Union[kept]  # noqa: UP007
 
 

@@ -74,7 +74,7 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
     "no function of position": (
         put("loads", 0, "value", "1 - q*x"),
         "loads[0].value",
-        "must be a number or an expression of x and y; this one q is unknown",
+        "must be a number, a table or an expression of x and y; this one q is unknown",
     ),
     "a field that has no value": (
         put("loads", 0, "value", "sqrt(x - 1e9)"),
