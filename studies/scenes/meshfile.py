@@ -34,6 +34,9 @@ TABLE = ".csv"
 MOST_POINTS = 1_000_000
 """Largest number of points of a mesh file."""
 
+MOST_LINES = 100_000
+"""Largest number of lines of a table of values."""
+
 _CELLS = {"quad": 4, "quad8": 4, "quad9": 4, "triangle": 3, "triangle6": 3}
 """Cells of meshio that a body may have -> number of their corners."""
 _LINES = ("line", "line3")
@@ -75,6 +78,8 @@ class MeshFile:
         ModelError
             if the file is no such table
         """
+        if self.data.count(b"\n") > MOST_LINES:
+            raise ModelError("table", "too many lines", f"must have at most {MOST_LINES} lines")
         try:
             return Tabulated.of(self.data.decode("utf-8-sig"), column)
         except (UnicodeDecodeError, csv.Error) as error:
