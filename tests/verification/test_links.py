@@ -28,6 +28,7 @@ from solver import (
     solve,
 )
 from solver.mesh import grid
+from solver.model.rigid import line
 from studies.scenes.scene import read_scene
 from tests.verification.bodies import E, bent, block, cells, steel
 
@@ -302,7 +303,8 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
 def test_a_link_that_holds_nothing_or_too_much_is_refused(given: dict[str, Any], told: str) -> None:
     body = block("block", np.linspace(0, 4, 3), np.linspace(0, 4, 3), supports={"bottom": "xy"})
     other = block("other", np.linspace(4, 6, 3), np.linspace(0, 4, 3), supports={"bottom": "xy"})
-    moved = RigidBody(name="moved", y=Moved(value=0.1))
+    face = {"face": line((0.0, 9.0), (4.0, 9.0))}
+    moved = RigidBody(name="moved", surfaces=face, y=Moved(value=0.1))
     with pytest.raises(ModelError, match=told):
         System(Model(
             bodies=(body, other),
