@@ -20,6 +20,7 @@ from solver.contact.problem import ContactProblem, ContactSolution
 from solver.contact.rows import ContactRows, joined
 from solver.errors import ModelError
 from solver.fem.rigid import RigidPart
+from solver.linear.solvers import Singular
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -35,8 +36,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _DEPENDENT = 1e-9
-"""Ratio of what is left of a condition without those before it to the condition; below it these
-hold its unknowns already."""
+"""Ratio of what is left of a condition without the others to the condition; below it the condition
+follows from them. Also the least singular value of the rigid motions that links hold."""
 _LITTLE = 1e-9
 """Ratio of the area of a node to the largest; below it no spring acts there."""
 
@@ -59,6 +60,11 @@ class Links:
     def __len__(self) -> int:
         """Return the number of conditions."""
         return len(self.compliance)
+
+    @property
+    def springy(self) -> bool:
+        """Whether springs resist any motion."""
+        return bool(self.compliance.any())
 
     def off(self, u: Sequence[Array], forces: Array) -> Array:
         """Return how far the conditions (c,) are not met by unknowns and forces [mm]."""
@@ -102,6 +108,11 @@ def eliminated(
     ----------
     links : number of conditions, the last of ``offset``, ``W`` and ``A``; their force has any sign
     apart : whether rigid motions that no link holds stay zero
+
+    Raises
+    ------
+    Singular
+        if a tangent has lost its stiffness against the links
     """
     m = len(problem.offset) - links
     W, offset, A = problem.W, problem.offset, problem.A
@@ -119,7 +130,10 @@ def eliminated(
     S[links:, :links] = S[:links, links:].T
     by_force = np.vstack([W[m:, :m], (A[:m] @ held).T])
     alone = np.concatenate([offset[m:], held.T @ problem.balance])
-    inverse = np.linalg.solve(S, np.column_stack([by_force, alone]))
+    try:
+        inverse = np.linalg.solve(S, np.column_stack([by_force, alone]))
+    except np.linalg.LinAlgError as error:  # at a limit load
+        raise Singular(str(error)) from error
     change = by_force.T @ inverse
     rest = replace(
         problem,
@@ -159,7 +173,7 @@ def links_of(
     Raises
     ------
     ModelError
-        where supports, motions or other links hold what a link should hold
+        where motions contradict supports or other links
     """
     pieces: list[list[ContactRows]] = [[] for _ in parts]
     compliance, places, whose = [np.zeros(0)], [np.zeros((2, 0))], [np.zeros(0, dtype=int)]
@@ -243,34 +257,36 @@ def _conditions(
 
 
 def _independent(made: Links, parts: Sequence[Part], X: Array) -> NDArray[np.int64]:
-    """Return the conditions without those on unknowns that supports hold at rest.
+    """Return the conditions that do not follow from supports and the others.
 
-    Raises `ModelError` for a condition that supports, motions or other conditions hold already.
+    Raises `ModelError` for one that follows from them but for prescribed motions, which contradict.
     """
-    free, driven = [np.zeros((len(made), 0))], np.zeros(len(made), dtype=bool)
-    for part, rows in zip(parts, made.rows, strict=True):
-        if rows is None:
-            continue
-        loose = np.isin(rows.dofs, part.free)
-        free.append(rows.block[:, loose])
-        moves = np.isin(rows.dofs, np.flatnonzero(part.driven.fields.any(axis=1)))
-        driven |= rows.block[:, moves].any(axis=1)
-    G = np.hstack(free)
+    each = [(p, rows) for p, rows in zip(parts, made.rows, strict=True) if rows is not None]
+    cases = sum(len(part.driven.cases) for part, _ in each)
+    free, driven = [np.zeros((len(made), 0))], np.zeros((len(made), cases))
+    for part, rows in each:
+        free.append(rows.block[:, np.isin(rows.dofs, part.free)])
+        own = rows.block @ part.driven.fields[rows.dofs]
+        cases -= own.shape[1]
+        driven[:, cases : cases + own.shape[1]] = own
+    rigid = np.flatnonzero(made.compliance == 0)
+    if not len(rigid):
+        return np.arange(len(made))
+    G, moves = np.hstack(free)[rigid], driven[rigid]
     size = np.linalg.norm(G, axis=1)
-    held = (size == 0) & (made.compliance == 0)
-    kept = np.flatnonzero(~held)
-    rigid = kept[made.compliance[kept] == 0]
-    wrong = np.flatnonzero(held & driven)
-    if len(rigid):
-        R, order = linalg.qr((G[rigid] / size[rigid, None]).T, mode="r", pivoting=True)
-        left = np.zeros(len(rigid))
-        left[: min(R.shape)] = np.abs(np.diag(R))
-        wrong = np.append(wrong, rigid[order[left < _DEPENDENT]])
+    G = np.divide(G, size[:, None], out=np.zeros_like(G), where=size[:, None] > 0)
+    R, order = linalg.qr(G.T, mode="r", pivoting=True)
+    rank = int((np.abs(np.diag(R)) > _DEPENDENT).sum())
+    kept, others = order[:rank], order[rank:]
+    follow = np.linalg.lstsq(G[kept].T, G[others].T)[0].T
+    scale = np.where(size > 0, size, 1.0)[:, None]
+    off = np.abs(moves[others] / scale[others] - follow @ (moves[kept] / scale[kept]))
+    wrong = others[(off > _DEPENDENT * np.abs(moves).max(initial=0.0)).any(axis=1)]
     if len(wrong):
-        x, y = X[:, wrong[0]]
+        x, y = X[:, rigid[wrong[0]]]
         raise ModelError(
-            f"links[{made.whose[wrong[0]]}]", f"({x:g}, {y:g})",
-            "must not hold what supports, motions or other links hold already: shorten one of the "
-            "boundaries by an element, or leave a component out",
+            f"links[{made.whose[rigid[wrong[0]]]}]", f"({x:g}, {y:g})",
+            "must not move what supports, motions or other links move in another way: shorten one "
+            "of the boundaries by an element, or leave a component out",
         )  # fmt: skip
-    return kept
+    return np.setdiff1d(np.arange(len(made)), rigid[others])

@@ -198,7 +198,7 @@ class Increment:
                     failure.why = softest
                 failure.why = self._slide((residuals, candidates)) or failure.why
                 raise
-            if iteration >= _LATE:
+            if iteration >= _LATE and not self.system.links.springy:
                 softest = softer(softest, self.system.parts, step.u, responses)
             before, found = u, self._search(u, residuals, candidates, step, error * scale)
             share, u, responses, residuals = found
@@ -244,7 +244,10 @@ class Increment:
         """Return the softest step, with whether the kinematic theorem excludes equilibrium.
 
         The theorem is not applied if a motion is prescribed: the work of its force is not known.
+        Nor is it with springs, whose force grows without limit.
         """
+        if self.system.links.springy:
+            return flow
         parts = self.system.parts
         moved = [now - before for now, before in zip(u, self.start.u, strict=True)]
         if any(np.delete(move, part.free).any() for part, move in zip(parts, moved, strict=True)):

@@ -15,6 +15,7 @@ from solver import (
     Body,
     ContactPair,
     Displacement,
+    LimitLoad,
     Link,
     Model,
     ModelError,
@@ -25,9 +26,10 @@ from solver import (
     Solution,
     Stage,
     System,
+    Traction,
     solve,
 )
-from solver.mesh import grid
+from solver.mesh import grid, within
 from solver.model.rigid import line
 from studies.scenes.scene import read_scene
 from tests.verification.bodies import E, bent, block, cells, steel
@@ -70,6 +72,17 @@ def test_a_beam_bent_by_moments_has_the_curvature_and_stress_of_its_closed_form(
     assert np.abs(released[0] - exact - ratio * YIELD * 2 * y / HEIGHT).max() < 5e-3 * YIELD
     for stage in ("bent", "released"):
         assert found.audit(stage).passed
+
+
+def test_a_beam_bears_no_moment_above_the_plastic_one() -> None:
+    scene = read_scene(SCENES / "bending.toml")
+    model = scene.model(scene.parameters(parts=8))
+    end, wall = model.rigid
+    turned = Pushed(value=1.7 * YIELD * HEIGHT**2 / 6)
+    end = replace(end, x=Pushed(), rotation=turned)
+    with pytest.raises(LimitLoad) as found:
+        solve(replace(model, rigid=(end, wall)), stages=[Stage(name="bent", target=1.0, steps=10)])
+    assert 1.7 * found.value.reached == pytest.approx(1.5, rel=0.02)
 
 
 def test_a_moment_that_is_distributed_bends_like_a_linear_traction() -> None:
@@ -292,10 +305,14 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "distributed": ({**SLAVE, "distributed": True}, "distributed = True: needs a rigid body"),
     "not facing": ({**SLAVE, "master": ("block", "bottom")}, r"links\[0\] .* do not face"),
     "corner": (
-        {"slave": ("block", "left"), "components": "y"},
-        r"links\[1\] = '\(0, 4\)': must not",
+        {"slave": ("block", "left"), "rigid": "moved"},
+        r"links\[0\] = '\(0, 0\)': must not move",
     ),
-    "supports": ({"slave": ("block", "bottom"), "rigid": "moved"}, r"links\[0\] = .* supports"),
+    "two motions": ({**SLAVE, "rigid": "moved"}, r"links\[.\] = '.*, 4\)': must not move"),
+    "supports": (
+        {"slave": ("block", "bottom"), "rigid": "moved"},
+        r"links\[0\] = .* must not move what supports, motions or other links",
+    ),
 }
 
 
@@ -312,6 +329,36 @@ def test_a_link_that_holds_nothing_or_too_much_is_refused(given: dict[str, Any],
             contacts=(ContactPair(slave=("block", "right"), master=("other", "left")),),
             links=(Link(**given), Link(**SLAVE, rigid="plate", components="y")),
         ))  # fmt: skip
+
+
+def test_links_that_agree_may_share_a_corner() -> None:
+    """Two sides follow one plate, which turns them with what they bound: no stress."""
+    body = block("block", np.linspace(0, 4, 3), np.linspace(0, 4, 3))
+    plate = RigidBody(name="plate", x=Moved(value=0.1), rotation=Moved(value=1e-3))
+    links = (Link(slave=("block", "left"), rigid="plate"), Link(**SLAVE, rigid="plate"))
+    found = solve(Model(bodies=(body,), rigid=(plate,), links=links))
+    assert len(found.system.links) == 2 * (5 + 5 - 1)
+    assert np.abs(found.stress("block", "loaded")).max() < 1e-6
+    assert found.audit().passed
+
+
+@pytest.mark.parametrize("element", ["quad4", "quad8"])
+def test_a_boundary_may_be_tied_in_two_pieces(element: str) -> None:
+    x, low, high = np.linspace(0, 4, 5), np.linspace(0, 1, 3), np.linspace(1, 2, 3)
+    lower = block("lower", x, low, element, supports={"bottom": "xy"})
+    mesh = within(grid(x, high), "one", ["bottom"], x=(0, 2), y=(1, 1))
+    mesh = within(mesh, "other", ["bottom"], x=(2, 4), y=(1, 1))
+    upper = Body(name="upper", mesh=mesh, material=steel(), element=element,
+                 loads=(Traction(boundary="top", x=100.0),))  # fmt: skip
+    links = [Link(slave=("upper", name), master=("lower", "top")) for name in ("one", "other")]
+    found = solve(Model(bodies=(lower, upper), links=tuple(links)))
+    whole = solve(
+        Model(bodies=(lower, upper), links=(replace(links[0], slave=("upper", "bottom")),))
+    )
+    moved = [each.displacement("upper", "loaded") for each in (found, whole)]
+    # quadratic elements have one more condition where the pieces meet
+    assert np.allclose(*moved, rtol=0, atol=0.01 * np.abs(moved[1]).max())
+    assert found.audit().passed
 
 
 def test_a_link_at_rest_on_a_support_adds_nothing() -> None:
