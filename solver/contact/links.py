@@ -221,14 +221,15 @@ def _conditions(
         bodies = [parts[names.index(of)].body for of, _ in link.sides]
         at_rest = [np.zeros_like(surfaces[side].X) for side in link.sides]
         master = surfaces[link.master]
-        pairing = pair(slave, at_rest[0], master, at_rest[1], largest_overlap(*bodies))
+        pairing = pair(slave, at_rest[0], master, at_rest[1], largest_overlap(*bodies), tied=True)
         at = np.flatnonzero(pairing.area > 0)
         if not len(at):
             allowed = "these surfaces do not face each other: check boundaries and positions"
             raise ModelError(name, link.sides, allowed)
-        areas = np.tile(pairing.area[at], 2)
-        block, others = (np.vstack([pairing.normal[k][at], pairing.tangent[k][at]]) for k in (0, 1))
-        X = np.tile(slave.X[:, slave.vertices[at]], 2)
+        areas = np.tile(pairing.area[at], len(link.axes))
+        ways = [(pairing.normal, pairing.tangent)[axis] for axis in link.axes]
+        block, others = (np.vstack([way[side][at] for way in ways]) for side in (0, 1))
+        X = np.tile(slave.X[:, slave.vertices[at]], len(link.axes))
         other = names.index(link.master[0])
         rows.append((other, ContactRows(parts[other].surface(master).dofs, others)))
     if link.rigid is not None:

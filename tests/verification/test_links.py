@@ -32,7 +32,7 @@ from solver import (
 from solver.mesh import grid, within
 from solver.model.rigid import line
 from studies.scenes.scene import read_scene
-from tests.verification.bodies import E, bent, block, cells, steel
+from tests.verification.bodies import E, bent, block, cells, sector, steel
 
 Array = NDArray[np.float64]
 
@@ -297,10 +297,6 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "contact": ({"slave": ("block", "right")}, r"links\[0\].slave .* link or contact, not both"),
     "rigid": ({**SLAVE, "rigid": "block"}, r"links\[0\].rigid = 'block': must be a rigid body"),
     "components": ({**SLAVE, "components": "z"}, "components = 'z': must be x, y or xy"),
-    "one component": (
-        {**SLAVE, "master": ("block", "left"), "components": "x"},
-        "components = 'x': must be xy between two boundaries",
-    ),
     "stiffness": ({**SLAVE, "stiffness": 0.0}, "stiffness = 0.0: must be positive"),
     "distributed": ({**SLAVE, "distributed": True}, "distributed = True: needs a rigid body"),
     "not facing": ({**SLAVE, "master": ("block", "bottom")}, r"links\[0\] .* do not face"),
@@ -359,6 +355,20 @@ def test_a_boundary_may_be_tied_in_two_pieces(element: str) -> None:
     # quadratic elements have one more condition where the pieces meet
     assert np.allclose(*moved, rtol=0, atol=0.01 * np.abs(moved[1]).max())
     assert found.audit().passed
+
+
+@pytest.mark.parametrize("element", ["quad8", "quad4"])
+@pytest.mark.parametrize("stiffness", [np.inf, 1e4])
+def test_a_tie_of_curved_surfaces_and_unequal_meshes_passes_the_audit(
+    element: str, stiffness: float
+) -> None:
+    inner = replace(sector(np.linspace(10, 15, 4), 4, element, material=steel(),
+                           pressure={"left": 100.0}), name="inner")  # fmt: skip
+    load = Traction(boundary="right", x=20.0, y=-30.0)
+    outer = replace(sector(np.linspace(15, 25, 6), 7, element, material=steel(), loads=(load,)),
+                    name="outer")  # fmt: skip
+    tie = Link(slave=("outer", "left"), master=("inner", "right"), stiffness=stiffness)
+    assert solve(Model(bodies=(inner, outer), links=(tie,))).audit().passed
 
 
 def test_a_link_at_rest_on_a_support_adds_nothing() -> None:

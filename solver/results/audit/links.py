@@ -93,17 +93,24 @@ def _resultant(system: System, own: Array, name: str) -> tuple[Array, Array]:
 def _unbalanced(system: System, k: int, converged: Converged) -> float:
     """Return the sum of the forces of a link on slave and partners, moments over their size [N].
 
-    With a master and a rigid body, the force on either is opposite to that on the slave.
+    With a master and a rigid body, the force on either is opposite to that on the slave. Forces of
+    a tie act on either surface: their moment across a gap, as between coarse arcs, is left out.
     """
     link = system.model.links[k]
     size = float(np.abs(system.full(link.slave[0]).X).max())
     partners = [name for name in (link.master and link.master[0], link.rigid) if name]
-    worst = 0.0
+    worst, arm = 0.0, 0.0
+    if link.master is not None:
+        slave, master = (_places(system, side, converged) for side in link.sides)
+        far, _ = _facing(slave.X, master)
+        arm = float(far.max(initial=0.0, where=far < _beside(slave.X)))
+    left = arm / size * converged.state.force_scale
     force, moment = _forces(system, k, converged, link.slave[0])
     for name in partners:  # in a tie within one body, the force is that on both sides
         same = name == link.slave[0]
         other, its = (0.0, 0.0) if same else _forces(system, k, converged, name)
-        worst = max(worst, float(np.abs(force + other).max()), abs(float(moment + its)) / size)
+        turning = max(abs(float(moment + its)) / size - left, 0.0)
+        worst = max(worst, float(np.abs(force + other).max()), turning)
     return worst
 
 
@@ -116,7 +123,7 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
     if link.master is not None:
         master = _places(system, link.master, converged)
         far, at_master = _facing(X, master)
-        area = np.where(far < _FACING * float(np.ptp(X, axis=1).max()), area, 0.0)
+        area = np.where(far < _beside(X), area, 0.0)
         others.append(at_master)
     if link.rigid is not None:
         number = system.part(link.rigid)
@@ -137,6 +144,11 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
             mean + _forces(system, k, converged, link.slave[0])[0][list(link.axes)] / link.stiffness
         )
     return float(np.abs(mean).max()) / area.sum() / size
+
+
+def _beside(X: Array) -> float:
+    """Return the distance up to which places of a slave at X (2, n) face its master [mm]."""
+    return _FACING * float(np.ptp(X, axis=1).max())
 
 
 def _facing(X: Array, master: _Pieces) -> tuple[Array, Array]:
