@@ -74,6 +74,22 @@ def test_a_beam_bent_by_moments_has_the_curvature_and_stress_of_its_closed_form(
         assert found.audit(stage).passed
 
 
+def test_a_strip_bends_until_its_measured_stress_is_in_balance() -> None:
+    """It keeps the stress of the table without its mean and its moment, exact to rounding."""
+    scene = read_scene(SCENES / "peened.toml")
+    (lap,) = scene.program(scene.parameters()).laps
+    found = solve(scene.model(scene.parameters()), stages=lap.stages)
+    depth, given = np.loadtxt(SCENES / "peened.csv", delimiter=",", skiprows=1).T
+    fine = np.linspace(-1, 1, 20001)
+    stress = np.interp(fine, depth, given)
+    mean, bend = (np.trapezoid(stress * by, fine) for by in (0.5, 1.5 * fine))
+    (_, y), left = points(found, "strip", "free")
+    assert np.abs(left[0] - (np.interp(y, depth, given) - mean - bend * y)).max() < 1e-4
+    assert np.abs(left[[1, 3]]).max() < 1e-6
+    assert found.motion("end", "free").rotation == pytest.approx(5.0 * bend / E, rel=1e-6)
+    assert found.audit("free").passed
+
+
 def test_a_beam_bears_no_moment_above_the_plastic_one() -> None:
     scene = read_scene(SCENES / "bending.toml")
     model = scene.model(scene.parameters(parts=8))
