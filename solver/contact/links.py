@@ -100,14 +100,15 @@ class Links:
 
 
 def eliminated(
-    problem: ContactProblem, links: int, *, apart: bool
+    problem: ContactProblem, links: int, touched: NDArray[np.bool_]
 ) -> tuple[ContactProblem, Callable[[ContactSolution], ContactSolution]]:
     """Return the contact problem without its last conditions, and the way back to all unknowns.
 
     Parameters
     ----------
     links : number of conditions, the last of ``offset``, ``W`` and ``A``; their force has any sign
-    apart : whether rigid motions that no link holds stay zero
+    touched : (k,) whether contact may hold the rigid motion: those that no link and no contact
+        holds stay zero
 
     Raises
     ------
@@ -120,8 +121,8 @@ def eliminated(
     _, sizes, ways = linalg.svd(A[m:] / size)
     rank = int((sizes > _DEPENDENT).sum())
     held, loose = ways[:rank].T, ways[rank:].T
-    if apart:
-        loose = loose[:, :0]
+    _, moved, ways = linalg.svd(loose[touched])
+    loose = loose @ ways[: int((moved > _DEPENDENT).sum())].T
     # of forces and motions, which differ in magnitude by the compliance
     held = held * (np.abs(np.diag(W)[m:]).max() / size)
     S = np.zeros((links + rank,) * 2)
