@@ -173,6 +173,29 @@ def test_two_tied_bodies_touch_another_as_one_body_does() -> None:
     assert two.audit().passed
 
 
+def test_tied_bodies_stay_where_they_are_when_contact_leaves_them() -> None:
+    """Nothing holds them then, and no load acts; the tie keeps them together."""
+    there = Amplitude(np.arange(3.0), np.array([1.0, 1.0, 0.0]))
+    x = np.linspace(-2, 2, 5)
+    ground = block("ground", np.linspace(-6, 6, 13), np.linspace(-6, 0, 7),
+                   supports={"bottom": "xy"})  # fmt: skip
+    pressed = Amplitude(np.arange(3.0), np.array([0.0, 1.0, 0.0]))
+    load = Pressure(boundary="top", value=50.0, amplitude=pressed)
+    lower = block("lower", x, np.linspace(0, 1, 3))
+    upper = block("upper", np.linspace(-2, 2, 8), np.linspace(1, 2, 4), loads=(load,))
+    tie = Link(slave=("upper", "bottom"), master=("lower", "top"))
+    pair = ContactPair(slave=("lower", "bottom"), master=("ground", "top"), friction=0.3,
+                       presence=there)  # fmt: skip
+    stages = (Stage(name="on", target=1.0, steps=2), Stage(name="off", target=2.0, steps=2))
+    model = Model(bodies=(lower, upper, ground), contacts=(pair,), links=(tie,))
+    found = solve(model, stages=stages)
+    for name in ("lower", "upper"):
+        assert np.abs(found.stress(name, "off")).max() < 1e-6
+        assert np.abs(found.displacement(name, "off")).max() < 0.1
+    for stage in ("on", "off"):
+        assert found.audit(stage).passed
+
+
 # -- springs and plane boundaries ----------------------------------------------------------------
 
 
