@@ -159,11 +159,9 @@ def surfaces_of_links(
     model: Model, wholes: Mapping[str, Discretisation | RigidPart]
 ) -> dict[Side, Surface]:
     """Return the surfaces of all links in the numbering of the whole bodies."""
-    return {
-        (name, boundary): wholes[name].chain(boundary, link.master is None)
-        for link in model.links
-        for name, boundary in link.sides
-    }
+    tied = {side for link in model.links if link.master for side in link.sides}
+    every = {side for link in model.links for side in link.sides}
+    return {side: wholes[side[0]].chain(side[1], side not in tied) for side in sorted(every)}
 
 
 def links_of(
@@ -198,7 +196,7 @@ def links_of(
 
 
 @dataclass(frozen=True, slots=True)
-class _Conditions:
+class _LinkRows:
     """The conditions of one link: rows by number of the part, compliance (c,), places X (2, c)."""
 
     rows: list[tuple[int, ContactRows]]
@@ -209,7 +207,7 @@ class _Conditions:
 def _conditions(
     name: str, link: Link, parts: Sequence[Part], names: Sequence[str],
     surfaces: Mapping[Side, Surface],
-) -> _Conditions:  # fmt: skip
+) -> _LinkRows:  # fmt: skip
     number, slave = names.index(link.slave[0]), surfaces[link.slave]
     rows: list[tuple[int, ContactRows]] = []
     if link.master is None:
@@ -252,10 +250,10 @@ def _conditions(
         block, areas, X = block[others_], areas[others_], X[:, others_]
     rows.append((number, ContactRows(parts[number].surface(slave).dofs, block)))
     if np.isinf(link.stiffness):
-        return _Conditions(rows, np.zeros(len(areas)), X)
+        return _LinkRows(rows, np.zeros(len(areas)), X)
     acts = areas > _LITTLE * areas.max()
     rows = [(k, ContactRows(own.dofs, own.block[acts])) for k, own in rows]
-    return _Conditions(rows, 1 / (link.stiffness * areas[acts]), X[:, acts])
+    return _LinkRows(rows, 1 / (link.stiffness * areas[acts]), X[:, acts])
 
 
 def _independent(made: Links, parts: Sequence[Part], X: Array) -> NDArray[np.int64]:

@@ -31,7 +31,7 @@ _FACING = 0.05
 faces no master."""
 
 
-class _Pieces(NamedTuple):
+class _Sampled(NamedTuple):
     """Middles X (2, n) of the pieces of a boundary, their motion u (2, n) [mm] and area (n,)."""
 
     X: Array
@@ -49,7 +49,7 @@ def links_error(system: System, converged: Converged) -> float:
     )  # fmt: skip
 
 
-def _places(system: System, side: Side, converged: Converged) -> _Pieces:
+def _places(system: System, side: Side, converged: Converged) -> _Sampled:
     name, boundary = side
     whole = system.full(name)
     edges = edges_of(whole, boundary)
@@ -63,7 +63,7 @@ def _places(system: System, side: Side, converged: Converged) -> _Pieces:
     X = at(middle, whole.X)
     length = np.linalg.norm(np.diff(at(ends, whole.X), axis=2), axis=0)
     area = length * whole.measure(X)
-    return _Pieces(X.reshape(2, -1), at(middle, moved).reshape(2, -1), area.ravel())
+    return _Sampled(X.reshape(2, -1), at(middle, moved).reshape(2, -1), area.ravel())
 
 
 def linked(system: System, state: State, name: str) -> Array:
@@ -151,7 +151,7 @@ def _beside(X: Array) -> float:
     return _FACING * float(np.ptp(X, axis=1).max())
 
 
-def _facing(X: Array, master: _Pieces) -> tuple[Array, Array]:
+def _facing(X: Array, master: _Sampled) -> tuple[Array, Array]:
     """Return the distance (n,) of places (2, n) from a master, and its motion (2, n) there.
 
     The motion is linear between the two nearest of its places.
