@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from solver.fem.operators import PartOperators
     from solver.fem.part import Part
     from solver.fem.surface import Surface
+    from solver.materials.law import Law
     from solver.materials.state import Response
     from solver.model.friction import BoundLines
     from solver.model.loads import Load
@@ -195,6 +196,11 @@ class System:
             for interface in self.interfaces
         )
         return small
+
+    @property
+    def laws(self) -> list[Law]:
+        """The material laws of the meshed bodies."""
+        return [body.material for body in self.model.bodies]
 
     @property
     def n_unknowns(self) -> int:

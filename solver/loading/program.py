@@ -33,6 +33,8 @@ class Stage:
     apart : whether the last increment separates the bodies
     turns : whether another motion begins: previous rates of gap and slip are then not used
     refined : whether `Program.refined` divides its increments
+    cycle : for a stage that is repeated, which time it is, from 1; 0 for another one. Its state is
+        kept under its name, and that of the time before as ``NAME_before``
     """
 
     name: str
@@ -42,6 +44,7 @@ class Stage:
     apart: bool = False
     turns: bool = False
     refined: bool = False
+    cycle: int = 0
 
     def __post_init__(self) -> None:
         if self.steps < 1:
@@ -81,7 +84,8 @@ class Lap:
     def targets(self, first: bool) -> Iterator[Target]:
         """Yield the ends of its increments; ``first`` says whether it is the first lap."""
         now, begins = self.start, None if first else self.start
-        for stage in self.stages:
+        following = [*self.stages[1:], None]
+        for stage, after in zip(self.stages, following, strict=True):
             times = stage.times(now)
             for k, time in enumerate(times):
                 last = k + 1 == len(times)
@@ -91,7 +95,9 @@ class Lap:
                     turns=stage.turns and k == 0,
                     apart=stage.apart and last,
                     keeps=stage.name if last else "",
-                    closes=last and stage is self.stages[-1],
+                    closes=last and after is None,
+                    cycle=stage.cycle,
+                    repeats=last and stage.cycle > 0 and (not after or after.cycle != stage.cycle),
                 )
                 begins = None
             now = stage.target
@@ -109,7 +115,8 @@ class Target:
     """The end of an increment of a program.
 
     ``begins`` is the time at which a later lap begins with this increment, ``keeps`` the name of
-    the stage that ends with it, ``closes`` says whether the lap ends with it.
+    the stage that ends with it, ``closes`` says whether the lap ends with it. ``cycle`` is that of
+    its stage, and ``repeats`` says whether the cycle ends with it.
     """
 
     time: float
@@ -118,6 +125,8 @@ class Target:
     apart: bool = False
     keeps: str = ""
     closes: bool = False
+    cycle: int = 0
+    repeats: bool = False
 
 
 @dataclass(frozen=True)

@@ -156,7 +156,7 @@ class Builder:
         from solver.model.loads import Removal
 
         found: dict[str, Amplitude] = {}
-        for k, (stage, *_) in enumerate(self.scene.passages):
+        for k, (stage, _) in enumerate(self.scene.passages):
             for side in stage.remove:
                 found.setdefault(side, Amplitude(np.array([k, k + 1.0]), np.array([0.0, 1.0])))
         sides = {side: side.split(".") for side in found}
@@ -235,7 +235,7 @@ class Builder:
         amplitude = self._amplitude(f"contacts[{k}]", table.amplitude)
         presence = None
         if table.active is not None and self.scene.passages:
-            there = [float(stage.name in table.active) for stage, *_ in self.scene.passages]
+            there = [float(stage.name in table.active) for stage, _ in self.scene.passages]
             presence = Amplitude(np.arange(1.0 + len(there)), np.array([*there[:1], *there]))
         return self.attempt(
             f"contacts[{k}]",
@@ -260,7 +260,7 @@ class Builder:
                 self.mistakes.append(StudyError(f"{where}.amplitude", given, allowed))
             return None
         values = [0.0]
-        for stage, *_ in passages:
+        for stage, _ in passages:
             usual = 1.0 if given is None else values[-1]
             values.append((given or {}).get(stage.name, 0.0 if stage.release else usual))
         return Amplitude(np.arange(len(values), dtype=float), np.array(values))
@@ -276,13 +276,14 @@ def program_of(scene: tables.SceneFile) -> Program:
         return load_cycles(loading.factor, step, loading.release_increments, loading.cycles)
     stages = tuple(
         Stage(
-            name=kept,
+            name=stage.name,
             target=float(k + 1),
             steps=stage.increments,
             apart=stage.release,
             turns=k > 0,
+            cycle=cycle,
         )
-        for k, (stage, kept, _) in enumerate(scene.passages)
+        for k, (stage, cycle) in enumerate(scene.passages)
     )
     return Program(laps=(Lap(stages),), place=_place(scene.passages))
 
@@ -292,7 +293,7 @@ def _place(passages: list[tables.Passage]) -> Any:
 
     def words(time: float) -> str:
         k = min(max(math.ceil(time - 1e-9) - 1, 0), len(passages) - 1)
-        stage, _, cycle = passages[k]
+        stage, cycle = passages[k]
         return f"{time - k:.4g} of stage {stage.name}" + (f" in cycle {cycle}" if cycle else "")
 
     return words

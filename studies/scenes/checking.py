@@ -194,6 +194,9 @@ def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:
         if names[first : first + len(repeated)] != repeated:
             allowed = f"must be stages one after the other, in their order: {', '.join(names)}"
             yield StudyError("repeat.stages", repeated, allowed)
+        if all(stage.release for stage in scene.stages if stage.name in repeated):
+            allowed = "must hold a stage that loads the bodies: they are released once"
+            yield StudyError("repeat.stages", repeated, allowed)
 
 
 def _results(scene: tables.SceneFile) -> Iterator[StudyError]:
