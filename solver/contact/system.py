@@ -381,11 +381,14 @@ class System:
         return replace(state, contacts=tuple(contacts))
 
     def joined(self, state: State, time: float) -> State:
-        """Return a state with the pairs at rest that come in before a time."""
+        """Return a state with the pairs at rest that come in before a time.
+
+        These are pairs that were absent, or of bodies that were separated: their gap is not known.
+        """
         contacts = list(state.contacts)
         for k, interface in enumerate(self.interfaces):
-            pair = interface.declared
-            if pair.absent(state.time) and not pair.absent(time):
+            apart = not np.isfinite(contacts[k].gap).any()
+            if apart and not interface.declared.absent(time):
                 gap = interface.pairing(state.u, time, finite=contacts[k].finite).gap
                 touching, finite = gap <= self.touching, contacts[k].finite
                 contacts[k] = ContactState.at_rest(gap, touching, finite=finite, before=contacts[k])
