@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from solver.materials.material import Material
     from solver.model.amplitude import Amplitude
     from solver.model.body import Body
+    from solver.model.link import Link
     from solver.model.loads import Displacement, InitialStress, Pressure, Temperature, Traction
     from solver.model.model import ContactPair, Model
     from solver.model.rigid import Moved, Pushed, RigidBody
@@ -42,6 +43,7 @@ _HOMES = {
     "Displacement": "model.loads",
     "InitialStress": "model.loads",
     "LimitLoad": "errors",
+    "Link": "model.link",
     "Material": "materials.material",
     "Model": "model.model",
     "ModelError": "errors",
@@ -78,6 +80,7 @@ __all__ = [
     "Displacement",
     "InitialStress",
     "LimitLoad",
+    "Link",
     "Material",
     "Model",
     "ModelError",

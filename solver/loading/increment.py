@@ -78,6 +78,7 @@ class Balanced:
 
     u: Vectors
     contacts: tuple[ContactState, ...]
+    links: NDArray[np.float64]
     responses: tuple[Response, ...]
     residuals: Vectors
     candidates: Candidates
@@ -118,7 +119,7 @@ class Increment:
         tolerances: Tolerances | None = None,
         stiffness: dict[bytes, NDArray[np.float64]] | None = None,
     ) -> None:
-        self.system = system
+        self.system = system = system.during(start)
         self.start = start
         self.time = time
         self.guess = guess
@@ -156,13 +157,13 @@ class Increment:
     def _iterate(self) -> Balanced:
         tolerances = self.tolerances
         origin = self.system.moved(self.guess or self.start, self.time)
-        u, contacts = origin.u, origin.contacts
+        u, contacts, links = origin.u, origin.contacts, origin.links
         responses = self._respond(u)
         residuals = self._residuals(u, responses)
         best, since_best, softest, moving = np.inf, 0, SoftestStep(), False
         series, begun, crawled = Series(), 0.0, 0
         for iteration in range(tolerances.iterations + 1):
-            candidates = self._candidates(u, contacts)
+            candidates = self._candidates(u, contacts, links)
             self._began = self._began or (residuals, candidates)
             scale, error, violation = self._errors(residuals, candidates)
             since_best = 0 if error < best else since_best + 1
@@ -178,6 +179,7 @@ class Increment:
                 return Balanced(
                     u=u,
                     contacts=contacts,
+                    links=links,
                     responses=responses,
                     residuals=residuals,
                     candidates=candidates,
@@ -209,6 +211,7 @@ class Increment:
                 responses = self._respond(u)
                 residuals = self._residuals(u, responses)
             contacts = candidates.states(contacts, forces, step.status)
+            links = forces[candidates.linked]
             if self.elastic_only and any(r.yielding.any() for r in responses):
                 raise Yielded
         # a residual that stops at rounding is no plastic flow; bodies that flow without resistance
@@ -217,7 +220,8 @@ class Increment:
         raise IncrementFailed(
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
             f"and a contact violation of {violation:.1e}",
-            self._slide() or (self._judged(softest, u, responses, contacts) if flows else None),
+            self._slide()
+            or (self._judged(softest, u, responses, contacts, links) if flows else None),
         )
 
     def _slide(self, *places: tuple[Vectors, Candidates]) -> Slide | None:
@@ -235,6 +239,7 @@ class Increment:
         u: Vectors,
         responses: Sequence[Response],
         contacts: tuple[ContactState, ...],
+        links: NDArray[np.float64],
     ) -> SoftestStep:
         """Return the softest step, with whether the kinematic theorem excludes equilibrium.
 
@@ -244,7 +249,7 @@ class Increment:
         moved = [now - before for now, before in zip(u, self.start.u, strict=True)]
         if any(np.delete(move, part.free).any() for part, move in zip(parts, moved, strict=True)):
             return flow
-        candidates = self._candidates(u, contacts)
+        candidates = self._candidates(u, contacts, links)
         inner = on_parts(self.system, candidates, candidates.forces)
         forces = [r + c for r, c in zip(self._residuals(u, responses), inner, strict=True)]
         proven = collapses(parts, self.time, moved, forces, responses)
@@ -261,11 +266,13 @@ class Increment:
         each = zip(self.system.parts, u, responses, strict=True)
         return tuple(part.residual(self.time, ui, response) for part, ui, response in each)
 
-    def _candidates(self, u: Vectors, contacts: tuple[ContactState, ...]) -> Candidates:
+    def _candidates(
+        self, u: Vectors, contacts: tuple[ContactState, ...], links: NDArray[np.float64]
+    ) -> Candidates:
         if not self.contact:
-            return no_candidates(self.system)
+            return no_candidates(self.system, u, links)
         span = self.time - self.start.time
-        found = find_candidates(self.system, self.start, u, contacts, span)
+        found = find_candidates(self.system, self.start, u, contacts, links, span)
         return found if self.friction else found.smooth()
 
     def _errors(self, residuals: Vectors, candidates: Candidates) -> tuple[float, float, float]:
@@ -281,7 +288,8 @@ class Increment:
         scale = max(self.start.force_scale, level, self._least)
         if scale == 0:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
-            return 0.0, float(overlap < -self.system.touching), 0.0
+            off = overlap < -self.system.touching or candidates.motion[candidates.linked].any()
+            return 0.0, float(off), 0.0
         error = self._unbalanced(residuals, candidates, candidates.forces) / scale
         return scale, error, candidates.violation(self._stiffness(candidates)) / scale
 
@@ -310,7 +318,9 @@ class Increment:
         key = b"".join(vertices.tobytes() for vertices in candidates.vertices)
         if key not in self.stiffness:
             W = candidates.compliance([o.elastic for o in self.system.operators])
-            self.stiffness[key] = 1 / np.diag(W)
+            W = np.diag(W).copy()
+            W[candidates.linked] += candidates.links.compliance
+            self.stiffness[key] = 1 / np.where(W > 0, W, W.max(initial=1.0))
         return self.stiffness[key]
 
     # -- 3, 4: the step ------------------------------------------------------------------------
@@ -400,7 +410,9 @@ class Increment:
             contact_work=candidates.work(self.start.contacts),
             plastic_work=sum(work for work, _ in spent),
             dissipation=float(np.min([0.0, *(least for _, least in spent)])),
-            state=State(self.time, u, tuple(r.state for r in responses), contacts, found.scale),
+            state=State(
+                self.time, u, tuple(r.state for r in responses), contacts, found.scale, found.links
+            ),
             responses=responses,
             iterations=found.iterations,
             pivoted=found.pivoted,

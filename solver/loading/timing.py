@@ -29,18 +29,20 @@ if TYPE_CHECKING:
 def timing(system: System, start: State, candidates: Candidates, stiffness: Array) -> Timing:
     """Return the timing of an increment from ``start``.
 
-    ``stiffness`` (n or 2n,) is that of the contact points, elastic [N/mm]. It bounds the uncertain
-    friction of a vertex: elastic stiffness times the slip without friction. A vertex that sticks
-    from the beginning of the increment has no slip; its tangential force is added instead.
+    ``stiffness`` (n or 2n, and of links,) is that of the contact points, elastic [N/mm]. It bounds
+    the uncertain friction of a vertex: elastic stiffness times the slip without friction. A vertex
+    that sticks from the beginning of the increment has no slip; its tangential force is added
+    instead.
     """
     n = candidates.n
     N = np.maximum(candidates.forces[:n], 0.0)
     bound, strained = np.zeros(n), np.zeros(n)
-    if len(candidates.motion) > n:
+    if candidates.frictional:
         bound = candidates.lines.least(N)
         slips = zip(candidates.slips, candidates.vertices, strict=True)
         slipped = np.abs(np.concatenate([slip[at] for slip, at in slips]))
-        strained = np.abs(candidates.forces[n:]) + stiffness[n:] * slipped
+        strained = np.abs(candidates.forces[candidates.along])
+        strained += stiffness[candidates.along] * slipped
     unknown = np.where(candidates.untimed, np.minimum(bound, strained), 0.0)
     stuck = np.where((N > 0) & (candidates.status == STICK), bound, 0.0)
     found = np.zeros((5, len(system.interfaces)))

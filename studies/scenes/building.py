@@ -21,6 +21,7 @@ from studies.errors import StudyError, nearest
 from studies.scenes import tables
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.shape_tables import ArcTable, mesh_of
+from studies.scenes.table import TabulatedTable
 
 if TYPE_CHECKING:
     from skfem import Mesh
@@ -28,9 +29,11 @@ if TYPE_CHECKING:
     from solver.materials.law import Law
     from solver.model.body import Body
     from solver.model.friction import FrictionLaw
+    from solver.model.link import Link
     from solver.model.loads import Load
     from solver.model.model import ContactPair, Model
     from solver.model.rigid import RigidBody
+    from solver.model.tabulated import Tabulated
 
 T = TypeVar("T")
 _NOT_OF_MODEL = (
@@ -72,6 +75,7 @@ class Builder:
         bodies = [self._body(name, body, laws) for name, body in t.bodies.items()]
         rigid = [self._rigid(name, body) for name, body in t.rigid.items()]
         contacts = [self._contact(k, contact) for k, contact in enumerate(t.contacts)]
+        links = [self._link(k, link) for k, link in enumerate(t.links)]
         for side in t.results.surfaces:
             self._has_boundary("results.surfaces", *side.split("."))
         for k, stage in enumerate(t.stages):
@@ -85,6 +89,7 @@ class Builder:
                 bodies=tuple(filter(None, bodies)),
                 rigid=tuple(filter(None, rigid)),
                 contacts=tuple(filter(None, contacts)),
+                links=tuple(filter(None, links)),
                 singular=tuple(SingularPoint(**each.model_dump()) for each in t.singular),
             ),
         )
@@ -187,7 +192,8 @@ class Builder:
             motion: tables.MotionTable = getattr(table, axis)
             amplitude = self._amplitude(f"rigid.{name}.{axis}", motion.amplitude)
             if motion.pushed is not None:
-                motions[axis] = Pushed(value=motion.pushed, amplitude=amplitude)
+                locked = self.scene.end_of(motion.locked) if motion.locked else math.inf
+                motions[axis] = Pushed(value=motion.pushed, amplitude=amplitude, locked=locked)
             else:
                 motions[axis] = Moved(value=motion.moved or 0.0, amplitude=amplitude)
         return self.attempt(
@@ -222,9 +228,11 @@ class Builder:
     # -- loads and contact -------------------------------------------------------------------
 
     def _load(self, k: int, table: tables.LoadTable) -> Load | None:
-        where = f"loads[{k}]"
+        where, files = f"loads[{k}]", self.meshes
+        if files is not None and any(t.file not in files for t in table.tabulated.values()):
+            return None  # reported already
         amplitude = self._amplitude(where, getattr(table, "amplitude", None))
-        return self.attempt(where, lambda: load_of(table, amplitude))
+        return self.attempt(where, lambda: load_of(table, amplitude, files))
 
     def _contact(self, k: int, table: tables.ContactTable) -> ContactPair | None:
         from solver.model.model import ContactPair
@@ -248,6 +256,23 @@ class Builder:
                 interference=table.interference,
                 amplitude=amplitude,
                 presence=presence,
+            ),
+        )
+
+    def _link(self, k: int, table: tables.LinkTable) -> Link | None:
+        from solver.model.link import Link
+
+        sides = [(body, boundary) for body, _, boundary in (s.partition(".") for s in table.sides)]
+        for name, (body, boundary) in zip(("slave", "master"), sides, strict=False):
+            self._has_boundary(f"links[{k}].{name}", body, boundary)
+        given = table.model_dump(include={"rigid", "components", "distributed"})
+        return self.attempt(
+            f"links[{k}]",
+            lambda: Link(
+                slave=sides[0],
+                master=sides[1] if table.master else None,
+                stiffness=table.stiffness or math.inf,
+                **given,
             ),
         )
 
@@ -317,11 +342,28 @@ def friction_of(table: tables.PairTable) -> FrictionLaw:
     return FRICTION.made(table.friction_law, table)
 
 
-def load_of(table: Any, amplitude: Amplitude | None = None) -> Load:
-    """Return the load of a table."""
+def load_of(
+    table: Any,
+    amplitude: Amplitude | None = None,
+    files: Mapping[str, MeshFile] | None = None,
+) -> Load:
+    """Return the load of a table; ``files`` are those beside the scene, None if not at hand."""
     kind = LOADS[table.kind]
     given = {n: getattr(table, n) for n in table.model_fields_set - {"kind", "body", "amplitude"}}
+    for name, each in table.tabulated.items():
+        given[name] = _table_of(f"{name}.file", each, files)
     return kind(**given, **{"amplitude": amplitude} if kind.varies else {})
+
+
+def _table_of(field: str, given: TabulatedTable, files: Mapping[str, MeshFile] | None) -> Tabulated:
+    """Return a table of values of a load."""
+    if files is None:
+        raise ModelError(field, given.file, "is not at hand: read the scene from its file")
+    try:
+        return files[given.file].table(given.column).times(given.times)
+    except ModelError as error:
+        allowed = f"{error.allowed}; it has {error.value}"
+        raise ModelError(field, given.file, allowed) from None
 
 
 def default_element(mesh: Mesh) -> str:

@@ -1,8 +1,9 @@
-"""Meshes of bodies from mesh files, read by meshio."""
+"""The files beside a scene file: meshes of bodies, read by meshio, and tables of values."""
 
 from __future__ import annotations
 
 import contextlib
+import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -13,6 +14,7 @@ from solver.errors import ModelError
 from solver.memory import kept
 from solver.mesh.cells import facets_of, mesh_of_cells
 from solver.mesh.section_mesh import FOOT, RUNNING, SectionMesh
+from solver.model.tabulated import Tabulated
 from studies.scenes.meshdata import MeshData
 from studies.scratch import scratch
 
@@ -26,8 +28,14 @@ OUTLINE = "outline"
 FORMATS = (".msh", ".vtk", ".vtu", ".mesh", ".bdf", ".nas")
 """Endings of mesh files in formats that do not refer to other files."""
 
+TABLE = ".csv"
+"""Ending of a file with a table of values."""
+
 MOST_POINTS = 1_000_000
 """Largest number of points of a mesh file."""
+
+MOST_LINES = 100_000
+"""Largest number of lines of a table of values."""
 
 _CELLS = {"quad": 4, "quad8": 4, "quad9": 4, "triangle": 3, "triangle6": 3}
 """Cells of meshio that a body may have -> number of their corners."""
@@ -40,7 +48,7 @@ _NUMBERS = ("gmsh:physical", "medit:ref", "nastran:ref")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MeshFile:
-    """The content of a mesh file.
+    """The content of a mesh file, or of a table of values.
 
     Attributes
     ----------
@@ -54,8 +62,28 @@ class MeshFile:
     arrays: bytes = b""
 
     def read(self) -> Self:
-        """Return the file with its arrays, so that nobody else needs to read its data."""
+        """Return the file with its arrays, so that nobody else needs to read its data.
+
+        A table is text, which needs none.
+        """
+        if self.name.endswith(TABLE):
+            return self
         return replace(self, arrays=_read(self.name, self.data).packed())
+
+    def table(self, column: str) -> Tabulated:
+        """Return the table of values of a column.
+
+        Raises
+        ------
+        ModelError
+            if the file is no such table
+        """
+        if self.data.count(b"\n") > MOST_LINES:
+            raise ModelError("table", "too many lines", f"must have at most {MOST_LINES} lines")
+        try:
+            return Tabulated.of(self.data.decode("utf-8-sig"), column)
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise ModelError("table", self.name, f"cannot be read: {error}") from None
 
     def mesh(self, part: str | None) -> Mesh:
         """Return the part of this name, or all cells, with named boundaries.

@@ -11,6 +11,7 @@ from typing import (
     Any,
     Literal,
     NamedTuple,
+    Self,
     TypeAlias,
     Union,
     get_args,
@@ -24,6 +25,7 @@ from pydantic import Field, StringConstraints, create_model
 
 from solver.errors import ModelError
 from solver.mesh.lines import closer
+from solver.model.link import Components
 from solver.model.loads import LOADS, Load
 from solver.parameters import Accuracy, Length, Stress
 from solver.parts import Declared, declared
@@ -31,7 +33,17 @@ from solver.results.outputs import outputs
 from solver.results.requested import OF_CONTACT, RequestedNumber, of_body
 from solver.scenes.material_parameters import ContactParameters, MaterialParameters
 from studies.scenes.shape_tables import ArcTable, GradedTable, LineTable, Shape
-from studies.scenes.table import Count, FieldText, FileName, Label, Place, SceneTable, Side, Span
+from studies.scenes.table import (
+    Count,
+    FieldText,
+    FileName,
+    Label,
+    Place,
+    SceneTable,
+    Side,
+    Span,
+    TabulatedTable,
+)
 
 # -- bodies ------------------------------------------------------------------------------------
 
@@ -116,20 +128,23 @@ Amplitude = dict[Label, float]
 
 
 class MotionTable(SceneTable):
-    """A motion of a rigid body: prescribed (``moved``), or free under a force (``pushed``)."""
+    """A motion of a rigid body: prescribed (``moved``), or free under a force (``pushed``).
+
+    From the end of the stage ``locked`` on, a free motion stays as it is then.
+    """
 
     moved: float | None = None
     pushed: float | None = None
     amplitude: Amplitude | None = None
+    locked: Label | None = None
 
 
 class RigidTable(SceneTable):
     """A rigid body: its surfaces by name, its centre and motions."""
 
-    surfaces: Annotated[
-        dict[Label, Annotated[LineTable | GradedTable | ArcTable, Field(discriminator="kind")]],
-        Field(min_length=1),
-    ]
+    surfaces: dict[
+        Label, Annotated[LineTable | GradedTable | ArcTable, Field(discriminator="kind")]
+    ] = Field(default_factory=dict)
     centre: Place = (0.0, 0.0)
     x: MotionTable = MotionTable()
     y: MotionTable = MotionTable()
@@ -143,6 +158,17 @@ class LoadTable(SceneTable):
     """Base of the tables of loads."""
 
     body: str
+
+    @property
+    def tabulated(self) -> dict[str, TabulatedTable]:
+        """Its entries that are tables of values."""
+        each = ((name, getattr(self, name)) for name in type(self).model_fields)
+        return {name: entry for name, entry in each if isinstance(entry, TabulatedTable)}
+
+    @property
+    def plain(self) -> Self:
+        """The load with zero in the place of tables of values, which needs no files."""
+        return self.model_copy(update=dict.fromkeys(self.tabulated, 0.0))
 
 
 def _load(word: str, kind: type[Load]) -> type[LoadTable]:
@@ -161,13 +187,13 @@ def _load(word: str, kind: type[Load]) -> type[LoadTable]:
 def _in_file(hint: Any) -> Any:
     """Return the type of a parameter in a file; None if it is a function of another kind.
 
-    A number that may be a function of position is an expression there.
+    A number that may be a function of position is an expression or a table of values there.
     """
     if get_origin(hint) not in (Union, UnionType):
         return None if get_origin(hint) is Callable else hint
     kept = tuple(each for each in get_args(hint) if get_origin(each) is not Callable)
     if len(kept) < len(get_args(hint)) and float in kept:
-        kept += (FieldText,)
+        kept += (TabulatedTable, FieldText)  # a wrong text is told last
     return None if kept == (NoneType,) else Union[kept]  # noqa: UP007
 
 
@@ -209,6 +235,22 @@ if TYPE_CHECKING:
     ContactTable = PairTable
 else:
     ContactTable = _contact()
+
+
+class LinkTable(SceneTable):
+    """A boundary that is tied, kept rigid, or held by springs; see `solver.Link`."""
+
+    slave: Side
+    master: Side | None = None
+    rigid: str | None = None
+    components: Components = "xy"
+    stiffness: Annotated[float, Interval(gt=0.0)] | None = None
+    distributed: bool = False
+
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """The boundaries that it joins."""
+        return (self.slave,) if self.master is None else (self.slave, self.master)
 
 
 class SingularTable(SceneTable):
@@ -484,6 +526,7 @@ class SceneFile(SceneTable):
     bodies: Annotated[dict[Label, BodyTable], Field(min_length=1)]
     rigid: dict[Label, RigidTable] = Field(default_factory=dict)
     contacts: tuple[ContactTable, ...] = ()
+    links: tuple[LinkTable, ...] = ()
     singular: tuple[SingularTable, ...] = ()
     allow: tuple[Literal["large_strain"], ...] = ()
     loads: tuple[AnyLoad, ...] = ()
@@ -538,6 +581,10 @@ class SceneFile(SceneTable):
                 for cycle in range(1, self.repeat.times + 1):
                     found += (Passage(each, cycle) for each in group)
         return found
+
+    def end_of(self, stage: str) -> float:
+        """Return the time at the end of a stage, the first time that it is gone through."""
+        return 1.0 + next(k for k, each in enumerate(self.passages) if each.stage.name == stage)
 
     @property
     def stage_names(self) -> list[str]:

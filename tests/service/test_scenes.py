@@ -51,6 +51,17 @@ def test_a_scene_has_the_id_of_its_content(service: Server, pin: str) -> None:
     assert again.json()["name"] == "pin"
 
 
+def test_a_table_of_values_is_posted_with_its_scene(service: Server) -> None:
+    strip, table = ((SCENES / f"peened.{end}").read_bytes() for end in ("toml", "csv"))
+    answer = post(service, strip, peened_csv=table)
+    assert answer.status_code == 201, answer.text
+    assert answer.json()["id"] == read_scene(SCENES / "peened.toml").id
+    other = post(service, strip, peened_csv=table + b"1.5,0\n").json()["id"]
+    assert other != answer.json()["id"]
+    wrong = post(service, strip, peened_csv=b"z,xx\n0,1\n").json()["errors"]
+    assert [each["field"] for each in wrong] == ["loads[0].xx.file"]
+
+
 def test_the_first_words_of_a_scene_stay_and_the_answer_says_so(service: Server, pin: str) -> None:
     first = post(service, PIN, pin_msh=MESH).json()
     assert first["note"] == ""

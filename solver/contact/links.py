@@ -1,0 +1,276 @@
+"""Links of a model as linear conditions between the unknowns of its parts.
+
+Each condition is ``C u + compliance F = 0`` with a force F of any sign, which acts on the parts by
+``C' F``. In a Newton step they are eliminated exactly, together with the rigid motions that they
+hold; what is left is a contact problem like any other, symmetric.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from solver.contact.geometry import pair
+from solver.contact.overlap import largest_overlap
+from solver.contact.problem import ContactProblem, ContactSolution
+from solver.contact.rows import ContactRows, joined
+from solver.errors import ModelError
+from solver.fem.rigid import RigidPart
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.fem.discretisation import Discretisation
+    from solver.fem.part import Part
+    from solver.fem.surface import Surface
+    from solver.model.link import Link, Side
+    from solver.model.model import Model
+
+    Array = NDArray[np.float64]
+
+_DEPENDENT = 1e-9
+"""Ratio of what is left of a condition without those before it to the condition; below it these
+hold its unknowns already."""
+_LITTLE = 1e-9
+"""Ratio of the area of a node to the largest; below it no spring acts there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Links:
+    """The conditions of all links.
+
+    Attributes
+    ----------
+    rows : for each part, the derivatives C (c, ...) on its unknowns; None if no link acts on it
+    compliance : (c,) of springs [mm/N], 0 where a link is rigid
+    whose : (c,) number of the link of each condition
+    """
+
+    rows: tuple[ContactRows | None, ...]
+    compliance: Array
+    whose: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        """Return the number of conditions."""
+        return len(self.compliance)
+
+    def off(self, u: Sequence[Array], forces: Array) -> Array:
+        """Return how far the conditions (c,) are not met by unknowns and forces [mm]."""
+        out = self.compliance * forces
+        for own, rows in zip(u, self.rows, strict=True):
+            if rows is not None:
+                out = out + rows.block @ own[rows.dofs]
+        return np.asarray(out)
+
+    def energy(self, forces: Array) -> float:
+        """Return the energy of the springs [N mm]."""
+        return float(self.compliance @ forces**2) / 2
+
+    def clamped(self, parts: Sequence[Part], time: float) -> tuple[float, float]:
+        """Return the force [N] and energy [N mm] of prescribed motions on linked nodes alone."""
+        moved, force, energy = np.zeros(len(self)), 0.0, 0.0
+        each = [(p, rows) for p, rows in zip(parts, self.rows, strict=True) if rows is not None]
+        for part, rows in each:
+            if part.driven.cases:
+                moved += rows.block @ part.driven.at(time)[rows.dofs]
+        for part, rows in each if moved.any() else ():
+            nodal, stiffness = np.abs(rows.block).T @ np.abs(moved), part.diagonal[rows.dofs]
+            force = float(np.hypot(force, np.linalg.norm(stiffness * nodal)))
+            energy += float(stiffness @ nodal**2) / 2
+        return force, energy
+
+    def on_part(self, part: int, forces: Array, size: int) -> Array:
+        """Return the forces (size,) that forces of the conditions (c,) exert on a part [N]."""
+        nodal, rows = np.zeros(size), self.rows[part]
+        if rows is not None:
+            nodal[rows.dofs] = forces @ rows.block
+        return nodal
+
+
+def eliminated(
+    problem: ContactProblem, links: int, *, apart: bool
+) -> tuple[ContactProblem, Callable[[ContactSolution], ContactSolution]]:
+    """Return the contact problem without its last conditions, and the way back to all unknowns.
+
+    Parameters
+    ----------
+    links : number of conditions, the last of ``offset``, ``W`` and ``A``; their force has any sign
+    apart : whether rigid motions that no link holds stay zero
+    """
+    m = len(problem.offset) - links
+    W, offset, A = problem.W, problem.offset, problem.A
+    size = np.abs(A[m:]).max(initial=0.0) or 1.0
+    _, sizes, ways = linalg.svd(A[m:] / size)
+    rank = int((sizes > _DEPENDENT).sum())
+    held, loose = ways[:rank].T, ways[rank:].T
+    if apart:
+        loose = loose[:, :0]
+    # of forces and motions, which differ in magnitude by the compliance
+    held = held * (np.abs(np.diag(W)[m:]).max() / size)
+    S = np.zeros((links + rank,) * 2)
+    S[:links, :links] = W[m:, m:]
+    S[:links, links:] = A[m:] @ held
+    S[links:, :links] = S[:links, links:].T
+    by_force = np.vstack([W[m:, :m], (A[:m] @ held).T])
+    alone = np.concatenate([offset[m:], held.T @ problem.balance])
+    inverse = np.linalg.solve(S, np.column_stack([by_force, alone]))
+    change = by_force.T @ inverse
+    rest = replace(
+        problem,
+        W=W[:m, :m] - (change[:, :m] + change[:, :m].T) / 2,
+        offset=offset[:m] - change[:, m],
+        A=A[:m] @ loose,
+        balance=loose.T @ problem.balance,
+    )
+
+    def whole(found: ContactSolution) -> ContactSolution:
+        own = -(inverse[:, :m] @ found.forces + inverse[:, m])
+        return replace(
+            found,
+            forces=np.concatenate([found.forces, own[:links]]),
+            rigid=held @ own[links:] + loose @ found.rigid,
+        )
+
+    return rest, whole
+
+
+def surfaces_of_links(
+    model: Model, wholes: Mapping[str, Discretisation | RigidPart]
+) -> dict[Side, Surface]:
+    """Return the surfaces of all links in the numbering of the whole bodies."""
+    return {
+        (name, boundary): wholes[name].chain(boundary, link.master is None)
+        for link in model.links
+        for name, boundary in link.sides
+    }
+
+
+def links_of(
+    model: Model, parts: Sequence[Part], names: Sequence[str], surfaces: Mapping[Side, Surface]
+) -> Links:
+    """Return the conditions of all links of a model.
+
+    Raises
+    ------
+    ModelError
+        where supports, motions or other links hold what a link should hold
+    """
+    pieces: list[list[ContactRows]] = [[] for _ in parts]
+    compliance, places, whose = [np.zeros(0)], [np.zeros((2, 0))], [np.zeros(0, dtype=int)]
+    each = [_conditions(f"links[{k}]", link, parts, names, surfaces)
+            for k, link in enumerate(model.links)]  # fmt: skip
+    ends = np.cumsum([0, *(len(own.compliance) for own in each)])
+    for k, own in enumerate(each):
+        for number, rows in own.rows:
+            block = np.zeros((ends[-1], rows.block.shape[1]))
+            block[ends[k] : ends[k + 1]] = rows.block
+            pieces[number].append(ContactRows(rows.dofs, block))
+        compliance.append(own.compliance)
+        places.append(own.X)
+        whose.append(np.full(len(own.compliance), k))
+    made = Links(
+        tuple(joined(own) for own in pieces), np.concatenate(compliance), np.concatenate(whose)
+    )
+    kept = _independent(made, parts, np.hstack(places))
+    cut = tuple(r and ContactRows(r.dofs, r.block[kept]) for r in made.rows)
+    return Links(cut, made.compliance[kept], made.whose[kept])
+
+
+@dataclass(frozen=True, slots=True)
+class _Conditions:
+    """The conditions of one link: rows by number of the part, compliance (c,), places X (2, c)."""
+
+    rows: list[tuple[int, ContactRows]]
+    compliance: Array
+    X: Array
+
+
+def _conditions(
+    name: str, link: Link, parts: Sequence[Part], names: Sequence[str],
+    surfaces: Mapping[Side, Surface],
+) -> _Conditions:  # fmt: skip
+    number, slave = names.index(link.slave[0]), surfaces[link.slave]
+    rows: list[tuple[int, ContactRows]] = []
+    if link.master is None:
+        areas = np.tile(slave.areas, len(link.axes))
+        nodes = np.tile(np.arange(len(slave.nodes)), len(link.axes))
+        axes = np.repeat(link.axes, len(slave.nodes))
+        block = np.eye(2 * len(slave.nodes))[2 * nodes + axes]
+        X = slave.X[:, nodes]
+    else:
+        bodies = [parts[names.index(of)].body for of, _ in link.sides]
+        at_rest = [np.zeros_like(surfaces[side].X) for side in link.sides]
+        master = surfaces[link.master]
+        pairing = pair(slave, at_rest[0], master, at_rest[1], largest_overlap(*bodies))
+        at = np.flatnonzero(pairing.area > 0)
+        if not len(at):
+            allowed = "these surfaces do not face each other: check boundaries and positions"
+            raise ModelError(name, link.sides, allowed)
+        areas = np.tile(pairing.area[at], 2)
+        block, others = (np.vstack([pairing.normal[k][at], pairing.tangent[k][at]]) for k in (0, 1))
+        X = np.tile(slave.X[:, slave.vertices[at]], 2)
+        other = names.index(link.master[0])
+        rows.append((other, ContactRows(parts[other].surface(master).dofs, others)))
+    if link.rigid is not None:
+        reference = names.index(link.rigid)
+        part = parts[reference]
+        assert isinstance(part, RigidPart)
+        motion = block @ part.linear(slave.X)
+        if link.distributed:
+            used = motion.any(axis=0)
+            weighted = motion[:, used].T * areas
+            block = np.linalg.solve(weighted @ motion[:, used], weighted) @ block
+            motion, X = np.eye(3)[used], np.tile(X.mean(axis=1, keepdims=True), int(used.sum()))
+            areas = np.full(len(block), np.inf)
+        rows.append((reference, ContactRows(np.arange(3), -motion)))
+    elif link.master is None and not link.grounded:  # the slave moves as one
+        first = np.repeat(np.arange(len(link.axes)) * len(slave.nodes), len(slave.nodes))
+        block = block - block[first]
+        others_ = np.arange(len(block)) != first
+        block, areas, X = block[others_], areas[others_], X[:, others_]
+    rows.append((number, ContactRows(parts[number].surface(slave).dofs, block)))
+    if np.isinf(link.stiffness):
+        return _Conditions(rows, np.zeros(len(areas)), X)
+    acts = areas > _LITTLE * areas.max()
+    rows = [(k, ContactRows(own.dofs, own.block[acts])) for k, own in rows]
+    return _Conditions(rows, 1 / (link.stiffness * areas[acts]), X[:, acts])
+
+
+def _independent(made: Links, parts: Sequence[Part], X: Array) -> NDArray[np.int64]:
+    """Return the conditions without those on unknowns that supports hold at rest.
+
+    Raises `ModelError` for a condition that supports, motions or other conditions hold already.
+    """
+    free, driven = [np.zeros((len(made), 0))], np.zeros(len(made), dtype=bool)
+    for part, rows in zip(parts, made.rows, strict=True):
+        if rows is None:
+            continue
+        loose = np.isin(rows.dofs, part.free)
+        free.append(rows.block[:, loose])
+        moves = np.isin(rows.dofs, np.flatnonzero(part.driven.fields.any(axis=1)))
+        driven |= rows.block[:, moves].any(axis=1)
+    G = np.hstack(free)
+    size = np.linalg.norm(G, axis=1)
+    held = (size == 0) & (made.compliance == 0)
+    kept = np.flatnonzero(~held)
+    rigid = kept[made.compliance[kept] == 0]
+    wrong = np.flatnonzero(held & driven)
+    if len(rigid):
+        R, order = linalg.qr((G[rigid] / size[rigid, None]).T, mode="r", pivoting=True)
+        left = np.zeros(len(rigid))
+        left[: min(R.shape)] = np.abs(np.diag(R))
+        wrong = np.append(wrong, rigid[order[left < _DEPENDENT]])
+    if len(wrong):
+        x, y = X[:, wrong[0]]
+        raise ModelError(
+            f"links[{made.whose[wrong[0]]}]", f"({x:g}, {y:g})",
+            "must not hold what supports, motions or other links hold already: shorten one of the "
+            "boundaries by an element, or leave a component out",
+        )  # fmt: skip
+    return kept
