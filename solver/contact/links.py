@@ -20,6 +20,7 @@ from solver.contact.problem import ContactProblem, ContactSolution
 from solver.contact.rows import ContactRows, joined
 from solver.errors import ModelError
 from solver.fem.rigid import RigidPart
+from solver.linear.solvers import Singular
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -119,7 +120,10 @@ def eliminated(
     S[links:, :links] = S[:links, links:].T
     by_force = np.vstack([W[m:, :m], (A[:m] @ held).T])
     alone = np.concatenate([offset[m:], held.T @ problem.balance])
-    inverse = np.linalg.solve(S, np.column_stack([by_force, alone]))
+    try:
+        inverse = np.linalg.solve(S, np.column_stack([by_force, alone]))
+    except np.linalg.LinAlgError as error:  # what is linked flows without stiffness
+        raise Singular("links cannot hold bodies without stiffness") from error
     change = by_force.T @ inverse
     rest = replace(
         problem,

@@ -19,12 +19,8 @@ YIELD, E = 300.0, 2e5
 
 
 def content(**repeat: Any) -> dict[str, Any]:
-    """Return the tables of the file, cycles as many as asked unless `until` is given.
-
-    Elements are twice as long as there: stress does not change along the wall.
-    """
+    """Return the tables of the file, cycles as many as asked unless `until` is given."""
     tables = tomllib.loads(FILE.read_text())
-    tables["bodies"]["wall"]["shape"]["x"][1] = {"at": 8, "parts": 8}
     del tables["repeat"]["until"]
     tables["repeat"] |= repeat
     return tables
@@ -54,7 +50,7 @@ def growth(steady: float, thermal: float) -> float:
 
 @pytest.mark.parametrize(
     ("steady", "below"),
-    [(0.4, ShakedownState.PLASTIC_SHAKEDOWN),
+    [(0.3, ShakedownState.PLASTIC_SHAKEDOWN), (0.5, ShakedownState.ELASTIC_SHAKEDOWN),
      (0.7, ShakedownState.ELASTIC_SHAKEDOWN), (0.9, ShakedownState.ELASTIC_SHAKEDOWN)],
 )  # fmt: skip
 def test_the_wall_ratchets_from_brees_boundary_on(steady: float, below: ShakedownState) -> None:
@@ -64,7 +60,7 @@ def test_the_wall_ratchets_from_brees_boundary_on(steady: float, below: Shakedow
     assert above.scalars["shakedown_state"] == ShakedownState.RATCHETTING
     assert abs(under.scalars["growth"]) < 1e-3 * YIELD / E
     for record in (under, above):
-        assert len(record.fields["cycle_net_increment"][1]) < 12
+        assert len(record.fields["cycle_net_increment"][1]) < 6
 
 
 def test_a_wall_that_never_yields_is_elastic_after_two_cycles() -> None:
@@ -76,11 +72,13 @@ def test_a_wall_that_never_yields_is_elastic_after_two_cycles() -> None:
 
 @pytest.mark.parametrize(("steady", "thermal"), [(0.7, 1.5), (0.8, 1.2)])
 def test_a_cycle_adds_the_strain_of_brees_closed_form(steady: float, thermal: float) -> None:
-    """The work of the steady stress on it is what the cycle dissipates, in every millimetre."""
-    record = computed(content(), times=12, steady=steady, thermal=thermal)
+    """Every point has it as plastic strain, in tension; increments take the mean of the stress."""
+    record = wall(steady=steady, thermal=thermal)
     found = record.scalars["growth"]
     assert found == pytest.approx(growth(steady, thermal), rel=0.02)
-    assert record.scalars["steady_net_increment"] > found
+    assert record.scalars["steady_net_increment"] == pytest.approx(found, rel=1e-3)
+    dissipated = record.fields["cycle_dissipation"][1][-1]
+    assert dissipated == pytest.approx(YIELD * found, rel=0.05)
 
 
 def test_after_cycles_that_end_early_the_loading_goes_on_as_after_all() -> None:
