@@ -33,6 +33,8 @@ class Stage:
     apart : whether the last increment separates the bodies
     turns : whether another motion begins: previous rates of gap and slip are then not used
     refined : whether `Program.refined` divides its increments
+    stops : times between, in order, at which an increment ends too, as where an amplitude bends.
+        ``steps`` are shared out between them, at least one each
     cycle : for a stage that is repeated, which time it is, from 1; 0 for another one. Its state is
         kept under its name, and that of the time before as ``NAME_before``
     """
@@ -44,6 +46,7 @@ class Stage:
     apart: bool = False
     turns: bool = False
     refined: bool = False
+    stops: tuple[float, ...] = ()
     cycle: int = 0
 
     def __post_init__(self) -> None:
@@ -56,6 +59,15 @@ class Stage:
 
     def times(self, start: float) -> list[float]:
         """Return the times at which its increments end."""
+        if self.stops:
+            ends = (start, *self.stops, self.target)
+            shares = [(end - begin) / (self.target - start) for begin, end in pairwise(ends)]
+            counts = [max(1, math.ceil(self.steps * share - ROUNDING)) for share in shares]
+            return [
+                begin + (end - begin) * k / count if k < count else end
+                for (begin, end), count in zip(pairwise(ends), counts, strict=True)
+                for k in range(1, count + 1)
+            ]
         if not self.step:
             way, steps = self.target - start, self.steps
             if self.target == 0.0:  # equal shares of the time at the start
@@ -107,7 +119,10 @@ class Lap:
         """Number of its increments."""
         starts = [self.start, *(stage.target for stage in self.stages[:-1])]
         pairs = zip(self.stages, starts, strict=True)
-        return sum(len(stage.times(now)) if stage.step else stage.steps for stage, now in pairs)
+        return sum(
+            len(stage.times(now)) if stage.step or stage.stops else stage.steps
+            for stage, now in pairs
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

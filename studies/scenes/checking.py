@@ -171,8 +171,12 @@ def _loads(scene: tables.SceneFile, files: set[str] | None) -> Iterator[StudyErr
     ]
     names = [stage.name for stage in scene.stages]
     for where, amplitude in amplitudes:
-        for stage in amplitude or {} if names else {}:
+        for stage, course in (amplitude or {}).items() if names else ():
             yield from _one_of(f"{where}.amplitude", stage, names)
+            file = getattr(course, "file", None)
+            if file is not None and files is not None and file not in files:
+                allowed = "there is no such file beside the scene"
+                yield StudyError(f"{where}.amplitude.{stage}.file", file, allowed)
 
 
 def _contacts(scene: tables.SceneFile) -> Iterator[StudyError]:

@@ -151,7 +151,7 @@ def _model(description: Description, parameters: Any) -> Model:
 
 
 def _program(description: Description, parameters: Any) -> Program:
-    return program_of(_tables(description, parameters))
+    return program_of(_tables(description, parameters), description.meshes)
 
 
 def _effort(description: Description, parameters: Any, values: Sequence[Any]) -> Effort:

@@ -123,8 +123,17 @@ Material = _material()
 # -- rigid bodies --------------------------------------------------------------------------------
 
 
-Amplitude = dict[Label, float]
-"""Stage -> load factor at its end; a stage left out keeps that of the one before."""
+class CourseTable(SceneTable):
+    """Load factors in a CSV file beside the scene: its columns ``time`` and ``column``."""
+
+    file: FileName
+    column: Label = "factor"
+
+
+Course = Annotated[tuple[tuple[float, float], ...], Field(min_length=1)]
+"""Times from the beginning of a stage, up to its end, and load factors; linear between them."""
+Amplitude = dict[Label, float | Course | CourseTable]
+"""Stage -> load factor at its end, or within it; one left out keeps that of the one before."""
 
 
 class MotionTable(SceneTable):
