@@ -133,8 +133,8 @@ def eliminated(
     alone = np.concatenate([offset[m:], held.T @ problem.balance])
     try:
         inverse = np.linalg.solve(S, np.column_stack([by_force, alone]))
-    except np.linalg.LinAlgError as error:  # at a limit load
-        raise Singular(str(error)) from error
+    except np.linalg.LinAlgError as error:  # what is linked flows without stiffness
+        raise Singular("links cannot hold bodies without stiffness") from error
     change = by_force.T @ inverse
     rest = replace(
         problem,

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from solver.fem.operators import PartOperators
     from solver.fem.part import Part
     from solver.fem.surface import Surface
+    from solver.materials.law import Law
     from solver.materials.state import Response
     from solver.model.friction import BoundLines
     from solver.model.link import Side
@@ -234,6 +235,11 @@ class System:
         return small
 
     @property
+    def laws(self) -> list[Law]:
+        """The material laws of the meshed bodies."""
+        return [body.material for body in self.model.bodies]
+
+    @property
     def n_unknowns(self) -> int:
         """Displacement unknowns of all parts."""
         return sum(len(part.free) for part in self.parts)
@@ -412,11 +418,14 @@ class System:
         return replace(state, contacts=tuple(contacts))
 
     def joined(self, state: State, time: float) -> State:
-        """Return a state with the pairs at rest that come in before a time."""
+        """Return a state with the pairs at rest that come in before a time.
+
+        These are pairs that were absent, or of bodies that were separated: their gap is not known.
+        """
         contacts = list(state.contacts)
         for k, interface in enumerate(self.interfaces):
-            pair = interface.declared
-            if pair.absent(state.time) and not pair.absent(time):
+            apart = not np.isfinite(contacts[k].gap).any()
+            if apart and not interface.declared.absent(time):
                 gap = interface.pairing(state.u, time, finite=contacts[k].finite).gap
                 touching, finite = gap <= self.touching, contacts[k].finite
                 contacts[k] = ContactState.at_rest(gap, touching, finite=finite, before=contacts[k])

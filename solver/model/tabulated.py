@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +14,7 @@ import numpy as np
 from solver.errors import ModelError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -23,7 +22,36 @@ if TYPE_CHECKING:
 
 _ROUNDED = 1e-9
 """Ratio of a distance to the size of the table; up to it a position outside counts as inside."""
-_WORDS = "must be numbers [mm] under a header of x, y or both"
+
+
+def columns_of(text: str, names: Sequence[str]) -> dict[str, Array]:
+    """Return columns (n,) of a CSV text whose header names them, and others perhaps.
+
+    Raises
+    ------
+    ModelError
+        if a column is absent, or an entry is no finite number
+    """
+    listed = ", ".join(names)
+    allowed = f"must be numbers under a header with {listed}"
+    try:
+        rows = [row for row in csv.reader(io.StringIO(text)) if any(map(str.strip, row))]
+    except csv.Error as error:
+        raise ModelError("table", str(error), allowed) from None
+    header = [name.strip() for name in rows[0]] if rows else []
+    if any(len(row) != len(header) for row in rows):
+        raise ModelError("table", "a line of another length", allowed)
+    if not set(names) <= set(header) or len(rows) < 2:
+        words = f"must have the columns {listed}, and numbers under them"
+        raise ModelError("table", ", ".join(header) or "nothing", words)
+    columns = dict(zip(header, zip(*rows[1:], strict=True), strict=True))
+    try:
+        found = {name: np.array(columns[name], dtype=float) for name in names}
+    except ValueError as error:
+        raise ModelError("table", str(error), allowed) from None
+    if not all(np.isfinite(each).all() for each in found.values()):
+        raise ModelError("table", "nan or inf", "must be finite")
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,21 +99,13 @@ class Tabulated:
         ModelError
             if a column is absent, or an entry is no number
         """
-        rows = [row for row in csv.reader(io.StringIO(text)) if any(map(str.strip, row))]
-        names = [name.strip() for name in rows[0]] if rows else []
-        if any(len(row) != len(names) for row in rows):
-            raise ModelError("table", "a line of another length", _WORDS)
-        columns: Mapping[str, list[str]] = dict(
-            zip(names, map(list, zip(*rows[1:], strict=True)), strict=bool(rows[1:]))
-        )
-        axes = [axis for axis in ("x", "y") if axis in columns]
-        if column not in columns or not axes or column in axes:
-            allowed = f"must have the columns x, y or both, and {column}"
-            raise ModelError("table", ", ".join(names) or "nothing", allowed)
-        try:
-            found = {name: np.array(columns[name], dtype=float) for name in (*axes, column)}
-        except ValueError as error:
-            raise ModelError("table", str(error), _WORDS) from None
+        first = text.lstrip().partition("\n")[0]
+        header = [name.strip(' \r"') for name in first.split(",")]
+        axes = [axis for axis in ("x", "y") if axis in header]
+        if not axes or column in axes:
+            listed = ", ".join(header) or "nothing"
+            raise ModelError("table", listed, f"must have the columns x, y or both, and {column}")
+        found = columns_of(text, (*axes, column))
         return cls(found.get("x"), found.get("y"), found[column])
 
     @classmethod

@@ -24,6 +24,7 @@ from studies.scenes.shape_tables import ArcTable, mesh_of
 from studies.scenes.table import TabulatedTable
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from skfem import Mesh
 
     from solver.materials.law import Law
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from solver.model.tabulated import Tabulated
 
 T = TypeVar("T")
+_MOTIONS = ("x", "y", "rotation")
 _NOT_OF_MODEL = (
     "name", "summary", "parameters.", "derived.", "stages", "loading", "results.", "outputs.",
     "singular", "allow", "accuracy", "checks", "advice",
@@ -161,7 +163,7 @@ class Builder:
         from solver.model.loads import Removal
 
         found: dict[str, Amplitude] = {}
-        for k, (stage, *_) in enumerate(self.scene.passages):
+        for k, (stage, _) in enumerate(self.scene.passages):
             for side in stage.remove:
                 found.setdefault(side, Amplitude(np.array([k, k + 1.0]), np.array([0.0, 1.0])))
         sides = {side: side.split(".") for side in found}
@@ -188,7 +190,7 @@ class Builder:
                 return None
             surfaces[each] = RigidSurface(points=chain)
         motions: dict[str, Moved | Pushed] = {}
-        for axis in ("x", "y", "rotation"):
+        for axis in _MOTIONS:
             motion: tables.MotionTable = getattr(table, axis)
             amplitude = self._amplitude(f"rigid.{name}.{axis}", motion.amplitude)
             if motion.pushed is not None:
@@ -243,7 +245,7 @@ class Builder:
         amplitude = self._amplitude(f"contacts[{k}]", table.amplitude)
         presence = None
         if table.active is not None and self.scene.passages:
-            there = [float(stage.name in table.active) for stage, *_ in self.scene.passages]
+            there = [float(stage.name in table.active) for stage, _ in self.scene.passages]
             presence = Amplitude(np.arange(1.0 + len(there)), np.array([*there[:1], *there]))
         return self.attempt(
             f"contacts[{k}]",
@@ -284,32 +286,89 @@ class Builder:
                 allowed = "needs stages: with loading all loads grow together"
                 self.mistakes.append(StudyError(f"{where}.amplitude", given, allowed))
             return None
-        values = [0.0]
-        for stage, *_ in passages:
+        times, values = [0.0], [0.0]
+        for k, (stage, _) in enumerate(passages):
             usual = 1.0 if given is None else values[-1]
-            values.append((given or {}).get(stage.name, 0.0 if stage.release else usual))
-        return Amplitude(np.arange(len(values), dtype=float), np.array(values))
+            factor = (given or {}).get(stage.name, 0.0 if stage.release else usual)
+            field = f"{where}.amplitude.{stage.name}"
+            found = self.attempt(field, partial(course_of, factor, values[-1], self.meshes))
+            for time, value in [(1.0, values[-1])] if found is None else found.tolist():
+                times.append(k + time)
+                values.append(value)
+        return Amplitude(np.array(times), np.array(values))
 
 
-def program_of(scene: tables.SceneFile) -> Program:
-    """Return the loading history."""
+def course_of(
+    given: float | tables.Course | tables.CourseTable,
+    before: float | None,
+    files: Mapping[str, MeshFile] | None,
+) -> NDArray[np.float64]:
+    """Return the share of a stage (0-1] and the load factor of each knot of a course (n, 2).
+
+    Parameters
+    ----------
+    before : load factor at the beginning of the stage; None if not known
+    files : files beside the scene; None if they are not at hand
+
+    Raises
+    ------
+    ModelError
+        for a table that is none, or that does not begin with the factor before
+    """
+    if isinstance(given, tables.CourseTable):
+        if files is None or given.file not in files:
+            return np.array([[1.0, before or 0.0]])  # reported already
+        course = files[given.file].columns("time", given.column)
+    else:
+        course = np.array([[1.0, given]] if isinstance(given, int | float) else given)
+    time, factor = course.T
+    if time[0] < 0 or not (np.diff(time) > 0).all() or not time[-1] > 0:
+        raise ModelError("time", time.tolist(), "must increase from 0 or later")
+    if time[0] == 0:
+        if before is not None and not math.isclose(factor[0], before, rel_tol=1e-9, abs_tol=1e-12):
+            allowed = f"must be {before:g}, with which the stage begins, or left out"
+            raise ModelError("factor", float(factor[0]), allowed)
+        course = course[1:]
+    return course / [time[-1], 1.0]
+
+
+def program_of(scene: tables.SceneFile, files: Mapping[str, MeshFile] | None = None) -> Program:
+    """Return the loading history; an increment ends where an amplitude bends."""
     loading = scene.loading
     if loading is not None:
         step = loading.step or loading.factor
         if loading.cycles is None:
             return load_and_release(loading.factor, step, loading.release_increments)
         return load_cycles(loading.factor, step, loading.release_increments, loading.cycles)
+    bends = _bends(scene, files)
     stages = tuple(
         Stage(
-            name=kept,
+            name=stage.name,
             target=float(k + 1),
             steps=stage.increments,
             apart=stage.release,
             turns=k > 0,
+            stops=tuple(k + share for share in bends.get(stage.name, ())),
+            cycle=cycle,
         )
-        for k, (stage, kept, _) in enumerate(scene.passages)
+        for k, (stage, cycle) in enumerate(scene.passages)
     )
     return Program(laps=(Lap(stages),), place=_place(scene.passages))
+
+
+def _bends(scene: tables.SceneFile, files: Mapping[str, MeshFile] | None) -> dict[str, list[float]]:
+    """Return for each stage the shares of it at which an amplitude bends, in order."""
+    motions = [getattr(body, axis) for body in scene.rigid.values() for axis in _MOTIONS]
+    found: dict[str, set[float]] = {}
+    for table in (*scene.loads, *scene.contacts, *motions):
+        for stage, given in (getattr(table, "amplitude", None) or {}).items():
+            if not isinstance(given, int | float):
+                try:
+                    course = course_of(given, None, files)
+                except ModelError:  # a mistake of the amplitude
+                    continue
+                found.setdefault(stage, set()).update(course[:-1, 0].round(12).tolist())
+    return {stage: sorted(shares) for stage, shares in found.items()}
 
 
 def _place(passages: list[tables.Passage]) -> Any:
@@ -317,7 +376,7 @@ def _place(passages: list[tables.Passage]) -> Any:
 
     def words(time: float) -> str:
         k = min(max(math.ceil(time - 1e-9) - 1, 0), len(passages) - 1)
-        stage, _, cycle = passages[k]
+        stage, cycle = passages[k]
         return f"{time - k:.4g} of stage {stage.name}" + (f" in cycle {cycle}" if cycle else "")
 
     return words

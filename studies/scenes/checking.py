@@ -171,8 +171,12 @@ def _loads(scene: tables.SceneFile, files: set[str] | None) -> Iterator[StudyErr
     ]
     names = [stage.name for stage in scene.stages]
     for where, amplitude in amplitudes:
-        for stage in amplitude or {} if names else {}:
+        for stage, course in (amplitude or {}).items() if names else ():
             yield from _one_of(f"{where}.amplitude", stage, names)
+            file = getattr(course, "file", None)
+            if file is not None and files is not None and file not in files:
+                allowed = "there is no such file beside the scene"
+                yield StudyError(f"{where}.amplitude.{stage}.file", file, allowed)
 
 
 def _contacts(scene: tables.SceneFile) -> Iterator[StudyError]:
@@ -209,6 +213,9 @@ def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:
         first = names.index(repeated[0])
         if names[first : first + len(repeated)] != repeated:
             allowed = f"must be stages one after the other, in their order: {', '.join(names)}"
+            yield StudyError("repeat.stages", repeated, allowed)
+        if all(stage.release for stage in scene.stages if stage.name in repeated):
+            allowed = "must hold a stage that loads the bodies: they are released once"
             yield StudyError("repeat.stages", repeated, allowed)
 
 

@@ -264,14 +264,21 @@ class Description:
 
 def file_names(content: Mapping[str, Any]) -> list[str]:
     """Return the names of the meshes of bodies and tables of loads, without paths to folders."""
-    bodies, loads = content.get("bodies"), content.get("loads")
+    bodies = content.get("bodies")
     each = bodies.values() if isinstance(bodies, Mapping) else ()
     found = [body.get("mesh") for body in each if isinstance(body, Mapping)]
-    for load in loads if isinstance(loads, list) else ():
-        entries = load.values() if isinstance(load, Mapping) else ()
-        found += [entry.get("file") for entry in entries if isinstance(entry, Mapping)]
+    found += _files([content.get(key) for key in ("loads", "contacts", "rigid")])
     plain = [name for name in found if isinstance(name, str) and FILE_NAME.fullmatch(name)]
     return list(dict.fromkeys(plain))
+
+
+def _files(tree: Any) -> Iterator[Any]:
+    """Yield the entries `file` of all tables in a part of the tree."""
+    if isinstance(tree, Mapping):
+        yield from [tree["file"]] if "file" in tree else []
+    each = tree.values() if isinstance(tree, Mapping) else tree
+    for entry in each if isinstance(each, Iterable) and not isinstance(each, str) else ():
+        yield from _files(entry)
 
 
 def _open(tables: Any) -> list[Mapping[str, Any]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -14,7 +13,7 @@ from solver.errors import ModelError
 from solver.memory import kept
 from solver.mesh.cells import facets_of, mesh_of_cells
 from solver.mesh.section_mesh import FOOT, RUNNING, SectionMesh
-from solver.model.tabulated import Tabulated
+from solver.model.tabulated import Tabulated, columns_of
 from studies.scenes.meshdata import MeshData
 from studies.scratch import scratch
 
@@ -70,6 +69,24 @@ class MeshFile:
             return self
         return replace(self, arrays=_read(self.name, self.data).packed())
 
+    def columns(self, *names: str) -> NDArray[np.float64]:
+        """Return columns (n, n_names) of a table of numbers.
+
+        Raises
+        ------
+        ModelError
+            if the file is no such table
+        """
+        return np.stack(list(columns_of(self._text(), names).values()), axis=1)
+
+    def _text(self) -> str:
+        if self.data.count(b"\n") > MOST_LINES:
+            raise ModelError("table", "too many lines", f"must have at most {MOST_LINES} lines")
+        try:
+            return self.data.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise ModelError("table", self.name, f"cannot be read: {error}") from None
+
     def table(self, column: str) -> Tabulated:
         """Return the table of values of a column.
 
@@ -78,12 +95,7 @@ class MeshFile:
         ModelError
             if the file is no such table
         """
-        if self.data.count(b"\n") > MOST_LINES:
-            raise ModelError("table", "too many lines", f"must have at most {MOST_LINES} lines")
-        try:
-            return Tabulated.of(self.data.decode("utf-8-sig"), column)
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise ModelError("table", self.name, f"cannot be read: {error}") from None
+        return Tabulated.of(self._text(), column)
 
     def mesh(self, part: str | None) -> Mesh:
         """Return the part of this name, or all cells, with named boundaries.

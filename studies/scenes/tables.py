@@ -124,8 +124,17 @@ Material = _material()
 # -- rigid bodies --------------------------------------------------------------------------------
 
 
-Amplitude = dict[Label, float]
-"""Stage -> load factor at its end; a stage left out keeps that of the one before."""
+class CourseTable(SceneTable):
+    """Load factors in a CSV file beside the scene: its columns ``time`` and ``column``."""
+
+    file: FileName
+    column: Label = "factor"
+
+
+Course = Annotated[tuple[tuple[float, float], ...], Field(min_length=1)]
+"""Times from the beginning of a stage, up to its end, and load factors; linear between them."""
+Amplitude = dict[Label, float | Course | CourseTable]
+"""Stage -> load factor at its end, or within it; one left out keeps that of the one before."""
 
 
 class MotionTable(SceneTable):
@@ -279,11 +288,12 @@ class RepeatTable(SceneTable):
     """Stages that follow one another, and how many times they are gone through.
 
     A state at the end of each is stored of the last time, and of the time before with the name
-    ``NAME_before``.
+    ``NAME_before``. With ``until`` they end when the shakedown state is decided, before that many.
     """
 
     stages: Annotated[tuple[Label, ...], Field(min_length=1)]
     times: Annotated[int, Interval(ge=2, le=1000)]
+    until: Literal["shaken_down"] | None = None
 
 
 class LoadingTable(SceneTable):
@@ -576,13 +586,10 @@ class SceneFile(SceneTable):
         found: list[Passage] = []
         for stage in self.stages:
             if stage.name not in repeated:
-                found.append(Passage(stage, stage.name))
+                found.append(Passage(stage))
             elif self.repeat and stage is group[0]:
-                for left in reversed(range(self.repeat.times)):
-                    ends = ("", "_before")[left] if left < 2 else None
-                    kept = ("" if ends is None else each.name + ends for each in group)
-                    cycle = self.repeat.times - left
-                    found += map(Passage, group, kept, [cycle] * len(group))
+                for cycle in range(1, self.repeat.times + 1):
+                    found += (Passage(each, cycle) for each in group)
         return found
 
     def end_of(self, stage: str) -> float:
@@ -593,8 +600,13 @@ class SceneFile(SceneTable):
     @property
     def stage_names(self) -> list[str]:
         """Names of the states at the ends of stages that are stored."""
-        kept = [each.kept for each in self.passages if each.kept]
-        return kept or ["loaded", "unloaded"]
+        group = list(self.repeat.stages) if self.repeat else []
+        found: list[str] = []
+        for stage in self.stages:
+            if group and stage.name == group[0]:
+                found += (f"{name}_before" for name in group)
+            found.append(stage.name)
+        return found or ["loaded", "unloaded"]
 
 
 class Passage(NamedTuple):
@@ -603,10 +615,8 @@ class Passage(NamedTuple):
     Attributes
     ----------
     stage : its table
-    kept : name of the state at its end; empty if it is not stored
     cycle : number of the time, from 1; 0 for a stage that is not repeated
     """
 
     stage: StageTable
-    kept: str
     cycle: int = 0

@@ -209,6 +209,7 @@ class NamedPlacesCheck:
             )
             values, X, s = _on_slave(found, kind), found.X, found.s
             share = self._share(found, kind)
+            values = values * found.depth if number.is_force else values
             if kind in ("pressure", "shear") and np.isnan(values[found.closed]).any():
                 return
             if (kind, number.take) == ("pressure", "extent"):
@@ -222,7 +223,7 @@ class NamedPlacesCheck:
             if number.minus:
                 values = values - self._values(number, number.minus, kind, part)[0]
             s = _lengths(X)
-        scale = self._scale(kind, values)
+        scale = self._scale(kind, values)  # of a force, force per length
         if not np.isfinite(values).any():
             return
         if number.take in ("maximum", "minimum"):

@@ -203,6 +203,14 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "loads[0].amplitude",
         "one of pressed",
     ),
+    "a release repeated alone": (
+        lambda content: content.update(
+            stages=[*content["stages"], {"name": "free", "release": True}],
+            repeat={"stages": ["free"], "times": 2},
+        ),
+        "repeat.stages",
+        "must hold a stage that loads the bodies",
+    ),
     "unknown region that is removed": (
         put("stages", 0, "remove", ["upper.skin"]),
         "stages[0].remove",
