@@ -21,6 +21,7 @@ from studies import Store, Study, open_netcdf
 from tests.architecture.sources import ROOT
 from tests.service.servers import (
     COARSE_PUNCH,
+    NOWHERE,
     PROGRAM,
     Server,
     environment,
@@ -245,8 +246,8 @@ def test_a_study_that_hangs_keeps_neither_a_stopped_nor_a_killed_service(mortal:
     assert mortal.client.delete(f"/studies/{study_id}").json()["status"] == "dismissed"
 
 
-def test_a_study_of_another_solver_fails_with_advice(mortal: Server, service: Server) -> None:
-    mortal.settings = service.settings
+def test_a_study_of_another_solver_fails_with_advice(mortal: Server) -> None:
+    mortal.settings = NOWHERE
     mortal.data.mkdir(parents=True)
     jobs = Jobs(mortal.data / "jobs.sqlite")
     study = {"name": "old", "scene": "fake", "parameters": {}, "sweep": {}}
