@@ -41,6 +41,10 @@ FIRST = (
             "studies/test_kill.py",
             "stability/test_scenes.py",
             "verification/test_rolling_elastic.py",
+            "studies/test_grid.py",
+            "verification/test_fretting.py",
+            "verification/test_wheel_rail.py",
+            "verification/test_prism_passes.py",
             "studies/test_run.py",
         )
     ),
