@@ -305,23 +305,14 @@ class Fitting(Chooser):
 
     def _go_on(self) -> None:
         """Begin anew with what is known, to the first run that lacks or to the end."""
-        from scipy.optimize import least_squares
-
         free = list(self.fit.free.values())
         first = np.array([each.share(each.first) for each in free]).round(_DIGITS)
         self.answer, self._wants = None, []
         try:
             self._ask([self._values(first), *(self._values(each) for each in self._stepped(first))])
-            found = least_squares(
-                self._differences, first, self._jacobian, bounds=(0.0, 1.0), x_scale=1.0,
-                ftol=_TOLERANCE, xtol=_TOLERANCE, gtol=1e-10, max_nfev=10 * self.fit.most,
-            )  # fmt: skip
-            values = self._values(found.x)
-            seen = self._all(values)
-            assert seen is not None
-            self.answer = Fitted(np.array(values), found.x.round(_DIGITS), seen, found.jac)
+            near = self._least(first, self._jacobian)
             with suppress(_Ends):  # no runs are left: differences to one side tell less well
-                self.answer = self.answer._replace(jacobian=self._central(found.x, found.jac))
+                self._least(near, self._central)
             self.reason = FOUND
         except _Lacking as lacking:
             self._wants = lacking.keys
@@ -329,6 +320,20 @@ class Fitting(Chooser):
             self.reason, self.message = (MOST, "") if not str(error) else (FAILED, str(error))
         if self.reason == MOST:
             self.message = f"needs more than {self.fit.most} runs: this is the best so far"
+
+    def _least(self, first: Numbers, jacobian: Callable[[Numbers], Numbers]) -> Numbers:
+        """Return the shares at which the sum of squares is least, from some on; take the answer."""
+        from scipy.optimize import least_squares
+
+        found = least_squares(
+            self._differences, first, jacobian, bounds=(0.0, 1.0), x_scale=1.0,
+            ftol=_TOLERANCE, xtol=_TOLERANCE, gtol=1e-10, max_nfev=10 * self.fit.most,
+        )  # fmt: skip
+        values = self._values(found.x)
+        seen = self._all(values)
+        assert seen is not None
+        self.answer = Fitted(np.array(values), found.x.round(_DIGITS), seen, found.jac)
+        return np.asarray(found.x)
 
     def _differences(self, shares: Numbers) -> Numbers:
         values = self._values(shares)
@@ -370,12 +375,15 @@ class Fitting(Chooser):
             self.answer = self.answer._replace(jacobian=found)
         return found
 
-    def _central(self, shares: Numbers, forward: Numbers) -> Numbers:
+    def _central(self, shares: Numbers) -> Numbers:
         """Return the Jacobian matrix of central differences, where there are runs on both sides.
 
-        What a change of the mesh makes turns its columns apart, and the parameters would seem to be
-        better known than they are: on twice the width it is half as much.
+        Differences to one side are those of a place half a step away. Where parameters are nearly
+        alike in what was measured, the sum of squares is not least where these say so, and what a
+        change of the mesh makes turns their columns apart: the parameters would seem to be better
+        known than they are.
         """
+        forward = self._jacobian(shares)
         here, steps = shares.round(_DIGITS), self._stepped(shares)
         others = [(2.0 * here - step).round(_DIGITS) for step in steps]
         inside = [bool(((each >= 0.0) & (each <= 1.0)).all()) for each in others]
