@@ -50,6 +50,8 @@ _DIGITS = 6
 """Digits of a share of the range: runs are asked for at these places."""
 _TOLERANCE = 1e-3
 """Least change of the sum of squares, as a share of it, and of the shares of the ranges."""
+_WIDEST = 0.2
+"""Widest difference to either side for the standard deviations, as a share of the range."""
 _CONDITION = 30.0
 """Condition index from which parameters cannot be told apart (reference, section 3.2)."""
 _SHARE = 0.5
@@ -305,14 +307,23 @@ class Fitting(Chooser):
 
     def _go_on(self) -> None:
         """Begin anew with what is known, to the first run that lacks or to the end."""
+        from scipy.optimize import least_squares
+
         free = list(self.fit.free.values())
         first = np.array([each.share(each.first) for each in free]).round(_DIGITS)
         self.answer, self._wants = None, []
         try:
             self._ask([self._values(first), *(self._values(each) for each in self._stepped(first))])
-            near = self._least(first, self._jacobian)
-            with suppress(_Ends):  # no runs are left: differences to one side tell less well
-                self._least(near, self._central)
+            found = least_squares(
+                self._differences, first, self._jacobian, bounds=(0.0, 1.0), x_scale=1.0,
+                ftol=_TOLERANCE, xtol=_TOLERANCE, gtol=1e-10, max_nfev=10 * self.fit.most,
+            )  # fmt: skip
+            values = self._values(found.x)
+            seen = self._all(values)
+            assert seen is not None
+            self.answer = Fitted(np.array(values), found.x.round(_DIGITS), seen, found.jac)
+            with suppress(_Ends):  # no runs are left: narrow differences tell less well
+                self.answer = self.answer._replace(jacobian=self._wide(self.answer))
             self.reason = FOUND
         except _Lacking as lacking:
             self._wants = lacking.keys
@@ -320,20 +331,6 @@ class Fitting(Chooser):
             self.reason, self.message = (MOST, "") if not str(error) else (FAILED, str(error))
         if self.reason == MOST:
             self.message = f"needs more than {self.fit.most} runs: this is the best so far"
-
-    def _least(self, first: Numbers, jacobian: Callable[[Numbers], Numbers]) -> Numbers:
-        """Return the shares at which the sum of squares is least, from some on; take the answer."""
-        from scipy.optimize import least_squares
-
-        found = least_squares(
-            self._differences, first, jacobian, bounds=(0.0, 1.0), x_scale=1.0,
-            ftol=_TOLERANCE, xtol=_TOLERANCE, gtol=1e-10, max_nfev=10 * self.fit.most,
-        )  # fmt: skip
-        values = self._values(found.x)
-        seen = self._all(values)
-        assert seen is not None
-        self.answer = Fitted(np.array(values), found.x.round(_DIGITS), seen, found.jac)
-        return np.asarray(found.x)
 
     def _differences(self, shares: Numbers) -> Numbers:
         values = self._values(shares)
@@ -375,25 +372,28 @@ class Fitting(Chooser):
             self.answer = self.answer._replace(jacobian=found)
         return found
 
-    def _central(self, shares: Numbers) -> Numbers:
-        """Return the Jacobian matrix of central differences, where there are runs on both sides.
+    def _wide(self, answer: Fitted) -> Numbers:
+        """Return the Jacobian matrix of central differences over what the parameters may be.
 
-        Differences to one side are those of a place half a step away. Where parameters are nearly
-        alike in what was measured, the sum of squares is not least where these say so, and what a
-        change of the mesh makes turns their columns apart: the parameters would seem to be better
-        known than they are.
+        That is two standard deviations to both sides. What a change of the mesh makes turns the
+        columns of narrow differences apart: parameters that are nearly alike in what was measured
+        would seem to be better known than they are. A column stays where runs fail, or at a bound.
         """
-        forward = self._jacobian(shares)
-        here, steps = shares.round(_DIGITS), self._stepped(shares)
-        others = [(2.0 * here - step).round(_DIGITS) for step in steps]
-        inside = [bool(((each >= 0.0) & (each <= 1.0)).all()) for each in others]
-        pairs = zip(others, inside, strict=True)
-        self._ask([self._values(each) for each, within in pairs if within])
-        found = forward.copy()
-        for k, (one, other) in enumerate(zip(steps, others, strict=True)):
-            ends = [self._all(self._values(each)) for each in (one, other) if inside[k]]
-            if len(ends) == 2 and ends[0] is not None and ends[1] is not None:
-                found[:, k] = (ends[0] - ends[1]) / (one[k] - other[k]) / self.fit.sigma
+        assert answer.jacobian is not None
+        here, found = answer.shares, answer.jacobian.copy()
+        sigma = np.sqrt(spread(self.fit, answer) * np.diag(np.linalg.pinv(found.T @ found)))
+        room = np.minimum(here, 1.0 - here)
+        widths = np.minimum(np.clip(2.0 * sigma, self.fit.step, _WIDEST), room).round(_DIGITS)
+        pairs = [
+            [(here + side * width * unit).round(_DIGITS) for side in (1.0, -1.0)]
+            for width, unit in zip(widths, np.eye(len(here)), strict=True)
+        ]
+        wide = [k for k, width in enumerate(widths) if width >= self.fit.step / 2.0]
+        self._ask([self._values(each) for k in wide for each in pairs[k]])
+        for k in wide:
+            ends = [self._all(self._values(each)) for each in pairs[k]]
+            if ends[0] is not None and ends[1] is not None:
+                found[:, k] = (ends[0] - ends[1]) / (2.0 * widths[k]) / self.fit.sigma
         return found
 
     def _stepped(self, shares: Numbers) -> list[Numbers]:
@@ -484,17 +484,21 @@ def certainty(fit: Fit, answer: Fitted) -> Certainty:
                 apart = [names[used[k]] for k in np.flatnonzero(share > _SHARE)]
                 if len(apart) > 1:
                     warnings.append(f"{_listed(apart)} cannot be told apart by what was measured")
-    spread = 1.0
-    freedom = len(fit.values) - count
-    if not fit.told and freedom > 0:
-        spread = float(np.sum(((answer.seen - fit.values) / fit.sigma) ** 2)) / freedom
-    covariance = spread * inverse * np.outer(slopes, slopes)
+    covariance = spread(fit, answer) * inverse * np.outer(slopes, slopes)
     sigma = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sigma, sigma)
     text = "; ".join(dict.fromkeys(warnings))
     if text and math.isfinite(condition):
         text += f": the condition of the Jacobian matrix is {condition:.3g}"
     return Certainty(covariance, correlation, condition, text)
+
+
+def spread(fit: Fit, answer: Fitted) -> float:
+    """Return the variance of the differences over sigma if some were not given; else 1."""
+    freedom = len(fit.values) - len(fit.free)
+    if fit.told or freedom <= 0:
+        return 1.0
+    return float(np.sum(((answer.seen - fit.values) / fit.sigma) ** 2)) / freedom
 
 
 def _listed(names: list[str]) -> str:
