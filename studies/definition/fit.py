@@ -10,9 +10,7 @@ References
 ----------
 Branch, M. A., Coleman, T. F. and Li, Y. (1999), A subspace, interior, and conjugate gradient method
 for large-scale bound-constrained minimization problems, SIAM J. Sci. Comput. 21: the method of
-`scipy.optimize.least_squares`. Belsley, D. A., Kuh, E. and Welsch, R. E. (1980), Regression
-Diagnostics, section 3.2: condition indices, and the shares of variances by which parameters are
-found that cannot be told apart.
+`scipy.optimize.least_squares`.
 """
 
 from __future__ import annotations
@@ -52,12 +50,6 @@ _TOLERANCE = 1e-3
 """Least change of the sum of squares, as a share of it, and of the shares of the ranges."""
 _WIDEST = 0.2
 """Widest difference to either side for the standard deviations, as a share of the range."""
-_CONDITION = 30.0
-"""Condition index from which parameters cannot be told apart (reference, section 3.2)."""
-_SHARE = 0.5
-"""Share of the variance of a parameter that a direction makes if the parameter is in it."""
-_WEAK = 1e-6
-"""Least length of a column of the Jacobian matrix over that of the longest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,10 +112,12 @@ class Fit:
         """Their standard deviations."""
         return np.concatenate([each.sigma for each in self.measured])
 
-    @property
-    def told(self) -> bool:
-        """Whether all standard deviations were given."""
-        return all(each.told for each in self.measured)
+    def spread(self, seen: Numbers) -> float:
+        """Return the variance of differences over sigma if some sigma were not given; else 1."""
+        freedom = len(self.values) - len(self.free)
+        if freedom <= 0 or all(each.told for each in self.measured):
+            return 1.0
+        return float(np.sum(((seen - self.values) / self.sigma) ** 2)) / freedom
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -381,7 +375,7 @@ class Fitting(Chooser):
         """
         assert answer.jacobian is not None
         here, found = answer.shares, answer.jacobian.copy()
-        sigma = np.sqrt(spread(self.fit, answer) * np.diag(np.linalg.pinv(found.T @ found)))
+        sigma = np.sqrt(self.fit.spread(answer.seen) * np.diag(np.linalg.pinv(found.T @ found)))
         room = np.minimum(here, 1.0 - here)
         widths = np.minimum(np.clip(2.0 * sigma, self.fit.step, _WIDEST), room).round(_DIGITS)
         pairs = [
@@ -436,73 +430,6 @@ class Fitting(Chooser):
 
     def _over_sigma(self, seen: Numbers) -> Numbers:
         return (seen - self.fit.values) / self.fit.sigma
-
-
-class Certainty(NamedTuple):
-    """How well parameters are known.
-
-    Attributes
-    ----------
-    covariance : (n, n) of the values; NaN where the lines say nothing
-    correlation : (n, n)
-    condition : of the Jacobian matrix with columns of length 1
-    warning : which parameters cannot be told apart, or change nothing; empty if there are none
-    """
-
-    covariance: Numbers
-    correlation: Numbers
-    condition: float
-    warning: str
-
-
-def certainty(fit: Fit, answer: Fitted) -> Certainty:
-    """Return how well the parameters of an answer with a Jacobian matrix are known.
-
-    Where not all standard deviations were given, they are scaled so that the differences have them.
-    """
-    assert answer.jacobian is not None
-    names, slopes = list(fit.free), [
-        each.slope(value) for each, value in zip(fit.free.values(), answer.values, strict=True)
-    ]  # fmt: skip
-    lengths = np.linalg.norm(answer.jacobian, axis=0)
-    idle = lengths <= _WEAK * max(lengths.max(initial=0.0), 1e-300)
-    count = len(names)
-    inverse = np.full((count, count), np.nan)
-    warnings = [f"{names[k]} changes nothing in what was measured" for k in np.flatnonzero(idle)]
-    condition = math.inf
-    if (used := np.flatnonzero(~idle)).size:
-        unit = answer.jacobian[:, used] / lengths[used]
-        _, sizes, rows = np.linalg.svd(unit, full_matrices=False)
-        sizes = np.maximum(sizes, 1e-15 * sizes[0])
-        own = (rows.T / sizes**2) @ rows / np.outer(lengths[used], lengths[used])
-        inverse[np.ix_(used, used)] = own
-        condition = math.inf if idle.any() else float(sizes[0] / sizes[-1])
-        shares = rows**2 / sizes[:, None] ** 2
-        shares /= shares.sum(axis=0)
-        for size, share in zip(sizes, shares, strict=True):
-            if sizes[0] / size >= _CONDITION:
-                apart = [names[used[k]] for k in np.flatnonzero(share > _SHARE)]
-                if len(apart) > 1:
-                    warnings.append(f"{_listed(apart)} cannot be told apart by what was measured")
-    covariance = spread(fit, answer) * inverse * np.outer(slopes, slopes)
-    sigma = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.outer(sigma, sigma)
-    text = "; ".join(dict.fromkeys(warnings))
-    if text and math.isfinite(condition):
-        text += f": the condition of the Jacobian matrix is {condition:.3g}"
-    return Certainty(covariance, correlation, condition, text)
-
-
-def spread(fit: Fit, answer: Fitted) -> float:
-    """Return the variance of the differences over sigma if some were not given; else 1."""
-    freedom = len(fit.values) - len(fit.free)
-    if fit.told or freedom <= 0:
-        return 1.0
-    return float(np.sum(((answer.seen - fit.values) / fit.sigma) ** 2)) / freedom
-
-
-def _listed(names: list[str]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _position(sets: Mapping[str, Any]) -> str:
