@@ -109,13 +109,10 @@ def slurm(options: argparse.Namespace) -> int:
     """Write a script for sbatch, which computes a study on a cluster."""
     from residua.slurm import script
     from studies.definition.study import Study
-    from studies.execution.part import check_parts
     from studies.storage.store import Store
 
     store = Store(options.out)
     study = Study.from_toml(options.study, (), store.definition, store.scene)
-    if not options.with_scheduler:
-        check_parts(study)
     text = script(
         study.name, options.study, options.out, options.script,
         tasks=options.tasks, time=options.time, memory=options.memory,

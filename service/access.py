@@ -30,7 +30,7 @@ NEEDED = [
         (r"POST /ui/sign-(in|out)", None),
         (r"(GET|HEAD|OPTIONS) .*", Scope.READ),
         (r"POST /(scenes|studies|studies/[^/?]+/retry|estimate)/?", Scope.SUBMIT),
-        (r"POST /ui/(new|studies/[^/?]+/(retry|stop))", Scope.SUBMIT),
+        (r"POST /ui/(new|scenes|studies/[^/?]+/(retry|stop))", Scope.SUBMIT),
         (r"DELETE /studies/[^/?]+/?", Scope.SUBMIT),
         (r".*", Scope.ADMIN),
     )
@@ -170,7 +170,7 @@ def check_content(request: Request) -> None:
     """Refuse a body without the content type JSON, or, for a scene, a form with files."""
     headers = request.headers
     path = request.scope["path"].removeprefix(request.scope.get("root_path", ""))
-    if path.rstrip("/") == "/scenes":
+    if path.rstrip("/") in ("/scenes", "/ui/scenes"):
         wanted, form = FORM, "multipart/form-data"
     elif is_page(request):
         wanted, form = FIELDS, "application/x-www-form-urlencoded"

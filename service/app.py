@@ -134,7 +134,7 @@ def assembled(settings: Settings, store: Store, jobs: Jobs, held: int | None) ->
     for name, part in parts.items():
         setattr(app.state, name, part)
     # Each is outside of the previous ones, so that refused requests are measured and logged too.
-    longest = {"/scenes": settings.max_scene_bytes}
+    longest = dict.fromkeys(("/scenes", "/ui/scenes"), settings.max_scene_bytes)
     app.add_middleware(body_limit, limit=settings.max_body_bytes, longest=longest)
     app.add_middleware(Gate, settings=settings, keys=keys, only_shows=held is None)
     app.add_middleware(head_is_get)

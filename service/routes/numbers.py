@@ -22,7 +22,7 @@ from service.dependencies import ThePictures, TheRun, TheStore, TheTables
 from service.errors import CONTENT, REFUSED
 from service.files import TAGS, UNCHANGED
 from service.octets import MEDIA_TYPE, octets
-from service.schemas import AuditFigure, ContentId, TableFilter
+from service.schemas import AuditFigure, ContentId, NumbersFilter, TableFilter
 from service.table import OUTCOMES, RUN, STATUS, RunTable, varied
 from service.written import FORMS, MISSING
 from studies import StudyError
@@ -90,26 +90,29 @@ def _table(ending: str, found: RunTable, which: TableFilter) -> Response:
 
 @router.get("/studies/{study_id}/numbers", tags=["studies"], responses={**OCTETS, **REFUSED})
 def numbers(
-    study_id: ContentId,
-    name: Annotated[list[str], Query(min_length=1, max_length=100)],
-    tables: TheTables,
+    study_id: ContentId, which: Annotated[NumbersFilter, Query()], tables: TheTables
 ) -> Response:
     """Return columns of the table as octets, in the order of the sweep; NaN is no value.
 
     The first line is JSON: `arrays` lists name, type and shape of the arrays that follow, in which
-    numbers are little endian. A `status` is a number, whose word is in `statuses`.
+    numbers are little endian. A text is a number, whose word is in `words`. Beside `name`, every
+    column is a query, as of the table; `at` has the positions of the runs that meet them.
     """
     found = tables.get(study_id)
-    arrays = {}
-    for each in dict.fromkeys(name):
+    at = found.chosen("", which.conditions)
+    arrays, words = {"at": at}, {}
+    for each in dict.fromkeys(which.name):
         column = found.column(each, "name")
-        if each == STATUS:
-            arrays[each] = np.array([OUTCOMES.index(word) for word in column.values])
-        elif column.number:
-            arrays[each] = column.values
+        if column.number:
+            arrays[each] = column.values[at]
+        elif column.group == "sweep" or each == STATUS:
+            known = OUTCOMES if each == STATUS else dict.fromkeys(column.values.tolist())
+            words[each] = [*known]
+            number = {word: code for code, word in enumerate(words[each])}
+            arrays[each] = np.array([number[word] for word in column.values[at]])
         else:
-            raise StudyError("name", each, "must be a column of numbers, or status")
-    return Response(octets({"statuses": OUTCOMES}, arrays), media_type=MEDIA_TYPE)
+            raise StudyError("name", each, "must be a column of numbers, of the sweep, or status")
+    return Response(octets({"words": words}, arrays), media_type=MEDIA_TYPE)
 
 
 @router.get("/studies/{study_id}/audit", tags=["studies"])

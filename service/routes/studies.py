@@ -68,8 +68,6 @@ MOST_FITTED = 1000
 """Largest number of runs to which a request may fit polynomials, which takes seconds."""
 
 SUBMISSION = Study.model_json_schema() | {"examples": [EXAMPLE]}
-for _name in ("refine", "fit"):  # refused here
-    del SUBMISSION["properties"][_name]
 SUBMISSION["properties"]["priority"] = {
     "type": "integer",
     "minimum": PRIORITIES[0],
@@ -240,6 +238,29 @@ def _indices(job: Job, datasets: Datasets, of: str) -> dict[str, Any]:
             allowed = f"at most {MOST_FITTED} are fitted here: fetch the data set, and fit it there"
             raise StudyError("runs", size, allowed)
         return told(sensitivity(runs, of))
+
+
+@router.get("/{study_id}/fit", responses=REFUSED)
+async def tell_fit(
+    job: TheJob, jobs: TheJobs, datasets: TheDatasets, pictures: ThePictures
+) -> dict[str, Any]:
+    """Tell what a fit has found: of `parameters` each has its `value`, `sigma` and bounds.
+
+    `message` warns, such as of parameters that cannot be told apart. The lines over which it was
+    fitted are in the data set.
+    """
+    return await pictures.alone(_fitted, job, jobs, datasets)
+
+
+def _fitted(job: Job, jobs: Jobs, datasets: Datasets) -> dict[str, Any]:
+    """Return what `tell_fit` tells."""
+    from studies import open_netcdf  # xarray takes half a second to import
+    from studies.views.fits import told
+
+    if not jobs.study(job.id).get("fit"):
+        raise StudyError("fit", job.name, "is a study without a fit: submit one with an entry fit")
+    with open_netcdf(datasets.ended(job)) as found:
+        return told(found)
 
 
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)

@@ -208,9 +208,23 @@ def test_numbers_are_sent_without_loss(seen: Seen) -> None:
     )
     assert {*order} == {*number.dims}
     assert np.array_equal(found["peak_residual_tension"], number.to_numpy().ravel())
-    assert {head["statuses"][int(code)] for code in found["status"]} == {"ok"}
+    assert {head["words"]["status"][int(code)] for code in found["status"]} == {"ok"}
     assert {*found["friction"]} == {0.0, 0.2, 0.4}
     assert seen.client.get(f"{seen.study}/numbers", params={"name": "run"}).status_code == 422
+
+
+def test_only_the_runs_that_meet_conditions_are_sent_and_texts_as_numbers(seen: Seen) -> None:
+    asked = {"name": ["friction", "hardening"], "friction": "0.1..0.3", "hardening": "isotropic"}
+    answer = seen.client.get(f"{seen.study}/numbers", params=asked)
+    head, found = arrays(answer.content)
+    lines = seen.lines()
+    places = [lines[int(at)] for at in found["at"]]
+    met = [each for each in lines if each["friction"] == "0.2" and each["hardening"] == "isotropic"]
+    assert places == met and len(met) == 2
+    assert [head["words"]["hardening"][int(code)] for code in found["hardening"]] == [
+        "isotropic"
+    ] * 2
+    assert {*found["friction"]} == {0.2}
 
 
 def test_the_values_of_a_run_are_those_of_its_file(seen: Seen) -> None:
