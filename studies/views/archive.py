@@ -21,12 +21,12 @@ from studies.storage.dataset import attributes_of
 from studies.views.audited import worst
 from studies.views.columns import value_text
 from studies.views.figures import FIGURES, group_of
-from studies.views.picking import one_run, sweep_axes
+from studies.views.picking import one_run, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import line_fields, map_fields, sweep_fields, usual_field
 from studies.views.plots.lines import line_figure
 from studies.views.plots.maps import map_figure
 from studies.views.plots.sweep import sweep_figure
-from studies.views.summary import placed
+from studies.views.summary import placed, values_text
 from studies.views.tables import FOOTNOTE, messages, run_cells
 
 LISTED = 500
@@ -34,6 +34,9 @@ LISTED = 500
 
 DRAWN = 4
 """Largest number of numbers that are drawn over the sweep."""
+
+SPELT = 12
+"""Largest number of values of an axis that are all named."""
 
 COLUMNS = 9
 """Largest number of columns of a part of the table that fit a page, beside those of the place."""
@@ -68,7 +71,7 @@ def archive(dataset: xr.Dataset) -> str:
         note=attrs.get("note", ""),
         counts=dict(zip(words.tolist(), count.tolist(), strict=True)),
         summary=_summary(str(attrs["scene"]), dataset["status"].size),
-        axes=[_axis(dataset, name) for name in axes],
+        axes=[_axis(dataset, name) for name in _varied(dataset)],
         parameters=_fixed(dataset),
         figures=[*_figures(dataset, axes)],
         table=table._replace(rows=table.rows[:LISTED]),
@@ -101,6 +104,13 @@ def _summary(scene: str, size: int) -> str:
     return f"{runs}. {about[:1].upper()}{about[1:]}."
 
 
+def _varied(dataset: xr.Dataset) -> list[str]:
+    """Return the coordinates that differ between runs, without the numbers of points."""
+    names = {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
+    numbered = {axis for name, axis in names.items() if name != axis}
+    return [n for n in names if n not in numbered or dataset[n].dtype.kind not in "iuf"]
+
+
 def _axis(dataset: xr.Dataset, name: str) -> dict[str, str]:
     """Return name, meaning, unit and values of an axis."""
     values = dataset[name]
@@ -108,7 +118,7 @@ def _axis(dataset: xr.Dataset, name: str) -> dict[str, str]:
         "name": name,
         "words": str(values.attrs.get("long_name", "")),
         "unit": _unit(values.attrs),
-        "text": ", ".join(value_text(each) for each in values.to_numpy().tolist()),
+        "text": values_text(values.to_numpy().tolist(), most=SPELT),
     }
 
 

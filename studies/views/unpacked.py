@@ -90,7 +90,10 @@ class Unpacked(Store):
         axes = dataset["status"].dims
         at = np.unravel_index(self.run_ids[run_id], dataset["status"].shape)
         place = dict(zip(axes, map(int, at), strict=True))
-        over = [name for name, each in dataset.data_vars.items() if {*axes} <= {*each.dims}]
+        over = [  # a run has no texts beside its outcome; those of a search are ids of others
+            name for name, each in dataset.data_vars.items()
+            if {*axes} <= {*each.dims} and (each.dtype.kind in "fiub" or name in _TEXTS)
+        ]  # fmt: skip
         run = own_grid(dataset[over].isel(place).load()).drop_encoding()
         run = run.drop_vars(
             [n for n, each in run.coords.items() if not each.dims and n not in axes]
@@ -107,15 +110,18 @@ class Unpacked(Store):
     def _rows(self, dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
         """Yield the rows of all runs for the catalogue."""
         axes, shape = dataset["status"].dims, dataset["status"].shape
-        values = {n: v.to_numpy() for n, v in dataset.data_vars.items() if v.dims == axes}
+        over = {str(n): each for n, each in dataset.data_vars.items() if each.dims == axes}
+        numbers = {n: each.to_numpy() for n, each in over.items() if each.dtype.kind in "fiub"}
+        texts = {name: over[name].to_numpy() for name in _TEXTS}
         for run_id, at in zip(self.run_ids, np.ndindex(shape), strict=True):
-            own = {str(name): each[at] for name, each in values.items()}
             place = dict(zip(axes, at, strict=True))
             attributes = {**dataset.attrs, "id": run_id}
             attributes["parameters"] = json.dumps(self._parameters(place))
-            numbers = {name: _plain(each) for name, each in own.items() if name not in _TEXTS}
-            texts = {name: str(own[name]) for name in _TEXTS}
-            yield layout.summary(attributes, numbers | texts) | {"scalars": numbers}
+            told = {name: str(each[at]) for name, each in texts.items()}
+            scalars = {name: _plain(each[at]) for name, each in numbers.items()}
+            yield layout.summary(attributes, told) | {
+                "scalars": scalars, "cpu_seconds": scalars.get("cpu_seconds"),
+            }  # fmt: skip
 
     def _parameters(self, place: dict[Any, int]) -> dict[str, Any]:
         """Return the parameters of a run: those of the study, and those of its place."""
