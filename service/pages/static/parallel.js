@@ -32,6 +32,7 @@ async function draw() {
     return { run, there, paint: there ? paint : "off", shares: axes.map((axis) => axis.share(raw(run, axis))) };
   });
   canvas.setAttribute("aria-label", `${lines.length} runs as lines over ${axes.map(({ name }) => words(name)).join(", ")}`);
+  section.classList.add("drawn");
   paint();
 }
 
