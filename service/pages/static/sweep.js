@@ -58,7 +58,7 @@ function held(x, y) {
   });
 }
 
-export async function drawSweep() {
+async function drawSweep() {
   const what = number(), possible = kinds();
   if (!what || !possible.length) {
     document.querySelector(".study .sweep").classList.add("bare");
@@ -308,3 +308,4 @@ chart.addEventListener("keydown", (event) => {
 const redraw = () => drawSweep().catch((error) => fail(chart, error.message));
 for (const what of ["number", "chosen", "runs"]) on(what, redraw);
 on("filter", () => kindNow(kinds()) === "marks" && redraw());
+redraw();
