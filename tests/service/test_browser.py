@@ -81,27 +81,35 @@ def cell(page: Any, x: float, y: float) -> tuple[float, float]:
 
 
 def test_no_page_has_a_serious_barrier_or_is_wider_than_a_phone(
-    context: Any, service: Server, study: str
+    context: Any, open_study_page: Any, service: Server, study: str
 ) -> None:
     both = runs(service, study)[:2]
     waited = {
         "/ui": "table.list",
-        f"/ui/studies/{study}": DRAWN.format("map"),
         f"/ui/runs/{both[0]}": DRAWN.format("map"),
         f"/ui/compare?run={both[0]}&run={both[1]}": DRAWN.format("difference"),
         "/ui/new?scene=punch": "[data-estimate] dd",
         "/ui/health": ".tiles",
         "/ui/sign-in": "form.stack",
     }
+    open_study_page.wait_for_selector(DRAWN.format("map"))
+    see(open_study_page, dark=True)
+    open_study_page.set_viewport_size({"width": 1280, "height": 900})
+    open_study_page.emulate_media(color_scheme="light")
     for path, there in waited.items():
         with opened(context, base(service) + path) as page:
             page.wait_for_selector(there)
-            assert not barriers(page), path
-            if "/studies/" in path or "new" in path:  # the others have the same colours
-                page.emulate_media(color_scheme="dark")
-                assert not barriers(page, "color-contrast"), path
-            page.set_viewport_size({"width": 390, "height": 844})
-            assert page.evaluate("document.documentElement.scrollWidth") == 390, path
+            see(page, dark="new" in path)  # the others have the same colours
+
+
+def see(page: Any, *, dark: bool) -> None:
+    """Look for barriers, also in the dark, and at the width of a phone."""
+    assert not barriers(page), page.url
+    if dark:
+        page.emulate_media(color_scheme="dark")
+        assert not barriers(page, "color-contrast"), page.url
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert page.evaluate("document.documentElement.scrollWidth") == 390, page.url
 
 
 def test_values_under_the_pointer_and_of_a_clicked_run_are_those_of_the_data_set(
