@@ -132,6 +132,7 @@ async def study_page(
 
 def _study(request: Request, study: Mapping[str, Any], tables: Tables) -> Response:
     table = tables.get(study["id"])
+    scene = scene_of_study(tables.store, study["scene"])
     query = dict(request.query_params)
     numbers = [each.name for each in chosen.usual(table)]
     number = query.get("number", "")
@@ -157,6 +158,7 @@ def _study(request: Request, study: Mapping[str, Any], tables: Tables) -> Respon
         request,
         "study",
         study=study,
+        scene_name=scene.name if scene else study["scene"],
         table=table,
         part=part,
         cell=_cell,
