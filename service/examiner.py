@@ -32,7 +32,7 @@ class Examined:
     Attributes
     ----------
     study : the checked study
-    runs : ids of its runs in the order of its cases; of a study with a goal they are not known
+    runs : ids of its runs in the order of its cases; one that chooses them has none yet
     estimate : its estimated cost
     """
 
@@ -97,10 +97,6 @@ def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examin
     """Return a checked study with its run ids and its cost; called in a separate process."""
     store = Store(directory)
     study = Study.known(content, partial(_posted, store), store.definition)
-    if study.asks and not study.goal:
-        field, what = ("refine", "refined") if study.refine else ("fit", "fitted")
-        allowed = f"is {what} by `residua run`, not by a service: submit the runs themselves"
-        raise StudyError(field, getattr(study, field), allowed)
     bounds.check_size(study)
     runs = list(study.checked().run_ids())
     cost = estimate(study, store)

@@ -44,7 +44,7 @@ from service.pages.run import audited, numbers_shown, parameters_shown
 from service.routes.health import health
 from service.routes.scenes import post_scene
 from service.schemas import ContentId, StudyFilter, Window
-from service.table import MESSAGE, RUN, STATUS, Tables, scene_of_study
+from service.table import MESSAGE, RUN, STATUS, Tables, scene_of_study, varied
 from solver.errors import ModelError
 from solver.scenes import Scene
 from studies import Store, StudyError
@@ -151,7 +151,7 @@ def _study(request: Request, study: Mapping[str, Any], tables: Tables) -> Respon
             "id": table.columns[RUN].values[at],
             "status": table.columns[STATUS].values[at],
             "message": table.columns[MESSAGE].values[at],
-            "at": [(each, _cell(each, at)) for each in chosen.varied(table)],
+            "at": [(each, _cell(each, at)) for each in varied(table)],
         }
     csv = urlencode({**part.where, **({"sort": part.sort} if part.sort else {})})
     return page(

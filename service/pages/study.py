@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from service.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, group_of
+from service.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, group_of, varied
 from studies.definition.vocabulary import OK
 from studies.views.figures import FIGURES
 
@@ -41,13 +41,6 @@ class TablePart:
     pages: int
     sort: str
     where: Mapping[str, str]
-
-
-def varied(table: RunTable) -> list[Column]:
-    """Return the columns of the sweep that are not the same in all runs."""
-    sweep = [each for each in table.columns.values() if each.group == "sweep"]
-    several = [each for each in sweep if len(set(each.values.tolist())) > 1]
-    return several or sweep
 
 
 def usual(table: RunTable) -> list[Column]:

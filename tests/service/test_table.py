@@ -24,6 +24,7 @@ from service.pages.form import as_toml, study_of
 from service.pages.run import audited
 from service.settings import Settings
 from service.table import RunTable, _column
+from service.written import FORMS
 from studies import Store, open_netcdf, open_study
 from studies.definition.identity import content_id
 from tests.studies.conftest import compute_here, fake_study
@@ -97,6 +98,49 @@ def test_a_table_is_filtered_and_sorted(seen: Seen) -> None:
     assert list(first) == ["run", "load_ratio"] and first["load_ratio"] == "0.3"
     (header, *_) = seen.client.get(f"{seen.study}/table.csv?columns=run,run").text.splitlines()
     assert header == "run"
+
+
+def test_a_table_is_the_same_in_every_form(seen: Seen) -> None:
+    asked = {"friction": "0.1..0.4", "sort": "-friction"}
+    asked["columns"] = "run,friction,status,peak_residual_tension"
+    lines = seen.lines(**asked)
+    whole = seen.client.get(f"{seen.study}/table.json", params=asked).json()
+    assert [{k: str(v) for k, v in row.items()} for row in whole["rows"]] == lines
+    units = {each["name"]: each["unit"] for each in whole["columns"]}
+    assert list(units) == list(lines[0]) and units["peak_residual_tension"] == "MPa"
+    parquet = pytest.importorskip("pyarrow.parquet", reason="the extra `parquet` is not installed")
+    answer = seen.client.get(f"{seen.study}/table.parquet", params=asked)
+    stored = parquet.read_table(io.BytesIO(answer.content))
+    assert stored.to_pylist() == whole["rows"] and len(lines) == 8
+    assert stored.schema.field("peak_residual_tension").metadata[b"units"] == b"MPa"
+
+
+def test_a_service_without_pyarrow_says_so(seen: Seen, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.routes.numbers.find_spec", lambda name: None)
+    answer = seen.client.get(f"{seen.study}/table.parquet")
+    assert answer.status_code == 406
+    assert "residua-contact[parquet]" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize("begun", ["=", "+", "-", "@", "\t", "\r"])
+def test_a_spreadsheet_takes_no_text_for_a_formula(begun: str) -> None:
+    labels = np.array([f"{begun}1+1", "a=b"], dtype=object)
+    columns = [_column("case", labels, "sweep"), _column("x", np.array([-1.5, math.nan]), "result")]
+    text = b"".join(FORMS["csv"].write(columns, np.arange(2))).decode()
+    rows = list(csv.reader(io.StringIO(text, newline="")))
+    shown = begun.replace("\r", " ")
+    assert rows == [["case", "x"], [f"'{shown}1+1", "-1.5"], ["a=b", ""]]
+    whole = json.loads(b"".join(FORMS["json"].write(columns, np.arange(2))))
+    assert whole["rows"] == [{"case": f"{begun}1+1", "x": -1.5}, {"case": "a=b", "x": None}]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_table_is_written_in_pieces(form: str) -> None:
+    if form == "parquet":
+        pytest.importorskip("pyarrow", reason="the extra `parquet` is not installed")
+    columns = [_column(f"c{k}", np.linspace(0.0, k, 60_000), "result") for k in range(3)]
+    sizes = [len(piece) for piece in FORMS[form].write(columns, np.arange(60_000))]
+    assert max(sizes) < 0.5 * sum(sizes)
 
 
 @pytest.mark.parametrize(("condition", "kept"), [("1e-12..", 2), ("..1e-12", 1), ("1e-12", 0)])
