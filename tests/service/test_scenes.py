@@ -162,6 +162,8 @@ def test_a_study_of_a_posted_scene_has_the_ids_and_numbers_of_the_file(
     assert [run["id"] for run in found["items"]] == [done["runs"][1]["id"]]
     picture = service.client.get(f"/runs/{done['runs'][0]['id']}/map.png")
     assert picture.status_code == 200, picture.text
+    page = service.client.get(f"/ui/runs/{done['runs'][0]['id']}").text
+    assert "yield stress of the plate" in page
 
 
 def test_a_run_that_keeps_its_fields_is_sent_for_paraview(
