@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from annotated_types import Interval, Unit
 from scipy.stats import chi2
-from studies.definition.certainty import certainty
 
 from residua.cli import main
 from solver.errors import ModelError
 from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, estimate, fit, open_study, run_study
+from studies.definition.certainty import certainty
 from studies.definition.fit import Fitted, Fitting, checked_fit, standings
 from studies.definition.identity import solver_hash
 from studies.definition.line import Line
