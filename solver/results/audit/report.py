@@ -14,6 +14,7 @@ from solver.results.audit.bodies import AuditedBody
 from solver.results.audit.contact_error import contact_error
 from solver.results.audit.figures import LIMITS
 from solver.results.audit.forces import action_reaction, imbalance, left_on, reactions
+from solver.results.audit.links import links_error
 from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.plain import PlainBody
 from solver.results.audit.theory import strain_of
@@ -92,7 +93,8 @@ def audit(
         "audit_yield": beyond,
         "audit_increment_error": _largest(*(body.increment_error() for body in bodies)),
         **{name: _largest(0.0, *(pair.figures[name] for pair in pairs)) for name in names},
-        "audit_energy": _energy_error(bodies, loaded),
+        "audit_links": _largest(*(links_error(system, converged) for converged in states)),
+        "audit_energy": _energy_error(bodies, loaded, system.links.energy(loaded.state.links)),
         "audit_touch_time": loaded.timing.unknown,
         "audit_slip_resolution": loaded.timing.passage,
         "audit_dissipation": least_dissipation,
@@ -126,11 +128,14 @@ def _laws(bodies: Sequence[AuditedBody], released: Sequence[AuditedBody]) -> tup
     return broken, beyond
 
 
-def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged) -> float:
-    """Return the error of the energy balance, over the largest term of the balance so far."""
+def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged, springs: float) -> float:
+    """Return the error of the energy balance, over the largest term of the balance so far.
+
+    ``springs`` is the energy of the springs of links [N mm].
+    """
     work = loaded.energy
     terms = np.array([
-        sum(body.stored() for body in bodies), -work.stored, work.plastic, work.friction,
+        sum(body.stored() for body in bodies) + springs, -work.stored, work.plastic, work.friction,
         work.contact, -work.external,
     ])  # fmt: skip
     level = max(float(np.abs(terms).max()), work.scale)
