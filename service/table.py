@@ -20,7 +20,6 @@ import numpy as np
 from service.job import Job
 from service.jobs import Jobs
 from service.overview import PENDING, chooses, searched_at
-from solver.results.audit.figures import AUDIT
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies import Store, StudyError
@@ -31,6 +30,7 @@ from studies.errors import one_of
 from studies.scenes.registry import known_names, scene_named
 from studies.storage.dataset import attributes_of, axis_attributes
 from studies.storage.seal import state_of
+from studies.views.figures import group_of
 
 KEPT = 8
 """Number of tables that are kept."""
@@ -48,12 +48,6 @@ RANGE = re.compile(r"(?P<low>[^.]*(?:\.\d[^.]*)?)\.\.(?P<high>.*)", re.DOTALL)
 
 OUTCOMES = (*STATUSES[:-1], PENDING)
 """Statuses of runs in a table, by their number in the column ``status`` of octets."""
-
-EFFORT = (
-    "increments", "cut_increments", "iterations", "median_iterations", "inner_fallbacks",
-    "blended_tangents", "cpu_seconds", "degrees_of_freedom",
-)  # fmt: skip
-"""Numbers that say how hard a run was to solve."""
 
 NUMBERS = ("result", "effort", "audit")
 """Groups of columns with the numbers of runs, the main ones first."""
@@ -209,13 +203,6 @@ def varied(table: RunTable) -> list[Column]:
     sweep = [each for each in table.columns.values() if each.group == "sweep"]
     several = [each for each in sweep if len(set(each.values.tolist())) > 1]
     return several or sweep
-
-
-def group_of(name: str) -> str:
-    """Return what a number of a run tells: ``result``, ``effort`` or ``audit``."""
-    if name in AUDIT or name.startswith("audit_"):
-        return "audit"
-    return "effort" if name in EFFORT else "result"
 
 
 def scene_of_study(store: Store, name: str) -> Scene | None:

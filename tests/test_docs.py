@@ -41,7 +41,7 @@ BLOCK = re.compile(
     r"^```(?P<language>python|console)\n(?P<text>.*?)^```",
     re.DOTALL | re.MULTILINE,
 )
-COSTLY = re.compile(r"https?://|residua (?:run|serve|submit|status|cancel|fetch)")
+COSTLY = re.compile(r"https?://|residua (?:run|serve|view|submit|status|cancel|fetch)")
 SNIPPET = "snippet.py"
 CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.pages.study import rank
-from service.table import group_of
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.storage.dataset import attributes_of
 from studies.views.audited import LIMITED
+from studies.views.figures import group_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,7 +17,8 @@ from residua.cli import main
 from solver.errors import ModelError
 from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, estimate, fit, open_study, run_study
-from studies.definition.fit import Fitted, Fitting, certainty, checked_fit, standings
+from studies.definition.certainty import certainty
+from studies.definition.fit import Fitted, Fitting, checked_fit, standings
 from studies.definition.identity import solver_hash
 from studies.definition.line import Line
 from studies.definition.measured import checked_measured, pieces
@@ -456,6 +457,11 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
     assert one.fit["measured"] == [
         {"of": "contact_half_width", "values": [50.5, 51.0], "sigma": [0.5, 0.5]}
     ]
+    (tmp_path / "p.csv").write_text(PRESSURE)
+    two = Study.from_toml(file, [tmp_path / "b.csv", tmp_path / "p.csv@stage=loaded"])
+    assert [line.get("at") for line in two.fit["measured"]] == [None, {"stage": "loaded"}]
+    with pytest.raises(StudyError, match="must be FILE, or FILE@NAME=VALUE"):
+        Study.from_toml(file, [tmp_path / "p.csv@stage=loaded,pass"])
     with pytest.raises(StudyError, match=r"fit\.measured = None: is missing"):
         Study.from_toml(file)
     for text, allowed in (
