@@ -65,14 +65,18 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
 
 @pytest.fixture(autouse=True, scope="module")
 def nothing_solved_outlives_its_module() -> Iterator[None]:
-    """Clear caches of solved problems, which hold factors of hundreds of megabytes."""
+    """Clear caches of solved problems, which hold factors of hundreds of megabytes.
+
+    What the solver keeps beyond its limit is dropped, and memory that is free is given back.
+    """
     yield
     for name, module in list(sys.modules.items()):
         if name.startswith(("tests.verification", "tests.solver")):
             for value in list(vars(module).values()):
                 if hasattr(value, "cache_clear") and value.__module__.startswith("tests."):
                     value.cache_clear()
-    gc.collect()
+    if memory := sys.modules.get("solver.memory"):
+        memory.release(memory.most_kept())
 
 
 @pytest.fixture(autouse=True, scope="session")
