@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 _DEPENDENT = 1e-9
 """Ratio of what is left of a condition without the others to the condition; below it the condition
 follows from them. Also the least singular value of the rigid motions that links hold."""
+_ALIKE = 1e-13
+"""Ratio of the mean square of a motion of a slave to the largest; below it is that of rounding."""
 _LITTLE = 1e-9
 """Ratio of the area of a node to the largest; below it no spring acts there."""
 
@@ -237,10 +239,9 @@ def _conditions(
         assert isinstance(part, RigidPart)
         motion = block @ part.linear(slave.X)
         if link.distributed:
-            used = motion.any(axis=0)
-            weighted = motion[:, used].T * areas
-            block = np.linalg.solve(weighted @ motion[:, used], weighted) @ block
-            motion, X = np.eye(3)[used], np.tile(X.mean(axis=1, keepdims=True), int(used.sum()))
+            around = parts[number].body.kinematics == "axisymmetric"
+            block, motion = _mean(name, link, block, motion, areas, around=around)
+            X = np.tile(X.mean(axis=1, keepdims=True), len(block))
             areas = np.full(len(block), np.inf)
         rows.append((reference, ContactRows(np.arange(3), -motion)))
     elif link.master is None and not link.grounded:  # the slave moves as one
@@ -254,6 +255,26 @@ def _conditions(
     acts = areas > _LITTLE * areas.max()
     rows = [(k, ContactRows(own.dofs, own.block[acts])) for k, own in rows]
     return _LinkRows(rows, 1 / (link.stiffness * areas[acts]), X[:, acts])
+
+
+def _mean(
+    name: str, link: Link, block: Array, motion: Array, areas: Array, *, around: bool
+) -> tuple[Array, Array]:
+    """Return the conditions that the mean motion of a slave is that of a rigid body.
+
+    The mean is that of least squares, over the motions (c, 3) of the slave by the rigid body. They
+    may depend on each other: on a straight boundary a rotation about a point beside it is also a
+    translation. ``around`` an axis radial motions and rotations have no mean.
+    """
+    motion = motion * ([0.0, 1.0, 0.0] if around else 1.0)
+    weighted = motion.T * areas
+    sizes, ways = linalg.eigh(weighted @ motion)
+    kept = sizes > _ALIKE * sizes[-1]
+    if not kept.any():
+        allowed = "must include y where it is distributed in axisymmetric bodies: x is radial"
+        raise ModelError(f"{name}.components", link.components, allowed)
+    ways, sizes = ways[:, kept], sizes[kept]
+    return (ways / sizes).T @ weighted @ block, ways.T
 
 
 def _independent(made: Links, parts: Sequence[Part], X: Array) -> NDArray[np.int64]:

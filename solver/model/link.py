@@ -31,7 +31,8 @@ class Link:
     components : of the displacement that it holds
     stiffness : of springs between the two, force per area and displacement [N/mm3]; inf is rigid
     distributed : whether only the mean motion of the slave is that of ``rigid``: its force and
-        moment act on the slave by a linear traction, and it may deform
+        moment act on the slave by a linear traction, and it may deform. In axisymmetric bodies
+        it is the mean motion along y alone, and the traction is constant
     """
 
     slave: Side

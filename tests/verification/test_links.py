@@ -101,12 +101,16 @@ def test_a_beam_bears_no_moment_above_the_plastic_one() -> None:
     assert 1.7 * found.value.reached == pytest.approx(1.5, rel=0.02)
 
 
-def test_a_moment_that_is_distributed_bends_like_a_linear_traction() -> None:
+@pytest.mark.parametrize("centre", [(0.0, 0.0), (1 / 3, 2.0)])
+def test_a_moment_that_is_distributed_bends_like_a_linear_traction(
+    centre: tuple[float, float],
+) -> None:
+    """Wherever the centre of the wall is: along its boundary a rotation may be a translation."""
     beam = block("beam", np.linspace(0, 20, 9), np.linspace(-5, 5, 5), kinematics="plane_stress",
                  supports={"left": "x"})  # fmt: skip
     moment = RigidBody(name="end", centre=(20.0, 0.0), x=Pushed(), y=Pushed(),
                        rotation=Pushed(value=5000.0))  # fmt: skip
-    wall = RigidBody(name="wall")
+    wall = RigidBody(name="wall", centre=centre)
     model = Model(
         bodies=(beam,),
         rigid=(moment, wall),
@@ -123,6 +127,21 @@ def test_a_moment_that_is_distributed_bends_like_a_linear_traction() -> None:
     assert np.allclose(stress[[1, 3]], 0.0, atol=1e-8 * exact)
     assert found.motion("end").rotation == pytest.approx(exact / E * 20.0, rel=1e-9)
     assert found.audit().passed
+
+
+def test_a_force_that_is_distributed_around_an_axis_leaves_radial_motion_free() -> None:
+    """It is a constant traction: of radial motions and rotations of a ring there is no mean."""
+    cylinder = block("bar", np.linspace(0, 5, 6), np.linspace(0, 5, 4), kinematics="axisymmetric",
+                     supports={"bottom": "y"})  # fmt: skip
+    pull = RigidBody(name="cap", centre=(0.0, 5.0), y=Pushed(value=100.0 * np.pi * 5.0**2))
+    link = Link(slave=("bar", "top"), rigid="cap", distributed=True)
+    found = solve(Model(bodies=(cylinder,), rigid=(pull,), links=(link,)))
+    exact = np.array([0.0, 100.0, 0.0, 0.0])[:, None]
+    assert np.allclose(found.stress("bar", "loaded"), exact, atol=1e-8 * 100.0)
+    assert len(found.system.links) == 1
+    assert found.audit().passed
+    with pytest.raises(ModelError, match=r"links\[0\].components = 'x': must include y"):
+        System(Model(bodies=(cylinder,), rigid=(pull,), links=(replace(link, components="x"),)))
 
 
 # -- ties ----------------------------------------------------------------------------------------

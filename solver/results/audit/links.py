@@ -109,7 +109,7 @@ def _unbalanced(system: System, k: int, converged: Converged) -> float:
     for name in partners:  # in a tie within one body, the force is that on both sides
         same = name == link.slave[0]
         other, its = (0.0, 0.0) if same else _forces(system, k, converged, name)
-        turning = max(abs(float(moment + its)) / size - left, 0.0)
+        turning = 0.0 if _is_ring(system, link) else abs(float(moment + its)) / size - left
         worst = max(worst, float(np.abs(force + other).max()), turning)
     return worst
 
@@ -132,7 +132,8 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
         others.append(np.array([x - angle * arm[1], y + angle * arm[0]]))
     size = max(float(np.abs(each).max()) for each in (u, *others))
     size = max(size, LEAST * _moved_by(system, link.slave[0], converged.state.force_scale))
-    jump = (u - sum(others))[list(link.axes)]
+    axes = [1] if _is_ring(system, link) else list(link.axes)
+    jump = (u - sum(others))[axes]
     if not size:
         return 0.0
     if link.master is None and not link.distributed and np.isinf(link.stiffness):
@@ -140,10 +141,13 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
         return float(np.abs(jump).max()) / size
     mean = (jump * area).sum(axis=1)
     if np.isfinite(link.stiffness):
-        mean = (
-            mean + _forces(system, k, converged, link.slave[0])[0][list(link.axes)] / link.stiffness
-        )
+        mean = mean + _forces(system, k, converged, link.slave[0])[0][axes] / link.stiffness
     return float(np.abs(mean).max()) / area.sum() / size
+
+
+def _is_ring(system: System, link: Link) -> bool:
+    """Whether a link holds the mean motion of a ring, which is that along its axis."""
+    return link.distributed and system.full(link.slave[0]).body.kinematics == "axisymmetric"
 
 
 def _beside(X: Array) -> float:
