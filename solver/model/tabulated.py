@@ -30,7 +30,7 @@ def columns_of(text: str, names: Sequence[str]) -> dict[str, Array]:
     Raises
     ------
     ModelError
-        if a column is absent, or an entry is no finite number
+        if a column is absent or there twice, or an entry is no finite number
     """
     listed = ", ".join(names)
     allowed = f"must be numbers under a header with {listed}"
@@ -44,6 +44,9 @@ def columns_of(text: str, names: Sequence[str]) -> dict[str, Array]:
     if not set(names) <= set(header) or len(rows) < 2:
         words = f"must have the columns {listed}, and numbers under them"
         raise ModelError("table", ", ".join(header) or "nothing", words)
+    twice = [name for name in names if header.count(name) > 1]
+    if twice:
+        raise ModelError("table", ", ".join(header), f"must have one column {twice[0]}")
     columns = dict(zip(header, zip(*rows[1:], strict=True), strict=True))
     try:
         found = {name: np.array(columns[name], dtype=float) for name in names}

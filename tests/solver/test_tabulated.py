@@ -67,6 +67,7 @@ def test_a_position_outside_is_refused_by_the_load() -> None:
         ("z,value\n0,1\n", "must have the columns x, y or both"),
         ("x,value\n0,1\n1,b\n", "could not convert .* must be numbers"),
         ("x,value\n0,1\n1\n", "a line of another length"),
+        ("x,value,value\n0,1,2\n1,3,4\n", "table = 'x, value, value': must have one column value"),
         ("x,value\n0,1\n", "must be lists of one length, 2 or more"),
         ("x,value\n0,1\n1,nan\n", "must be finite"),
         ("x,value\n0,1\n1,2\n0,3\n", r"table = \(0.0,\): must not be a position of two values"),
