@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from itertools import pairwise, takewhile
+from itertools import groupby, pairwise, takewhile
 from typing import TYPE_CHECKING
 
 from solver.errors import ModelError
@@ -54,6 +54,8 @@ class Stage:
             raise ModelError(f"{self.name}.steps", self.steps, "must be at least 1")
         if not self.step >= 0:
             raise ModelError(f"{self.name}.step", self.step, "must not be negative")
+        if self.stops and self.step:
+            raise ModelError(f"{self.name}.step", self.step, "must be 0 with stops: give steps")
         if not math.isfinite(self.target):
             raise ModelError(f"{self.name}.target", self.target, "must be finite")
 
@@ -61,6 +63,9 @@ class Stage:
         """Return the times at which its increments end."""
         if self.stops:
             ends = (start, *self.stops, self.target)
+            if len({later > earlier for earlier, later in pairwise(ends)}) > 1 or start in ends[1:]:
+                allowed = f"must be between its start {start:g} and its target, in order"
+                raise ModelError(f"{self.name}.stops", self.stops, allowed)
             shares = [(end - begin) / (self.target - start) for begin, end in pairwise(ends)]
             counts = [max(1, math.ceil(self.steps * share - ROUNDING)) for share in shares]
             return [
@@ -92,6 +97,20 @@ class Lap:
 
     stages: tuple[Stage, ...]
     start: float = 0.0
+
+    def __post_init__(self) -> None:
+        each = [
+            (cycle, tuple(stage.name for stage in own))
+            for cycle, own in groupby(self.stages, key=lambda stage: stage.cycle)
+        ]
+        numbers, names = (
+            [cycle for cycle, _ in each if cycle],
+            {own for cycle, own in each if cycle},
+        )
+        apart = any(not cycle for cycle, _ in each[1:-1])
+        if numbers != list(range(1, len(numbers) + 1)) or len(names) > 1 or apart:
+            allowed = "must be 1, 2, ... of stages that follow one another, with the same names"
+            raise ModelError("cycle", [cycle for cycle, _ in each], allowed)
 
     def targets(self, first: bool) -> Iterator[Target]:
         """Yield the ends of its increments; ``first`` says whether it is the first lap."""

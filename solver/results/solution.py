@@ -14,7 +14,7 @@ from solver.contact.system import System
 from solver.errors import ModelError
 from solver.loading.control import Control, PathControl
 from solver.loading.outcome import Tally
-from solver.loading.program import Lap, Program
+from solver.loading.program import ROUNDING, Lap, Program
 from solver.loading.stepper import Stepper
 from solver.loading.walker import Walker
 from solver.results import saved
@@ -227,8 +227,8 @@ def solve(
     stages : stages to solve instead of ``load``, for loads with amplitudes, which are functions of
         time; the solution then has the states at their ends. Those of one `Stage.cycle` follow one
         another, and have the same names in the next
-    until : ``shaken_down`` leaves out cycles after the shakedown state is decided: their loads must
-        be the same at the end of each
+    until : ``shaken_down`` leaves out cycles after the shakedown state is decided: loads must be
+        the same at the end of each
     control : increments and tolerances; by default twenty increments of loading
     linear_solver : ``auto``, ``pardiso`` or ``superlu``
     progress : called after each increment with the completed fraction of the increments, up to 1;
@@ -250,9 +250,13 @@ def solve(
         raise ModelError("load", load, "must be positive and finite")
     if until not in (None, "shaken_down"):
         raise ModelError("until", until, "must be shaken_down or None")
-    names = [(stage.name, stage.cycle) for stage in stages]
+    names = [stage.name for stage in stages if stage.cycle < 2]
+    names += [f"{stage.name}_before" for stage in stages if stage.cycle == 2]
     if len(set(names)) < len(names):
         raise ModelError("stages", names, "must have different names")
+    if until:
+        ends = {stage.cycle: stage.target for stage in stages if stage.cycle}
+        _check_ends(model, list(ends.values()))
     control = control or PathControl(load_step=load / 20)
     program = Program(laps=(Lap(tuple(stages)),)) if stages else control.program(load)
     for body in () if stages else model.bodies:
@@ -276,6 +280,16 @@ def solve(
         history=outcome.history,
         cycles=outcome.cycles,
     )
+
+
+def _check_ends(model: Model, times: Sequence[float]) -> None:
+    """Refuse loads that differ at the ends of cycles: after the last one others are left out."""
+    for body in (*model.bodies, *model.rigid):
+        for load in body.every_load:
+            factors = [load.factor(t) for t in times if load.varies and getattr(load, "value", 1)]
+            if np.ptp(factors or 0.0) > ROUNDING * np.abs(factors or 0.0).max():
+                allowed = f"must be the same at the ends of all cycles: {load.name} of {body.name}"
+                raise ModelError("until", [float(f"{each:.6g}") for each in factors], allowed)
 
 
 class _IncrementCount:

@@ -443,6 +443,46 @@ def test_bad_stages_are_refused_by_name(fields):
         Stage(**({"name": "loaded", "target": 1.0} | fields))
 
 
+@pytest.mark.parametrize("stops", [(2.0, 1.0), (3.0,), (0.0,), (1.0, 1.0)])
+def test_stops_outside_of_a_stage_are_refused(stops):
+    assert Stage(name="on", target=3.0, stops=(1.0,)).times(0.0) == [1.0, 3.0]
+    with pytest.raises(ModelError, match=r"on.stops = .* between its start 0 and its target"):
+        Stage(name="on", target=3.0, stops=stops).times(0.0)
+    with pytest.raises(ModelError, match=r"on.step = 0.1: must be 0 with stops"):
+        Stage(name="on", target=3.0, stops=stops, step=0.1)
+
+
+@pytest.mark.parametrize(
+    ("cycles", "names"),
+    [
+        ((2, 3), "aa"), ((1, 1, 3, 3), "abab"), ((1, 2, 1, 2), "aabb"),
+        ((1, 0, 2), "aba"), ((1, 1, 2, 2), "abba"), ((1, 1, 2), "aba"), ((-1, 1), "aa"),
+    ],
+)  # fmt: skip
+def test_cycles_that_do_not_repeat_one_another_are_refused(cycles, names):
+    stages = [Stage(name=name, target=k + 1.0, cycle=cycle)
+              for k, (cycle, name) in enumerate(zip(cycles, names, strict=True))]  # fmt: skip
+    with pytest.raises(ModelError, match=r"cycle = .*: must be 1, 2, ... of stages that follow"):
+        Lap(tuple(stages))
+
+
+def test_cycles_that_end_under_other_loads_are_not_left_out(system):
+    amplitude = Amplitude([0, 1, 2, 3, 4], [0, 1, 0, 1, 0.1])
+    stages = [Stage(name=name, target=2.0 * k + at, cycle=k + 1)
+              for k in (0, 1) for at, name in ((1, "on"), (2, "off"))]  # fmt: skip
+    for given in (None, amplitude):
+        body = replace(system.model.bodies[0], amplitude=given)
+        changed = replace(system.model, bodies=(body, *system.model.bodies[1:]))
+        with pytest.raises(ModelError, match=r"until = .* the same at the ends of all cycles"):
+            solve(changed, stages=stages, until="shaken_down")
+    taken = [
+        Stage(name="on_before", target=1.0),
+        *(replace(s, target=s.target + 2) for s in stages),
+    ]
+    with pytest.raises(ModelError, match="must have different names"):
+        solve(system.model, stages=taken)
+
+
 @pytest.mark.parametrize(
     "laps",
     [
