@@ -239,7 +239,7 @@ def _conditions(
         assert isinstance(part, RigidPart)
         motion = block @ part.linear(slave.X)
         if link.distributed:
-            around = parts[number].body.kinematics == "axisymmetric"
+            around = slave.thickness is None
             block, motion = _mean(name, link, block, motion, areas, around=around)
             X = np.tile(X.mean(axis=1, keepdims=True), len(block))
             areas = np.full(len(block), np.inf)

@@ -37,7 +37,9 @@ if TYPE_CHECKING:
     from solver.fem.frame import RigidMotion
     from solver.loading.cycle import Cycle
     from solver.loading.program import Stage
+    from solver.model.body import Body
     from solver.model.model import Model
+    from solver.model.rigid import RigidBody
     from solver.results.shakedown import Shakedown
 
 
@@ -255,8 +257,8 @@ def solve(
     if len(set(names)) < len(names):
         raise ModelError("stages", names, "must have different names")
     if until:
-        ends = {stage.cycle: stage.target for stage in stages if stage.cycle}
-        _check_ends(model, list(ends.values()))
+        last = {stage.cycle: stage.target for stage in stages if stage.cycle}
+        _check_ends(model, list(last.values()))
     control = control or PathControl(load_step=load / 20)
     program = Program(laps=(Lap(tuple(stages)),)) if stages else control.program(load)
     for body in () if stages else model.bodies:
@@ -284,9 +286,12 @@ def solve(
 
 def _check_ends(model: Model, times: Sequence[float]) -> None:
     """Refuse loads that differ at the ends of cycles: after the last one others are left out."""
-    for body in (*model.bodies, *model.rigid):
+    bodies: list[Body | RigidBody] = [*model.bodies, *model.rigid]
+    for body in bodies:
         for load in body.every_load:
-            factors = [load.factor(t) for t in times if load.varies and getattr(load, "value", 1)]
+            factors = [
+                load.factor(t) for t in times if load.varies and getattr(load, "value", True)
+            ]
             if np.ptp(factors or 0.0) > ROUNDING * np.abs(factors or 0.0).max():
                 allowed = f"must be the same at the ends of all cycles: {load.name} of {body.name}"
                 raise ModelError("until", [float(f"{each:.6g}") for each in factors], allowed)
