@@ -331,7 +331,7 @@ class Removal(Load):
 
     The load factor is the share that is removed: the stiffness of the elements is lost in this
     share, and with it the forces by which they hold the others, which are so released. At 1 they
-    are gone, with a stiffness of rounding left.
+    are gone, with a stiffness of rounding left. It has an amplitude, which does not decrease.
 
     Attributes
     ----------
@@ -341,12 +341,16 @@ class Removal(Load):
     region: str
 
     def check(self, kinematics: Kinematics) -> None:
-        """Raise `ModelError` for a load factor that is no share."""
+        """Raise `ModelError` for a load factor that is no share, or decreases."""
         del kinematics
-        share = np.zeros(1) if self.amplitude is None else np.asarray(self.amplitude.value)
+        if self.amplitude is None:
+            raise ModelError("removal.amplitude", None, "must be given: solve takes loads back")
+        share = np.asarray(self.amplitude.value)
         for worst in (share.min(), share.max()):
             if not 0 <= worst <= 1:
                 raise ModelError("removal.amplitude", float(worst), "must be a share, from 0 to 1")
+        if (np.diff(share) < 0).any():
+            raise ModelError("removal.amplitude", share.tolist(), "must not decrease")
 
     @property
     def removes(self) -> str:

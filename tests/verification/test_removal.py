@@ -117,3 +117,7 @@ def test_a_load_on_what_is_removed_is_refused() -> None:
         bar(STEEL, Removal(region="shin", amplitude=AWAY))
     with pytest.raises(ModelError, match="must be a share"):
         bar(STEEL, Removal(region="skin", amplitude=Amplitude([1, 2], [0, 2])))
+    with pytest.raises(ModelError, match="must not decrease"):
+        bar(STEEL, Removal(region="skin", amplitude=Amplitude([1, 2, 3], [0, 1, 0])))
+    with pytest.raises(ModelError, match=r"removal.amplitude = None: must be given"):
+        bar(STEEL, Removal(region="skin"))
