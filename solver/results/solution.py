@@ -287,14 +287,22 @@ def solve(
 def _check_ends(model: Model, times: Sequence[float]) -> None:
     """Refuse loads that differ at the ends of cycles: after the last one others are left out."""
     bodies: list[Body | RigidBody] = [*model.bodies, *model.rigid]
-    for body in bodies:
-        for load in body.every_load:
-            factors = [
-                load.factor(t) for t in times if load.varies and getattr(load, "value", True)
-            ]
-            if np.ptp(factors or 0.0) > ROUNDING * np.abs(factors or 0.0).max():
-                allowed = f"must be the same at the ends of all cycles: {load.name} of {body.name}"
-                raise ModelError("until", [float(f"{each:.6g}") for each in factors], allowed)
+    of: list[tuple[str, Callable[[float], float]]] = [
+        (f"{load.name} of {body.name}", load.factor)
+        for body in bodies
+        for load in body.every_load
+        if load.varies and getattr(load, "value", True)
+    ]
+    for k, contact in enumerate(model.contacts):
+        of.append((f"contacts[{k}].interference", contact.offset))
+        of += [(f"contacts[{k}].presence", each.at) for each in (contact.presence,) if each]
+    of += [(f"travelling of {body.name}", float) for body in model.bodies if body.travelling]
+    of += [(f"axle of {body.name}", float) for body in model.bodies if body.axle]
+    for name, value in of:
+        ends = [value(time) for time in times]
+        if np.ptp(ends or 0.0) > ROUNDING * np.abs(ends or 0.0).max():
+            allowed = f"must be the same at the ends of all cycles: {name}"
+            raise ModelError("until", [float(f"{end:.6g}") for end in ends], allowed)
 
 
 class _IncrementCount:
