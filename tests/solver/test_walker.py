@@ -467,12 +467,17 @@ def test_cycles_that_do_not_repeat_one_another_are_refused(cycles, names):
 
 
 def test_cycles_that_end_under_other_loads_are_not_left_out(system):
-    amplitude = Amplitude([0, 1, 2, 3, 4], [0, 1, 0, 1, 0.1])
+    other = Amplitude([0, 1, 2, 3, 4], [0, 1, 0, 1, 0.1])
+    body, *rest = system.model.bodies
+    (pair,) = system.model.contacts
     stages = [Stage(name=name, target=2.0 * k + at, cycle=k + 1)
               for k in (0, 1) for at, name in ((1, "on"), (2, "off"))]  # fmt: skip
-    for given in (None, amplitude):
-        body = replace(system.model.bodies[0], amplitude=given)
-        changed = replace(system.model, bodies=(body, *system.model.bodies[1:]))
+    for pressure, presence in ((None, None), (other, None), (Amplitude.constant(1.0), other)):
+        changed = replace(
+            system.model,
+            bodies=(replace(body, amplitude=pressure), *rest),
+            contacts=(replace(pair, presence=presence),),
+        )
         with pytest.raises(ModelError, match=r"until = .* the same at the ends of all cycles"):
             solve(changed, stages=stages, until="shaken_down")
     taken = [
