@@ -117,7 +117,7 @@ class Increment:
         elastic_only: bool = False,
         patient: bool = False,
         tolerances: Tolerances | None = None,
-        compliance: dict[bytes, NDArray[np.float64]] | None = None,
+        compliance: dict[tuple[bytes, ...], NDArray[np.float64]] | None = None,
     ) -> None:
         self.system = system = system.during(start)
         self.start = start
@@ -319,7 +319,7 @@ class Increment:
 
     def _compliance(self, candidates: Candidates) -> NDArray[np.float64]:
         """Return the elastic compliance of the contact points [mm/N], a scale; computed once."""
-        key = b"".join(vertices.tobytes() for vertices in candidates.vertices)
+        key = tuple(vertices.tobytes() for vertices in candidates.vertices)
         if key not in self.compliance:
             W = candidates.compliance([o.elastic for o in self.system.operators])
             last = np.arange(len(W))[candidates.linked]

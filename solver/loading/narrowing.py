@@ -77,7 +77,7 @@ def narrowed(
         return None
     candidates = find_candidates(system, start, at.u, at.contacts, at.links, time - start.time)
     needed = _needed(system, candidates, yields)
-    compliance: dict[bytes, NDArray[np.float64]] = {}
+    compliance: dict[tuple[bytes, ...], NDArray[np.float64]] = {}
     for _ in range(_ROUNDS):
         windows = tuple(_around(system, k, windows[k], need) for k, need in enumerate(needed))
         if not any(windows):

@@ -130,7 +130,8 @@ def rounding(system: System, u: Vectors) -> float:
 
 def unheld(system: System, candidates: Candidates) -> str:
     """Return a hint on bodies that only contact holds, and no contact force does; else empty."""
-    floating = [repr(part.body.name) for part in system.parts if part.rigid.shape[1]]
+    each = zip(system.parts, candidates.holds, strict=True)
+    floating = [repr(part.body.name) for part, held in each if held and part.rigid.shape[1]]
     if not floating or candidates.forces.any():
         return ""
     gap = min(candidates.motion[: candidates.n].min(initial=np.inf), candidates.beyond)

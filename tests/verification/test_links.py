@@ -20,6 +20,7 @@ from solver import (
     Model,
     ModelError,
     Moved,
+    NotConverged,
     Pressure,
     Pushed,
     RigidBody,
@@ -383,6 +384,14 @@ def test_a_link_that_holds_nothing_or_too_much_is_refused(given: dict[str, Any],
             contacts=(ContactPair(slave=("block", "right"), master=("other", "left")),),
             links=(Link(**given), Link(**SLAVE, rigid="plate", components="y")),
         ))  # fmt: skip
+
+
+def test_a_force_on_a_support_is_not_said_to_need_contact() -> None:
+    body = block("block", np.linspace(0, 4, 3), np.linspace(0, 4, 3), supports={"bottom": "xy"})
+    push = RigidBody(name="push", y=Pushed(value=-10.0))
+    link = Link(slave=("block", "bottom"), rigid="push", components="y")
+    with pytest.raises(NotConverged, match=r"balance this load$"):
+        solve(Model(bodies=(body,), rigid=(push,), links=(link,)))
 
 
 def test_links_that_agree_may_share_a_corner() -> None:
