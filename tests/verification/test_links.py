@@ -424,6 +424,17 @@ def test_a_boundary_may_be_tied_in_two_pieces(element: str) -> None:
     assert found.audit().passed
 
 
+@pytest.mark.parametrize("parts", [4, 8, 32])
+def test_a_slave_that_goes_on_beyond_its_master_passes_the_audit(parts: int) -> None:
+    """The master ends within an element of the slave, whichever of them is finer."""
+    plate = block("plate", np.linspace(0, 4, parts + 1), np.linspace(0, 2, 3),
+                  supports={"bottom": "xy"})  # fmt: skip
+    rib = block("rib", np.linspace(1.1, 2.3, 3), np.linspace(2, 3, 3), pressure={"top": 10.0})
+    tie = Link(slave=("plate", "top"), master=("rib", "bottom"))
+    found = solve(Model(bodies=(plate, rib), links=(tie,)))
+    assert found.audit().passed
+
+
 @pytest.mark.parametrize("element", ["quad8", "quad4"])
 @pytest.mark.parametrize("stiffness", [np.inf, 1e4])
 def test_a_tie_of_curved_surfaces_and_unequal_meshes_passes_the_audit(

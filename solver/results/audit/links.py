@@ -29,14 +29,24 @@ _PIECES = 16
 _FACING = 0.05
 """Ratio of the distance from the master to the length of the slave; above it a place of the slave
 faces no master."""
+_HALVINGS = 20
+"""How often a piece is halved to find the end of the master beside it."""
+_BEYOND = 1e-6
+"""Ratio of a distance to the length of a piece; up to it a place beside a piece counts as on it."""
 
 
 class _Sampled(NamedTuple):
-    """Middles X (2, n) of the pieces of a boundary, their motion u (2, n) [mm] and area (n,)."""
+    """Pieces of a boundary.
+
+    Middles X (2, n), their motion u (2, n) [mm] and area (n,); ``ends`` (2, 2, n) are starts and
+    ends, ``moved`` is their motion.
+    """
 
     X: Array
     u: Array
     area: Array
+    ends: Array
+    moved: Array
 
 
 def links_error(system: System, converged: Converged) -> float:
@@ -59,11 +69,15 @@ def _places(system: System, side: Side, converged: Converged) -> _Sampled:
     def at(xi: Array, field: Array) -> Array:
         return np.asarray(field[:, edges] @ shape_functions(xi, edges.shape[1]).T)
 
-    middle = (ends[1:] + ends[:-1]) / 2
-    X = at(middle, whole.X)
-    length = np.linalg.norm(np.diff(at(ends, whole.X), axis=2), axis=0)
-    area = length * whole.measure(X)
-    return _Sampled(X.reshape(2, -1), at(middle, moved).reshape(2, -1), area.ravel())
+    def pieces(field: Array) -> Array:
+        along = at(ends, field)
+        return np.stack([each.reshape(2, -1) for each in (along[..., :-1], along[..., 1:])])
+
+    middle, outline = (ends[1:] + ends[:-1]) / 2, pieces(whole.X)
+    X, u = at(middle, whole.X), at(middle, moved)
+    length = np.linalg.norm(outline[1] - outline[0], axis=0).reshape(X.shape[1:])
+    area = (length * whole.measure(X)).ravel()
+    return _Sampled(X.reshape(2, -1), u.reshape(2, -1), area, outline, pieces(moved))
 
 
 def linked(system: System, state: State, name: str) -> Array:
@@ -117,14 +131,12 @@ def _unbalanced(system: System, k: int, converged: Converged) -> float:
 def _misfit(system: System, k: int, converged: Converged) -> float:
     """Return the motion that a link should prevent over the largest motion of what it joins."""
     link: Link = system.model.links[k]
-    slave = _places(system, link.slave, converged)
-    X, u, area = slave
-    others = [np.zeros_like(u)]
+    slave, others = _places(system, link.slave, converged), []
     if link.master is not None:
         master = _places(system, link.master, converged)
-        far, at_master = _facing(X, master)
-        area = np.where(far < _beside(X), area, 0.0)
-        others.append(at_master)
+        slave = _opposite(slave, master)
+        others.append(_facing(slave.X, master)[1])
+    X, u, area, *_ = slave
     if link.rigid is not None:
         number = system.part(link.rigid)
         x, y, angle = system.parts[number].motion_of(converged.state.u[number])  # type: ignore[attr-defined]
@@ -133,7 +145,7 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
     size = max(float(np.abs(each).max()) for each in (u, *others))
     size = max(size, LEAST * _moved_by(system, link.slave[0], converged.state.force_scale))
     axes = [1] if _is_ring(system, link) else list(link.axes)
-    jump = (u - sum(others))[axes]
+    jump = (u - sum(others, np.zeros_like(u)))[axes]
     if not size:
         return 0.0
     if link.master is None and not link.distributed and np.isinf(link.stiffness):
@@ -143,6 +155,25 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
     if np.isfinite(link.stiffness):
         mean = mean + _forces(system, k, converged, link.slave[0])[0][axes] / link.stiffness
     return float(np.abs(mean).max()) / area.sum() / size
+
+
+def _opposite(slave: _Sampled, master: _Sampled) -> _Sampled:
+    """Return the slave, of each piece that part which faces the master."""
+    most, (start, end) = _beside(slave.X), slave.ends
+    begins, stops = (_facing(X, master)[0] < most for X in (start, end))
+    cut = np.flatnonzero(begins != stops)
+    kept = np.where(begins[cut], 0.0, 1.0)  # the end that faces the master, as a share
+    inside, outside = kept, 1 - kept
+    for _ in range(_HALVINGS):
+        middle = (inside + outside) / 2
+        faces = _facing((1 - middle) * start[:, cut] + middle * end[:, cut], master)[0] < most
+        inside, outside = np.where(faces, middle, inside), np.where(faces, outside, middle)
+    share = (inside + kept) / 2
+    X, u, area = slave.X.copy(), slave.u.copy(), np.where(begins | stops, slave.area, 0.0)
+    for at, (first, last) in ((X, slave.ends), (u, slave.moved)):
+        at[:, cut] = (1 - share) * first[:, cut] + share * last[:, cut]
+    area[cut] *= np.abs(inside - kept)
+    return slave._replace(X=X, u=u, area=area)
 
 
 def _is_ring(system: System, link: Link) -> bool:
@@ -158,14 +189,19 @@ def _beside(X: Array) -> float:
 def _facing(X: Array, master: _Sampled) -> tuple[Array, Array]:
     """Return the distance (n,) of places (2, n) from a master, and its motion (2, n) there.
 
-    The motion is linear between the two nearest of its places.
+    The distance is infinite beyond an end of the master.
     """
-    away = np.linalg.norm(X[:, :, None] - master.X[:, None, :], axis=0)
-    one, other = np.argsort(away, axis=1)[:, :2].T
-    along = master.X[:, other] - master.X[:, one]
-    share = ((X - master.X[:, one]) * along).sum(axis=0) / (along**2).sum(axis=0)
-    moved = master.u[:, one] + share * (master.u[:, other] - master.u[:, one])
-    return np.linalg.norm(X - master.X[:, one] - share * along, axis=0), moved
+    begin, end = master.ends
+    along = end - begin
+    share = (X.T @ along - (begin * along).sum(axis=0)) / (along**2).sum(axis=0)
+    inside = share.clip(0.0, 1.0)
+    away = np.linalg.norm(X[:, :, None] - begin[:, None] - inside * along[:, None], axis=0)
+    row, nearest = np.arange(X.shape[1]), away.argmin(axis=1)
+    share, inside = share[row, nearest], inside[row, nearest]
+    shapes = (1 - inside) * (1 - 2 * inside), 4 * inside * (1 - inside), inside * (2 * inside - 1)
+    each = (master.moved[0], master.u, master.moved[1])
+    moved = sum(u[:, nearest] * shape for u, shape in zip(each, shapes, strict=True))
+    return np.where(np.abs(share - inside) < _BEYOND, away[row, nearest], np.inf), np.asarray(moved)
 
 
 def _moved_by(system: System, name: str, force: float) -> float:
