@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import Amplitude, Body, Material, Model, ModelError, Pressure, Solution, Stage, solve
+from solver import (
+    Amplitude,
+    Body,
+    Material,
+    Model,
+    ModelError,
+    Pressure,
+    Solution,
+    Stage,
+    Traction,
+    solve,
+)
 from solver.mesh import grid, marked, within
 from solver.model.loads import InitialStress, Load, Removal
 from studies.scenes.scene import read_scene
@@ -84,6 +95,19 @@ def test_a_bar_that_is_cut_through_between_walls_loses_all_stress_and_springs_ap
     np.testing.assert_allclose(sides["stress"], 0.0, atol=1e-5 * PEAK)
     np.testing.assert_allclose(sides["displacement"][0, 1:], PEAK / E * np.array([-5.0, 4.0]),
                                rtol=1e-5)  # fmt: skip
+
+
+def test_a_piece_that_is_cut_off_under_load_fails_the_audit() -> None:
+    """Only what is left of the removed elements holds it: it moves far, in balance."""
+    mesh = marked(grid(np.linspace(0.0, 10.0, 21), np.linspace(0.0, 1.0, 3)), "slot", x=(5.0, 6.0))
+    pull = Traction(boundary="right", x=1.0, amplitude=Amplitude([0, 1], [0, 1]))
+    held = Body(name="bar", mesh=mesh, material=STEEL, kinematics="plane_stress",
+                supports={"left": "x", "bottom": "y"},
+                loads=(pull, Removal(region="slot", amplitude=AWAY)))  # fmt: skip
+    found = cut(held)
+    assert found.audit("rest").passed
+    (told,) = found.audit("cut").violations
+    assert told.startswith("removed elements of bar bear")
 
 
 def test_a_reamed_hole_loses_the_stress_that_lames_closed_form_says() -> None:

@@ -83,6 +83,14 @@ class AuditedBody:
         """Nodal forces (n_nodes, 2) that balance the stress of the body [N]."""
         return self.plain.forces(self.stress)
 
+    @property
+    def borne(self) -> float:
+        """Norm of the nodal forces that removed elements bear by what is left of them [N]."""
+        kept = np.isfinite(self.plain.known(self.stress, self._converged.state.time))
+        if kept.all():
+            return 0.0
+        return float(np.linalg.norm(self.plain.forces(np.where(kept, 0.0, self.stress))))
+
     @cached_property
     def linked(self) -> Array:
         """Nodal forces (n_nodes, 2) of links on the whole body [N]."""

@@ -32,6 +32,8 @@ _SURFACE_SHEAR = 1.1
 _REACTIONS, _TRAVELLING = 1e-5, 5e-3  # elements integrate a Hertz pressure with its steep ends
 _ENERGY, _TURNING = 1e-5, 0.02  # with finite sliding contact normals rotate within an increment
 _FORCE = 1e-6  # of the force level
+_BORNE = 1e-4
+"""Ratio of the force of removed elements to the force level; above it they hold what is cut off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +113,7 @@ def audit(
     )
     return Audit(
         figures,
-        violations=_violations(system, figures, loaded, pairs),
+        violations=_violations(system, figures, loaded, pairs) + _severed([*bodies, *released]),
         warnings=sum((pair.warnings for pair in pairs), warnings(figures)),
         outside=sum((pair.outside for pair in pairs), strain.outside),
     )
@@ -208,6 +210,19 @@ def _violations(
     )
     found = sum((_beyond(pair.figures, pair.limits) for pair in pairs), ())
     return broken(figures, limits, yield_stress) + found
+
+
+def _severed(bodies: Sequence[AuditedBody]) -> tuple[str, ...]:
+    """Return messages on bodies of which removed elements still bear force."""
+    found: dict[str, float] = {}
+    for body in bodies:
+        found[body.name] = _largest(found.get(body.name, 0.0), body.borne / (body.force_level or 1))
+    return tuple(
+        f"removed elements of {name} bear {share:.2g} of the force: nothing else holds what is cut "
+        "off, hold it or end its loads before"
+        for name, share in found.items()
+        if not share <= _BORNE
+    )
 
 
 def limits_at(scale: float, *, travelling: bool = False, turning: bool = False) -> dict[str, float]:
