@@ -258,6 +258,8 @@ def solve(
         raise ModelError("stages", names, "must have different names")
     if until:
         last = {stage.cycle: stage.target for stage in stages if stage.cycle}
+        if not last:
+            raise ModelError("until", until, "needs stages with a cycle")
         _check_ends(model, list(last.values()))
     control = control or PathControl(load_step=load / 20)
     program = Program(laps=(Lap(tuple(stages)),)) if stages else control.program(load)
@@ -300,7 +302,7 @@ def _check_ends(model: Model, times: Sequence[float]) -> None:
     of += [(f"axle of {body.name}", float) for body in model.bodies if body.axle]
     for name, value in of:
         ends = [value(time) for time in times]
-        if np.ptp(ends or 0.0) > ROUNDING * np.abs(ends or 0.0).max():
+        if np.ptp(ends) > ROUNDING * np.abs(ends).max():
             allowed = f"must be the same at the ends of all cycles: {name}"
             raise ModelError("until", [float(f"{end:.6g}") for end in ends], allowed)
 

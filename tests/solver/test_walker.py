@@ -480,6 +480,8 @@ def test_cycles_that_end_under_other_loads_are_not_left_out(system):
         )
         with pytest.raises(ModelError, match=r"until = .* the same at the ends of all cycles"):
             solve(changed, stages=stages, until="shaken_down")
+    with pytest.raises(ModelError, match="until = 'shaken_down': needs stages with a cycle"):
+        solve(system.model, until="shaken_down")
     taken = [
         Stage(name="on_before", target=1.0),
         *(replace(s, target=s.target + 2) for s in stages),
