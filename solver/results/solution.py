@@ -293,7 +293,9 @@ def _check_ends(model: Model, times: Sequence[float]) -> None:
         (f"{load.name} of {body.name}", load.factor)
         for body in bodies
         for load in body.every_load
-        if load.varies and getattr(load, "value", True)
+        if load.varies
+        and getattr(load, "value", True)
+        and (any(load.components.values()) or not load.components)  # held still
     ]
     for k, contact in enumerate(model.contacts):
         of.append((f"contacts[{k}].interference", contact.offset))
