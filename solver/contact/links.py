@@ -19,6 +19,7 @@ from solver.contact.overlap import largest_overlap
 from solver.contact.problem import ContactProblem, ContactSolution
 from solver.contact.rows import ContactRows, joined
 from solver.errors import ModelError
+from solver.fem.loads import comparing
 from solver.fem.rigid import RigidPart
 from solver.linear.solvers import Singular
 
@@ -283,13 +284,11 @@ def _independent(made: Links, parts: Sequence[Part], X: Array) -> NDArray[np.int
     Raises `ModelError` for one that follows from them but for prescribed motions, which contradict.
     """
     each = [(p, rows) for p, rows in zip(parts, made.rows, strict=True) if rows is not None]
-    cases = sum(len(part.driven.cases) for part, _ in each)
-    free, driven = [np.zeros((len(made), 0))], np.zeros((len(made), cases))
+    times = comparing([load for part, _ in each for load in part.driven.cases])
+    free, driven = [np.zeros((len(made), 0))], np.zeros((len(made), len(times)))
     for part, rows in each:
         free.append(rows.block[:, np.isin(rows.dofs, part.free)])
-        own = rows.block @ part.driven.fields[rows.dofs]
-        cases -= own.shape[1]
-        driven[:, cases : cases + own.shape[1]] = own
+        driven += rows.block @ np.stack([part.driven.at(t)[rows.dofs] for t in times], axis=1)
     rigid = np.flatnonzero(made.compliance == 0)
     if not len(rigid):
         return np.arange(len(made))

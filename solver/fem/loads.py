@@ -168,7 +168,7 @@ class _Prescription:
         shared = np.intersect1d(self.dofs, other.dofs)
         if not len(shared):
             return
-        times = _comparing([*self.loads, *other.loads])
+        times = comparing([*self.loads, *other.loads])
         mine, others = self.at(times), other.at(times)
         apart = np.abs(mine - others)
         worst = int(apart.argmax())
@@ -183,7 +183,7 @@ class _Prescription:
         )  # fmt: skip
 
 
-def _comparing(loads: Sequence[Load]) -> Array:
+def comparing(loads: Sequence[Load]) -> Array:
     """Return times (n,) such that sums of amplitudes equal at these are equal at all times.
 
     Amplitudes are linear between knots and may jump at knots: two times in between are enough.
@@ -233,7 +233,7 @@ def check_removed(part: Nodes, loads: Superposed) -> None:
         for load, field in zip(loads.cases, loads.fields.T, strict=True):
             if not field.reshape(-1, 2)[alone].any():
                 continue
-            after = [t for t in _comparing([load, removal]) if removal.factor(t) >= 1]
+            after = [t for t in comparing([load, removal]) if removal.factor(t) >= 1]
             if any(load.factor(t) for t in after):
                 allowed = (
                     f"acts on region {removal.removes} of body {part.body.name} after it is "

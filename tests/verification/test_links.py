@@ -386,6 +386,21 @@ def test_a_link_that_holds_nothing_or_too_much_is_refused(given: dict[str, Any],
         ))  # fmt: skip
 
 
+def test_a_link_that_moves_as_a_prescribed_displacement_does_is_met() -> None:
+    """Both move by the same at every time, by other amplitudes."""
+    times, half = np.array([0.0, 1.0]), np.array([0.0, 0.5])
+    load = Displacement(boundary="top", y=0.01, amplitude=Amplitude(times, 2 * half))
+    body = block("block", np.linspace(0, 4, 3), np.linspace(0, 4, 3), supports={"bottom": "xy"},
+                 loads=(load,))  # fmt: skip
+    plate = RigidBody(name="plate", y=Moved(value=0.02, amplitude=Amplitude(times, half)))
+    model = Model(bodies=(body,), rigid=(plate,),
+                  links=(Link(**SLAVE, rigid="plate", components="y"),))  # fmt: skip
+    assert len(System(model).links) == 0
+    other = replace(plate, y=Moved(value=0.02, amplitude=Amplitude(times, half**2)))
+    with pytest.raises(ModelError, match="must not move what supports, motions"):
+        System(replace(model, rigid=(other,)))
+
+
 def test_a_force_on_a_support_is_not_said_to_need_contact() -> None:
     body = block("block", np.linspace(0, 4, 3), np.linspace(0, 4, 3), supports={"bottom": "xy"})
     push = RigidBody(name="push", y=Pushed(value=-10.0))
