@@ -54,7 +54,9 @@ def expanded(**pair):
 
 def test_a_pair_that_leaves_leaves_the_state_of_bodies_that_are_separated():
     """Nothing yields on the way back: the way to the state without contact does not matter."""
-    found = solve(expanded(presence=Amplitude([1, 2], [1, 0])), stages=(IN, OUT))
+    half = replace(OUT, name="half", target=1.5, steps=2)
+    stages = (IN, half, replace(OUT, steps=2, turns=False))
+    found = solve(expanded(presence=Amplitude([1, 2], [1, 0])), stages=stages)
     parted = solve(expanded(), stages=(IN, replace(OUT, apart=True)))
     stress, reference = (each.stress("plate", "out") for each in (found, parted))
     assert np.abs(reference).max() > 200.0
@@ -64,7 +66,7 @@ def test_a_pair_that_leaves_leaves_the_state_of_bodies_that_are_separated():
     contact = found.contact(stage="out")
     assert np.isnan(contact.gap).all()
     assert not contact.pressure.any()
-    for stage in ("in", "out"):
+    for stage in ("in", "half", "out"):
         check = found.audit(stage)
         assert check.passed, check.violations
         assert check.figures["audit_energy"] < 1e-9

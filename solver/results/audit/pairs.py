@@ -217,7 +217,7 @@ class AuditedPair:
         # mean over the area: at a sharp corner the last vertex overlaps mostly by distortion
         deep = np.maximum(-np.minimum(gap, true), 0.0) @ self.touching.area
         area = float(self.touching.area[self._closed].sum() or self.touching.area.sum())
-        return {
+        found = {
             "audit_overlap": max(float(deep) / (area or 1.0), float(np.abs(true) @ pressed)),
             "audit_closed_gap": float(np.abs(gap) @ pressed),
             "audit_tension": max(0.0, -float(self.normal.min(initial=0.0))),
@@ -227,6 +227,10 @@ class AuditedPair:
             "audit_slip": self._wrong_slip(),
             "audit_contact_resolution": self._coarseness(),
         }
+        if self._pair.left(self._start.time, self._state.time) is not None:
+            # of a pair that leaves the forces are given, wherever its surfaces are
+            found |= dict.fromkeys((*self.limits, "audit_slip"), 0.0)
+        return found
 
     def _coarseness(self) -> float:
         """Return the longest edge in a contact of curved surfaces over its width; 0 if flat.
