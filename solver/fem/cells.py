@@ -2,7 +2,8 @@
 
 An element is the image of the unit square; that of a triangle has one side drawn together to a
 point. Cells begin as whole squares. Where the integral of the field differs between Gauss's and
-Lobatto's rule, the cell is halved along the direction in which it differs more.
+Lobatto's rule, the cell is halved along the direction in which it differs more. What is narrower
+than a sixth of an element may lie between all points of both, and is then missed.
 """
 
 from __future__ import annotations
