@@ -268,6 +268,11 @@ def test_a_prescribed_rotation_turns_a_free_body_without_stress() -> None:
     assert np.allclose(found.displacement("block", "loaded"), moved, atol=1e-10)
     assert np.abs(found.stress("block", "loaded")).max() < 1e-6
     assert found.audit().passed
+    assert not found.audit().outside
+    far = replace(tool, rotation=Moved(value=0.2))
+    model = replace(found.system.model, rigid=(far,))
+    (told,) = solve(model).audit().outside
+    assert told.startswith("tool turns by 0.2 rad what is linked to it")
 
 
 # -- a bolt --------------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from solver.contact.state import Converged, State
     from solver.contact.system import System
+    from solver.fem.frame import RigidMotion
     from solver.model.link import Link, Side
 
     Array = NDArray[np.float64]
@@ -33,6 +34,9 @@ _HALVINGS = 20
 """How often a piece is halved to find the end of the master beside it."""
 _BEYOND = 1e-6
 """Ratio of a distance to the length of a piece; up to it a place beside a piece counts as on it."""
+
+_SMALL = 0.1
+"""Largest rotation by links [rad]. Taken for small it stretches by half of its square, 0.5 %."""
 
 
 class _Sampled(NamedTuple):
@@ -78,6 +82,26 @@ def _places(system: System, side: Side, converged: Converged) -> _Sampled:
     length = np.linalg.norm(outline[1] - outline[0], axis=0).reshape(X.shape[1:])
     area = (length * whole.measure(X)).ravel()
     return _Sampled(X.reshape(2, -1), u.reshape(2, -1), area, outline, pieces(moved))
+
+
+def turned(system: System, converged: Converged) -> tuple[str, ...]:
+    """Return messages on rigid bodies that turn boundaries too far for links."""
+    found = []
+    for name in dict.fromkeys(link.rigid for link in system.model.links if link.rigid):
+        angle = abs(_motion(system, name, converged).rotation)
+        if not angle <= _SMALL:
+            found.append(
+                f"{name} turns by {angle:.2g} rad what is linked to it: links take rotations for "
+                f"small, which stretches it by {angle**2 / 2:.2g}; turn it less"
+            )
+    return tuple(found)
+
+
+def _motion(system: System, name: str, converged: Converged) -> RigidMotion:
+    number = system.part(name)
+    part = system.parts[number]
+    assert isinstance(part, RigidPart)
+    return part.motion_of(converged.state.u[number])
 
 
 def linked(system: System, state: State, name: str) -> Array:
@@ -138,9 +162,9 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
         others.append(_facing(slave.X, master)[1])
     X, u, area, *_ = slave
     if link.rigid is not None:
-        number = system.part(link.rigid)
-        x, y, angle = system.parts[number].motion_of(converged.state.u[number])  # type: ignore[attr-defined]
-        arm = X - np.reshape(system.parts[number].body.centre, (2, 1))  # type: ignore[union-attr]
+        x, y, angle = _motion(system, link.rigid, converged)
+        centre = system.parts[system.part(link.rigid)].body.centre  # type: ignore[union-attr]
+        arm = X - np.reshape(centre, (2, 1))
         others.append(np.array([x - angle * arm[1], y + angle * arm[0]]))
     size = max(float(np.abs(each).max()) for each in (u, *others))
     size = max(size, LEAST * _moved_by(system, link.slave[0], converged.state.force_scale))

@@ -14,7 +14,7 @@ from solver.results.audit.bodies import AuditedBody
 from solver.results.audit.contact_error import contact_error
 from solver.results.audit.figures import LIMITS
 from solver.results.audit.forces import action_reaction, imbalance, left_on, reactions
-from solver.results.audit.links import links_error
+from solver.results.audit.links import links_error, turned
 from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.plain import PlainBody
 from solver.results.audit.theory import strain_of
@@ -45,8 +45,8 @@ class Audit:
     figures : values of the figures by name
     violations : messages on conditions that the solution violates
     warnings : messages on results that need attention
-    outside : messages on strain or sliding too large for small-strain theory; the run is solved
-        correctly, but its equations do not describe the bodies
+    outside : messages on strain, sliding or rotation too large for small-strain theory; the run is
+        solved correctly, but its equations do not describe the bodies
     """
 
     figures: Mapping[str, float]
@@ -115,7 +115,7 @@ def audit(
         figures,
         violations=_violations(system, figures, loaded, pairs) + _severed([*bodies, *released]),
         warnings=sum((pair.warnings for pair in pairs), warnings(figures)),
-        outside=sum((pair.outside for pair in pairs), strain.outside),
+        outside=sum((pair.outside for pair in pairs), strain.outside) + turned(system, loaded),
     )
 
 
