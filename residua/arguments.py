@@ -71,6 +71,17 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
 
+    one = add("view", commands.view)
+    one.add_argument("path", type=_path, metavar="DIR|DATASET")
+    one.add_argument(
+        "--port", type=_integer(0, 65535), default=0, help="default: any port that is free"
+    )
+    one.add_argument("--no-browser", action="store_true", help="print the address alone")
+
+    one = add("report", commands.report)
+    one.add_argument("path", type=_place, metavar="DIR|DATASET")
+    one.add_argument("--out", "-o", type=_path, default=Path("report.html"), metavar="HTML")
+
     for more in (_add_cluster, _add_numbers, _add_access, _add_remote):
         more(add)
     return whole

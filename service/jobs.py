@@ -34,6 +34,8 @@ ALIKE = """SELECT 1 FROM job AS mine JOIN job AS theirs ON theirs.scene = mine.s
     WHERE mine.id = ? AND theirs.id IN (SELECT value FROM json_each(?))
     AND mine.stage <> '' AND theirs.stage <> '' LIMIT 1"""
 BOTH = (SHARED, ALIKE)
+NOTES = 200
+"""Number of notes that are kept of what happened to a job."""
 
 
 class Jobs(Database):
@@ -110,7 +112,16 @@ class Jobs(Database):
             connection.execute(
                 f"INSERT INTO job ({ALL}, study) VALUES ({MARKS}, ?)", [*row_of(job), text]
             )
+            tell(connection, job)
             return job, True
+
+    def told(self, job_id: str) -> list[tuple[str, str]]:
+        """Return what happened to a job: times and words, the oldest first."""
+        with self.transaction("BEGIN") as connection:
+            found = connection.execute(
+                "SELECT at, words FROM told WHERE job = ? ORDER BY rowid", (job_id,)
+            )
+            return [tuple(row) for row in found]
 
     def get(self, job_id: str) -> Job:
         """Return one job.
@@ -345,9 +356,22 @@ class Jobs(Database):
 
 def put(connection: sqlite3.Connection, job: Job, **changes: Any) -> Job:
     """Change a job in the transaction of a connection, and return it."""
-    job = replace(job, **changes)
+    before, job = job, replace(job, **changes)
+    if (job.state, job.message) != (before.state, before.message):
+        tell(connection, job)
     connection.execute(f"UPDATE job SET ({ALL}) = ({MARKS}) WHERE id = ?", [*row_of(job), job.id])
     return job
+
+
+def tell(connection: sqlite3.Connection, job: Job) -> None:
+    """Note the state of a job and the reason for it; the latest notes stay."""
+    words = f"{job.state}: {job.message}" if job.message else str(job.state)
+    connection.execute("INSERT INTO told VALUES (?, ?, ?)", (job.id, now(), words))
+    connection.execute(
+        "DELETE FROM told WHERE job = ? AND rowid NOT IN"
+        " (SELECT rowid FROM told WHERE job = ? ORDER BY rowid DESC LIMIT ?)",
+        (job.id, job.id, NOTES),
+    )
 
 
 def unknown(job_id: str) -> NotFound:

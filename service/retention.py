@@ -206,6 +206,7 @@ class Keeper:
             with suppress(FileNotFoundError):
                 shutil.rmtree(directory)
             queue.execute("DELETE FROM run WHERE job = ?", (study_id,))
+            queue.execute("DELETE FROM told WHERE job = ?", (study_id,))
             queue.execute("DELETE FROM job WHERE id = ?", (study_id,))
         return freed
 

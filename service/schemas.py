@@ -73,18 +73,39 @@ class Prediction(BaseModel):
     )
 
 
-class TableFilter(BaseModel):
+class Conditions(BaseModel):
     """The runs of a study that are requested, by any column of its table."""
 
     model_config = ConfigDict(extra="allow")
-
-    sort: str = Field(default="", description="a column; with a minus, the largest first")
-    columns: str = Field(default="", description="names with commas between; all by default")
 
     @property
     def conditions(self) -> dict[str, str]:
         """The conditions by column."""
         return {name: str(value) for name, value in (self.model_extra or {}).items() if value != ""}
+
+
+class AuditFigure(BaseModel):
+    """The largest value of a figure of the audit among the runs of a study."""
+
+    name: str
+    words: str
+    value: float
+    limit: float = Field(description="a run with a larger value fails")
+    run: str = Field(description="id of the run that has it")
+    at: dict[str, Any] = Field(description="where the run is in the sweep")
+
+
+class TableFilter(Conditions):
+    """The part of the table of a study that is requested."""
+
+    sort: str = Field(default="", description="a column; with a minus, the largest first")
+    columns: str = Field(default="", description="names with commas between; all by default")
+
+
+class NumbersFilter(Conditions):
+    """The columns of the table of a study that are requested."""
+
+    name: list[str] = Field(min_length=1, max_length=100, description="names of columns")
 
 
 class MapQuery(BaseModel):

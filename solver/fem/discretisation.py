@@ -10,9 +10,9 @@ from scipy import linalg, sparse
 
 from solver.fem import kinematics
 from solver.fem.assembly import Assembly, whole_matrix
-from solver.fem.heat import Heat
 from solver.fem.loads import (
     Superposed,
+    check_removed,
     eigenstrains,
     nodal_forces,
     prescribed,
@@ -21,7 +21,8 @@ from solver.fem.loads import (
 from solver.fem.nodes import Nodes
 from solver.fem.operators import Operators
 from solver.fem.part import Part, same_unknowns
-from solver.fem.surface import edges_of, extract, shortest
+from solver.fem.softening import Softening
+from solver.fem.surface import edges_of, extract, gathered, shortest
 from solver.linear import solvers as linear
 from solver.mesh.elements import element_type
 
@@ -53,6 +54,7 @@ class Discretisation(Nodes, Part):
     loads : nodal forces (n,) of pressures and tractions [N]
     condensable : ``loads`` plus the nodal forces of the eigenstrain in an elastic body [N]
     free : unknowns that no support holds, without periodic copies
+    driven : prescribed displacements (n,) [mm]
     active : unknowns of ``free`` that are not pinned
     rigid : (n, n_rigid) rigid motions the supports leave free
     """
@@ -77,8 +79,11 @@ class Discretisation(Nodes, Part):
         self.moves = body.travelling is not None
         self._travelling: tuple[float, NDArray[np.float64]] = (np.nan, np.zeros(0))
         self.loads = nodal_forces(self)
+        check_removed(self, self.loads)
         self.eigenstrains = eigenstrains(self)
-        self.heat = Heat.of(self, self.points.reshape(2, -1))
+        per_element = self.weights.shape[1]
+        elements = np.repeat(np.arange(len(self.weights)), per_element)
+        self.softening = Softening.of(self, self.points.reshape(2, -1), elements)
         self._hold()
 
     def _hold(self) -> None:
@@ -96,9 +101,9 @@ class Discretisation(Nodes, Part):
         self.free = free
         self.active = choose_pins(motions, free)
 
-    def chain(self, boundary: str) -> Surface:
-        """Return the surface of a named boundary, which must be one open chain."""
-        return extract(self, boundary)
+    def chain(self, boundary: str, any_shape: bool = False) -> Surface:
+        """Return the surface of a named boundary: one open chain, unless any shape is allowed."""
+        return gathered(self, boundary) if any_shape else extract(self, boundary)
 
     def operators(self, surfaces: list[Surface], linear_solver: str) -> Operators:
         """Return the inverse stiffnesses of this part, for its contact surfaces."""
@@ -163,11 +168,16 @@ class Discretisation(Nodes, Part):
 
     def law(self, time: float) -> Law:
         """Return the material law of its points at a time; temperature may change it."""
-        return self.heat.law(self.body.law, time) if self.heat else self.body.law
+        return self.softening.law(self.body.law, time) if self.softening else self.body.law
 
-    def hot(self, surface: Surface) -> Heat | None:
+    def gone(self, time: float) -> NDArray[np.bool_] | None:
+        """Return whether elements at the points (n_points,) are removed; None if none ever are."""
+        lost = self.softening
+        return lost.gone(time) if lost and lost.removed.cases else None
+
+    def hot(self, surface: Surface) -> Softening | None:
         """Return how heat lowers the yield stress at a surface's nodes; None if it does not."""
-        heat = Heat.of(self, self.X[:, surface.nodes])
+        heat = Softening.of(self, self.X[:, surface.nodes])
         return heat if heat and heat.strength.fields.any() else None
 
     def eigenstrain(self, time: float) -> NDArray[np.float64]:
@@ -216,8 +226,8 @@ class Discretisation(Nodes, Part):
             nodal += np.bincount(self.dofs.ravel(), each.sum(axis=1).ravel(), self.n)
         if self.driven.cases:
             moved = self.driven.at(time)
-            nodal += np.abs(self._diagonal * moved)
-            energy += float(moved @ (self._diagonal * moved)) / 2
+            nodal += np.abs(self.diagonal * moved)
+            energy += float(moved @ (self.diagonal * moved)) / 2
         return float(np.linalg.norm(nodal)), energy
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:

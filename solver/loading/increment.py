@@ -78,6 +78,7 @@ class Balanced:
 
     u: Vectors
     contacts: tuple[ContactState, ...]
+    links: NDArray[np.float64]
     responses: tuple[Response, ...]
     residuals: Vectors
     candidates: Candidates
@@ -100,7 +101,7 @@ class Increment:
     elastic_only : raise `Yielded` as soon as a point yields
     patient : use all iterations if every body hardens, so that an equilibrium exists: with little
         hardening the residual rises and falls while the energy falls
-    stiffness : elastic stiffness of contact points by their vertices, as far as known [N/mm]
+    compliance : elastic compliance of contact points by their vertices, as far as known [mm/N]
     """
 
     def __init__(
@@ -116,9 +117,9 @@ class Increment:
         elastic_only: bool = False,
         patient: bool = False,
         tolerances: Tolerances | None = None,
-        stiffness: dict[bytes, NDArray[np.float64]] | None = None,
+        compliance: dict[bytes, NDArray[np.float64]] | None = None,
     ) -> None:
-        self.system = system
+        self.system = system = system.during(start)
         self.start = start
         self.time = time
         self.guess = guess
@@ -133,7 +134,7 @@ class Increment:
         self._began: tuple[Vectors, Candidates] | None = None  # residuals, candidates
         self._pivoted, self._blended = 0, 0
         self._softened = any(part.body.law.has_corners for part in system.parts)  # no tangent there
-        self.stiffness = {} if stiffness is None else stiffness
+        self.compliance = {} if compliance is None else compliance
 
     def solve(self) -> Converged:
         """Return the converged increment or raise `IncrementFailed` (or `Yielded`)."""
@@ -156,13 +157,13 @@ class Increment:
     def _iterate(self) -> Balanced:
         tolerances = self.tolerances
         origin = self.system.moved(self.guess or self.start, self.time)
-        u, contacts = origin.u, origin.contacts
+        u, contacts, links = origin.u, origin.contacts, origin.links
         responses = self._respond(u)
         residuals = self._residuals(u, responses)
         best, since_best, softest, moving = np.inf, 0, SoftestStep(), False
         series, begun, crawled = Series(), 0.0, 0
         for iteration in range(tolerances.iterations + 1):
-            candidates = self._candidates(u, contacts)
+            candidates = self._candidates(u, contacts, links)
             self._began = self._began or (residuals, candidates)
             scale, error, violation = self._errors(residuals, candidates)
             since_best = 0 if error < best else since_best + 1
@@ -178,6 +179,7 @@ class Increment:
                 return Balanced(
                     u=u,
                     contacts=contacts,
+                    links=links,
                     responses=responses,
                     residuals=residuals,
                     candidates=candidates,
@@ -196,7 +198,7 @@ class Increment:
                     failure.why = softest
                 failure.why = self._slide((residuals, candidates)) or failure.why
                 raise
-            if iteration >= _LATE:
+            if iteration >= _LATE and not self.system.links.springy:
                 softest = softer(softest, self.system.parts, step.u, responses)
             before, found = u, self._search(u, residuals, candidates, step, error * scale)
             share, u, responses, residuals = found
@@ -209,6 +211,7 @@ class Increment:
                 responses = self._respond(u)
                 residuals = self._residuals(u, responses)
             contacts = candidates.states(contacts, forces, step.status)
+            links = forces[candidates.linked]
             if self.elastic_only and any(r.yielding.any() for r in responses):
                 raise Yielded
         # a residual that stops at rounding is no plastic flow; bodies that flow without resistance
@@ -217,7 +220,8 @@ class Increment:
         raise IncrementFailed(
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
             f"and a contact violation of {violation:.1e}",
-            self._slide() or (self._judged(softest, u, responses, contacts) if flows else None),
+            self._slide()
+            or (self._judged(softest, u, responses, contacts, links) if flows else None),
         )
 
     def _slide(self, *places: tuple[Vectors, Candidates]) -> Slide | None:
@@ -235,16 +239,20 @@ class Increment:
         u: Vectors,
         responses: Sequence[Response],
         contacts: tuple[ContactState, ...],
+        links: NDArray[np.float64],
     ) -> SoftestStep:
         """Return the softest step, with whether the kinematic theorem excludes equilibrium.
 
         The theorem is not applied if a motion is prescribed: the work of its force is not known.
+        Nor is it with springs, whose force grows without limit.
         """
+        if self.system.links.springy:
+            return flow
         parts = self.system.parts
         moved = [now - before for now, before in zip(u, self.start.u, strict=True)]
         if any(np.delete(move, part.free).any() for part, move in zip(parts, moved, strict=True)):
             return flow
-        candidates = self._candidates(u, contacts)
+        candidates = self._candidates(u, contacts, links)
         inner = on_parts(self.system, candidates, candidates.forces)
         forces = [r + c for r, c in zip(self._residuals(u, responses), inner, strict=True)]
         proven = collapses(parts, self.time, moved, forces, responses)
@@ -261,11 +269,13 @@ class Increment:
         each = zip(self.system.parts, u, responses, strict=True)
         return tuple(part.residual(self.time, ui, response) for part, ui, response in each)
 
-    def _candidates(self, u: Vectors, contacts: tuple[ContactState, ...]) -> Candidates:
+    def _candidates(
+        self, u: Vectors, contacts: tuple[ContactState, ...], links: NDArray[np.float64]
+    ) -> Candidates:
         if not self.contact:
-            return no_candidates(self.system)
+            return no_candidates(self.system, u, links)
         span = self.time - self.start.time
-        found = find_candidates(self.system, self.start, u, contacts, span)
+        found = find_candidates(self.system, self.start, u, contacts, links, span)
         return found if self.friction else found.smooth()
 
     def _errors(self, residuals: Vectors, candidates: Candidates) -> tuple[float, float, float]:
@@ -281,9 +291,11 @@ class Increment:
         scale = max(self.start.force_scale, level, self._least)
         if scale == 0:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
-            return 0.0, float(overlap < -self.system.touching), 0.0
+            off = overlap < -self.system.touching or candidates.motion[candidates.linked].any()
+            return 0.0, float(off), 0.0
         error = self._unbalanced(residuals, candidates, candidates.forces) / scale
-        return scale, error, candidates.violation(self._stiffness(candidates)) / scale
+        stiffness = 1 / np.diag(self._compliance(candidates))
+        return scale, error, candidates.violation(stiffness) / scale
 
     def _unbalanced(
         self, residuals: Vectors, candidates: Candidates, forces: NDArray[np.float64]
@@ -305,13 +317,16 @@ class Increment:
         met = violation < self.tolerances.contact and candidates.beyond >= 0
         return balanced and met
 
-    def _stiffness(self, candidates: Candidates) -> NDArray[np.float64]:
-        """Return the elastic stiffness of the contact points [N/mm], a scale; computed once."""
+    def _compliance(self, candidates: Candidates) -> NDArray[np.float64]:
+        """Return the elastic compliance of the contact points [mm/N], a scale; computed once."""
         key = b"".join(vertices.tobytes() for vertices in candidates.vertices)
-        if key not in self.stiffness:
+        if key not in self.compliance:
             W = candidates.compliance([o.elastic for o in self.system.operators])
-            self.stiffness[key] = 1 / np.diag(W)
-        return self.stiffness[key]
+            last = np.arange(len(W))[candidates.linked]
+            own = W[last, last] + candidates.links.compliance
+            W[last, last] = np.where(own > 0, own, np.diag(W).max(initial=1.0))
+            self.compliance[key] = W
+        return self.compliance[key]
 
     # -- 3, 4: the step ------------------------------------------------------------------------
 
@@ -332,7 +347,7 @@ class Increment:
                     o.tangent(response, blend)
                     for o, response in zip(self.system.operators, responses, strict=True)
                 ]
-                step = newton_step(self.system, residuals, operators, candidates, self.contact)
+                step = newton_step(self.system, residuals, operators, candidates)
             except Singular:
                 continue
             if step and not blend and is_mechanism(self.system.parts, self.time, step.u, responses):
@@ -400,7 +415,9 @@ class Increment:
             contact_work=candidates.work(self.start.contacts),
             plastic_work=sum(work for work, _ in spent),
             dissipation=float(np.min([0.0, *(least for _, least in spent)])),
-            state=State(self.time, u, tuple(r.state for r in responses), contacts, found.scale),
+            state=State(
+                self.time, u, tuple(r.state for r in responses), contacts, found.scale, found.links
+            ),
             responses=responses,
             iterations=found.iterations,
             pivoted=found.pivoted,
@@ -413,4 +430,4 @@ class Increment:
     def _timing(self, candidates: Candidates) -> Timing:
         if not candidates.n or not self.friction:
             return Timing()
-        return timing(self.system, self.start, candidates, self._stiffness(candidates))
+        return timing(self.system, self.start, candidates, self._compliance(candidates))

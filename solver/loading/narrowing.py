@@ -55,14 +55,16 @@ def narrowed(
 ) -> Converged | None:
     """Return an increment from ``start`` to ``time`` that was solved in windows.
 
-    None if nothing yields, if windows would be large, if a body comes loose, or if the increment
-    fails in them.
+    None if nothing yields, if windows would be large, if a body comes loose, if links act outside
+    of windows, or if the increment fails in them.
 
     Parameters
     ----------
     before : the last increment, which ended at ``start``
     guess : predicted state, if any
     """
+    if len(system.links):
+        return None
     windows = before.windows or (None,) * len(system.parts)
     longer = replace(tolerances, iterations=int(_PATIENCE * tolerances.iterations))
     begin, count = system.moved(start, time), np.zeros(3, dtype=int)
@@ -73,9 +75,9 @@ def narrowed(
     yields: Yields = [now if now is None or was is None else now | was for now, was in both]
     if not before.windows and not any(own is not None and own.any() for own in yields):
         return None
-    candidates = find_candidates(system, start, at.u, at.contacts, time - start.time)
+    candidates = find_candidates(system, start, at.u, at.contacts, at.links, time - start.time)
     needed = _needed(system, candidates, yields)
-    stiffness: dict[bytes, NDArray[np.float64]] = {}
+    compliance: dict[bytes, NDArray[np.float64]] = {}
     for _ in range(_ROUNDS):
         windows = tuple(_around(system, k, windows[k], need) for k, need in enumerate(needed))
         if not any(windows):
@@ -95,7 +97,7 @@ def narrowed(
                 elastic_first=elastic_first,
                 patient=patient,
                 tolerances=longer,
-                stiffness=stiffness,
+                compliance=compliance,
             ).approach()
         except (IncrementFailed, Singular):
             return None
@@ -109,7 +111,7 @@ def narrowed(
         if all(w is None or y is None or not (y & ~w.elements).any() for w, y in inside):
             iterations, pivoted, blended = count.tolist()
             found = replace(found, iterations=iterations, pivoted=pivoted, blended=blended)
-            whole = Increment(system, start, time, tolerances=tolerances, stiffness=stiffness)
+            whole = Increment(system, start, time, tolerances=tolerances, compliance=compliance)
             converged = whole.closed(found)
             return converged and replace(converged, windows=windows)
         needed = _needed(system, found.candidates, yields)
@@ -136,7 +138,9 @@ def _expanded(
         u=u,
         responses=responses,
         residuals=tuple(part.residual(time, ui, response) for part, ui, response in forces),
-        candidates=find_candidates(system, start, u, found.contacts, time - start.time),
+        candidates=find_candidates(
+            system, start, u, found.contacts, start.links, time - start.time
+        ),
     )
 
 

@@ -1,8 +1,9 @@
 """Loads of a body, each with its own amplitude over time.
 
 A kind of load is a subclass of `Load` that overrides some of its methods: a force on a boundary, a
-force per volume, an eigenstrain, a stress present before loading, a prescribed displacement, or a
-loss of stiffness and strength. The solver uses only these methods; no other code knows the kinds.
+force per volume, an eigenstrain, a stress present before loading, a prescribed displacement, a loss
+of stiffness and strength, or the removal of elements. The solver uses only these methods; no other
+code knows the kinds.
 Values are those at load factor 1. The load factor at a time is that of the amplitude; without an
 amplitude it is the time itself. A `Value` may vary in space.
 """
@@ -26,7 +27,7 @@ from solver.parts import Parts
 Array = NDArray[np.float64]
 Field = Callable[[Array], Array]
 Value = float | Field
-"""A number, or a function of position: (positions (2, n) [mm]) -> (n,)."""
+"""A number, or a function of position: (positions (2, n) [mm]) -> (n,), such as a `Tabulated`."""
 
 _ALWAYS = Amplitude.constant(1.0)
 _VECTOR, _TENSOR = ("x", "y"), ("xx", "yy", "zz", "xy")
@@ -104,6 +105,11 @@ class Load:
         """Prescribed displacements of its boundaries: component 0 (x) or 1 (y) -> [mm]."""
         return {}
 
+    @property
+    def removes(self) -> str:
+        """The region of the body whose elements it takes away; empty if it takes none."""
+        return ""
+
 
 LOADS: Parts[Load] = Parts("kind", alike=False)
 """Kinds of load by the words that name them in scene files."""
@@ -150,8 +156,7 @@ class Traction(BoundaryLoad):
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a component that is not finite."""
         del kinematics
-        for axis in ("x", "y"):
-            _check_value(f"traction.{self.boundary}.{axis}", getattr(self, axis), "MPa")
+        _check_components(f"traction.{self.boundary}", self, _VECTOR, "MPa")
 
     def push(self, x: Array, along: Array) -> Array:
         """Return the forces (2, n) on pieces of the boundary [N/mm]."""
@@ -170,8 +175,7 @@ class BodyForce(Load):
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a component that is not finite."""
         del kinematics
-        for axis in ("x", "y"):
-            _check_value(f"body_force.{axis}", getattr(self, axis), "N/mm3")
+        _check_components("body_force", self, _VECTOR, "N/mm3")
 
     def body_force(self, x: Array) -> Array:
         """Return the force per volume (2, n) at positions x [N/mm3]."""
@@ -321,6 +325,35 @@ class Temperature(Load):
         return self.modulus_drop * rise, self.yield_drop * rise
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Removal(Load):
+    """The removal of the elements of a region of the body, such as by machining.
+
+    The load factor is the share that is removed: the stiffness of the elements is lost in this
+    share, and with it the forces by which they hold the others, which are so released. At 1 they
+    are gone, with a stiffness of rounding left.
+
+    Attributes
+    ----------
+    region : name of a set of elements, ``subdomains`` of the mesh
+    """
+
+    region: str
+
+    def check(self, kinematics: Kinematics) -> None:
+        """Raise `ModelError` for a load factor that is no share."""
+        del kinematics
+        share = np.zeros(1) if self.amplitude is None else np.asarray(self.amplitude.value)
+        for worst in (share.min(), share.max()):
+            if not 0 <= worst <= 1:
+                raise ModelError("removal.amplitude", float(worst), "must be a share, from 0 to 1")
+
+    @property
+    def removes(self) -> str:
+        """The region that it takes away."""
+        return self.region
+
+
 @LOADS.word("initial_stress")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InitialStress(Load):
@@ -377,8 +410,7 @@ class InitialStress(Load):
         """Raise `ModelError` if the stress is neither components nor a function of position."""
         del kinematics
         each = {name: getattr(self, name) for name in _TENSOR}
-        for name, value in each.items():
-            _check_value(f"initial_stress.{name}", value, "MPa")
+        _check_components("initial_stress", self, _TENSOR, "MPa")
         if self.stress is not None and not callable(self.stress):
             raise ModelError("initial_stress.stress", self.stress, "must be a function of position")
         if self.stress is not None and any(each.values()):
@@ -399,6 +431,11 @@ def _check_value(field: str, value: object, unit: str) -> None:
         _finite(field, value, unit)
 
 
+def _check_components(field: str, load: Load, names: tuple[str, ...], unit: str) -> None:
+    for name in names:
+        _check_value(f"{field}.{name}", getattr(load, name), unit)
+
+
 def _finite(field: str, value: object, unit: str) -> None:
     if not isinstance(value, int | float | np.number) or not np.isfinite(float(value)):
         raise ModelError(field, value, f"must be finite [{unit}]")
@@ -417,7 +454,11 @@ def _components(field: str, load: Load, names: tuple[str, ...], x: Array, unit: 
 
 def _values(field: str, value: Value, x: Array, unit: str) -> Array:
     """Return a number or a function of position at positions x (n,), or raise `ModelError`."""
-    return checked(field, value(x) if callable(value) else value, (x.shape[1],), unit)
+    try:
+        found = value(x) if callable(value) else value
+    except ModelError as error:  # of a table
+        raise ModelError(field, error.value, error.allowed) from None
+    return checked(field, found, (x.shape[1],), unit)
 
 
 def checked(field: str, value: object, shape: tuple[int, ...], unit: str) -> Array:

@@ -12,6 +12,7 @@ from solver.errors import ModelError
 from solver.materials.doubts import doubts
 from solver.model.body import Body
 from solver.model.friction import Coulomb, FrictionLaw
+from solver.model.link import Link
 from solver.model.rigid import Pushed, RigidBody
 from solver.model.singular import SingularPoint
 
@@ -50,6 +51,9 @@ class ContactPair:
     interference : overlap at load factor 1, in addition to that of the mesh [mm]: a load, which
         pushes the bodies apart with friction
     amplitude : load factor of the interference; when absent, time is the load factor
+    presence : whether the pair is there over time: its surfaces may touch while it is above 0 and
+        does not decrease. While it decreases its forces decrease with it, wherever the surfaces
+        are; at 0 there is no pair, and bodies pass through each other. When absent, always 1
     """
 
     slave: tuple[str, str]
@@ -61,8 +65,11 @@ class ContactPair:
     gap: float = 0.0
     interference: float = 0.0
     amplitude: Amplitude | None = None
+    presence: Amplitude | None = None
 
     def __post_init__(self) -> None:
+        if self.presence is not None and (least := float(np.min(self.presence.value))) < 0:
+            raise ModelError("presence", least, "must not be negative")
         if not self.shear_limit > 0:
             raise ModelError("shear_limit", self.shear_limit, "must be positive")
         if isinstance(self.friction, FrictionLaw):
@@ -88,6 +95,17 @@ class ContactPair:
         factor = time if self.amplitude is None else self.amplitude.at(time)
         return self.gap - factor * self.interference
 
+    def absent(self, time: float) -> bool:
+        """Return whether there is no pair at a time."""
+        return self.presence is not None and self.presence.at(time) == 0
+
+    def left(self, before: float, time: float) -> float | None:
+        """Return the ratio of its forces at a time to those before; None if contact finds them."""
+        if self.presence is None:
+            return None
+        was, now = self.presence.at(before), self.presence.at(time)
+        return None if now > 0 and now >= was else now / (was or 1.0)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Model:
@@ -98,12 +116,14 @@ class Model:
     bodies : bodies with different names and the same kinematics
     rigid : rigid bodies, with names of their own
     contacts : pairs of boundaries that may touch, of bodies of one thickness
+    links : boundaries that are tied, kept rigid, or held by springs
     singular : points around which large strain is not judged: it depends on the mesh
     """
 
     bodies: tuple[Body, ...]
     contacts: tuple[ContactPair, ...] = ()
     rigid: tuple[RigidBody, ...] = ()
+    links: tuple[Link, ...] = ()
     singular: tuple[SingularPoint, ...] = ()
 
     def __post_init__(self) -> None:
@@ -127,6 +147,36 @@ class Model:
             elastic = all(self.body(name, side).material.elastic for side, (name, _) in sides)
             contact.law.check_bodies(elastic=elastic)
         self._check_pairs()
+        for k, link in enumerate(self.links):
+            self._check_link(f"links[{k}]", link)
+        for body in self.rigid:
+            if not body.surfaces and all(link.rigid != body.name for link in self.links):
+                allowed = "must be 1 or more, unless a link moves a boundary with the body"
+                raise ModelError(f"rigid.{body.name}.surfaces", {}, allowed)
+
+    def _check_link(self, name: str, link: Link) -> None:
+        """Refuse bodies that a link cannot join, and surfaces that something else holds too."""
+        sides = zip(("slave", "master"), link.sides, strict=False)
+        for side, (of, boundary) in sides:
+            body = self.body(of, f"{name}.{side}")
+            if not isinstance(body, Body):
+                allowed = "must be a boundary of a body with a mesh: name a rigid body by rigid"
+                raise ModelError(f"{name}.{side}", (of, boundary), allowed)
+            if body.axle is not None or body.periodic is not None:
+                allowed = "must be of a body without an axle that is not periodic"
+                raise ModelError(f"{name}.{side}", (of, boundary), allowed)
+            body.facets(boundary, f"{name}.{side}", outer=True)
+            for j, pair in enumerate(self.contacts):
+                if any(self._overlap((of, boundary), each) for each in (pair.slave, pair.master)):
+                    allowed = f"shares facets with contacts[{j}]: link or contact, not both"
+                    raise ModelError(f"{name}.{side}", (of, boundary), allowed)
+        if link.master is not None and self._overlap(*link.sides):
+            allowed = f"shares facets with slave {link.slave}: must be another surface"
+            raise ModelError(f"{name}.master", link.master, allowed)
+        if link.rigid is not None and not isinstance(
+            self.body(link.rigid, f"{name}.rigid"), RigidBody
+        ):
+            raise ModelError(f"{name}.rigid", link.rigid, "must be a rigid body")
 
     def _check_pairs(self) -> None:
         """Refuse two thicknesses, a surface paired with itself, and two surfaces paired twice."""

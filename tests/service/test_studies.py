@@ -239,7 +239,9 @@ def test_a_waiting_study_is_dismissed_without_being_computed(service: Server) ->
     waiting = service.post(fake_study("waiting", seconds=0.05))
     assert service.client.post(f"/studies/{waiting}/retry").status_code == 409
     assert service.client.delete(f"/studies/{waiting}").json()["status"] == "dismissed"
-    assert service.client.get(f"/studies/{waiting}/dataset.nc").status_code == 404
+    content = io.BytesIO(service.client.get(f"/studies/{waiting}/dataset.nc").content)
+    with xr.open_dataset(content, engine="h5netcdf") as dataset:
+        assert set(dataset["status"].to_numpy().ravel()) == {"missing"}
     service.finished(busy)
     assert service.study(waiting)["counts"] == {"pending": 4}
     assert service.client.delete(f"/studies/{busy}").status_code == 409

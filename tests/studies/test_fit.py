@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from annotated_types import Interval, Unit
 from scipy.stats import chi2
-from studies.definition.certainty import certainty
 
 from residua.cli import main
 from solver.errors import ModelError
 from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, estimate, fit, open_study, run_study
+from studies.definition.certainty import certainty
 from studies.definition.fit import Fitted, Fitting, checked_fit, standings
 from studies.definition.identity import solver_hash
 from studies.definition.line import Line
@@ -252,7 +252,7 @@ def test_an_interrupted_fit_goes_on_and_asks_for_the_same_runs(tmp_path: Path) -
     one = study(measured(0.02))
     at_once = fit_here(one, Store(tmp_path / "a"))
     store, parts = Store(tmp_path / "b"), []
-    while some := fit_here(one, store, most=2):
+    while some := fit_here(one, store, most=5):
         parts += some
     assert sorted(parts) == sorted(at_once), "the same runs, and none twice"
     with open_study(tmp_path / "a") as a, open_study(tmp_path / "b") as b:
@@ -475,11 +475,12 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
 
 
 @pytest.mark.processes
+@pytest.mark.usefixtures("one_worker")
 def test_a_killed_fit_is_taken_up_and_computes_no_run_twice(tmp_path: Path) -> None:
     marks, out, file = tmp_path / "marks", tmp_path / "out", tmp_path / "study.toml"
     marks.mkdir()
     (tmp_path / "p.csv").write_text(PRESSURE)
-    file.write_text(FAKE_FIT.format(seconds=0.4, mark=marks) + LINES)
+    file.write_text(FAKE_FIT.format(seconds=0.2, mark=marks) + LINES)
     before = runs_before_a_kill("fit", file, out, 4)
     outcome = run_study(Study.from_toml(file), Store(out), workers=1)
     assert outcome.ok

@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from skfem import CellBasis
 
+from solver.fem.cells import smooth_cells
 from solver.fem.surface import edges_of
 from solver.materials.heated import Heated
 from solver.mesh.edges import shape_functions
@@ -40,8 +40,8 @@ the whole force: loads may bend and jump."""
 _GAUSS = (0.5 - 0.75**0.5 / 3, 0.5 + 0.75**0.5 / 3)
 _INSIDE = (0.5, 1e-6, 1 - 1e-6)
 """Gauss points of a chord; its middle, and its ends, where neighbours may have other loads."""
-_VOLUME_DEGREE = 10
-"""Polynomial degree up to which forces per volume are integrated exactly."""
+GHOST = 1e-7
+"""Share of stiffness that elements keep when they are removed."""
 
 
 def load_factor(amplitude: Amplitude | None, time: float) -> float:
@@ -144,9 +144,10 @@ class PlainBody:
         volume, nodes = self.volume.sum(axis=1), self._nodes
         count = self.part.X.shape[1]
         weighted = values.reshape(*values.shape[:-1], *self.volume.shape) * volume[:, None]
-        each = np.moveaxis(weighted @ to_nodes.T, -1, -2).reshape(-1, nodes.size)
-        total = np.bincount(nodes.ravel(), np.tile(volume, len(nodes)), count)
-        total[total == 0] = 1.0  # copies of a periodic body belong to no element
+        gone = np.isnan(weighted).reshape(-1, *self.volume.shape).any(axis=(0, 2))
+        each = np.moveaxis(np.nan_to_num(weighted) @ to_nodes.T, -1, -2).reshape(-1, nodes.size)
+        total = np.bincount(nodes.ravel(), np.tile(np.where(gone, 0, volume), len(nodes)), count)
+        total[total == 0] = np.nan if gone.any() else 1.0  # 1: copies of a periodic body
         sums = np.stack([np.bincount(nodes.ravel(), one, count) for one in each]) / total
         return np.asarray(sums[:, self.part.same].reshape(*values.shape[:-1], count))
 
@@ -173,7 +174,20 @@ class PlainBody:
                 factor = load_factor(load.amplitude, time)
                 stiff -= factor * lost[0]
                 strong -= factor * lost[1]
-        return stiff, strong
+        return self.left(time) * stiff, strong
+
+    def left(self, time: float) -> Array:
+        """Return the shares of stiffness (n_points,) that removal leaves; 1 where none is."""
+        left = np.ones(self.volume.shape)
+        for load in self.body.every_load:
+            if load.removes:
+                elements = np.asarray(self.body.mesh.subdomains[load.removes])
+                left[elements] -= load_factor(load.amplitude, time)
+        return np.maximum(left, GHOST).ravel()
+
+    def known(self, values: Array, time: float) -> Array:
+        """Return values (..., n_points), NaN in elements that are removed."""
+        return np.where(self.left(time) > GHOST, values, np.nan)
 
     def law(self, time: float) -> Law:
         """Return the law of the points at a time."""
@@ -271,17 +285,25 @@ class PlainBody:
         return total
 
     def _on_volume(self, load: Load) -> Array:
-        """Return the moments (3, 2) of a load's force per volume, integrated over elements."""
+        """Return the moments (3, 2) of a load's force per volume, integrated over elements.
+
+        Only the cells are those of the solver.
+        """
         if load.body_force(self.points) is None:
             return np.zeros((3, 2))
-        basis = CellBasis(self.body.mesh, self.part.basis.elem, intorder=_VOLUME_DEGREE)
-        x = np.asarray(basis.global_coordinates())
-        given = np.asarray(load.body_force(x.reshape(2, -1)))
-        force = np.broadcast_to(given, (2, x[0].size)).reshape(x.shape)
-        force = force * basis.dx * self._depth(x)
-        nodal = np.array([(force * np.asarray(b[0])).sum(axis=2) for b in basis.basis])
-        at = self.part.X[:, basis.element_dofs]
-        return self.moments(nodal.swapaxes(0, 1).reshape(2, -1), at.reshape(2, -1))
+
+        def force(x: Array) -> Array:
+            given = np.asarray(load.body_force(x.reshape(2, -1)))
+            return np.broadcast_to(given, (2, x[0].size)).reshape(x.shape) * self._depth(x)
+
+        basis, rule = self.part.basis, np.polynomial.legendre.leggauss(6)
+        cells = smooth_cells(basis, force)
+        local, x, area = cells.points(rule, rule)
+        given, total = force(x) * area, np.zeros((3, 2))
+        for k, own in enumerate(basis.element_dofs):
+            nodal = (given * np.asarray(basis.elem.lbasis(local, k)[0])).sum(axis=2)
+            total += self.moments(nodal, self.part.X[:, own[cells.element]])
+        return total
 
     def elastic_energy(self, stress: Array, time: float) -> float:
         """Return the energy of a Mandel stress (4, n_points) at a time [N mm]."""
