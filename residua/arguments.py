@@ -27,8 +27,9 @@ def parser() -> argparse.ArgumentParser:
     _add_run(add("run", commands.run))
     one = add("fit", commands.fit)
     one.add_argument(
-        "--measured", type=_path, nargs="+", default=[], metavar="CSV",
-        help="measured lines: columns PLACE and VALUE, named as variables of the runs, and sigma",
+        "--measured", type=_path, nargs="+", default=[], metavar="CSV[@NAME=VALUE]",
+        help="measured lines: columns PLACE and VALUE, named as variables of the runs, and sigma; "
+        "NAME=VALUE tells the place on other dimensions, such as stage=unloaded",
     )  # fmt: skip
     _add_run(one)
 

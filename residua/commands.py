@@ -99,8 +99,7 @@ def _part(study: Study, options: argparse.Namespace) -> int:
         )  # fmt: skip
     progress.close()
     number, count = options.part
-    left = "searches" if study.asks else "loading paths"
-    others = f", {found.left} {left} are left to others" if found.left else ""
+    others = f", {found.left} loading paths are left to others" if found.left else ""
     print(f"{study.name}: part {number} of {count}: {len(found.computed)} runs computed{others}")
     return INTERRUPTED if found.stopped else OK
 

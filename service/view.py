@@ -45,7 +45,7 @@ ELSEWHERE = "it has not ended, and no run was added lately"
 """What is told of a study that was begun."""
 
 
-class Shown:
+class ViewedFolder:
     """A folder of results, as a store and a queue in which nothing waits.
 
     Parameters
@@ -115,7 +115,7 @@ def application(path: Path) -> Iterator[tuple[FastAPI, str]]:
     with scratch() as folder:
         settings = Settings(data=folder, host=HOST, root_path="", require_keys=False)
         if (path / "studies").is_dir():
-            shown = Shown(path, folder)
+            shown = ViewedFolder(path, folder)
             shown.look()
             _tell_others(path, shown)
             ended = threading.Event()
@@ -138,7 +138,7 @@ def application(path: Path) -> Iterator[tuple[FastAPI, str]]:
         yield assembled(settings, store, jobs, None), f"/ui/studies/{store.study_id}"
 
 
-def _watch(shown: Shown, ended: threading.Event) -> None:
+def _watch(shown: ViewedFolder, ended: threading.Event) -> None:
     while not ended.wait(LOOK):
         try:
             shown.look()
@@ -146,7 +146,7 @@ def _watch(shown: Shown, ended: threading.Event) -> None:
             log.exception("the folder cannot be read now")
 
 
-def _tell_others(path: Path, shown: Shown) -> None:
+def _tell_others(path: Path, shown: ViewedFolder) -> None:
     """Tell which studies are not shown: those of another version of the solver."""
     known = {job.id for job in shown.jobs.page(limit=-1, offset=0)[0]}
     for study_id in shown.store.study_ids():

@@ -21,7 +21,7 @@ from fastapi.testclient import TestClient
 
 from residua.cli import main
 from service.job import StudyState
-from service.view import Shown, application
+from service.view import ViewedFolder, application
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.storage import seal
 from studies.views.unpacked import Unpacked
@@ -93,7 +93,7 @@ def test_a_study_that_is_computed_elsewhere_is_followed(
 ) -> None:
     study, store = folder
     begun = fake_study("begun", sweep=AXES | {"load_ratio": [0.3, 0.9, 1.0]})
-    seen = Shown(store.directory, tmp_path)
+    seen = ViewedFolder(store.directory, tmp_path)
     seen.look()
     job = seen.jobs.get(begun.id)
     assert (job.state, job.progress) == (StudyState.RUNNING, pytest.approx(200 / 3))
