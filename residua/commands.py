@@ -6,7 +6,7 @@ import argparse
 import signal
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING, Any
@@ -29,7 +29,8 @@ def run(options: argparse.Namespace) -> int:
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, run_study
     from studies.storage.store import Store
-    from studies.views.report import prepare, report
+    from studies.views.report import prepare
+    from studies.views.report import report as report_of
 
     limits = Limits(
         stall_seconds=options.stall_seconds, path_seconds=options.path_seconds,
@@ -72,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
             should_stop=lambda: bool(interrupted),
         )
     progress.close()
-    printed = report(study, store, outcome)
+    printed = report_of(study, store, outcome)
     computed = f"{len(outcome.computed)} computed in {outcome.wall_seconds:.0f} s"
     print(f"{printed.text.rstrip()}, {computed}")
     written = {outcome.dataset: outcome.anew} | dict.fromkeys(printed.files, printed.anew)
@@ -98,8 +99,7 @@ def _part(study: Study, options: argparse.Namespace) -> int:
         )  # fmt: skip
     progress.close()
     number, count = options.part
-    left = "searches" if study.asks else "loading paths"
-    others = f", {found.left} {left} are left to others" if found.left else ""
+    others = f", {found.left} loading paths are left to others" if found.left else ""
     print(f"{study.name}: part {number} of {count}: {len(found.computed)} runs computed{others}")
     return INTERRUPTED if found.stopped else OK
 
@@ -108,13 +108,10 @@ def slurm(options: argparse.Namespace) -> int:
     """Write a script for sbatch, which computes a study on a cluster."""
     from residua.slurm import script
     from studies.definition.study import Study
-    from studies.execution.part import check_parts
     from studies.storage.store import Store
 
     store = Store(options.out)
     study = Study.from_toml(options.study, (), store.definition, store.scene)
-    if not options.with_scheduler:
-        check_parts(study)
     text = script(
         study.name, options.study, options.out, options.script,
         tasks=options.tasks, time=options.time, memory=options.memory,
@@ -275,14 +272,34 @@ def serve(options: argparse.Namespace) -> int:
     return OK
 
 
+def view(options: argparse.Namespace) -> int:
+    """Open pages on a folder of results, or on a data set, in the browser; nothing is computed."""
+    from service.view import view as show_pages
+
+    show_pages(options.path, options.port, not options.no_browser)
+    return OK
+
+
+def report(options: argparse.Namespace) -> int:
+    """Write a study as one HTML file that needs no server: pictures, table, audit, versions."""
+    from studies.views.archive import archive
+    from studies.views.reading import open_study
+
+    with open_study(options.path) as dataset, _written("--out", options.out) as part:
+        part.write_text(archive(dataset), encoding="utf-8")
+    print(f"wrote {options.out}")
+    return OK
+
+
 def remote(options: argparse.Namespace) -> int:
     """Talk to a running service."""
     import httpx
 
-    from residua.client import Refused, Service, api_key
+    from residua.keys import api_key
+    from studies.client import Client, Refused
 
     try:
-        with closing(Service(options.url, api_key(options.api_key_file))) as service:
+        with Client(options.url, api_key(options.api_key_file)) as service:
             print(options.talk(service, options))
     except Refused as error:
         return complain(error, BAD_INPUT)
@@ -293,27 +310,25 @@ def remote(options: argparse.Namespace) -> int:
 
 def submit(service: Any, options: argparse.Namespace) -> str:
     """Send a study to a running service and print its id."""
-    return str(service.submit(options.study)["id"])
+    return str(service.submit(options.study).id)
 
 
 def status(service: Any, options: argparse.Namespace) -> str:
     """Print the state of a study on a running service."""
-    state = service.status(options.id)
+    state = service.study(options.id).detail()
     stage = f"  {state['stage']}" if state.get("stage") else ""
     return f"{state['status']}  {state['progress']:g} %{stage}"
 
 
 def cancel(service: Any, options: argparse.Namespace) -> str:
     """Stop a study on a running service."""
-    service.cancel(options.id)
+    service.study(options.id).cancel()
     return f"cancelled {options.id}"
 
 
 def fetch(service: Any, options: argparse.Namespace) -> str:
     """Save the data set of a study on a running service."""
-    target = options.out or Path(f"{options.id}.nc")
-    service.fetch(options.id, target)
-    return f"wrote {target}"
+    return f"wrote {service.study(options.id).fetch(options.out or Path(f'{options.id}.nc'))}"
 
 
 @contextmanager

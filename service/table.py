@@ -20,7 +20,6 @@ import numpy as np
 from service.job import Job
 from service.jobs import Jobs
 from service.overview import PENDING, chooses, searched_at
-from solver.results.audit.figures import AUDIT
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies import Store, StudyError
@@ -31,9 +30,13 @@ from studies.errors import one_of
 from studies.scenes.registry import known_names, scene_named
 from studies.storage.dataset import attributes_of, axis_attributes
 from studies.storage.seal import state_of
+from studies.views.figures import group_of
 
 KEPT = 8
 """Number of tables that are kept."""
+
+BATCH = 1000
+"""Number of runs whose rows of the catalogue are in memory at a time."""
 
 SAME = 1e-9
 """Relative difference below which a number is the one that a query names."""
@@ -45,12 +48,6 @@ RANGE = re.compile(r"(?P<low>[^.]*(?:\.\d[^.]*)?)\.\.(?P<high>.*)", re.DOTALL)
 
 OUTCOMES = (*STATUSES[:-1], PENDING)
 """Statuses of runs in a table, by their number in the column ``status`` of octets."""
-
-EFFORT = (
-    "increments", "cut_increments", "iterations", "median_iterations", "inner_fallbacks",
-    "blended_tangents", "cpu_seconds", "degrees_of_freedom",
-)  # fmt: skip
-"""Numbers that say how hard a run was to solve."""
 
 NUMBERS = ("result", "effort", "audit")
 """Groups of columns with the numbers of runs, the main ones first."""
@@ -81,13 +78,6 @@ class Column:
     def number(self) -> bool:
         """Whether it has numbers."""
         return self.values.dtype.kind == "f"
-
-    def text(self, at: int) -> str:
-        """Return a value with all its digits; empty if there is none."""
-        value = self.values[at].item() if self.number else self.values[at]
-        if not self.number:
-            return str(value)
-        return "" if math.isnan(value) else self.flags.get(int(value), f"{value!r}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,13 +137,6 @@ class RunTable:
             values = values.astype(float)
         return found[np.argsort(-values if sort.startswith("-") else values, kind="stable")]
 
-    def rows(self, at: Sequence[int] | np.ndarray, names: Sequence[str]) -> Iterator[list[str]]:
-        """Yield the texts of these runs in these columns, after a line with the names."""
-        wanted = [self.column(name) for name in names]
-        yield [each.name for each in wanted]
-        for position in at:
-            yield [each.text(position) for each in wanted]
-
 
 class Tables:
     """The tables of studies; one is made again when its study or the catalogue has changed."""
@@ -180,33 +163,46 @@ class Tables:
 
     def _made(self, job: Job) -> RunTable:
         study, runs = self.jobs.study(job.id), self.jobs.runs(job.id)
-        rows, allow = self.store.catalogue.rows(runs), study.get("allow", [])
         scene = scene_of_study(self.store, job.scene)
-        found = [rows.get(each) for each in runs]
         axes = {name: labels(name, axis) for name, axis in study["sweep"].items()}
-        if chooses(study):
-            axes, columns = {}, [*_asked(study, found, scene)]
+        asks, allow = chooses(study), study.get("allow", [])
+        outcome, said = (np.full(len(runs), text, dtype=object) for text in (PENDING, ""))
+        numbers: dict[str, np.ndarray] = {}
+        asked: dict[str, list[Any]] = {}
+        for first in range(0, len(runs), BATCH):
+            some = runs[first : first + BATCH]
+            rows = self.store.catalogue.rows(some)
+            for at, row in enumerate(map(rows.get, some), first):
+                if row is None:
+                    continue
+                outcome[at], said[at] = taken(row["status"], allow), row["message"]
+                for name, number in row["scalars"].items():
+                    if name not in numbers:
+                        numbers[name] = np.full(len(runs), math.nan)
+                    numbers[name][at] = math.nan if number is None else number
+                for name, value in searched_at(study, row["parameters"]).items() if asks else ():
+                    asked.setdefault(name, [None] * len(runs))[at] = value
+        if asks:
+            axes = {}
+            columns = [_placed(name, _array(each), scene) for name, each in asked.items()]
         else:
             columns = [*_sweep(study["sweep"], axes, scene)]
-        outcome = [taken(row["status"], allow) if row else PENDING for row in found]
-        columns.append(_column(STATUS, np.array(outcome, dtype=object), "run"))
+        columns.append(_column(STATUS, outcome, "run"))
         known = {each.name for each in columns}
-        scalars = [row["scalars"] if row else {} for row in found]
-        for name in dict.fromkeys(name for each in scalars for name in each if name not in known):
-            values = np.array([each.get(name, math.nan) for each in scalars], dtype=float)
-            group = group_of(name)
-            columns.append(_column(name, values, group, scene))
-        columns.append(_column(RUN, np.array(runs, dtype=object), "run"))
-        said = [row["message"] if row else "" for row in found]
-        columns.append(_column(MESSAGE, np.array(said, dtype=object), "run"))
+        for name in (each for each in numbers if each not in known):
+            columns.append(_column(name, numbers[name], group_of(name), scene))
+        columns += [
+            _column(RUN, np.array(runs, dtype=object), "run"),
+            _column(MESSAGE, said, "run"),
+        ]
         return RunTable(axes=axes, columns={each.name: each for each in columns})
 
 
-def group_of(name: str) -> str:
-    """Return what a number of a run tells: ``result``, ``effort`` or ``audit``."""
-    if name in AUDIT or name.startswith("audit_"):
-        return "audit"
-    return "effort" if name in EFFORT else "result"
+def varied(table: RunTable) -> list[Column]:
+    """Return the columns of the sweep that are not the same in all runs."""
+    sweep = [each for each in table.columns.values() if each.group == "sweep"]
+    several = [each for each in sweep if len(set(each.values.tolist())) > 1]
+    return several or sweep
 
 
 def scene_of_study(store: Store, name: str) -> Scene | None:
@@ -226,15 +222,6 @@ def _sweep(
     own = {name: (name, values) for name, values in axes.items()}
     for name, (axis, values) in {**own, **linked_values(dict(sweep))}.items():
         yield _placed(name, _array(values)[at[axis]], scene)
-
-
-def _asked(
-    study: Mapping[str, Any], rows: Sequence[Mapping[str, Any] | None], scene: Scene | None
-) -> Iterator[Column]:
-    """Yield the axes of a study that chooses its runs, and what it searches, over these runs."""
-    at = [searched_at(study, row["parameters"]) if row else {} for row in rows]
-    for name in dict.fromkeys(name for each in at for name in each):
-        yield _placed(name, _array([each.get(name) for each in at]), scene)
 
 
 def _array(values: Sequence[Any]) -> np.ndarray:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from solver.model.model import ContactPair, Model
     from solver.model.rigid import Moved, Pushed, RigidBody
     from solver.model.singular import SingularPoint
+    from solver.model.tabulated import Tabulated
     from solver.results.audit.report import Audit
     from solver.results.record import Record, Status
     from solver.results.solution import Solution, solve
@@ -65,6 +66,7 @@ _HOMES = {
     "Stage": "loading.program",
     "Status": "results.record",
     "System": "contact.system",
+    "Tabulated": "model.tabulated",
     "Temperature": "model.loads",
     "Tolerances": "loading.control",
     "Traction": "model.loads",
@@ -100,6 +102,7 @@ __all__ = [
     "Stage",
     "Status",
     "System",
+    "Tabulated",
     "Temperature",
     "Tolerances",
     "Traction",

@@ -26,8 +26,14 @@ if TYPE_CHECKING:
     from solver.contact.system import System
     from solver.fem.operators import Operator
 
+    Array = NDArray[np.float64]
+
 _MARGIN = 0.25
 """Vertices nearer than this many element lengths are candidates."""
+_POWER = 5 / 3
+"""Power of the gap in the slip of a vertex that comes near."""
+_FELL = 0.5
+"""Ratio of normal forces that fell to those that rose, up to which a contact grows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +49,7 @@ class Candidates:
     forces : (n or 2n, and c,) normal, with friction tangential, and link forces of the current
         iterate [N]
     status : (n,) of the current iterate, as in `solver.contact.problem`
-    untimed : (n,) whether the vertex touched since the last state, at a time that is not known
+    unsure : (n,) the possible error of ``uncounted`` [mm]; inf if the time of touch is not known
     rows : one per part, None for a part without contact surface
     covered : for each interface, the share of each candidate's hat function that faces the master
     gaps, slips : for each interface, gap and slip of all its vertices [mm]; the gap is inf where no
@@ -62,7 +68,7 @@ class Candidates:
     uncounted: NDArray[np.float64]
     forces: NDArray[np.float64]
     status: NDArray[np.int64]
-    untimed: NDArray[np.bool_]
+    unsure: NDArray[np.float64]
     rows: tuple[ContactRows | None, ...]
     covered: tuple[NDArray[np.float64], ...]
     gaps: tuple[NDArray[np.float64], ...]
@@ -205,9 +211,11 @@ class Candidates:
             slipped[at] += moved[here]
             with np.errstate(invalid="ignore", divide="ignore"):
                 rates = np.stack([gap - old.gap, slip]) / span
+                earlier = np.stack([old.gap, old.earlier[0], old.rates[1] / old.rates[0]])
             rates[:, ~np.isfinite(rates).all(axis=0)] = np.nan
-            touching = new.status != OPEN
-            out.append(replace(new, touching=touching, gap=gap, rates=rates, slipped=slipped))
+            earlier[:, not _grew(old.normal, new.normal)] = np.nan
+            past = {"gap": gap, "rates": rates, "earlier": earlier}
+            out.append(replace(new, touching=new.status != OPEN, slipped=slipped, **past))
         return tuple(out)
 
 
@@ -228,11 +236,10 @@ def no_candidates(
     gaps = tuple(np.full(len(i.slave_surface.edges) + 1, np.inf) for i in system.interfaces)
     slips = tuple(map(np.zeros_like, gaps))
     status = empty.astype(int)
-    known = empty.astype(bool)
     lines = BoundLines.none(0)
     pushes = tuple(np.zeros(part.n) for part in system.parts)
     return Candidates(
-        none, lines, off, empty, links, status, known, rows, covered, gaps, slips, np.inf,
+        none, lines, off, empty, links, status, empty, rows, covered, gaps, slips, np.inf,
         leaving=(None,) * len(none), pushes=pushes, holds=(False,) * len(pushes),
         links=system.links,
     )  # fmt: skip
@@ -251,7 +258,7 @@ def find_candidates(
     ``contacts`` and ``links`` have the forces of the current iterate.
 
     Slips count from the state ``start`` or, where a vertex had no contact then, from the moment
-    it touched, if the rates of its approach are known from the last increment.
+    it touched, if its approach is known from the last increments.
     """
     time = start.time + span
     shares = [interface.declared.left(start.time, time) for interface in system.interfaces]
@@ -282,7 +289,7 @@ def find_candidates(
     last = slice(m - len(system.links), m)
     motion[last] = system.links.off(u, links)
     lines: list[BoundLines] = []
-    untimed = np.zeros(n, dtype=bool)
+    unsure = np.zeros(n)
     pieces = [_below(m, rows) for rows in system.links.rows]
     slips: list[NDArray[np.float64]] = []
     for pair, (interface, pairing, at, before, normal) in enumerate(
@@ -293,9 +300,8 @@ def find_candidates(
         left = leaving[pair]
         if left is None:
             beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
-        uncounted[normal] = np.where(before.touching, 0.0, _slip_before_contact(before, span))[at]
-        untimed[normal] = np.isnan(uncounted[normal])
-        uncounted[normal] = np.nan_to_num(uncounted[normal])
+        approach = np.where(before.touching, 0.0, _slip_before_contact(before, span))
+        uncounted[normal], unsure[normal] = approach[:, at]
         shear = system.bound(pair, pairing, start, time).at(at)
         lines.append(shear.over(pairing.area[at]))
         for side, (number, part, surface) in enumerate(interface.sides):
@@ -327,7 +333,7 @@ def find_candidates(
         uncounted=uncounted,
         forces=np.concatenate(forces),
         status=gather("status").astype(np.int64),
-        untimed=untimed,
+        unsure=unsure,
         rows=tuple(joined(p) for p in pieces),
         covered=tuple(p.covered[v] for p, v in zip(pairings, vertices, strict=True)),
         gaps=tuple(p.gap for p in pairings),
@@ -347,15 +353,37 @@ def _below(m: int, rows: ContactRows | None) -> list[ContactRows]:
     return [ContactRows(rows.dofs, np.pad(rows.block, ((m - len(rows.block), 0), (0, 0))))]
 
 
-def _slip_before_contact(before: ContactState, span: float) -> NDArray[np.float64]:
-    """Return the slip (n,) before contact, if gap and slip continue at their last rates [mm].
+def _slip_before_contact(before: ContactState, span: float) -> tuple[Array, Array]:
+    """Return the slip (n,) before contact, and its possible error [mm].
 
-    A vertex that would close later than ``span`` is taken to touch at its end. NaN where the gap
-    does not close, or its rates are not known.
+    Gap and slip continue at their last rates; a vertex that would close later than ``span`` is
+    taken to touch at its end. If contact grew in the last two increments, slip continues as a
+    function of the gap, ``a + b gap + c gap^(5/3)`` through the last three states, and what that
+    changes is the possible error: beyond the end of a contact that grows, surfaces move with the
+    root of the distance y to this end, gap and slip are ``y^1.5`` times a series in y, and the
+    change of slip with the gap is one in ``gap^(2/3)``.
+
+    Where the gap does not close, or its rates are not known, the slip is 0, its possible error inf.
     """
     closing, sliding = before.rates * span
     share = np.divide(before.gap, -closing, out=np.full_like(closing, np.nan), where=closing < 0)
-    return np.asarray(sliding * np.clip(share, 0.0, 1.0))
+    share = share.clip(0.0, 1.0)
+    last, first, slope = before.earlier
+    with np.errstate(invalid="ignore", divide="ignore"):
+        gaps = np.stack([before.gap + share * closing, before.gap, last, first]).clip(0.0)
+        power = np.diff(gaps**_POWER, axis=0) / np.diff(gaps, axis=0)
+        change = (sliding / closing - slope) / (power[1] - power[2]) * (power[0] - power[1])
+        more = change * share * closing
+        bends = np.isfinite(more) & (before.gap < last) & (last < first)
+    more = np.where(bends, more, 0.0)
+    known = np.isfinite(share)
+    return np.where(known, sliding * share + more, 0.0), np.where(known, more, np.inf)
+
+
+def _grew(before: Array, after: Array) -> bool:
+    """Whether normal forces (n,) of a contact mostly grew: in one that moves on as many fell."""
+    change = after - before
+    return bool(-change.sum(where=change < 0) <= _FELL * change.sum(where=change > 0))
 
 
 def _near(pairing: Pairing, contact: ContactState, floating: bool) -> NDArray[np.int64]:

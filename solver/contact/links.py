@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _DEPENDENT = 1e-9
-"""Ratio of what is left of a condition without those before it to the condition; below it these
-hold its unknowns already."""
+"""Ratio of what is left of a condition without the others to the condition; below it the condition
+follows from them. Also the least singular value of the rigid motions that links hold."""
 _LITTLE = 1e-9
 """Ratio of the area of a node to the largest; below it no spring acts there."""
 
@@ -60,6 +60,11 @@ class Links:
     def __len__(self) -> int:
         """Return the number of conditions."""
         return len(self.compliance)
+
+    @property
+    def springy(self) -> bool:
+        """Whether springs resist any motion."""
+        return bool(self.compliance.any())
 
     def off(self, u: Sequence[Array], forces: Array) -> Array:
         """Return how far the conditions (c,) are not met by unknowns and forces [mm]."""
@@ -95,14 +100,20 @@ class Links:
 
 
 def eliminated(
-    problem: ContactProblem, links: int, *, apart: bool
+    problem: ContactProblem, links: int, touched: NDArray[np.bool_]
 ) -> tuple[ContactProblem, Callable[[ContactSolution], ContactSolution]]:
     """Return the contact problem without its last conditions, and the way back to all unknowns.
 
     Parameters
     ----------
     links : number of conditions, the last of ``offset``, ``W`` and ``A``; their force has any sign
-    apart : whether rigid motions that no link holds stay zero
+    touched : (k,) whether contact may hold the rigid motion: those that no link and no contact
+        holds stay zero
+
+    Raises
+    ------
+    Singular
+        if a tangent has lost its stiffness against the links
     """
     m = len(problem.offset) - links
     W, offset, A = problem.W, problem.offset, problem.A
@@ -110,8 +121,8 @@ def eliminated(
     _, sizes, ways = linalg.svd(A[m:] / size)
     rank = int((sizes > _DEPENDENT).sum())
     held, loose = ways[:rank].T, ways[rank:].T
-    if apart:
-        loose = loose[:, :0]
+    _, moved, ways = linalg.svd(loose[touched])
+    loose = loose @ ways[: int((moved > _DEPENDENT).sum())].T
     # of forces and motions, which differ in magnitude by the compliance
     held = held * (np.abs(np.diag(W)[m:]).max() / size)
     S = np.zeros((links + rank,) * 2)
@@ -148,11 +159,9 @@ def surfaces_of_links(
     model: Model, wholes: Mapping[str, Discretisation | RigidPart]
 ) -> dict[Side, Surface]:
     """Return the surfaces of all links in the numbering of the whole bodies."""
-    return {
-        (name, boundary): wholes[name].chain(boundary, link.master is None)
-        for link in model.links
-        for name, boundary in link.sides
-    }
+    tied = {side for link in model.links if link.master for side in link.sides}
+    every = {side for link in model.links for side in link.sides}
+    return {side: wholes[side[0]].chain(side[1], side not in tied) for side in sorted(every)}
 
 
 def links_of(
@@ -163,7 +172,7 @@ def links_of(
     Raises
     ------
     ModelError
-        where supports, motions or other links hold what a link should hold
+        where motions contradict supports or other links
     """
     pieces: list[list[ContactRows]] = [[] for _ in parts]
     compliance, places, whose = [np.zeros(0)], [np.zeros((2, 0))], [np.zeros(0, dtype=int)]
@@ -187,7 +196,7 @@ def links_of(
 
 
 @dataclass(frozen=True, slots=True)
-class _Conditions:
+class _LinkRows:
     """The conditions of one link: rows by number of the part, compliance (c,), places X (2, c)."""
 
     rows: list[tuple[int, ContactRows]]
@@ -198,7 +207,7 @@ class _Conditions:
 def _conditions(
     name: str, link: Link, parts: Sequence[Part], names: Sequence[str],
     surfaces: Mapping[Side, Surface],
-) -> _Conditions:  # fmt: skip
+) -> _LinkRows:  # fmt: skip
     number, slave = names.index(link.slave[0]), surfaces[link.slave]
     rows: list[tuple[int, ContactRows]] = []
     if link.master is None:
@@ -211,14 +220,15 @@ def _conditions(
         bodies = [parts[names.index(of)].body for of, _ in link.sides]
         at_rest = [np.zeros_like(surfaces[side].X) for side in link.sides]
         master = surfaces[link.master]
-        pairing = pair(slave, at_rest[0], master, at_rest[1], largest_overlap(*bodies))
+        pairing = pair(slave, at_rest[0], master, at_rest[1], largest_overlap(*bodies), tied=True)
         at = np.flatnonzero(pairing.area > 0)
         if not len(at):
             allowed = "these surfaces do not face each other: check boundaries and positions"
             raise ModelError(name, link.sides, allowed)
-        areas = np.tile(pairing.area[at], 2)
-        block, others = (np.vstack([pairing.normal[k][at], pairing.tangent[k][at]]) for k in (0, 1))
-        X = np.tile(slave.X[:, slave.vertices[at]], 2)
+        areas = np.tile(pairing.area[at], len(link.axes))
+        ways = [(pairing.normal, pairing.tangent)[axis] for axis in link.axes]
+        block, others = (np.vstack([way[side][at] for way in ways]) for side in (0, 1))
+        X = np.tile(slave.X[:, slave.vertices[at]], len(link.axes))
         other = names.index(link.master[0])
         rows.append((other, ContactRows(parts[other].surface(master).dofs, others)))
     if link.rigid is not None:
@@ -240,41 +250,43 @@ def _conditions(
         block, areas, X = block[others_], areas[others_], X[:, others_]
     rows.append((number, ContactRows(parts[number].surface(slave).dofs, block)))
     if np.isinf(link.stiffness):
-        return _Conditions(rows, np.zeros(len(areas)), X)
+        return _LinkRows(rows, np.zeros(len(areas)), X)
     acts = areas > _LITTLE * areas.max()
     rows = [(k, ContactRows(own.dofs, own.block[acts])) for k, own in rows]
-    return _Conditions(rows, 1 / (link.stiffness * areas[acts]), X[:, acts])
+    return _LinkRows(rows, 1 / (link.stiffness * areas[acts]), X[:, acts])
 
 
 def _independent(made: Links, parts: Sequence[Part], X: Array) -> NDArray[np.int64]:
-    """Return the conditions without those on unknowns that supports hold at rest.
+    """Return the conditions that do not follow from supports and the others.
 
-    Raises `ModelError` for a condition that supports, motions or other conditions hold already.
+    Raises `ModelError` for one that follows from them but for prescribed motions, which contradict.
     """
-    free, driven = [np.zeros((len(made), 0))], np.zeros(len(made), dtype=bool)
-    for part, rows in zip(parts, made.rows, strict=True):
-        if rows is None:
-            continue
-        loose = np.isin(rows.dofs, part.free)
-        free.append(rows.block[:, loose])
-        moves = np.isin(rows.dofs, np.flatnonzero(part.driven.fields.any(axis=1)))
-        driven |= rows.block[:, moves].any(axis=1)
-    G = np.hstack(free)
+    each = [(p, rows) for p, rows in zip(parts, made.rows, strict=True) if rows is not None]
+    cases = sum(len(part.driven.cases) for part, _ in each)
+    free, driven = [np.zeros((len(made), 0))], np.zeros((len(made), cases))
+    for part, rows in each:
+        free.append(rows.block[:, np.isin(rows.dofs, part.free)])
+        own = rows.block @ part.driven.fields[rows.dofs]
+        cases -= own.shape[1]
+        driven[:, cases : cases + own.shape[1]] = own
+    rigid = np.flatnonzero(made.compliance == 0)
+    if not len(rigid):
+        return np.arange(len(made))
+    G, moves = np.hstack(free)[rigid], driven[rigid]
     size = np.linalg.norm(G, axis=1)
-    held = (size == 0) & (made.compliance == 0)
-    kept = np.flatnonzero(~held)
-    rigid = kept[made.compliance[kept] == 0]
-    wrong = np.flatnonzero(held & driven)
-    if len(rigid):
-        R, order = linalg.qr((G[rigid] / size[rigid, None]).T, mode="r", pivoting=True)
-        left = np.zeros(len(rigid))
-        left[: min(R.shape)] = np.abs(np.diag(R))
-        wrong = np.append(wrong, rigid[order[left < _DEPENDENT]])
+    G = np.divide(G, size[:, None], out=np.zeros_like(G), where=size[:, None] > 0)
+    R, order = linalg.qr(G.T, mode="r", pivoting=True)
+    rank = int((np.abs(np.diag(R)) > _DEPENDENT).sum())
+    kept, others = order[:rank], order[rank:]
+    follow = np.linalg.lstsq(G[kept].T, G[others].T)[0].T
+    scale = np.where(size > 0, size, 1.0)[:, None]
+    off = np.abs(moves[others] / scale[others] - follow @ (moves[kept] / scale[kept]))
+    wrong = others[(off > _DEPENDENT * np.abs(moves).max(initial=0.0)).any(axis=1)]
     if len(wrong):
-        x, y = X[:, wrong[0]]
+        x, y = X[:, rigid[wrong[0]]]
         raise ModelError(
-            f"links[{made.whose[wrong[0]]}]", f"({x:g}, {y:g})",
-            "must not hold what supports, motions or other links hold already: shorten one of the "
-            "boundaries by an element, or leave a component out",
+            f"links[{made.whose[rigid[wrong[0]]]}]", f"({x:g}, {y:g})",
+            "must not move what supports, motions or other links move in another way: shorten one "
+            "of the boundaries by an element, or leave a component out",
         )  # fmt: skip
-    return kept
+    return np.setdiff1d(np.arange(len(made)), rigid[others])

@@ -101,7 +101,7 @@ class Increment:
     elastic_only : raise `Yielded` as soon as a point yields
     patient : use all iterations if every body hardens, so that an equilibrium exists: with little
         hardening the residual rises and falls while the energy falls
-    stiffness : elastic stiffness of contact points by their vertices, as far as known [N/mm]
+    compliance : elastic compliance of contact points by their vertices, as far as known [mm/N]
     """
 
     def __init__(
@@ -117,7 +117,7 @@ class Increment:
         elastic_only: bool = False,
         patient: bool = False,
         tolerances: Tolerances | None = None,
-        stiffness: dict[bytes, NDArray[np.float64]] | None = None,
+        compliance: dict[bytes, NDArray[np.float64]] | None = None,
     ) -> None:
         self.system = system = system.during(start)
         self.start = start
@@ -134,7 +134,7 @@ class Increment:
         self._began: tuple[Vectors, Candidates] | None = None  # residuals, candidates
         self._pivoted, self._blended = 0, 0
         self._softened = any(part.body.law.has_corners for part in system.parts)  # no tangent there
-        self.stiffness = {} if stiffness is None else stiffness
+        self.compliance = {} if compliance is None else compliance
 
     def solve(self) -> Converged:
         """Return the converged increment or raise `IncrementFailed` (or `Yielded`)."""
@@ -198,7 +198,7 @@ class Increment:
                     failure.why = softest
                 failure.why = self._slide((residuals, candidates)) or failure.why
                 raise
-            if iteration >= _LATE:
+            if iteration >= _LATE and not self.system.links.springy:
                 softest = softer(softest, self.system.parts, step.u, responses)
             before, found = u, self._search(u, residuals, candidates, step, error * scale)
             share, u, responses, residuals = found
@@ -244,7 +244,10 @@ class Increment:
         """Return the softest step, with whether the kinematic theorem excludes equilibrium.
 
         The theorem is not applied if a motion is prescribed: the work of its force is not known.
+        Nor is it with springs, whose force grows without limit.
         """
+        if self.system.links.springy:
+            return flow
         parts = self.system.parts
         moved = [now - before for now, before in zip(u, self.start.u, strict=True)]
         if any(np.delete(move, part.free).any() for part, move in zip(parts, moved, strict=True)):
@@ -291,7 +294,8 @@ class Increment:
             off = overlap < -self.system.touching or candidates.motion[candidates.linked].any()
             return 0.0, float(off), 0.0
         error = self._unbalanced(residuals, candidates, candidates.forces) / scale
-        return scale, error, candidates.violation(self._stiffness(candidates)) / scale
+        stiffness = 1 / np.diag(self._compliance(candidates))
+        return scale, error, candidates.violation(stiffness) / scale
 
     def _unbalanced(
         self, residuals: Vectors, candidates: Candidates, forces: NDArray[np.float64]
@@ -313,15 +317,16 @@ class Increment:
         met = violation < self.tolerances.contact and candidates.beyond >= 0
         return balanced and met
 
-    def _stiffness(self, candidates: Candidates) -> NDArray[np.float64]:
-        """Return the elastic stiffness of the contact points [N/mm], a scale; computed once."""
+    def _compliance(self, candidates: Candidates) -> NDArray[np.float64]:
+        """Return the elastic compliance of the contact points [mm/N], a scale; computed once."""
         key = b"".join(vertices.tobytes() for vertices in candidates.vertices)
-        if key not in self.stiffness:
+        if key not in self.compliance:
             W = candidates.compliance([o.elastic for o in self.system.operators])
-            W = np.diag(W).copy()
-            W[candidates.linked] += candidates.links.compliance
-            self.stiffness[key] = 1 / np.where(W > 0, W, W.max(initial=1.0))
-        return self.stiffness[key]
+            last = np.arange(len(W))[candidates.linked]
+            own = W[last, last] + candidates.links.compliance
+            W[last, last] = np.where(own > 0, own, np.diag(W).max(initial=1.0))
+            self.compliance[key] = W
+        return self.compliance[key]
 
     # -- 3, 4: the step ------------------------------------------------------------------------
 
@@ -425,4 +430,4 @@ class Increment:
     def _timing(self, candidates: Candidates) -> Timing:
         if not candidates.n or not self.friction:
             return Timing()
-        return timing(self.system, self.start, candidates, self._stiffness(candidates))
+        return timing(self.system, self.start, candidates, self._compliance(candidates))

@@ -73,25 +73,29 @@ def newton_step(
     begun = [operator.begin(r) for operator, r in zip(operators, balanced, strict=True)]
     for i, part in enumerate(begun):
         motion += candidates.of_part(i, part.kept)
-    links = len(candidates.links)
     each = zip(system.parts, candidates.holds, candidates.links.rows, strict=True)
     floating = [
         part.rigid if held or linked is not None else part.rigid[:, :0]
         for part, held, linked in each
     ]
-    last = np.arange(len(W))[candidates.linked]
+    links, last = len(candidates.links), np.arange(len(W))[candidates.linked]
     W[last, last] += candidates.links.compliance
-    motion[candidates.linked] -= candidates.links.compliance * candidates.forces[candidates.linked]
-    acting = [r + pushed for r, pushed in zip(residuals, candidates.pushes, strict=True)]
+    motion[last] -= candidates.links.compliance * candidates.forces[last]
     problem = ContactProblem(
         W=W,
         offset=motion,
         lines=candidates.lines,
         A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
-        balance=np.concatenate([R.T @ r for R, r in zip(floating, acting, strict=True)]),
+        balance=np.concatenate(
+            [
+                R.T @ (r + pushed)
+                for R, r, pushed in zip(floating, residuals, candidates.pushes, strict=True)
+            ]
+        ),
     )
     if links:
-        problem, whole = eliminated(problem, links, apart=not any(candidates.holds))
+        touched = np.repeat(candidates.holds, [R.shape[1] for R in floating])
+        problem, whole = eliminated(problem, links, touched)
     solution = solve_contact(problem, candidates.status)
     if solution is None:
         return None

@@ -28,7 +28,7 @@ class Link:
     master : body and boundary to which the slave is tied; their nodes need not match
     rigid : the rigid body whose motion the slave follows; with a master, the motion of the slave
         relative to the master, such as the shortening of a bolt. Rotations are small
-    components : of the displacement; both where a master is given
+    components : of the displacement that it holds
     stiffness : of springs between the two, force per area and displacement [N/mm3]; inf is rigid
     distributed : whether only the mean motion of the slave is that of ``rigid``: its force and
         moment act on the slave by a linear traction, and it may deform
@@ -46,8 +46,6 @@ class Link:
             raise ModelError("components", self.components, "must be x, y or xy")
         if not self.stiffness > 0:
             raise ModelError("stiffness", self.stiffness, "must be positive [N/mm3]")
-        if self.master is not None and self.components != "xy":
-            raise ModelError("components", self.components, "must be xy between two boundaries")
         if self.distributed and (
             self.rigid is None or self.master or math.isfinite(self.stiffness)
         ):

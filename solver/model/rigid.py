@@ -35,7 +35,8 @@ class Pushed(Load):
 
     Attributes
     ----------
-    locked : time from which the motion stays as it is then, as that of a tightened bolt
+    locked : time from which the motion stays as it is then, as that of a tightened bolt: in all
+        increments that begin at or after it
     """
 
     value: float = 0.0

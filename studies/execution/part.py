@@ -1,24 +1,27 @@
 """Compute a part of a study: one process of many, which meet in the directory alone.
 
-Each process goes through all loading paths of the study, or all searches of its goal, from a place
-of its own, and computes those that lack runs and that it can claim (`studies.storage.claims`). It
-ends when nothing is left that it can claim. What one that was killed has left is claimed by another
-one, or computed by `run_study` at the end, which combines the runs.
+Each process goes through all loading paths of the study, from a place of its own, and computes
+those that lack runs and that it can claim (`studies.storage.claims`). Of a study that chooses its
+runs each process carries out all programs: they ask for the same runs, whoever computes them. It
+ends when nothing is left that it can claim, and no run of others can make a program ask for more.
+What one that was killed has left is claimed by another one, or computed by `run_study` at the end,
+which combines the runs.
 """
 
 from __future__ import annotations
 
+import itertools
 import os
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Container
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
 from studies.errors import StudyError
-from studies.execution.asking import Asking
+from studies.execution.asking import Asked, Asking
 from studies.execution.run import StudyEvent
 from studies.execution.task import PathTask, walk
 from studies.scratch import scratch
@@ -30,6 +33,8 @@ _MOST_DEATHS = 2
 """Number of processes that died with a path, after which it is blamed and not tried again."""
 _LOOK = 2.0
 """Seconds after which the files of runs are listed again."""
+_WAIT = 0.5
+"""Seconds after which a process that waits for the runs of others looks again."""
 _DIED = (
     "the processes that computed this loading path died; if memory ran out, give each more, or "
     "more time if a limit of the cluster ended them"
@@ -43,8 +48,8 @@ class PartOutcome:
     Attributes
     ----------
     computed : ids of the runs that it has computed
-    left : number of loading paths, or of searches, that lack runs at its end: others have claimed
-        them, or it was stopped
+    left : number of loading paths that lack runs at its end: others have claimed them, or it was
+        stopped
     stopped : whether it was stopped
     """
 
@@ -79,14 +84,13 @@ def run_part(
     StoreBusy
         if a process that is no part computes into the directory
     StudyError
-        if the part is none, as `check_parts`, or if the directory is not writable
+        if the part is none, or the directory is not writable
     StoreFull
         if the disk is full
     """
     number, count = part
     if not 1 <= number <= count:
         raise StudyError("part", f"{number}/{count}", "must be i/n with 1 <= i <= n")
-    check_parts(study)
     with scratch() as folder:
         store = Store(directory)
         # SQLite is not made for directories that machines share
@@ -96,13 +100,6 @@ def run_part(
             emit = on_event or (lambda event: None)
             work = _PartWork(study, store, emit, should_stop or (lambda: False))
             return work.done((number - 1) / count)
-
-
-def check_parts(study: Study) -> None:
-    """Raise `StudyError` if parts cannot share a study."""
-    if study.asks and not study.goal:
-        allowed = "chooses its runs, so that parts cannot share it: use a scheduler"
-        raise StudyError("part", study.name, allowed)
 
 
 @dataclass(slots=True)
@@ -121,45 +118,52 @@ class _PartWork:
     def done(self, begin: float) -> PartOutcome:
         """Go through all units, from a place between 0 and 1 on, until none can be claimed."""
         claims = Claims(self.store.directory / "claims")
-        units = self._units()
+        asking = Asking(self.study, self.store, resume=True) if self.study.asks else None
+        units = self._units(asking)
         first = round(begin * len(units))
-        left, count, claimed = units[first:] + units[:first], len(units), True
-        while claimed and left and not self.stop():
-            claimed = False
-            waiting: list[_PathUnit | _SearchUnit] = []
+        left, moved = units[first:] + units[:first], True
+        while left and not self.stop() and not (asking and asking.ended):
+            if not moved:
+                if asking is None or asking.goes_on:
+                    break
+                time.sleep(_WAIT)
+            moved = False
+            waiting: list[_Unit] = []
             for at, unit in enumerate(left):
-                self._share = 1.0 - (len(left) - at + len(waiting)) / count
+                open_ = len(left) - at + len(waiting)
+                self._share = asking.progress if asking else 1.0 - open_ / len(units)
                 if self.stop():
                     waiting += left[at:]
                     break
                 if self._complete(unit):
+                    moved = True
                     continue
-                with claims.held(unit.name) as claim:
+                with claims.held(unit.path.id) as claim:
                     if claim is None:
                         waiting.append(unit)
                         continue
-                    claimed = True
+                    moved = True
                     unit.compute(self, claim.deaths >= _MOST_DEATHS)
                     claim.done = not self.stop()
                     if not claim.done:
                         waiting.append(unit)
-            left = waiting
+            left = [*self._units(asking), *waiting] if asking else waiting
         return PartOutcome(computed=self.computed, left=len(left), stopped=self.stop())
 
-    def _units(self) -> list[_PathUnit | _SearchUnit]:
-        if self.study.asks:
-            return [_SearchUnit(case.id, k) for k, case in enumerate(self.study.cases())]
-        return [_PathUnit(path.id, path) for path in self.study.paths()]
+    def _units(self, asking: Asking | None) -> list[_Unit]:
+        """Return what is to be done; of programs what they have asked for anew."""
+        if asking is None:
+            return [_Unit(path) for path in self.study.paths()]
+        asked = itertools.takewhile(lambda each: each is not None, asking.paths())
+        return [_Unit(each.path, asking, each) for each in asked if each]
 
-    def _complete(self, unit: _PathUnit | _SearchUnit) -> bool:
+    def _complete(self, unit: _Unit) -> bool:
         """Whether the runs of a unit were there when the files were listed last."""
         if time.monotonic() - self._looked > _LOOK:
             with os.scandir(self.store.directory / "runs") as files:
                 self._there = {each.name.removesuffix(".nc") for each in files}
             self._looked = time.monotonic()
-        return isinstance(unit, _PathUnit) and all(
-            case.id in self._there for case in unit.path.cases
-        )
+        return unit.complete(self._there)
 
     def walk(self, task: PathTask, hear: Callable[[str, dict[str, Any]], str]) -> None:
         """Compute the runs of a task."""
@@ -191,51 +195,46 @@ class _PartWork:
 
 
 @dataclass(frozen=True, slots=True)
-class _PathUnit:
-    """A loading path of a sweep."""
+class _Unit:
+    """A loading path of a sweep, or one that a program asks for."""
 
-    name: str
     path: LoadingPath
+    asking: Asking | None = None
+    asked: Asked | None = None
+
+    def complete(self, there: Container[str]) -> bool:
+        """Tell whether its runs are there; then its program takes them."""
+        cases = self.path.cases  # of a path that goes on they are not known
+        complete = bool(cases) and all(case.id in there for case in cases)
+        if complete and self.asking:
+            self.asking.closed(self.path.id)
+        return complete
 
     def compute(self, part: _PartWork, hopeless: bool) -> None:
         """Compute its runs that are not there; or store that those who tried have died."""
         cases = tuple(case for case in self.path.cases if not part.store.run_path(case.id).exists())
-        if hopeless:
+        path = replace(self.path, cases=cases)
+        if self.asking and self.asked:
+            self._ask(part, path, hopeless, self.asking, self.asked)
+        elif hopeless:
             for case in cases:
                 part.store.write_run(case, _DIED)
         elif cases:
-            path = LoadingPath(self.path.id, self.path.parameters, cases)
             part.walk(part.task(path), lambda path, row: "")
 
-
-@dataclass(frozen=True, slots=True)
-class _SearchUnit:
-    """The search at one place of the axes of a study with a goal."""
-
-    name: str
-    number: int
-
-    def compute(self, part: _PartWork, hopeless: bool) -> None:
-        """Search to the end; or store that those who tried have died."""
-        asking = Asking(part.study, part.store, resume=True, only=self.number)
-
-        def hear(path: str, row: dict[str, Any]) -> str:
-            place = asking.about(path, row)
-            asking.heard(path, row)
-            return place
-
-        for asked in self._asked(asking, part):
-            if hopeless:
-                owed = asking.owed(asked.path.id) or asked.path.cases[0]
-                part.store.write_run(owed, _DIED)
-                hopeless = False
-            else:
-                part.walk(part.task(asked.path, limit=asked.limit, place=asked.place), hear)
-            asking.closed(asked.path.id)
-
-    @staticmethod
-    def _asked(asking: Asking, part: _PartWork) -> Iterator[Any]:
-        for asked in asking.paths():
-            if asked is None or part.stop():
-                return
-            yield asked
+    def _ask(
+        self, part: _PartWork, path: LoadingPath, hopeless: bool, asking: Asking, asked: Asked
+    ) -> None:
+        """Compute what its program asks for, if it still does."""
+        place, cases = asked.place, path.cases
+        if place:
+            owed = asking.owed(path.id)
+            place, cases = asking.place(path.id), (owed,) if owed else ()
+        elif len(cases) < len(self.path.cases):
+            cases = ()  # its program takes what is there, and asks anew
+        if hopeless and cases:
+            for case in cases[:1] if asked.limit else cases:
+                part.store.write_run(case, _DIED)
+        elif cases:
+            part.walk(part.task(path, limit=asked.limit, place=place), asking.heard)
+        asking.closed(path.id)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterable, Mapping
 from types import NoneType, UnionType
 from typing import (
@@ -593,7 +594,8 @@ class SceneFile(SceneTable):
 
     def end_of(self, stage: str) -> float:
         """Return the time at the end of a stage, the first time that it is gone through."""
-        return 1.0 + next(k for k, each in enumerate(self.passages) if each.stage.name == stage)
+        names = [each.stage.name for each in self.passages]
+        return names.index(stage) + 1.0 if stage in names else math.inf
 
     @property
     def stage_names(self) -> list[str]:

@@ -138,10 +138,10 @@ def _mesh(path: Path, name: str) -> MeshFile:
 
 
 class Index(Database):
-    """The index of the scenes of a directory."""
+    """The index of the scenes of a directory; its file may be in another one."""
 
-    def __init__(self, directory: Path) -> None:
-        super().__init__(directory / "scenes.sqlite", CatalogueDamaged, StoreBusy)
+    def __init__(self, directory: Path, lists: Path) -> None:
+        super().__init__(lists / "scenes.sqlite", CatalogueDamaged, StoreBusy)
         self.scenes = directory / "scenes"
 
     def follow(self, read: Callable[[str], Scene | None], refused: Collection[str]) -> None:

@@ -15,6 +15,7 @@ from solver import (
     Body,
     ContactPair,
     Displacement,
+    LimitLoad,
     Link,
     Model,
     ModelError,
@@ -25,12 +26,13 @@ from solver import (
     Solution,
     Stage,
     System,
+    Traction,
     solve,
 )
-from solver.mesh import grid
+from solver.mesh import grid, within
 from solver.model.rigid import line
 from studies.scenes.scene import read_scene
-from tests.verification.bodies import E, bent, block, cells, steel
+from tests.verification.bodies import E, bent, block, cells, sector, steel
 
 Array = NDArray[np.float64]
 
@@ -70,6 +72,33 @@ def test_a_beam_bent_by_moments_has_the_curvature_and_stress_of_its_closed_form(
     assert np.abs(released[0] - exact - ratio * YIELD * 2 * y / HEIGHT).max() < 5e-3 * YIELD
     for stage in ("bent", "released"):
         assert found.audit(stage).passed
+
+
+def test_a_strip_bends_until_its_measured_stress_is_in_balance() -> None:
+    """It keeps the stress of the table without its mean and its moment, exact to rounding."""
+    scene = read_scene(SCENES / "peened.toml")
+    (lap,) = scene.program(scene.parameters()).laps
+    found = solve(scene.model(scene.parameters()), stages=lap.stages)
+    depth, given = np.loadtxt(SCENES / "peened.csv", delimiter=",", skiprows=1).T
+    fine = np.linspace(-1, 1, 20001)
+    stress = np.interp(fine, depth, given)
+    mean, bend = (np.trapezoid(stress * by, fine) for by in (0.5, 1.5 * fine))
+    (_, y), left = points(found, "strip", "free")
+    assert np.abs(left[0] - (np.interp(y, depth, given) - mean - bend * y)).max() < 1e-4
+    assert np.abs(left[[1, 3]]).max() < 1e-6
+    assert found.motion("end", "free").rotation == pytest.approx(5.0 * bend / E, rel=1e-6)
+    assert found.audit("free").passed
+
+
+def test_a_beam_bears_no_moment_above_the_plastic_one() -> None:
+    scene = read_scene(SCENES / "bending.toml")
+    model = scene.model(scene.parameters(parts=8))
+    end, wall = model.rigid
+    turned = Pushed(value=1.7 * YIELD * HEIGHT**2 / 6)
+    end = replace(end, x=Pushed(), rotation=turned)
+    with pytest.raises(LimitLoad) as found:
+        solve(replace(model, rigid=(end, wall)), stages=[Stage(name="bent", target=1.0, steps=10)])
+    assert 1.7 * found.value.reached == pytest.approx(1.5, rel=0.02)
 
 
 def test_a_moment_that_is_distributed_bends_like_a_linear_traction() -> None:
@@ -142,6 +171,29 @@ def test_two_tied_bodies_touch_another_as_one_body_does() -> None:
     assert normal.sum() == pytest.approx(500.0)
     assert one.audit().passed
     assert two.audit().passed
+
+
+def test_tied_bodies_stay_where_they_are_when_contact_leaves_them() -> None:
+    """Nothing holds them then, and no load acts; the tie keeps them together."""
+    there = Amplitude(np.arange(3.0), np.array([1.0, 1.0, 0.0]))
+    x = np.linspace(-2, 2, 5)
+    ground = block("ground", np.linspace(-6, 6, 13), np.linspace(-6, 0, 7),
+                   supports={"bottom": "xy"})  # fmt: skip
+    pressed = Amplitude(np.arange(3.0), np.array([0.0, 1.0, 0.0]))
+    load = Pressure(boundary="top", value=50.0, amplitude=pressed)
+    lower = block("lower", x, np.linspace(0, 1, 3))
+    upper = block("upper", np.linspace(-2, 2, 8), np.linspace(1, 2, 4), loads=(load,))
+    tie = Link(slave=("upper", "bottom"), master=("lower", "top"))
+    pair = ContactPair(slave=("lower", "bottom"), master=("ground", "top"), friction=0.3,
+                       presence=there)  # fmt: skip
+    stages = (Stage(name="on", target=1.0, steps=2), Stage(name="off", target=2.0, steps=2))
+    model = Model(bodies=(lower, upper, ground), contacts=(pair,), links=(tie,))
+    found = solve(model, stages=stages)
+    for name in ("lower", "upper"):
+        assert np.abs(found.stress(name, "off")).max() < 1e-6
+        assert np.abs(found.displacement(name, "off")).max() < 0.1
+    for stage in ("on", "off"):
+        assert found.audit(stage).passed
 
 
 # -- springs and plane boundaries ----------------------------------------------------------------
@@ -284,18 +336,18 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "contact": ({"slave": ("block", "right")}, r"links\[0\].slave .* link or contact, not both"),
     "rigid": ({**SLAVE, "rigid": "block"}, r"links\[0\].rigid = 'block': must be a rigid body"),
     "components": ({**SLAVE, "components": "z"}, "components = 'z': must be x, y or xy"),
-    "one component": (
-        {**SLAVE, "master": ("block", "left"), "components": "x"},
-        "components = 'x': must be xy between two boundaries",
-    ),
     "stiffness": ({**SLAVE, "stiffness": 0.0}, "stiffness = 0.0: must be positive"),
     "distributed": ({**SLAVE, "distributed": True}, "distributed = True: needs a rigid body"),
     "not facing": ({**SLAVE, "master": ("block", "bottom")}, r"links\[0\] .* do not face"),
     "corner": (
-        {"slave": ("block", "left"), "components": "y"},
-        r"links\[1\] = '\(0, 4\)': must not",
+        {"slave": ("block", "left"), "rigid": "moved"},
+        r"links\[0\] = '\(0, 0\)': must not move",
     ),
-    "supports": ({"slave": ("block", "bottom"), "rigid": "moved"}, r"links\[0\] = .* supports"),
+    "two motions": ({**SLAVE, "rigid": "moved"}, r"links\[.\] = '.*, 4\)': must not move"),
+    "supports": (
+        {"slave": ("block", "bottom"), "rigid": "moved"},
+        r"links\[0\] = .* must not move what supports, motions or other links",
+    ),
 }
 
 
@@ -312,6 +364,50 @@ def test_a_link_that_holds_nothing_or_too_much_is_refused(given: dict[str, Any],
             contacts=(ContactPair(slave=("block", "right"), master=("other", "left")),),
             links=(Link(**given), Link(**SLAVE, rigid="plate", components="y")),
         ))  # fmt: skip
+
+
+def test_links_that_agree_may_share_a_corner() -> None:
+    """Two sides follow one plate, which turns them with what they bound: no stress."""
+    body = block("block", np.linspace(0, 4, 3), np.linspace(0, 4, 3))
+    plate = RigidBody(name="plate", x=Moved(value=0.1), rotation=Moved(value=1e-3))
+    links = (Link(slave=("block", "left"), rigid="plate"), Link(**SLAVE, rigid="plate"))
+    found = solve(Model(bodies=(body,), rigid=(plate,), links=links))
+    assert len(found.system.links) == 2 * (5 + 5 - 1)
+    assert np.abs(found.stress("block", "loaded")).max() < 1e-6
+    assert found.audit().passed
+
+
+@pytest.mark.parametrize("element", ["quad4", "quad8"])
+def test_a_boundary_may_be_tied_in_two_pieces(element: str) -> None:
+    x, low, high = np.linspace(0, 4, 5), np.linspace(0, 1, 3), np.linspace(1, 2, 3)
+    lower = block("lower", x, low, element, supports={"bottom": "xy"})
+    mesh = within(grid(x, high), "one", ["bottom"], x=(0, 2), y=(1, 1))
+    mesh = within(mesh, "other", ["bottom"], x=(2, 4), y=(1, 1))
+    upper = Body(name="upper", mesh=mesh, material=steel(), element=element,
+                 loads=(Traction(boundary="top", x=100.0),))  # fmt: skip
+    links = [Link(slave=("upper", name), master=("lower", "top")) for name in ("one", "other")]
+    found = solve(Model(bodies=(lower, upper), links=tuple(links)))
+    whole = solve(
+        Model(bodies=(lower, upper), links=(replace(links[0], slave=("upper", "bottom")),))
+    )
+    moved = [each.displacement("upper", "loaded") for each in (found, whole)]
+    # quadratic elements have one more condition where the pieces meet
+    assert np.allclose(*moved, rtol=0, atol=0.01 * np.abs(moved[1]).max())
+    assert found.audit().passed
+
+
+@pytest.mark.parametrize("element", ["quad8", "quad4"])
+@pytest.mark.parametrize("stiffness", [np.inf, 1e4])
+def test_a_tie_of_curved_surfaces_and_unequal_meshes_passes_the_audit(
+    element: str, stiffness: float
+) -> None:
+    inner = replace(sector(np.linspace(10, 15, 4), 4, element, material=steel(),
+                           pressure={"left": 100.0}), name="inner")  # fmt: skip
+    load = Traction(boundary="right", x=20.0, y=-30.0)
+    outer = replace(sector(np.linspace(15, 25, 6), 7, element, material=steel(), loads=(load,)),
+                    name="outer")  # fmt: skip
+    tie = Link(slave=("outer", "left"), master=("inner", "right"), stiffness=stiffness)
+    assert solve(Model(bodies=(inner, outer), links=(tie,))).audit().passed
 
 
 def test_a_link_at_rest_on_a_support_adds_nothing() -> None:

@@ -118,7 +118,6 @@ AUDIT: dict[str, Quantity] = {figure.name: figure for figure in _DECLARED}
 
 LIMITS = {
     "audit_residual": 1e-6,
-    "audit_reactions": 1e-5,
     "audit_action_reaction": 1e-3,
     "audit_links": 1e-3,
     "audit_law": 1e-6,
@@ -127,6 +126,5 @@ LIMITS = {
     "audit_touch_time": 0.1,
     "audit_slip_resolution": 0.5,
     "audit_history": 1e-6,
-    "audit_energy": 1e-5,
 }
-"""Limits that do not depend on the run."""
+"""Limits that no run changes; `solver.results.audit.report.limits_at` has those of a run."""

@@ -31,7 +31,7 @@ _FACING = 0.05
 faces no master."""
 
 
-class _Pieces(NamedTuple):
+class _Sampled(NamedTuple):
     """Middles X (2, n) of the pieces of a boundary, their motion u (2, n) [mm] and area (n,)."""
 
     X: Array
@@ -49,7 +49,7 @@ def links_error(system: System, converged: Converged) -> float:
     )  # fmt: skip
 
 
-def _places(system: System, side: Side, converged: Converged) -> _Pieces:
+def _places(system: System, side: Side, converged: Converged) -> _Sampled:
     name, boundary = side
     whole = system.full(name)
     edges = edges_of(whole, boundary)
@@ -63,7 +63,7 @@ def _places(system: System, side: Side, converged: Converged) -> _Pieces:
     X = at(middle, whole.X)
     length = np.linalg.norm(np.diff(at(ends, whole.X), axis=2), axis=0)
     area = length * whole.measure(X)
-    return _Pieces(X.reshape(2, -1), at(middle, moved).reshape(2, -1), area.ravel())
+    return _Sampled(X.reshape(2, -1), at(middle, moved).reshape(2, -1), area.ravel())
 
 
 def linked(system: System, state: State, name: str) -> Array:
@@ -93,17 +93,24 @@ def _resultant(system: System, own: Array, name: str) -> tuple[Array, Array]:
 def _unbalanced(system: System, k: int, converged: Converged) -> float:
     """Return the sum of the forces of a link on slave and partners, moments over their size [N].
 
-    With a master and a rigid body, the force on either is opposite to that on the slave.
+    With a master and a rigid body, the force on either is opposite to that on the slave. Forces of
+    a tie act on either surface: their moment across a gap, as between coarse arcs, is left out.
     """
     link = system.model.links[k]
     size = float(np.abs(system.full(link.slave[0]).X).max())
     partners = [name for name in (link.master and link.master[0], link.rigid) if name]
-    worst = 0.0
+    worst, arm = 0.0, 0.0
+    if link.master is not None:
+        slave, master = (_places(system, side, converged) for side in link.sides)
+        far, _ = _facing(slave.X, master)
+        arm = float(far.max(initial=0.0, where=far < _beside(slave.X)))
+    left = arm / size * converged.state.force_scale
     force, moment = _forces(system, k, converged, link.slave[0])
     for name in partners:  # in a tie within one body, the force is that on both sides
         same = name == link.slave[0]
         other, its = (0.0, 0.0) if same else _forces(system, k, converged, name)
-        worst = max(worst, float(np.abs(force + other).max()), abs(float(moment + its)) / size)
+        turning = max(abs(float(moment + its)) / size - left, 0.0)
+        worst = max(worst, float(np.abs(force + other).max()), turning)
     return worst
 
 
@@ -116,7 +123,7 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
     if link.master is not None:
         master = _places(system, link.master, converged)
         far, at_master = _facing(X, master)
-        area = np.where(far < _FACING * float(np.ptp(X, axis=1).max()), area, 0.0)
+        area = np.where(far < _beside(X), area, 0.0)
         others.append(at_master)
     if link.rigid is not None:
         number = system.part(link.rigid)
@@ -139,7 +146,12 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
     return float(np.abs(mean).max()) / area.sum() / size
 
 
-def _facing(X: Array, master: _Pieces) -> tuple[Array, Array]:
+def _beside(X: Array) -> float:
+    """Return the distance up to which places of a slave at X (2, n) face its master [mm]."""
+    return _FACING * float(np.ptp(X, axis=1).max())
+
+
+def _facing(X: Array, master: _Sampled) -> tuple[Array, Array]:
     """Return the distance (n,) of places (2, n) from a master, and its motion (2, n) there.
 
     The motion is linear between the two nearest of its places.

@@ -380,6 +380,11 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "links[0].stiffness",
         "greater than 0",
     ),
+    "lock at no stage": (
+        rigid(y={"pushed": -1.0, "locked": "presed"}),
+        "rigid.plate.y.locked",
+        "did you mean pressed?",
+    ),
     "lock of a prescribed motion": (
         rigid(y={"moved": -1.0, "locked": "pressed"}),
         "rigid.plate.y.locked",

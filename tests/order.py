@@ -1,0 +1,70 @@
+"""Order of the test files of a run, and which of them one test process runs.
+
+The files of the service go to one process, one after another: they share services, and while they
+wait, other processes compute.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from xdist.scheduler import LoadFileScheduling
+
+from tests.marks import HERE
+
+TOGETHER = HERE / "service"
+"""A folder whose files share processes, except those that are in `FIRST` by themselves."""
+
+FIRST = (
+    TOGETHER,
+    *(
+        HERE / name
+        for name in (
+            "test_docs.py",
+            "verification/test_steady_laws.py",
+            "verification/test_shakedown.py",
+            "test_examples.py",
+            "verification/test_mutations.py",
+            "verification/test_rolling_table.py",
+            "service/test_durability.py",
+            "verification/test_rolling_endless.py",
+            "verification/test_punch.py",
+            "studies/test_goal.py",
+            "benchmarks/test_benchmarks.py",
+            "verification/test_rolling.py",
+            "studies/test_fit.py",
+            "verification/test_ball.py",
+            "verification/test_track_ends.py",
+            "studies/test_own_parts.py",
+            "verification/test_contact_in_time.py",
+            "verification/test_coarser.py",
+            "studies/test_kill.py",
+            "stability/test_scenes.py",
+            "verification/test_rolling_elastic.py",
+            "studies/test_grid.py",
+            "verification/test_fretting.py",
+            "verification/test_wheel_rail.py",
+            "verification/test_prism_passes.py",
+            "studies/test_run.py",
+        )
+    ),
+)
+"""Units that take long, in the order in which they start: no core waits for them at the end. One
+that starts processes and waits for them comes after some that compute."""
+
+
+class Order(LoadFileScheduling):
+    """Hands out files whole, and those of `TOGETHER` as one."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return str(unit(HERE.parent / super()._split_scope(nodeid)))
+
+
+def unit(file: Path) -> Path:
+    """Return what is handed to a test process at once: a file, or the folder of `TOGETHER`."""
+    return TOGETHER if TOGETHER in file.parents and file not in FIRST else file
+
+
+def place(file: Path) -> int:
+    """Return by what the files of the test run are sorted."""
+    return FIRST.index(unit(file)) if unit(file) in FIRST else len(FIRST)
