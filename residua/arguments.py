@@ -38,9 +38,11 @@ def parser() -> argparse.ArgumentParser:
 
     one = add("show", commands.show)
     one.add_argument("path", type=_path, metavar="DIR|RUN")
+    _study(one)
 
     one = add("plot", commands.plot)
     one.add_argument("path", type=_place, metavar="RUN|DIR")
+    _study(one)
     one.add_argument(
         "--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
         help="of the sweep, or of the field's own dimensions, such as pass=2",
@@ -62,6 +64,7 @@ def parser() -> argparse.ArgumentParser:
 
     one = add("export", commands.export)
     one.add_argument("path", type=_path, metavar="RUN|DIR")
+    _study(one)
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
     one.add_argument("--vtu", type=_path, required=True, metavar="FOLDER", help="where they go")
 
@@ -73,6 +76,7 @@ def parser() -> argparse.ArgumentParser:
 
     one = add("view", commands.view)
     one.add_argument("path", type=_path, metavar="DIR|DATASET")
+    _study(one)
     one.add_argument(
         "--port", type=_integer(0, 65535), default=0, help="default: any port that is free"
     )
@@ -80,6 +84,7 @@ def parser() -> argparse.ArgumentParser:
 
     one = add("report", commands.report)
     one.add_argument("path", type=_place, metavar="DIR|DATASET")
+    _study(one)
     one.add_argument("--out", "-o", type=_path, default=Path("report.html"), metavar="HTML")
 
     for more in (_add_cluster, _add_numbers, _add_access, _add_remote):
@@ -92,6 +97,12 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
+
+
+def _study(one: argparse.ArgumentParser) -> None:
+    one.add_argument(
+        "--study", metavar="NAME|ID|latest", help="of the studies in a folder, as DIR/NAME says too"
+    )
 
 
 def _add_run(one: argparse.ArgumentParser) -> None:
@@ -151,6 +162,7 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
 
     one = add("best", commands.best)
     one.add_argument("path", type=_place, metavar="DIR")
+    _study(one)
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
     one.add_argument(
         "--where", nargs="+", action="extend", default=[], metavar="CONDITION",
@@ -161,6 +173,7 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
 
     one = add("predict", commands.predict)
     one.add_argument("path", type=_path, metavar="DIR")
+    _study(one)
     one.add_argument("at", nargs="+", metavar="NAME=VALUE", help="each parameter that varies")
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
     one.add_argument("--by", choices=["cells", "gaussian"], help="default: cells, if it has any")
@@ -171,6 +184,7 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
 
     one = add("sensitivity", commands.sensitivity)
     one.add_argument("path", type=_path, metavar="DIR")
+    _study(one)
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
     one.add_argument(

@@ -30,6 +30,7 @@ class StudyFilter(Window):
     status: StudyState | None = None
     tag: str | None = Field(default=None, description="one of the tags of the study")
     scene: str | None = Field(default=None, description="name of its scene, or id of a posted one")
+    name: str | None = Field(default=None, description="its name; several may have it")
     text: str | None = Field(default=None, description="a part of its name or its note")
 
 

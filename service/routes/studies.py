@@ -117,7 +117,7 @@ def list_studies(which: Annotated[StudyFilter, Query()], jobs: TheJobs) -> Study
     """List studies, the latest first."""
     page, total = jobs.page(
         limit=which.limit, offset=which.offset, state=which.status, tag=which.tag,
-        scene=which.scene, text=which.text,
+        scene=which.scene, text=which.text, name=which.name,
     )  # fmt: skip
     return StudyPage(total=total, items=[overview.summary(job) for job in page])
 

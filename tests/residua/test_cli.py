@@ -272,6 +272,10 @@ def test_show_takes_a_run_a_study_or_a_directory(
         assert main(["show", str(path)]) == 0
         assert capsys.readouterr().out.count(" ok ") == study.size
     assert main(["show", str(store.directory / "nowhere")]) == 2
+    for name in (study.name, study.id[:6], "latest"):
+        assert main(["show", str(store.directory), "--study", name]) == 0
+        assert capsys.readouterr().out.count(" ok ") == study.size
+    assert main(["show", str(store.directory), "--study", "nowhere"]) == 2
 
 
 @pytest.mark.processes
