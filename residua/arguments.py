@@ -35,6 +35,18 @@ def parser() -> argparse.ArgumentParser:
     one = add("scenes", commands.scenes)
     one.add_argument("name", nargs="?")
 
+    one = add("draw", commands.draw)
+    one.add_argument(
+        "what", metavar="SCENE|STUDY.toml",
+        help="name of a scene, its file, or a study, whose first run is drawn",
+    )  # fmt: skip
+    one.add_argument(
+        "--set", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
+        help="parameters, in place of those of the study or the defaults",
+    )  # fmt: skip
+    one.add_argument("--zoom", type=float, metavar="MM", help="only within this distance of 0, 0")
+    _add_window(one)
+
     one = add("show", commands.show)
     one.add_argument("path", type=_path, metavar="DIR|RUN")
 
@@ -51,13 +63,8 @@ def parser() -> argparse.ArgumentParser:
         help="only within this distance of the contact's centre, or of its edge if half of the "
         "bodies was computed",
     )  # fmt: skip
-    one.add_argument(
-        "--window", type=float, nargs=4, metavar=("X0", "X1", "Y0", "Y1"),
-        help="only this part of a map [mm]",
-    )  # fmt: skip
     one.add_argument("--over", metavar="AXIS", help="draw lines for each value of this axis")
-    one.add_argument("--resolution", type=float, metavar="DPI", help="dots per inch, 50 to 600")
-    one.add_argument("--out", type=_path, required=True, metavar="PNG")
+    _add_window(one)
 
     one = add("export", commands.export)
     one.add_argument("path", type=_path, metavar="RUN|DIR")
@@ -80,6 +87,15 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
+
+
+def _add_window(one: argparse.ArgumentParser) -> None:
+    one.add_argument(
+        "--window", type=float, nargs=4, metavar=("X0", "X1", "Y0", "Y1"),
+        help="only this part [mm]",
+    )  # fmt: skip
+    one.add_argument("--resolution", type=float, metavar="DPI", help="dots per inch, 50 to 600")
+    one.add_argument("--out", type=_path, required=True, metavar="PNG")
 
 
 def _add_run(one: argparse.ArgumentParser) -> None:

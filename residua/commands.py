@@ -139,6 +139,19 @@ def scenes(options: argparse.Namespace) -> int:
     return OK
 
 
+def draw(options: argparse.Namespace) -> int:
+    """Draw a scene before anything is computed: meshes, boundaries, supports, loads, contacts."""
+    from studies.views.described import described_scene
+    from studies.views.plots.picture import resolved
+    from studies.views.plots.setup import setup_figure
+
+    scene, values = described_scene(options.what, _selection(options.set, "--set"))
+    sheet = setup_figure(scene, values, options.zoom, options.window)
+    _save(resolved(sheet, options.resolution), options.out)
+    print(f"wrote {options.out}")
+    return OK
+
+
 def show(options: argparse.Namespace) -> int:
     """Print the results of a run, a study or all studies of a directory."""
     from studies.views.reading import begun_studies, find_datasets, open_netcdf, present_datasets

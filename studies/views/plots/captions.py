@@ -94,6 +94,14 @@ def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:
         return {name: parameter.default for name, parameter in known.items()}
 
 
+def short_number(value: float) -> str:
+    """Return four digits of a number, without a power of ten up to a million."""
+    text = f"{value:.4g}"
+    if "e" in text and 1e-4 <= abs(value) < 1e6:
+        text = f"{float(text):.0f}"
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
 def wrapped(text: str, width: float, points: int) -> str:
     """Return text in lines that fit `width` [in] at a font size [points]."""
     return textwrap.fill(text, int(width * 72.0 / (0.52 * points)), break_long_words=False)

@@ -81,6 +81,11 @@ def picture(
             _refuse({"window": window}, f"{field} is no map: leave it out")
             part = _part(dataset, field, selection or {}, over)
             figure = line_figure(part, field, component, zoom, over)
+    return resolved(figure, resolution)
+
+
+def resolved(figure: Figure, resolution: float | None) -> Figure:
+    """Return a figure with its resolution [dpi], by default its own, or raise `StudyError`."""
     if resolution is not None:
         if not _COARSEST <= resolution <= _FINEST:
             allowed = f"must be {_COARSEST} to {_FINEST} dots per inch"
