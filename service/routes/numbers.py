@@ -48,7 +48,7 @@ def table(
     Beside the queries named below, every column is one: `?friction=0.1..0.4&hardening=none`.
     """
     found = tables.get(study_id)
-    at = found.chosen(which.sort, which.conditions)
+    at = found.chosen(which.sort, which.selection)
     names = dict.fromkeys(which.columns.split(",") if which.columns else found.columns)
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(found.rows(at, [*names]))

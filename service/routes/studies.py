@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import WithJsonSchema
 
-from service import overview
+from service import maps, overview
 from service.dependencies import (
     TheDetails,
     TheExaminer,
@@ -31,8 +32,10 @@ from service.errors import REFUSED, Busy, Conflict, NotFound, QueueLost
 from service.files import NETCDF, netcdf
 from service.job import Job, StudyState
 from service.jobs import Jobs
+from service.maps import PICTURE
 from service.schemas import (
     ContentId,
+    PlotQuery,
     Prediction,
     PredictQuery,
     StudyDetail,
@@ -224,6 +227,24 @@ def _indices(job: Job, jobs: Jobs, store: Store, of: str) -> dict[str, Any]:
             allowed = f"at most {MOST_FITTED} are fitted here: fetch the data set, and fit it there"
             raise StudyError("runs", size, allowed)
         return told(sensitivity(runs, of))
+
+
+@router.get("/{study_id}/plot.png", responses={**PICTURE, **REFUSED})
+async def draw_study(
+    job: TheJob,
+    query: Annotated[PlotQuery, Query()],
+    jobs: TheJobs,
+    store: TheStore,
+    pictures: ThePictures,
+    request: Request,
+) -> Response:
+    """Draw a number of the runs over what is swept, or a map or lines of one run.
+
+    Beside the queries named below, every axis of the sweep and dimension of the field is one:
+    `?field=contact_pressure&over=friction&load_ratio=0.5&stage=loaded`.
+    """
+    found = await run_in_threadpool(dataset, job, jobs, store)
+    return await pictures.of_file(request, Path(found.path), query, maps.draw_study)
 
 
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)

@@ -38,7 +38,7 @@ _NAMES = {"boundary", "amplitude", "position"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Acting:
+class Arrows:
     """One load as it is drawn.
 
     Attributes
@@ -70,7 +70,7 @@ def outward(mesh: Mesh, facets: Array) -> tuple[Array, Array]:
     return ends, np.stack([along[1], -along[0]])
 
 
-def acting(bodies: Sequence[Body], rigid: Sequence[RigidBody]) -> Iterator[Acting]:
+def acting(bodies: Sequence[Body], rigid: Sequence[RigidBody]) -> Iterator[Arrows]:
     """Yield the loads of bodies and the motions of rigid bodies, at load factor 1."""
     for body in bodies:
         for load in body.every_load:
@@ -94,12 +94,12 @@ def acting(bodies: Sequence[Body], rigid: Sequence[RigidBody]) -> Iterator[Actin
                 yield _single(text, each.centre, to, _FORCE if pushed else _MOTION)
 
 
-def _single(text: str, at: Any, way: Any, colour: str) -> Acting:
+def _single(text: str, at: Any, way: Any, colour: str) -> Arrows:
     place, to = np.reshape(at, (2, 1)), np.reshape(np.asarray(way, dtype=float), (2, 1))
-    return Acting(text=text, at=place, way=to, inward=np.array([True]), colour=colour)
+    return Arrows(text=text, at=place, way=to, inward=np.array([True]), colour=colour)
 
 
-def _of_load(body: Body, load: Load) -> Acting:
+def _of_load(body: Body, load: Load) -> Arrows:
     where = ", ".join(load.boundaries)
     text = f"{words(load.name)} {body.name}{f'.{where}' if where else ''}{_told(load)}"
     if not load.boundaries:
@@ -107,7 +107,7 @@ def _of_load(body: Body, load: Load) -> Acting:
         force = load.body_force(middle)
         way = np.zeros((2, 1)) if force is None else _unit(force)
         colour = _FIELD if force is None else _FORCE
-        return Acting(text=text, at=middle, way=way, inward=np.array([False]), colour=colour)
+        return Arrows(text=text, at=middle, way=way, inward=np.array([False]), colour=colour)
     facets = np.concatenate([body.facets(name) for name in load.boundaries])
     ends, normal = outward(body.mesh, facets)
     at, along = ends.mean(axis=2), ends[:, :, 1] - ends[:, :, 0]
@@ -120,12 +120,12 @@ def _of_load(body: Body, load: Load) -> Acting:
     chosen = _spread(length)
     way = _unit(way)
     inward = (way * normal).sum(axis=0) < -1e-9 * length
-    return Acting(
+    return Arrows(
         text=text, at=at[:, chosen], way=way[:, chosen], inward=inward[chosen], colour=colour
     )
 
 
-def _travelling(body: Body) -> Acting:
+def _travelling(body: Body) -> Arrows:
     """Return a travelling pressure at the time at which it is largest, nearest to x = 0."""
     load = body.travelling
     assert load is not None
@@ -139,7 +139,7 @@ def _travelling(body: Body) -> Acting:
     there = np.flatnonzero(np.linalg.norm(force, axis=0) > 0.0)
     there = there[_spread(length[there])]
     peak, half = short_number(load.peak), short_number(load.half_width)
-    return Acting(
+    return Arrows(
         text=f"travelling pressure {body.name}.{load.boundary}: {peak}, half-width {half}",
         at=at[:, there],
         way=_unit(force)[:, there],
@@ -178,7 +178,7 @@ def _spread(length: Array) -> Array:
     return np.unique(np.abs(reached[:, None] - wanted).argmin(axis=0))
 
 
-def draw_acting(axes: Axes, load: Acting, inch: float) -> dict[str, Any]:
+def draw_acting(axes: Axes, load: Arrows, inch: float) -> dict[str, Any]:
     """Draw the arrows of a load where an inch is so many mm; return its entry of the legend."""
     moves = np.linalg.norm(load.way, axis=0) > 1e-9
     apart = _apart(load.at, inch)
