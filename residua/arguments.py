@@ -153,13 +153,22 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
     one.add_argument("--field", help="the number of the runs that is drawn")
     one.add_argument("--out", type=_path, metavar="PNG", help="draw what differs")
 
+    one = add("table", commands.table)
+    one.add_argument("path", type=_place, metavar="DIR")
+    kind = one.add_mutually_exclusive_group()
+    kind.add_argument("--csv", action="store_true", help="with commas between; this is the default")
+    kind.add_argument("--json", action="store_true", help="a list of objects")
+    one.add_argument("--columns", nargs="+", metavar="NAME", help="default: all")
+    _add_where(one)
+    one.add_argument(
+        "--sort", default="", metavar="NAME", help="by a column; --sort=-NAME: largest first"
+    )
+    one.add_argument("--out", type=_path, metavar="FILE", help="default: print it")
+
     one = add("best", commands.best)
     one.add_argument("path", type=_place, metavar="DIR")
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
-    one.add_argument(
-        "--where", nargs="+", action="extend", default=[], metavar="CONDITION",
-        help='such as "friction<0.3" or "hardening=none"; runs must meet all',
-    )  # fmt: skip
+    _add_where(one)
     one.add_argument("--lowest", action="store_true", help="the lowest numbers first")
     one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
 
@@ -182,6 +191,13 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
         help="chaos (default); delta, pawn or rbd_fast, with the library SALib",
     )  # fmt: skip
     one.add_argument("--out", type=_path, metavar="PNG", help="draw indices, tornado and runs")
+
+
+def _add_where(one: argparse.ArgumentParser) -> None:
+    one.add_argument(
+        "--where", nargs="+", action="extend", default=[], metavar="CONDITION",
+        help='such as "friction<0.3" or "hardening=none"; runs must meet all',
+    )  # fmt: skip
 
 
 def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:

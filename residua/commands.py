@@ -201,6 +201,27 @@ def best(options: argparse.Namespace) -> int:
     return OK
 
 
+def table(options: argparse.Namespace) -> int:
+    """Write the numbers of the runs of a study as CSV or JSON."""
+    from studies.views.numbers import table_of
+    from studies.views.reading import open_study
+    from studies.views.table import csv_text, json_text
+
+    with open_study(options.path) as dataset:
+        found = table_of(dataset)
+    at = found.chosen(options.sort)
+    for condition in options.where:
+        at = at[found.meeting(condition)[at]]
+    text = (json_text if options.json else csv_text)(found, at, options.columns or [*found.columns])
+    if options.out is None:
+        print(text.rstrip("\n"))
+        return OK
+    with _written("--out", options.out) as part:
+        part.write_text(text, encoding="utf-8")
+    print(f"wrote {options.out}")
+    return OK
+
+
 def diff(options: argparse.Namespace) -> int:
     """Tell what differs between two studies, also of two versions of the solver."""
     from studies.views.differing import diff, difference_table

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.pages.study import rank
-from service.table import group_of
 from solver.results.audit.figures import LIMITS
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.storage.dataset import attributes_of
+from studies.views.table import group_of
 
 OTHER = ("audit_energy", "audit_reactions")
 """Figures with another limit under finite sliding, and under a travelling load."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -22,10 +20,11 @@ from service.errors import REFUSED
 from service.files import TAGS, UNCHANGED
 from service.octets import MEDIA_TYPE, octets
 from service.schemas import ContentId, TableFilter
-from service.table import OUTCOMES, STATUS
+from service.table import OUTCOMES
 from studies import StudyError
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
+from studies.views.table import STATUS, csv_text
 
 router = APIRouter()
 
@@ -50,10 +49,8 @@ def table(
     found = tables.get(study_id)
     at = found.chosen(which.sort, which.selection)
     names = dict.fromkeys(which.columns.split(",") if which.columns else found.columns)
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(found.rows(at, [*names]))
     named = {"content-disposition": 'attachment; filename="table.csv"'}
-    return Response(text.getvalue(), media_type=CSV, headers=named)
+    return Response(csv_text(found, at, [*names]), media_type=CSV, headers=named)
 
 
 @router.get("/studies/{study_id}/numbers", tags=["studies"], responses={**OCTETS, **REFUSED})

@@ -23,9 +23,9 @@ from service.maps import Pictures
 from service.pages.form import as_toml, study_of
 from service.pages.run import audited
 from service.settings import Settings
-from service.table import RunTable, _column
 from studies import Store, open_netcdf, open_study
 from studies.definition.identity import content_id
+from studies.views.table import RunTable, column_of
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE
 
@@ -101,7 +101,7 @@ def test_a_table_is_filtered_and_sorted(seen: Seen) -> None:
 
 @pytest.mark.parametrize(("condition", "kept"), [("1e-12..", 2), ("..1e-12", 1), ("1e-12", 0)])
 def test_a_range_of_small_numbers_has_small_ends(condition: str, kept: int) -> None:
-    column = _column("audit_small", np.array([2e-13, 3e-12, 4e-11, math.nan]), "audit")
+    column = column_of("audit_small", np.array([2e-13, 3e-12, 4e-11, math.nan]), "audit")
     table = RunTable(axes={}, columns={"run": column, "audit_small": column})
     assert len(table.chosen(where={"audit_small": condition})) == kept
 
@@ -131,7 +131,7 @@ def test_runs_that_a_study_chooses_have_their_own_places(
 
 
 def test_numbers_that_stand_for_words_are_filtered_by_words() -> None:
-    column = _column("mode", np.array([0.0, 1.0, math.nan]), "result")
+    column = column_of("mode", np.array([0.0, 1.0, math.nan]), "result")
     column = dataclasses.replace(column, flags={0: "rolls", 1: "slides"})
     table = RunTable(axes={}, columns={"run": column, "mode": column})
     assert table.chosen(where={"mode": "slides, nothing"}).tolist() == [1]
