@@ -64,6 +64,10 @@ def parser() -> argparse.ArgumentParser:
         "bodies was computed",
     )  # fmt: skip
     one.add_argument("--over", metavar="AXIS", help="draw lines for each value of this axis")
+    one.add_argument(
+        "--deformed", type=float, metavar="FACTOR",
+        help='draw the bodies of a map deformed, of a study with keep = "fields"',
+    )  # fmt: skip
     _add_window(one)
 
     one = add("export", commands.export)

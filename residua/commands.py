@@ -173,14 +173,18 @@ def show(options: argparse.Namespace) -> int:
 
 def plot(options: argparse.Namespace) -> int:
     """Draw a field of one run, or one value per run over the sweep."""
+    from studies.views.kept import drawn_from
     from studies.views.plots.picture import picture
     from studies.views.reading import open_study
 
     selection = _selection(options.select)
-    with open_study(options.path) as dataset:
+    with (
+        open_study(options.path) as dataset,
+        drawn_from(options.path, dataset, options.field, selection) as (found, left),
+    ):
         drawn = picture(
-            dataset, options.field, options.component, options.zoom, selection,
-            window=options.window, over=options.over,
+            found, options.field, options.component, options.zoom, left,
+            window=options.window, over=options.over, deformed=options.deformed,
             resolution=options.resolution,
         )  # fmt: skip
         _save(drawn, options.out)

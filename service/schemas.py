@@ -128,6 +128,10 @@ class MapQuery(BaseModel):
     stage: str | None = Field(default=None, description="of several stages; the last by default")
     zoom: Zoom = None
     window: Part = None
+    deformed: float = Field(
+        default=0.0, allow_inf_nan=False,
+        description="factor of the displacements, of a run that keeps its fields",
+    )  # fmt: skip
     resolution: Resolution = 150
 
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from solver.errors import ModelError
+from solver.results.invariants import component, known_components
 from solver.results.quantities import Quantity
-from solver.tensors import AXES, components
+from solver.tensors import AXES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,7 +27,6 @@ Span = tuple[float, float]
 Take = Literal["maximum", "minimum", "integral", "extent"]
 _UNITS = {"stress": "MPa", "mises": "MPa", "plastic_strain": "1", "displacement": "mm",
           "pressure": "MPa", "shear": "MPa", "gap": "mm", "slip": "mm"}  # fmt: skip
-_COMPONENTS = {name: k for names in (components(6), AXES) for k, name in enumerate(names)}
 EXTREME = ("maximum", "minimum")
 OF_CONTACT = ("pressure", "shear", "gap", "slip")
 """Fields of a contact of which a number can be requested."""
@@ -34,7 +34,7 @@ OF_CONTACT = ("pressure", "shear", "gap", "slip")
 
 def of_body(axes: int) -> tuple[str, ...]:
     """Return the fields of a body with this many axes of which a number can be requested."""
-    stress = (f"stress.{name}" for name in components(2 * axes))
+    stress = (f"stress.{name}" for name in known_components(2 * axes))
     moved = (f"displacement.{name}" for name in AXES[:axes])
     return (*stress, "mises", "plastic_strain", *moved)
 
@@ -159,7 +159,9 @@ class RequestedNumber:
             found = mises if kind == "mises" else strain
         else:
             found = getattr(fields.at_nodes(at, body), kind)
-        values = found[_COMPONENTS[part]] if part else found
+        if kind == "stress":
+            found = component(found, part)
+        values = found[AXES.index(part)] if kind == "displacement" else found
         inside = np.ones(X.shape[1], dtype=bool)
         for k, span in enumerate((self.x, self.y, self.z)):
             if span is not None:

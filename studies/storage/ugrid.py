@@ -88,6 +88,11 @@ def owns(name: str, dims: Iterable[Hashable]) -> bool:
     return name == _MESH or not {_TIME, _NODE, _FACE, _CELL}.isdisjoint(dims)
 
 
+def keeps(run: xr.Dataset) -> bool:
+    """Whether the data set of a run has the fields at the nodes."""
+    return run.attrs.get(KEEP) == FIELDS and _MESH in run.variables
+
+
 def read(run: xr.Dataset) -> MeshFields:
     """Return the fields at the nodes from the data set of a run.
 
@@ -96,7 +101,7 @@ def read(run: xr.Dataset) -> MeshFields:
     StudyError
         if it has none
     """
-    if run.attrs.get(KEEP) != FIELDS or _MESH not in run.variables:
+    if not keeps(run):
         allowed = 'keeps no fields: its study must say keep = "fields", and the run must succeed'
         raise StudyError("run", run.attrs.get("id", ""), allowed)
     cells, of = (_nodes(run[name]) for name in ("mesh_cell_nodes", "mesh_cell_body"))

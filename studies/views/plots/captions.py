@@ -36,8 +36,25 @@ def named(name: str, value: Any, unit: str = "") -> str:
 
 
 def label(variable: xr.DataArray) -> str:
-    """Return the meaning of a variable with its unit, for an axis."""
-    return _measured(variable.attrs.get("long_name", str(variable.name)), variable)
+    """Return the meaning of a variable with its symbol and unit, for an axis."""
+    name = variable.attrs.get("long_name", str(variable.name))
+    return _measured(f"{name} {symbol(variable)}".rstrip(), variable)
+
+
+_SYMBOLS = {
+    "principal_1": "{0}_{{1}}", "principal_2": "{0}_{{2}}", "principal_3": "{0}_{{3}}",
+    "tresca": "{0}_{{1}} - {0}_{{3}}", "hydrostatic": r"{0}_{{\mathrm{{m}}}}",
+}  # fmt: skip
+"""Invariants of a tensor as mathtext, with its letter."""
+
+
+def symbol(values: xr.DataArray) -> str:
+    """Return the symbol of a component of a stress or strain; empty for other variables."""
+    if "component" not in values.coords or values["component"].ndim:
+        return ""
+    name = str(values["component"].item())
+    letter = r"\sigma" if values.attrs.get("units") == "MPa" else r"\varepsilon"
+    return f"${_SYMBOLS.get(name, f'{{0}}_{{{{{name}}}}}').format(letter)}$"
 
 
 def short_label(variable: xr.DataArray) -> str:
@@ -94,9 +111,9 @@ def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:
         return {name: parameter.default for name, parameter in known.items()}
 
 
-def short_number(value: float) -> str:
-    """Return four digits of a number, without a power of ten up to a million."""
-    text = f"{value:.4g}"
+def short_number(value: float, digits: int = 4) -> str:
+    """Return a few digits of a number, without a power of ten up to a million."""
+    text = f"{value:.{digits}g}"
     if "e" in text and 1e-4 <= abs(value) < 1e6:
         text = f"{float(text):.0f}"
     return text.replace("-", "\N{MINUS SIGN}")

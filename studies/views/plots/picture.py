@@ -21,7 +21,9 @@ from studies.views.plots.fields import (
     usual_field,
 )
 from studies.views.plots.lines import line_figure
+from studies.views.plots.mapped import STAGE
 from studies.views.plots.maps import map_figure
+from studies.views.plots.meshed import mesh_maps
 from studies.views.plots.sweep import sweep_figure
 
 _COARSEST, _FINEST = 50, 600
@@ -37,6 +39,7 @@ def picture(
     *,
     window: Window | None = None,
     over: str | None = None,
+    deformed: float | None = None,
     resolution: float | None = None,
 ) -> Figure:
     """Return a figure of `field`, by default of residual stress (of stress, if none is kept).
@@ -53,6 +56,7 @@ def picture(
         dimension of the field, such as ``pass``
     window : for a map: show only this part
     over : for lines: axis of the sweep; each of its values has a line
+    deformed : for a map of a run that keeps its fields: factor of the displacements
     resolution : dots per inch; by default that of the figure
 
     Raises
@@ -63,22 +67,32 @@ def picture(
     maps, lines, singles = map_fields(dataset), line_fields(dataset), sweep_fields(dataset)
     labelled = labelled_fields(dataset)
     field = field or usual_field(dataset)
-    given = {"component": component, "zoom": zoom, "window": window, "over": over}
+    given = {
+        "component": component, "zoom": zoom, "window": window, "over": over, "deformed": deformed
+    }  # fmt: skip
     if field in singles:
         _refuse(given, f"{field} has one value a run: leave it out")
         figure = sweep_figure(select(dataset, selection or {}), field)
     elif field in labelled:
         _refuse(given | {"component": None}, f"{field} has one value a run: leave it out")
         figure = sweep_figure(_labelled(dataset, field, component, selection or {}), field)
+    elif field in mesh_maps(dataset):
+        _refuse({"over": over}, f"{field} is a map of one run: leave it out")
+        swept, chosen = sweep_coordinates(dataset), dict(selection or {})
+        _known(chosen, [*swept, STAGE])
+        stage = chosen.pop(STAGE, None)
+        run = one_run(dataset, chosen)
+        staged = None if stage is None else str(stage)
+        figure = map_figure(run, field, component, zoom, window, staged, deformed or 0.0)
     else:
         one_run(dataset)  # without a successful run there are no fields: report the reason
         check_field(field, [*maps, *lines, *singles, *labelled])
         if field in maps:
             _refuse({"over": over}, f"{field} is a map of one run: leave it out")
             part = _part(dataset, field, selection or {})
-            figure = map_figure(part, field, component, zoom, window)
+            figure = map_figure(part, field, component, zoom, window, deformed=deformed or 0.0)
         else:
-            _refuse({"window": window}, f"{field} is no map: leave it out")
+            _refuse({"window": window, "deformed": deformed}, f"{field} is no map: leave it out")
             part = _part(dataset, field, selection or {}, over)
             figure = line_figure(part, field, component, zoom, over)
     return resolved(figure, resolution)
