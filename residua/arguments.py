@@ -63,7 +63,15 @@ def parser() -> argparse.ArgumentParser:
         help="only within this distance of the contact's centre, or of its edge if half of the "
         "bodies was computed",
     )  # fmt: skip
-    one.add_argument("--over", metavar="AXIS", help="draw lines for each value of this axis")
+    one.add_argument(
+        "--over",
+        metavar="AXIS",
+        help="draw lines for each value of this axis, or dimension of the field",
+    )
+    one.add_argument(
+        "--against", metavar="NAME",
+        help="draw lines over increments over this variable, such as a motion: a loop",
+    )  # fmt: skip
     one.add_argument(
         "--deformed", type=float, metavar="FACTOR",
         help='draw the bodies of a map deformed, of a study with keep = "fields"',

@@ -184,7 +184,8 @@ def plot(options: argparse.Namespace) -> int:
     ):
         drawn = picture(
             found, options.field, options.component, options.zoom, left,
-            window=options.window, over=options.over, deformed=options.deformed,
+            window=options.window, over=options.over, against=options.against,
+            deformed=options.deformed,
             resolution=options.resolution,
         )  # fmt: skip
         _save(drawn, options.out)

@@ -162,11 +162,15 @@ def draw_lines(path: Path, query: LineQuery) -> bytes:
 def draw_study(path: Path, query: PlotQuery) -> bytes:
     """Return a field of the study in ``path`` as PNG; raise `StudyError` as `picture` does."""
     from studies import open_netcdf
+    from studies.views.kept import drawn_from
     from studies.views.plots.picture import picture
 
-    with open_netcdf(path) as dataset:
+    with (
+        open_netcdf(path) as dataset,
+        drawn_from(path, dataset, query.field, query.selection) as (found, left),
+    ):
         asked = query.model_dump(include={"field", "component", "zoom", "window", "over"})
-        return png(picture(dataset, selection=query.selection, **asked), query.resolution)
+        return png(picture(found, selection=left, **asked), query.resolution)
 
 
 def png(figure: Figure, resolution: int) -> bytes:

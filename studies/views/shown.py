@@ -10,8 +10,8 @@ import xarray as xr
 
 from solver.tensors import AXES
 from studies.errors import StudyError
+from studies.views.plots.captions import DISTANCE
 from studies.views.plots.fields import (
-    DISTANCE,
     check_field,
     component_names,
     component_of,

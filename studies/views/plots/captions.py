@@ -10,6 +10,7 @@ from typing import Any
 import xarray as xr
 
 from solver.errors import ModelError
+from solver.tensors import AXES
 from studies.definition.parameters import defaults, parameters_of, plain
 from studies.scenes.registry import scene_of
 from studies.storage.frame import FRACTION
@@ -53,8 +54,28 @@ def symbol(values: xr.DataArray) -> str:
     if "component" not in values.coords or values["component"].ndim:
         return ""
     name = str(values["component"].item())
-    letter = r"\sigma" if values.attrs.get("units") == "MPa" else r"\varepsilon"
+    words_of = f"{values.name} {values.attrs.get('long_name', '')}"
+    letter = r"\varepsilon" if "strain" in words_of else r"\sigma"
     return f"${_SYMBOLS.get(name, f'{{0}}_{{{{{name}}}}}').format(letter)}$"
+
+
+DISTANCE = "distance"
+"""The coordinate of lines and contacts that `placed` adds."""
+_LENGTHS = {
+    "s": "distance from the middle $s$",
+    "depth": "depth below the surface",
+    "fraction": "fraction of the length",
+}
+"""Labels of axes, by the name of the variable; those of coordinates are their names."""
+
+
+def axis_label(coordinate: xr.DataArray) -> str:
+    """Return the label of a horizontal axis with its unit: short, with the symbol."""
+    name = str(coordinate.name)
+    usual = f"${name}$" if name in AXES else coordinate.attrs.get("long_name", words(name))
+    if name == DISTANCE:
+        usual = f"{usual.replace('distance s ', 'distance ')} $s$"
+    return _measured(_LENGTHS.get(name, usual), coordinate)
 
 
 def short_label(variable: xr.DataArray) -> str:

@@ -13,6 +13,7 @@ from solver.results.invariants import component as derived
 from solver.tensors import AXES, components
 from studies.definition.vocabulary import SYMMETRIC
 from studies.errors import StudyError, one_of
+from studies.views.plots.captions import DISTANCE
 
 Window = Sequence[float]
 """Part of a map: horizontal range, vertical range [mm]."""
@@ -20,7 +21,6 @@ Window = Sequence[float]
 _RESIDUAL, _STRESS = "residual_stress", "map_stress"
 ALONG = ("s", "depth", "increment", "fraction")
 """Dimensions along which lines are drawn."""
-DISTANCE = "distance"
 _DECAYED = 0.02
 """Depth is shown as far as values exceed this share of the peak."""
 DRAWN = (*AXES, *ALONG)

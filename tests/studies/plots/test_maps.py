@@ -264,7 +264,7 @@ def test_the_figure_suits_the_field(computed: ComputedStudy) -> None:
     with open_study(store.directory) as together:
         assert picture(together, "residual_stress").axes[0].child_axes
         assert picture(together, "contact_pressure").axes[0].lines
-        assert picture(together, "increments").axes[0].collections
+        assert picture(together, "increments").axes[0].lines
 
 
 def test_an_axis_of_the_sweep_may_be_called_like_a_coordinate(computed: ComputedStudy) -> None:
@@ -276,7 +276,7 @@ def test_an_axis_of_the_sweep_may_be_called_like_a_coordinate(computed: Computed
             np.ma.getdata(mesh.get_array()),
             np.ma.getdata(mesh_of(picture(together, "residual_stress"))[1].get_array()),
         )
-        assert picture(swept, "pass_creepage", selection={"pass": 1}).axes[0].collections
+        assert picture(swept, "pass_creepage", selection={"pass": 1}).axes[0].lines
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("$x$ [mm]", "$y$ [mm]")
 
 
