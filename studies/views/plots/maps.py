@@ -33,6 +33,8 @@ _AREA, _LONGEST = 26.0, 8.0
 """Area of a map and its longest side [in]."""
 _BARS = 24
 """Number of bars of directions along the longer side of a map."""
+_LITTLE = 0.01
+"""Share of the end of the colours below which a direction means nothing."""
 _TEXT = 3.2
 """Least length of the lines around a map [in]."""
 
@@ -174,13 +176,15 @@ def _draw_directions(axes: Axes, run: xr.Dataset, drawn: Mapped, box: Box) -> No
     apart = max(right - left, top - bottom) / _BARS
     seen = (places[0] > left) & (places[0] < right) & (places[1] > bottom) & (places[1] < top)
     known = np.flatnonzero(seen & np.isfinite(tensor).all(axis=0))
+    values, directions = principal_of(tensor[:, known])
+    large = np.abs(values[PRINCIPAL.index(name)]) > _LITTLE * drawn.high
+    known, directions = known[large], directions[..., large]
     squares = np.floor((places[:, known] - [[left], [bottom]]) / apart)
     away = np.abs((places[:, known] - [[left], [bottom]]) / apart - squares - 0.5).max(axis=0)
     order = np.argsort(away, kind="stable")  # in each square the place nearest to its middle
     _, first = np.unique(squares[:, order], axis=1, return_index=True)
     chosen = known[order[first]]
-    _, directions = principal_of(tensor[:, chosen])
-    way = directions[plane, PRINCIPAL.index(name)]
+    way = directions[plane, PRINCIPAL.index(name)][:, order[first]]
     axes.quiver(
         *places[:, chosen], *(0.7 * apart * way), angles="xy", scale_units="xy", scale=1.0,
         pivot="middle", headwidth=0.0, headlength=0.0, headaxislength=0.0, units="dots", width=1.6,
