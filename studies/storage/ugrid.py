@@ -118,6 +118,7 @@ def read(run: xr.Dataset) -> MeshFields:
             "stress": np.stack([_at(run, f"stress_{c}", k) for c in parts]),
             "mises": _at(run, "mises", k),
             "plastic_strain": _at(run, "plastic_strain", k),
+            "plastic_tensor": np.stack([_at(run, f"plastic_strain_{c}", k) for c in parts]),
         }
         for k in range(run.sizes[_TIME])
     ]
@@ -133,9 +134,11 @@ def _parts(fields: MeshFields) -> dict[str, np.ndarray]:
         for name in next(iter(fields.stages.values()))
     }
     moved, stress = stacked.pop("displacement"), stacked.pop("stress")
+    plastic, names = stacked.pop("plastic_tensor"), components(stress.shape[1])
     return {
         **{f"displacement_{a}": moved[:, k] for k, a in enumerate(AXES[: moved.shape[1]])},
-        **{f"stress_{c}": stress[:, k] for k, c in enumerate(components(stress.shape[1]))},
+        **{f"stress_{c}": stress[:, k] for k, c in enumerate(names)},
+        **{f"plastic_strain_{c}": plastic[:, k] for k, c in enumerate(names)},
         **stacked,
     }
 
@@ -143,7 +146,7 @@ def _parts(fields: MeshFields) -> dict[str, np.ndarray]:
 def _unit(name: str) -> str:
     if name.startswith("displacement"):
         return "mm"
-    return "1" if name == "plastic_strain" else "MPa"
+    return "1" if name.startswith("plastic_strain") else "MPa"
 
 
 def _whole(values: np.ndarray) -> np.ndarray:

@@ -347,7 +347,7 @@ def test_the_time_left_is_told_at_the_pace_so_far(
     study, clock = fake_study(), iter((0.0, 0.0, 3600.0, 5400.0, 7290.0))
     monkeypatch.setattr("residua.progress.time.monotonic", lambda: next(clock))
     monkeypatch.setattr("residua.progress._REDRAW", -1.0)
-    first, second, *_ = study.cases()
+    first = next(study.cases())
     bar = Progress(study, screen)
     bar(StudyEvent(kind="path", progress=0.0, path="a"))
     bar(StudyEvent(kind="run", progress=0.5, path="a", run=first.id, status="ok"))

@@ -29,8 +29,8 @@ CONTENT: dict[str, Any] = {
 
 @pytest.fixture(scope="module")
 def pressed() -> Solution:
-    """Two blocks with different elements, pressed together."""
-    steel = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
+    """Two blocks with different elements, pressed together until the upper one yields."""
+    steel = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=175.0)
     x = np.linspace(0.0, 2.0, 3)
     upper = Body(name="upper", mesh=grid(x, x, "tri"), material=steel, element="tri6",
                  supports={"left": "x"}, pressure={"top": 200.0})  # fmt: skip
@@ -90,6 +90,19 @@ def test_faces_cover_the_bodies_once(kept: tuple[Study, Store]) -> None:
             each = run[name]
             assert (each.attrs["mesh"], each.attrs["location"]) == ("mesh", "node")
             assert each.dims == ("time", "mesh_node")
+
+
+def test_plastic_strain_keeps_the_volume_and_makes_the_equivalent_one(pressed: Solution) -> None:
+    at = pressed.mesh_fields().stages["unloaded"]
+    xx, yy, zz, xy = at["plastic_tensor"]
+    most = at["plastic_strain"].max()
+    assert most > 1e-6
+    np.testing.assert_allclose(xx + yy + zz, 0.0, atol=1e-9 * most)
+    equivalent = np.sqrt(2.0 / 3.0 * (xx**2 + yy**2 + zz**2 + 2.0 * xy**2))
+    assert (equivalent <= (1.0 + 1e-9) * most).all()
+    k = at["plastic_strain"].argmax()
+    assert yy[k] < 0.0 < xx[k]  # pressed flat
+    assert equivalent[k] == pytest.approx(most, rel=0.05)
 
 
 def test_the_fields_are_those_of_the_solution(pressed: Solution) -> None:

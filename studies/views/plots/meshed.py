@@ -145,8 +145,12 @@ def _values(
         words = {"long_name": f"displacement along {component}", "units": "mm"}
         values = at["displacement"][known.index(component)]
         return xr.DataArray(values, scalars, _NODE, field, words), None
-    nodal = at[(_AT_THE_END | _STAGED)[field]]
+    name = (_AT_THE_END | _STAGED)[field]
+    tensor = name == "plastic_strain" and component is not None
+    nodal = at["plastic_tensor" if tensor else name]
     words = QUANTITIES[field].attributes
+    if tensor:
+        words = words | {"long_name": words["long_name"].removeprefix("equivalent ")}
     if nodal.ndim == 1:
         return component_of(xr.DataArray(nodal, scalars, _NODE, field, words), component), None
     names = list(components(len(nodal)))

@@ -36,7 +36,7 @@ def kept(*, symmetric: bool = False, grid: bool = True) -> xr.Dataset:
     stress = np.stack([10.0 * X[0], nothing, nothing, nothing + 2.0])
     end = {
         "displacement": np.stack([nothing, -0.1 * X[0]]), "stress": stress,
-        "mises": np.abs(stress[0]), "plastic_strain": 1e-3 * X[0],
+        "mises": np.abs(stress[0]), "plastic_strain": 1e-3 * X[0], "plastic_tensor": 1e-4 * stress,
     }  # fmt: skip
     begin = {name: 3.0 * values for name, values in end.items()}
     bodies = {"block": ("quad4", QUADS), "pad": ("tri3", 6 + np.array([[0, 1, 2], [0, 2, 3]]))}
@@ -58,6 +58,9 @@ def test_values_are_those_of_the_nodes_on_every_face() -> None:
     assert drawn.box == pytest.approx((0.1, 1.9, -0.9, 0.9))
     begin = on_mesh(kept(), "map_mises", stage="loaded")
     np.testing.assert_array_equal(begin.values, 30 * drawn.X[0])
+    plastic = on_mesh(kept(), "plastic_strain", "xx")
+    np.testing.assert_allclose(plastic.values, 1e-3 * drawn.X[0])
+    assert plastic.values.attrs["long_name"] == "plastic strain after unloading"
 
 
 def test_both_halves_are_mirrored_with_the_sign_of_shear() -> None:
