@@ -56,7 +56,7 @@ clean: ## remove the environment and caches; results in out/ stay
 
 $(STAMP): pyproject.toml constraints.txt $(BIN)/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-		--constraint constraints.txt --editable '.[dev,mkl]'
+		--constraint constraints.txt --editable '.[dev,mkl,parquet,zarr]'
 	@touch $@
 
 # Else the first run that needs a kernel would wait for the compiler, for 13 s.

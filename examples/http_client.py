@@ -5,7 +5,6 @@ port of this machine, and is stopped at the end. In daily use the service runs e
 need only the function `use`.
 """
 
-import json
 import socket
 import subprocess
 import sys
@@ -14,7 +13,8 @@ import time
 from pathlib import Path
 
 import httpx
-import xarray as xr
+
+from studies import Client
 
 STUDY = {
     "name": "tour",
@@ -31,12 +31,12 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def wait_until_ready(client: httpx.Client, seconds: float = 30.0) -> None:
+def wait_until_ready(url: str, seconds: float = 30.0) -> None:
     """Wait until the service reports that it is ready."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
         try:
-            if client.get("/health").is_success:
+            if httpx.get(f"{url}/health").is_success:
                 return
         except httpx.TransportError:  # the service does not listen yet
             pass
@@ -44,25 +44,24 @@ def wait_until_ready(client: httpx.Client, seconds: float = 30.0) -> None:
     raise TimeoutError("the service did not start")
 
 
-def use(client: httpx.Client, target: Path) -> None:
-    """Submit the study, follow it to its end, and save its data set."""
-    # 201: accepted. 200: the service has this study already and does not compute it again. 4xx: a
-    # problem document, whose `errors` say which field is wrong and what is allowed.
-    answer = client.post("/studies", json=STUDY).raise_for_status()
-    study = answer.headers["location"]  # /studies/<id>
-    print(f"{answer.status_code} {study}")
+def use(service: Client, target: Path) -> None:
+    """Submit the study, follow it to its end, read numbers and the data set, and save it."""
+    # A study that the service has already is not computed again. A wrong one raises `Refused`,
+    # whose text says which field is wrong and what is allowed.
+    study = service.submit(STUDY)
+    study.wait()  # a bar on a terminal, the study itself in a notebook
+    print(study)
+    assert study.detail()["status"] == "successful"
 
-    # The service sends an event after each change, and closes the stream when the study ends.
-    with client.stream("GET", f"{study}/events", timeout=None) as events:
-        for line in events.iter_lines():
-            if line.startswith("data:"):
-                now = json.loads(line.removeprefix("data:"))
-                print(f"{now['status']} {now['progress']:.0f} %")
-    assert now["status"] == "successful", now["message"]
+    rows = study.table(
+        friction="0.3", sort="load_ratio", columns="load_ratio,peak_residual_tension"
+    )
+    assert [row["load_ratio"] for row in rows] == [0.5714, 0.8571], "one run for each load"
 
-    target.write_bytes(client.get(f"{study}/dataset.nc").raise_for_status().content)
-    found = client.get("/runs", params={"friction": 0.3, "status": "ok"}).raise_for_status().json()
-    assert found["total"] == 2, "one run for each load"
+    dataset = study.open()  # also while the study runs; values are read when they are used
+    print(dataset["peak_residual_tension"].squeeze("hardening").to_pandas().to_string())
+    assert (dataset["status"] == "ok").all(), "every run is ok"
+    study.fetch(target)
 
 
 with tempfile.TemporaryDirectory() as home:
@@ -70,12 +69,10 @@ with tempfile.TemporaryDirectory() as home:
     serve = [sys.executable, "-m", "residua", "serve", "--port", str(port)]
     service = subprocess.Popen([*serve, "--data", str(Path(home, "data"))])
     try:
-        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=30.0) as client:
-            wait_until_ready(client)
+        url = f"http://127.0.0.1:{port}"
+        wait_until_ready(url)
+        with Client(url) as client:
             use(client, Path(home, "tour.nc"))
     finally:
         service.terminate()  # the service shuts down cleanly, as after Ctrl-C
         service.wait(timeout=30.0)
-    with xr.open_dataset(Path(home, "tour.nc")) as dataset:
-        print(dataset["peak_residual_tension"].squeeze("hardening").to_pandas().to_string())
-        assert (dataset["status"] == "ok").all(), "every run is ok"

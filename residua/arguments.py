@@ -169,7 +169,11 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
     one.add_argument("path", type=_place, metavar="DIR")
     kind = one.add_mutually_exclusive_group()
     kind.add_argument("--csv", action="store_true", help="with commas between; this is the default")
-    kind.add_argument("--json", action="store_true", help="a list of objects")
+    kind.add_argument(
+        "--json",
+        action="store_true",
+        help="columns with their units, rows as objects",
+    )
     one.add_argument("--columns", nargs="+", metavar="NAME", help="default: all")
     _add_where(one)
     one.add_argument(

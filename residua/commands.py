@@ -6,7 +6,7 @@ import argparse
 import signal
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING, Any
@@ -108,13 +108,10 @@ def slurm(options: argparse.Namespace) -> int:
     """Write a script for sbatch, which computes a study on a cluster."""
     from residua.slurm import script
     from studies.definition.study import Study
-    from studies.execution.part import check_parts
     from studies.storage.store import Store
 
     store = Store(options.out)
     study = Study.from_toml(options.study, (), store.definition, store.scene)
-    if not options.with_scheduler:
-        check_parts(study)
     text = script(
         study.name, options.study, options.out, options.script,
         tasks=options.tasks, time=options.time, memory=options.memory,
@@ -210,19 +207,21 @@ def table(options: argparse.Namespace) -> int:
     """Write the numbers of the runs of a study as CSV or JSON."""
     from studies.views.numbers import table_of
     from studies.views.reading import open_study
-    from studies.views.table import csv_text, json_text
+    from studies.views.written import FORMS
 
     with open_study(options.path) as dataset:
         found = table_of(dataset)
     at = found.chosen(options.sort)
     for condition in options.where:
         at = at[found.meeting(condition)[at]]
-    text = (json_text if options.json else csv_text)(found, at, options.columns or [*found.columns])
+    columns = [found.column(name) for name in dict.fromkeys(options.columns or found.columns)]
+    pieces = FORMS["json" if options.json else "csv"].write(columns, at)
     if options.out is None:
-        print(text.rstrip("\n"))
+        for piece in pieces:
+            sys.stdout.write(piece.decode())
         return OK
-    with _written("--out", options.out) as part:
-        part.write_text(text, encoding="utf-8")
+    with _written("--out", options.out) as part, part.open("wb") as file:
+        file.writelines(pieces)
     print(f"wrote {options.out}")
     return OK
 
@@ -318,10 +317,11 @@ def remote(options: argparse.Namespace) -> int:
     """Talk to a running service."""
     import httpx
 
-    from residua.client import Refused, Service, api_key
+    from residua.keys import api_key
+    from studies.client import Client, Refused
 
     try:
-        with closing(Service(options.url, api_key(options.api_key_file))) as service:
+        with Client(options.url, api_key(options.api_key_file)) as service:
             print(options.talk(service, options))
     except Refused as error:
         return complain(error, BAD_INPUT)
@@ -332,27 +332,25 @@ def remote(options: argparse.Namespace) -> int:
 
 def submit(service: Any, options: argparse.Namespace) -> str:
     """Send a study to a running service and print its id."""
-    return str(service.submit(options.study)["id"])
+    return str(service.submit(options.study).id)
 
 
 def status(service: Any, options: argparse.Namespace) -> str:
     """Print the state of a study on a running service."""
-    state = service.status(options.id)
+    state = service.study(options.id).detail()
     stage = f"  {state['stage']}" if state.get("stage") else ""
     return f"{state['status']}  {state['progress']:g} %{stage}"
 
 
 def cancel(service: Any, options: argparse.Namespace) -> str:
     """Stop a study on a running service."""
-    service.cancel(options.id)
+    service.study(options.id).cancel()
     return f"cancelled {options.id}"
 
 
 def fetch(service: Any, options: argparse.Namespace) -> str:
     """Save the data set of a study on a running service."""
-    target = options.out or Path(f"{options.id}.nc")
-    service.fetch(options.id, target)
-    return f"wrote {target}"
+    return f"wrote {service.study(options.id).fetch(options.out or Path(f'{options.id}.nc'))}"
 
 
 @contextmanager

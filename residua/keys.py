@@ -1,14 +1,16 @@
-"""Subcommands for API keys of the service, and certificates of scheduler and workers."""
+"""API keys of the service, made and read, and certificates of scheduler and workers."""
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Any
 
 from residua.status import OK
+from studies.errors import StudyError
 
 
 def keys(options: argparse.Namespace) -> int:
@@ -49,3 +51,23 @@ def certificates(options: argparse.Namespace) -> int:
     for path in write_certificates(options.out):
         print(f"wrote {path}")
     return OK
+
+
+def api_key(path: Path | None) -> str | None:
+    """Return the key in the file ``path``, or in the environment; errors never show the key."""
+    if path is None:
+        return _plain("RESIDUA_API_KEY", os.environ.get("RESIDUA_API_KEY", "")) or None
+    try:
+        text = path.read_text(encoding="ascii", errors="replace")
+    except OSError as error:  # the text may be the key itself, typed by mistake: do not show it
+        allowed = f"must be a file that contains the key: {error.strerror}"
+        raise StudyError("--api-key-file", "…", allowed) from None
+    return _plain("--api-key-file", text)
+
+
+def _plain(source: str, text: str) -> str:
+    """Return the key, or raise `StudyError` if a header cannot contain it."""
+    key = text.strip()
+    if not re.fullmatch(r"[\w-]*", key, re.ASCII):
+        raise StudyError(source, "…", "must hold one key: letters, digits, '-' and '_'")
+    return key

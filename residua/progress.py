@@ -13,8 +13,8 @@ from studies.definition.vocabulary import OK
 from studies.execution.run import StudyEvent
 from studies.toml import CASE
 from studies.views.columns import counted, value_text
+from studies.views.summary import bar
 
-_WIDTH = 28
 _REDRAW = 0.1
 """Seconds between two drawings of the bar."""
 
@@ -79,14 +79,12 @@ class Progress:
 
     def _draw(self) -> None:
         progress = self._progress
-        filled = round(_WIDTH * progress)
         failed = f", {self._failed} failed" if self._failed else ""
-        bar = f"{'█' * filled}{'·' * (_WIDTH - filled)}"
         reused = f" ({self._reused} were there)" if self._reused else ""
         most = "at most " if self._asks else ""
         runs = f"{self._reused + self._seen} of {most}{self._size} runs{reused}{failed}"
         left = "  combining the data set" if progress >= 1.0 else self._remaining(progress)
-        text = f"{bar} {100 * progress:3.0f} %  {runs}{left}"
+        text = f"{bar(progress)}  {runs}{left}"
         print(f"\r{text}\x1b[K", end="", file=self._stream, flush=True)
 
     def _remaining(self, progress: float) -> str:

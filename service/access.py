@@ -16,6 +16,9 @@ from service.keys import Keys, KeysError, Scope
 from service.pages.rendering import COOKIE, is_page, told
 from service.settings import Settings, address_of
 
+ONLY_SHOWN = "these pages only show what is stored: start `residua serve` to compute"
+"""Refusal of requests that change something, where nothing is computed."""
+
 SAFE = ("GET", "HEAD", "OPTIONS")
 
 NEEDED = [
@@ -27,7 +30,7 @@ NEEDED = [
         (r"POST /ui/sign-(in|out)", None),
         (r"(GET|HEAD|OPTIONS) .*", Scope.READ),
         (r"POST /(scenes|studies|studies/[^/?]+/retry|estimate)/?", Scope.SUBMIT),
-        (r"POST /ui/(new|studies/[^/?]+/(retry|stop))", Scope.SUBMIT),
+        (r"POST /ui/(new|scenes|studies/[^/?]+/(retry|stop))", Scope.SUBMIT),
         (r"DELETE /studies/[^/?]+/?", Scope.SUBMIT),
         (r".*", Scope.ADMIN),
     )
@@ -53,10 +56,14 @@ class Gate:
 
     The caller's scope is stored in ``request.state.caller``: a `Scope`, or None without a key; in
     ``request.state.name`` the name of the key, or ``address …`` of a caller without one.
+
+    Where the application ``only_shows``, everybody may read, and nobody anything else.
     """
 
-    def __init__(self, app: ASGIApp, settings: Settings, keys: Keys) -> None:
-        self.app = app
+    def __init__(
+        self, app: ASGIApp, settings: Settings, keys: Keys, only_shows: bool = False
+    ) -> None:
+        self.app, self.only_shows = app, only_shows
         self.keys_needed = settings.keys_required
         self.keys = keys
         self.names = {
@@ -105,6 +112,10 @@ class Gate:
         """Return the caller's scope, or raise `HTTPException` if it is not sufficient."""
         # No name of a key has a space.
         request.state.name = f"address {request.client.host if request.client else 'unknown'}"
+        if self.only_shows:
+            if not Scope.READ.covers(needed(request) or Scope.READ):
+                raise HTTPException(HTTPStatus.FORBIDDEN, ONLY_SHOWN)
+            return Scope.READ
         if not self.keys_needed:
             return Scope.ADMIN
         wanted, header = needed(request), request.headers.get("authorization", "")
@@ -159,7 +170,7 @@ def check_content(request: Request) -> None:
     """Refuse a body without the content type JSON, or, for a scene, a form with files."""
     headers = request.headers
     path = request.scope["path"].removeprefix(request.scope.get("root_path", ""))
-    if path.rstrip("/") == "/scenes":
+    if path.rstrip("/") in ("/scenes", "/ui/scenes"):
         wanted, form = FORM, "multipart/form-data"
     elif is_page(request):
         wanted, form = FIELDS, "application/x-www-form-urlencoded"

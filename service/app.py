@@ -18,10 +18,12 @@ import solver
 from service import errors, logs, routes
 from service.access import Gate
 from service.connections import limited
+from service.datasets import Datasets
 from service.errors import QueueLost
 from service.examiner import Examiner
 from service.headers import SecurityHeaders
 from service.inspector import Inspector
+from service.jobs import Jobs
 from service.keys import Keys, KeysError
 from service.limits import body_limit
 from service.maps import Pictures
@@ -70,8 +72,7 @@ def create_app(settings: Settings) -> FastAPI:
     KeysError
         If callers need a key and there is none.
     """
-    keys = Keys(settings.data)
-    if settings.keys_required and not keys.all():
+    if settings.keys_required and not Keys(settings.data).all():
         raise KeysError(
             f"{settings.host} is open to others, who need an API key; make "
             f"one: residua keys add NAME --scope admin --data {shlex.quote(str(settings.data))}"
@@ -80,22 +81,38 @@ def create_app(settings: Settings) -> FastAPI:
     held = lock(settings.data / "service.lock", IN_USE, settings.lock_seconds)
     store = open_store(settings.data)
     jobs = open_queue(settings.data / "jobs.sqlite", store, settings.max_queue)
-    mend = Mender(jobs, store).look
-    starter = Starter(held)
-    runner = Runner(settings, jobs, Pool(settings, starter), starter, mend)
-    examiner = Examiner(settings)
+    return assembled(settings, store, jobs, held)
+
+
+def assembled(settings: Settings, store: Store, jobs: Jobs, held: int | None) -> FastAPI:
+    """Return the application on a store and a queue.
+
+    Parameters
+    ----------
+    held : the lock of their directory, which is left at the end; None for pages that only show:
+        nothing is computed, and requests that change something are refused
+    """
+    keys = Keys(settings.data)
+    starter = Starter(-1 if held is None else held)
+    runner = Runner(settings, jobs, Pool(settings, starter), starter, Mender(jobs, store).look)
     kept = settings.keep_days, settings.keep_bytes
     scenes = settings.max_scenes_bytes, settings.max_key_scenes_bytes
     keeper = Keeper(jobs, store, runner.computes, *kept, *scenes)
     metrics = Metrics(jobs, store, runner)
+    datasets = Datasets(jobs, store)
 
     @contextlib.asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         try:
-            async with runner.working(), keeper.working():
+            async with contextlib.AsyncExitStack() as stack:
+                if held is not None:
+                    await stack.enter_async_context(runner.working())
+                    await stack.enter_async_context(keeper.working())
                 yield
         finally:
-            os.close(held)
+            datasets.close()
+            if held is not None:
+                os.close(held)
 
     app = FastAPI(
         title="Residua",
@@ -106,23 +123,19 @@ def create_app(settings: Settings) -> FastAPI:
         docs_url=None,
         redoc_url=None,
     )
-    app.state.settings = settings
-    app.state.store = store
-    app.state.jobs = jobs
-    app.state.runner = runner
-    app.state.examiner = examiner
-    app.state.inspector = Inspector(settings.reader_seconds)
-    app.state.details = Details(jobs, store)
-    app.state.tables = Tables(jobs, store)
-    app.state.keeper = keeper
-    app.state.keys = keys
-    app.state.metrics = metrics
-    app.state.pictures = Pictures(settings.map_queue, settings.map_bytes)
-    app.state.probe = Probe()
+    parts = {
+        "settings": settings, "store": store, "jobs": jobs, "runner": runner, "keeper": keeper,
+        "keys": keys, "metrics": metrics, "datasets": datasets, "probe": Probe(),
+        "examiner": Examiner(settings), "inspector": Inspector(settings.reader_seconds),
+        "details": Details(jobs, store), "tables": Tables(jobs, store),
+        "pictures": Pictures(settings.map_queue, settings.map_bytes),
+    }  # fmt: skip
+    for name, part in parts.items():
+        setattr(app.state, name, part)
     # Each is outside of the previous ones, so that refused requests are measured and logged too.
-    longest = {"/scenes": settings.max_scene_bytes}
+    longest = dict.fromkeys(("/scenes", "/ui/scenes"), settings.max_scene_bytes)
     app.add_middleware(body_limit, limit=settings.max_body_bytes, longest=longest)
-    app.add_middleware(Gate, settings=settings, keys=keys)
+    app.add_middleware(Gate, settings=settings, keys=keys, only_shows=held is None)
     app.add_middleware(head_is_get)
     app.add_middleware(SecurityHeaders)
     app.add_middleware(logs.RequestLog, observe=metrics.observe)

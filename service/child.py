@@ -42,7 +42,8 @@ def compute(order: Mapping[str, Any], outlet: Outlet, stop: threading.Event) -> 
         should_stop=stop.is_set,
     )
     outlet.send("outcome", {
-        "counts": outcome.counts, "asked": outcome.asked, "stage": outcome.stage,
+        "counts": outcome.counts, "counted": study.counted, "asked": outcome.asked,
+        "stage": outcome.stage,
     })  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from fastapi import Depends, Request
 
+from service.datasets import Datasets
 from service.errors import NotFound
 from service.examiner import Examiner
 from service.inspector import Inspector
@@ -37,6 +38,7 @@ def held(name: str) -> Any:
     return Depends(get)
 
 
+TheDatasets = Annotated[Datasets, held("datasets")]
 TheDetails = Annotated[Details, held("details")]
 TheExaminer = Annotated[Examiner, held("examiner")]
 TheInspector = Annotated[Inspector, held("inspector")]

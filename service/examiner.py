@@ -1,4 +1,4 @@
-"""Check studies before they are accepted, in a separate process.
+"""Check studies before they are accepted, and draw their scenes, in a separate process.
 
 To check every run of a large study and to make its id takes seconds, and memory.
 """
@@ -32,7 +32,7 @@ class Examined:
     Attributes
     ----------
     study : the checked study
-    runs : ids of its runs in the order of its cases; of a study with a goal they are not known
+    runs : ids of its runs in the order of its cases; one that chooses them has none yet
     estimate : its estimated cost
     """
 
@@ -68,15 +68,35 @@ class Examiner:
         async with self.process.turn():
             return await self.process.call(examined, *what, name=name, advice=": sweep less")
 
+    async def picture(self, content: Mapping[str, Any]) -> str:
+        """Return the scene of the first run of a study, with its mesh, as SVG.
+
+        Raises
+        ------
+        StudyError
+            If the study has a mistake.
+        Busy
+            If too many others wait, or the process was killed.
+        """
+        async with self.process.turn():
+            name = content.get("name")
+            return await self.process.call(pictured, dict(content), self.directory, name=name)
+
+
+def pictured(content: dict[str, Any], directory: Path) -> str:
+    """Return the scene of the first run of a study; called in a separate process."""
+    from studies.views.scene_picture import scene_svg
+
+    store = Store(directory)
+    study = Study.known(content, partial(_posted, store), store.definition)
+    first = next(iter(study.cases()))
+    return scene_svg(first.scene, first.parameters)
+
 
 def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:
     """Return a checked study with its run ids and its cost; called in a separate process."""
     store = Store(directory)
     study = Study.known(content, partial(_posted, store), store.definition)
-    if study.asks and not study.goal:
-        field, what = ("refine", "refined") if study.refine else ("fit", "fitted")
-        allowed = f"is {what} by `residua run`, not by a service: submit the runs themselves"
-        raise StudyError(field, getattr(study, field), allowed)
     bounds.check_size(study)
     runs = list(study.checked().run_ids())
     cost = estimate(study, store)

@@ -49,7 +49,7 @@ class Job:
     turn : the greater was accepted or retried later
     digest : checksum of the text of the study
     bytes : estimated size of the runs that it lacked, and of its data set
-    stage : of a study with a goal, how many of its searches have ended
+    stage : of a study that chooses its runs, how far it is; empty for others
     """
 
     id: str
@@ -114,14 +114,11 @@ def wanted(
     return (f"WHERE {' AND '.join(clauses)}" if clauses else ""), values
 
 
-def verdict(counts: Mapping[str, int], stage: str = "") -> tuple[StudyState, str]:
-    """Return the final state of a study from the number of its runs by status, and the reason.
-
-    Those of a study with a ``stage`` are the answers to its goal.
-    """
+def verdict(counts: Mapping[str, int], counted: str = "runs") -> tuple[StudyState, str]:
+    """Return the final state of a study from what is ``counted`` by status, and the reason."""
     others = {status: count for status, count in counts.items() if count and status != "ok"}
     if not others:
         return StudyState.SUCCESSFUL, ""
     listed = ", ".join(f"{count} {status}" for status, count in others.items())
-    what = "searches" if stage else "runs"
-    return StudyState.FAILED, f"{sum(others.values())} of {sum(counts.values())} {what}: {listed}"
+    most = sum(counts.values())
+    return StudyState.FAILED, f"{sum(others.values())} of {most} {counted}: {listed}"

@@ -30,11 +30,12 @@ NEXT_TURN = "SELECT COALESCE(MAX(turn), 0) + 1 FROM job"
 BEGUN = {"state": StudyState.RUNNING, "message": "", "finished": None}
 SHARED = """SELECT 1 FROM run AS mine JOIN run AS theirs ON theirs.run = mine.run
     WHERE mine.job = ? AND theirs.job IN (SELECT value FROM json_each(?)) LIMIT 1"""
-GOAL = "CASE WHEN json_valid({0}.study) THEN json_extract({0}.study, '$.goal') END IS NOT NULL"
-ALIKE = f"""SELECT 1 FROM job AS mine JOIN job AS theirs ON theirs.scene = mine.scene
+ALIKE = """SELECT 1 FROM job AS mine JOIN job AS theirs ON theirs.scene = mine.scene
     WHERE mine.id = ? AND theirs.id IN (SELECT value FROM json_each(?))
-    AND {GOAL.format("mine")} AND {GOAL.format("theirs")} LIMIT 1"""
+    AND mine.stage <> '' AND theirs.stage <> '' LIMIT 1"""
 BOTH = (SHARED, ALIKE)
+NOTES = 200
+"""Number of notes that are kept of what happened to a job."""
 
 
 class Jobs(Database):
@@ -77,8 +78,8 @@ class Jobs(Database):
 
         ``runs`` are the ids of its runs in the order of its cases. They are stored, because a
         changed solver would give other ids, and the study would not find its runs. Those of a study
-        with a goal are not known yet: they are at most ``most``, and its ``stage`` tells of its
-        searches. ``size`` is what it will write [bytes].
+        that chooses them are not known yet: they are at most ``most``, and its ``stage`` tells how
+        far it is. ``size`` is what it will write [bytes].
 
         Raises
         ------
@@ -111,7 +112,16 @@ class Jobs(Database):
             connection.execute(
                 f"INSERT INTO job ({ALL}, study) VALUES ({MARKS}, ?)", [*row_of(job), text]
             )
+            tell(connection, job)
             return job, True
+
+    def told(self, job_id: str) -> list[tuple[str, str]]:
+        """Return what happened to a job: times and words, the oldest first."""
+        with self.transaction("BEGIN") as connection:
+            found = connection.execute(
+                "SELECT at, words FROM told WHERE job = ? ORDER BY rowid", (job_id,)
+            )
+            return [tuple(row) for row in found]
 
     def get(self, job_id: str) -> Job:
         """Return one job.
@@ -139,7 +149,7 @@ class Jobs(Database):
             return [row["run"] for row in rows]
 
     def asked(self, job_id: str, runs: Collection[str], stage: str) -> None:
-        """Add runs that a search has asked for, and write how many of the searches have ended."""
+        """Add runs that a study has asked for, and write how far it is."""
         with self.transaction() as connection, suppress(NotFound):
             job = self.read(connection, job_id)
             rows = connection.execute("SELECT run FROM run WHERE job = ?", (job_id,))
@@ -152,10 +162,10 @@ class Jobs(Database):
             put(connection, job, stage=stage)
 
     def searches(self) -> dict[str, str]:
-        """Return, by id, the scene of each waiting or running job that searches."""
+        """Return, by id, the scene of each waiting or running job that chooses its runs."""
         with self.transaction("BEGIN") as connection:
             rows = connection.execute(
-                f"SELECT id, scene FROM job WHERE state IN (?, ?) AND {GOAL.format('job')}",
+                "SELECT id, scene FROM job WHERE state IN (?, ?) AND stage <> ''",
                 (StudyState.RUNNING, StudyState.ACCEPTED),
             )
             return dict(rows.fetchall())
@@ -202,8 +212,8 @@ class Jobs(Database):
         """Mark the next job as running, and return it; None if there is none.
 
         It has at most ``largest`` runs, and shares no run with ``busy``, the jobs that are being
-        computed, so that common runs are computed once. Two searches in one scene may ask for the
-        same runs: one of them waits.
+        computed, so that common runs are computed once. Two that choose their runs in one scene
+        may ask for the same ones: one of them waits.
         """
         others = json.dumps(list(busy))
         with self.transaction() as connection:
@@ -346,9 +356,22 @@ class Jobs(Database):
 
 def put(connection: sqlite3.Connection, job: Job, **changes: Any) -> Job:
     """Change a job in the transaction of a connection, and return it."""
-    job = replace(job, **changes)
+    before, job = job, replace(job, **changes)
+    if (job.state, job.message) != (before.state, before.message):
+        tell(connection, job)
     connection.execute(f"UPDATE job SET ({ALL}) = ({MARKS}) WHERE id = ?", [*row_of(job), job.id])
     return job
+
+
+def tell(connection: sqlite3.Connection, job: Job) -> None:
+    """Note the state of a job and the reason for it; the latest notes stay."""
+    words = f"{job.state}: {job.message}" if job.message else str(job.state)
+    connection.execute("INSERT INTO told VALUES (?, ?, ?)", (job.id, now(), words))
+    connection.execute(
+        "DELETE FROM told WHERE job = ? AND rowid NOT IN"
+        " (SELECT rowid FROM told WHERE job = ? ORDER BY rowid DESC LIMIT ?)",
+        (job.id, job.id, NOTES),
+    )
 
 
 def unknown(job_id: str) -> NotFound:

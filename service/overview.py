@@ -25,6 +25,8 @@ KEPT = 100
 
 PENDING = "pending"
 """Status of a run that is not in the catalogue."""
+CHOOSE = ("goal", "refine", "fit")
+"""Entries of studies that choose their runs."""
 
 
 def summary(job: Job) -> StudySummary:
@@ -85,7 +87,7 @@ class Details:
         counts = Counter[str]()
         for status, number in self.store.catalogue.counts(self.jobs.runs(job.id)).items():
             counts[taken(status, allow)] += number
-        goal, asks = study.get("goal", {}), chooses(study)
+        asks = chooses(study)
         if not asks and (pending := job.size - sum(counts.values())):
             counts[PENDING] = pending
         axes = {name: labels(name, axis) for name, axis in study["sweep"].items()}
@@ -101,7 +103,7 @@ class Details:
             **_columns(job),
             parameters=study["parameters"],
             sweep=study["sweep"],
-            goal=goal,
+            **{name: study.get(name, {}) for name in CHOOSE},
             **{"note": "", "tags": [], "keep": "", "allow": [], **_own_words(study)},
             counts=counts,
             runs=[
@@ -118,7 +120,7 @@ class Details:
 
 def chooses(study: Mapping[str, Any]) -> bool:
     """Whether a study asks for runs by the outcomes of others: they do not fill its axes."""
-    return any(study.get(name) for name in ("goal", "refine", "fit"))
+    return any(study.get(name) for name in CHOOSE)
 
 
 def point(axes: dict[str, list[Any]], position: int) -> dict[str, Any]:

@@ -88,7 +88,7 @@ def _add(study_id: str, jobs: Jobs, store: Store, begun: bool = True) -> None:
         there = (store.run_path(run).is_file() for run in study.run_ids())
         ended = not begun or sum(there) >= counts.total() - counts[MISSING]
     if counts and (ended or not begun):
-        jobs.finish(study.id, *verdict(counts, study.stage()), standing=StudyState.ACCEPTED)
+        jobs.finish(study.id, *verdict(counts, study.counted), standing=StudyState.ACCEPTED)
 
 
 class Mender:

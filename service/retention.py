@@ -76,14 +76,14 @@ class Keeper:
                     needed = f"the study {user['id']} needs this run"
                     raise Conflict(f"{needed}: dismiss it first, or wait for its end")
             if self._searched([run_id]):
-                needed = "a study searches in the scene of this run, and may need it"
+                needed = "a study chooses its runs in the scene of this one, and may need it"
                 raise Conflict(f"{needed}: dismiss it first, or wait for its end")
             self.store.discard([run_id])
 
     def _searched(self, runs: Collection[str]) -> set[str]:
-        """Return those runs in whose scene a waiting or running study searches.
+        """Return those runs in whose scene a waiting or running study chooses its runs.
 
-        What a search asks for is known at its end.
+        What it asks for is known at its end.
         """
         scenes = set(self.jobs.searches().values())
         described = (self.store.scene(each, whole=False) for each in scenes)
@@ -206,6 +206,7 @@ class Keeper:
             with suppress(FileNotFoundError):
                 shutil.rmtree(directory)
             queue.execute("DELETE FROM run WHERE job = ?", (study_id,))
+            queue.execute("DELETE FROM told WHERE job = ?", (study_id,))
             queue.execute("DELETE FROM job WHERE id = ?", (study_id,))
         return freed
 
@@ -285,7 +286,7 @@ class Keeper:
         """Return the runs of studies that are not in the queue: those of the command line.
 
         A study that cannot be read, or whose id has changed, cannot be computed again, and needs no
-        run. One with a goal needs the runs that its search has asked for (`Store.runs_of`).
+        run. One that chooses its runs needs those that it has asked for (`Store.runs_of`).
         """
         with self.jobs.transaction("BEGIN") as queue:
             known = {row["id"] for row in queue.execute("SELECT id FROM job")}

@@ -47,9 +47,8 @@ class Attempt:
     heard : time of the last message of its process [s]
     waiting : reason for which the study waits; empty if it does not
     runs : number of runs that were finished
-    asked, stage : of a study with a goal, the runs that its searches have asked for, and how many
-        of these have ended
-    counts : number of runs by status at the end of the study; None if it did not end
+    asked, stage : of a study that chooses its runs, those that it has asked for, and how far it is
+    counts, counted : number by status at the end of the study, and of what; None if it did not end
     reason : why it did not end
     patient : whether waiting helps: no scheduler answers, or another process uses the directory
     hopeless : whether every further start would fail in the same way
@@ -62,6 +61,7 @@ class Attempt:
     asked: set[str] = field(default_factory=set)
     stage: str = ""
     counts: dict[str, int] | None = None
+    counted: str = "runs"
     reason: str = "its process ended without a result or an error message; see the service's log"
     patient: bool = False
     hopeless: bool = False
@@ -174,7 +174,7 @@ class Runner:
             if await self._unwanted(job):
                 return
             if attempt.counts is not None:
-                end = verdict(attempt.counts, attempt.stage)
+                end = verdict(attempt.counts, attempt.counted)
                 await asyncio.to_thread(self.jobs.finish, job.id, *end)
                 return
             progress = attempt.progress
@@ -291,7 +291,8 @@ async def follow(child: Process, attempt: Attempt) -> None:
                 if attempt.stage and content["run"]:
                     attempt.asked.add(content["run"])
             case "outcome":
-                attempt.counts, attempt.stage = content["counts"], content["stage"]
+                attempt.counts, attempt.counted = content["counts"], content["counted"]
+                attempt.stage = content["stage"]
                 attempt.asked.update(content["asked"])
             case "refused" | "wait" | "error" as kind:
                 attempt.reason = content["reason"]

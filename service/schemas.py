@@ -84,13 +84,6 @@ class Selecting(BaseModel):
         return {name: str(value) for name, value in (self.model_extra or {}).items() if value != ""}
 
 
-class TableFilter(Selecting):
-    """The runs of a study that are requested, by any column of its table."""
-
-    sort: str = Field(default="", description="a column; with a minus, the largest first")
-    columns: str = Field(default="", description="names with commas between; all by default")
-
-
 Millimetres = Annotated[float, Field(allow_inf_nan=False)]
 Resolution = Annotated[int, Field(ge=50, le=600, description="dots per inch")]
 Zoom = Annotated[
@@ -112,6 +105,30 @@ Part = Annotated[
     ),
 ]
 Component = Annotated[str | None, Field(description="of a tensor; the first by default")]
+
+
+class AuditFigure(BaseModel):
+    """The largest value of a figure of the audit among the runs of a study."""
+
+    name: str
+    words: str
+    value: float
+    limit: float = Field(description="a run with a larger value fails")
+    run: str = Field(description="id of the run that has it")
+    at: dict[str, Any] = Field(description="where the run is in the sweep")
+
+
+class TableFilter(Selecting):
+    """The part of the table of a study that is requested."""
+
+    sort: str = Field(default="", description="a column; with a minus, the largest first")
+    columns: str = Field(default="", description="names with commas between; all by default")
+
+
+class NumbersFilter(Selecting):
+    """The columns of the table of a study that are requested."""
+
+    name: list[str] = Field(min_length=1, max_length=100, description="names of columns")
 
 
 class MapQuery(BaseModel):
@@ -178,8 +195,10 @@ class StudySummary(BaseModel):
         description="why it failed; while it runs, what it waits for or why it was started again"
     )
     progress: float = Field(ge=0, le=100, description="percentage of the work that is done")
-    size: int = Field(description="number of runs; of a study with a goal the largest possible one")
-    stage: str = Field(description="of a study with a goal, how many of its searches have ended")
+    size: int = Field(
+        description="number of runs; the largest possible one if the study chooses them"
+    )
+    stage: str = Field(description="of a study that chooses its runs, how far it is")
     priority: int = Field(description="the greater is computed first")
     submitted: str
     started: str | None
@@ -201,6 +220,8 @@ class StudyDetail(StudySummary):
     parameters: dict[str, Any]
     sweep: Axes
     goal: dict[str, Any] = Field(description="what is searched at each place of the axes")
+    refine: dict[str, Any] = Field(description="numbers of the runs, between which it adds others")
+    fit: dict[str, Any] = Field(description="what was measured, and the parameters it searches")
     note: str = Field(description="what its author wrote of it")
     tags: list[str]
     keep: str = Field(description="``fields`` where the runs keep the fields at the nodes")
@@ -209,7 +230,7 @@ class StudyDetail(StudySummary):
     )
     counts: dict[str, int] = Field(description="runs by status, as the study takes them")
     runs: list[StudyRun] = Field(
-        description="a page of its runs; of a study with a goal those that it has asked for"
+        description="a page of its runs; if it chooses them, of those that it has asked for"
     )
 
 

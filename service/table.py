@@ -31,6 +31,9 @@ from studies.views.table import MESSAGE, RUN, STATUS, Column, RunTable, column_o
 KEPT = 8
 """Number of tables that are kept."""
 
+BATCH = 1000
+"""Number of runs whose rows of the catalogue are in memory at a time."""
+
 OUTCOMES = (*STATUSES[:-1], PENDING)
 """Statuses of runs in a table, by their number in the column ``status`` of octets."""
 
@@ -60,25 +63,38 @@ class Tables:
 
     def _made(self, job: Job) -> RunTable:
         study, runs = self.jobs.study(job.id), self.jobs.runs(job.id)
-        rows, allow = self.store.catalogue.rows(runs), study.get("allow", [])
         scene = scene_of_study(self.store, job.scene)
-        found = [rows.get(each) for each in runs]
         axes = {name: labels(name, axis) for name, axis in study["sweep"].items()}
-        if chooses(study):
-            axes, columns = {}, [*_asked(study, found, scene)]
+        asks, allow = chooses(study), study.get("allow", [])
+        outcome, said = (np.full(len(runs), text, dtype=object) for text in (PENDING, ""))
+        numbers: dict[str, np.ndarray] = {}
+        asked: dict[str, list[Any]] = {}
+        for first in range(0, len(runs), BATCH):
+            some = runs[first : first + BATCH]
+            rows = self.store.catalogue.rows(some)
+            for at, row in enumerate(map(rows.get, some), first):
+                if row is None:
+                    continue
+                outcome[at], said[at] = taken(row["status"], allow), row["message"]
+                for name, number in row["scalars"].items():
+                    if name not in numbers:
+                        numbers[name] = np.full(len(runs), math.nan)
+                    numbers[name][at] = math.nan if number is None else number
+                for name, value in searched_at(study, row["parameters"]).items() if asks else ():
+                    asked.setdefault(name, [None] * len(runs))[at] = value
+        if asks:
+            axes = {}
+            columns = [_placed(name, _array(each), scene) for name, each in asked.items()]
         else:
             columns = [*_sweep(study["sweep"], axes, scene)]
-        outcome = [taken(row["status"], allow) if row else PENDING for row in found]
-        columns.append(column_of(STATUS, np.array(outcome, dtype=object), "run"))
+        columns.append(column_of(STATUS, outcome, "run"))
         known = {each.name for each in columns}
-        scalars = [row["scalars"] if row else {} for row in found]
-        for name in dict.fromkeys(name for each in scalars for name in each if name not in known):
-            values = np.array([each.get(name, math.nan) for each in scalars], dtype=float)
-            group = group_of(name)
-            columns.append(column_of(name, values, group, scene))
-        columns.append(column_of(RUN, np.array(runs, dtype=object), "run"))
-        said = [row["message"] if row else "" for row in found]
-        columns.append(column_of(MESSAGE, np.array(said, dtype=object), "run"))
+        for name in (each for each in numbers if each not in known):
+            columns.append(column_of(name, numbers[name], group_of(name), scene))
+        columns += [
+            column_of(RUN, np.array(runs, dtype=object), "run"),
+            column_of(MESSAGE, said, "run"),
+        ]
         return RunTable(axes=axes, columns={each.name: each for each in columns})
 
 
@@ -99,15 +115,6 @@ def _sweep(
     own = {name: (name, values) for name, values in axes.items()}
     for name, (axis, values) in {**own, **linked_values(dict(sweep))}.items():
         yield _placed(name, _array(values)[at[axis]], scene)
-
-
-def _asked(
-    study: Mapping[str, Any], rows: Sequence[Mapping[str, Any] | None], scene: Scene | None
-) -> Iterator[Column]:
-    """Yield the axes of a study that chooses its runs, and what it searches, over these runs."""
-    at = [searched_at(study, row["parameters"]) if row else {} for row in rows]
-    for name in dict.fromkeys(name for each in at for name in each):
-        yield _placed(name, _array([each.get(name) for each in at]), scene)
 
 
 def _array(values: Sequence[Any]) -> np.ndarray:

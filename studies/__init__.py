@@ -18,6 +18,7 @@ from studies.errors import (
 )
 
 if TYPE_CHECKING:
+    from studies.client import Client
     from studies.definition.cases import Case, LoadingPath
     from studies.definition.parameters import scene_schema
     from studies.definition.study import Study
@@ -34,10 +35,12 @@ if TYPE_CHECKING:
     from studies.views.reading import open_netcdf, open_study
     from studies.views.sensitivity import sensitivity
     from studies.views.solution import to_xarray
+    from studies.views.summary import summary
 
 _HOMES = {
     "Access": "execution.cluster",
     "Case": "definition.cases",
+    "Client": "client",
     "Limits": "execution.limits",
     "Bounds": "execution.estimate",
     "Difference": "views.differing",
@@ -57,6 +60,7 @@ _HOMES = {
     "run_study": "execution.run",
     "scene_schema": "definition.parameters",
     "sensitivity": "views.sensitivity",
+    "summary": "views.summary",
     "sweep": "execution.function",
     "to_grid": "views.grids",
     "to_xarray": "views.solution",
@@ -67,6 +71,7 @@ __all__ = [
     "Bounds",
     "Case",
     "CatalogueDamaged",
+    "Client",
     "Difference",
     "Estimate",
     "FileDamaged",
@@ -90,6 +95,7 @@ __all__ = [
     "run_study",
     "scene_schema",
     "sensitivity",
+    "summary",
     "sweep",
     "to_grid",
     "to_xarray",

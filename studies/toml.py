@@ -1,4 +1,4 @@
-"""Read TOML files of studies and scenes."""
+"""Read and write TOML files of studies and scenes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import re
 import stat
 import tomllib
+from collections.abc import Mapping
 from itertools import accumulate, chain
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ _TEXT = re.compile(
     re.DOTALL,
 )
 _KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
+_BARE = re.compile(r"[\w-]+", re.ASCII)
 _STEP = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
@@ -102,3 +104,22 @@ def toml_of(data: bytes, field: str, name: str) -> dict[str, Any]:
     except ValueError as error:
         raise StudyError(field, name, f"must be valid TOML: {error}") from None
     return plain
+
+
+def toml_text(value: Any) -> str:
+    """Return a value as TOML on one line, which is JSON but for tables."""
+    if isinstance(value, Mapping):
+        entries = (f"{_key(name)} = {toml_text(each)}" for name, each in value.items())
+        return "{" + ", ".join(entries) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(toml_text, value)) + "]"
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def toml_file(content: Mapping[str, Any]) -> str:
+    """Return the text of a TOML file with this content, an entry a line."""
+    return "".join(f"{_key(name)} = {toml_text(each)}\n" for name, each in content.items())
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else toml_text(name)

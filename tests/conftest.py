@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.marks import allowed, of_folder, place
+from tests.marks import allowed, of_folder
+from tests.order import Order, place
 
 if TYPE_CHECKING:
+    from xdist.remote import Producer
+
     from studies import Access
 
 # Workers of the test run share the cores: threads of BLAS would wait for each other. This is set
@@ -23,6 +26,18 @@ os.environ["OMP_NUM_THREADS"] = "1"
 # Hundreds of processes import the project: without compiled files each would take 0.15 s longer.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Return the number of test processes: one more than cores, as some wait for others."""
+    return len(os.sched_getaffinity(0)) + 1
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Order | None:
+    """Hand out files whole, and those that share services together."""
+    return Order(config, log) if config.getoption("dist") == "loadfile" else None
 
 
 @pytest.hookimpl(trylast=True)

@@ -23,39 +23,6 @@ FOLDERS = {
 }
 """Marks of all tests of a folder."""
 
-LONG = {
-    HERE / name
-    for name in (
-        "test_docs.py",
-        "test_examples.py",
-        "service/test_durability.py",
-        "service/test_scenes.py",
-        "service/test_together.py",
-        "benchmarks/test_benchmarks.py",
-        "stability/test_scenes.py",
-        "studies/test_kill.py",
-        "studies/test_own_parts.py",
-        "studies/test_run.py",
-        "verification/test_ball.py",
-        "verification/test_coarser.py",
-        "verification/test_contact_in_time.py",
-        "verification/test_mutations.py",
-        "verification/test_punch.py",
-        "verification/test_rolling.py",
-        "verification/test_rolling_elastic.py",
-        "verification/test_rolling_endless.py",
-        "verification/test_rolling_table.py",
-        "verification/test_shakedown.py",
-        "verification/test_steady_laws.py",
-        "verification/test_track_ends.py",
-    )
-}
-"""Files of more than 20 s of CPU; they start first, so that no core waits for them at the end."""
-
-WAITING = HERE / "service"
-"""A folder whose tests share processes that wait; its files start before all others, so that these
-end with the last of them."""
-
 EXPENSIVE = {
     "solves": ("solver.loading.increment.Increment.solve", "solver.steady.search.passing"),
     "processes": (
@@ -76,11 +43,6 @@ _START = subprocess.Popen.__init__
 def of_folder(path: Path) -> tuple[str, ...]:
     """Return the marks that a test file has by its folder."""
     return FOLDERS.get(path.relative_to(HERE).parts[0], ())
-
-
-def place(path: Path) -> tuple[bool, bool]:
-    """Return by what the files of the test run are sorted."""
-    return WAITING not in path.parents, path not in LONG
 
 
 @contextmanager

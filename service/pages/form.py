@@ -14,6 +14,7 @@ from solver.scenes import Scene
 from studies import StudyError
 from studies.definition.cases import USUAL_AXES
 from studies.definition.parameters import Parameter, parameters_of, plain
+from studies.toml import toml_text
 
 PREFIX = "p."
 """What precedes the name of a parameter in the name of its field."""
@@ -164,21 +165,12 @@ def beside(error: StudyError, scene: Scene) -> tuple[str, str]:
 def as_toml(study: Mapping[str, Any]) -> str:
     """Return the file of a study."""
     tables = ("parameters", "sweep")
-    lines = [f"{key} = {_toml(value)}" for key, value in study.items() if key not in tables]
+    lines = [f"{key} = {toml_text(value)}" for key, value in study.items() if key not in tables]
     for table in tables:
         if study[table]:
             lines += ["", f"[{table}]"]
-            lines += [f"{key} = {_toml(value)}" for key, value in study[table].items()]
+            lines += [f"{key} = {toml_text(value)}" for key, value in study[table].items()]
     return "\n".join(lines) + "\n"
-
-
-def _toml(value: Any) -> str:
-    """Return a value as TOML, which is JSON but for tables."""
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def as_curl(study: Mapping[str, Any], address: str) -> str:

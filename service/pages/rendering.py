@@ -8,6 +8,7 @@ from functools import cache
 from http import HTTPStatus
 from typing import Any
 
+import numpy as np
 from fastapi import Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, RedirectResponse
@@ -37,11 +38,22 @@ def templates() -> Environment:
     )
     found.filters |= {
         "words": lambda name: str(name).replace("_", " "),
-        "number": value_text,
+        "number": number_text,
         "moment": lambda text: (text or "").replace("T", " ").removesuffix("+00:00"),
         "data": _data,
     }
     return found
+
+
+def number_text(value: Any) -> str:
+    """Return a value as the pages show it: numbers with four digits and a minus, "–" for none."""
+    real = isinstance(value, float | np.floating)
+    if real and 1e4 <= abs(float(value)) < 1e6:
+        return f"{float(value):.0f}".replace("-", "−")
+    text = value_text(value)
+    if text == "-":
+        return "–"
+    return text.replace("-", "−") if real or isinstance(value, int) else text
 
 
 def _data(content: Any) -> str:

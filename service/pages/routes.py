@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import gzip
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from http import HTTPStatus
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Form, Query, Request, Response
+from fastapi import APIRouter, File, Form, Query, Request, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse, RedirectResponse
 
@@ -20,9 +20,11 @@ from service.dependencies import (
     TheCaller,
     TheDetails,
     TheExaminer,
+    TheInspector,
     TheJobs,
     TheKeeper,
     TheKeys,
+    TheName,
     TheProbe,
     TheRun,
     TheRunner,
@@ -37,17 +39,19 @@ from service.pages import form
 from service.pages import study as chosen
 from service.pages.assets import asset
 from service.pages.compare import MOST, compared
-from service.pages.rendering import COOKIE, ROOT, PageRoute, page
+from service.pages.rendering import COOKIE, ROOT, PageRoute, number_text, page
 from service.pages.run import audited, numbers_shown, parameters_shown
 from service.routes.health import health
+from service.routes.scenes import post_scene
 from service.schemas import ContentId, StudyFilter, Window
 from service.table import Tables, scene_of_study
+from solver.errors import ModelError
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
 from studies.scenes.registry import known_names, known_scenes
-from studies.views.columns import value_text
-from studies.views.table import MESSAGE, RUN, STATUS
+from studies.views.scene_picture import sentence
+from studies.views.table import MESSAGE, RUN, STATUS, varied
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
 home = APIRouter(include_in_schema=False)
@@ -147,7 +151,7 @@ def _study(request: Request, study: Mapping[str, Any], tables: Tables) -> Respon
             "id": table.columns[RUN].values[at],
             "status": table.columns[STATUS].values[at],
             "message": table.columns[MESSAGE].values[at],
-            "at": [(each, _cell(each, at)) for each in chosen.varied(table)],
+            "at": [(each, _cell(each, at)) for each in varied(table)],
         }
     csv = urlencode({**part.where, **({"sort": part.sort} if part.sort else {})})
     return page(
@@ -178,7 +182,7 @@ def _cell(column: Any, at: int) -> str:
     value = column.values[at]
     if column.flags and value == value:
         return str(column.flags.get(int(value), value)).replace("_", " ")
-    return value_text(value)
+    return number_text(value)
 
 
 @router.get("/runs/{run_id}")
@@ -238,10 +242,49 @@ async def health_page(
 @router.get("/new")
 def new_page(request: Request, store: TheStore, scene: str = "punch") -> Response:
     """Show the form of a new study; parameters in the address fill it."""
+    return _form(request, store, scene, _given(request.query_params.multi_items()), {}, None)
+
+
+def _given(fields: Iterable[tuple[str, object]]) -> dict[str, list[str]]:
+    """Return the texts of the fields of a form by their names."""
     given: dict[str, list[str]] = {}
-    for name, value in request.query_params.multi_items():
-        given.setdefault(name, []).append(value)
-    return _form(request, store, scene, given, {}, None)
+    for name, value in fields:
+        given.setdefault(name, []).append(str(value))
+    return given
+
+
+@router.get("/scene.svg")
+async def draw_scene(request: Request, store: TheStore, examiner: TheExaminer) -> Response:
+    """Draw the scene that the fields of the form describe, or say why it cannot be drawn."""
+    given = _given(request.query_params.multi_items())
+    name = given.get("scene", [""])[0]
+    scene = await run_in_threadpool(known_scene, store, name)
+    content, wrong = await run_in_threadpool(form.study_of, name, scene, given)
+    try:
+        if wrong:
+            name, allowed = next(iter(wrong.items()))
+            raise StudyError(name, given.get(f"p.{name}"), allowed)
+        picture = await examiner.picture(content)
+    except (StudyError, ModelError):
+        picture = sentence("There is no such scene: a field has a mistake.")
+    return Response(picture, media_type="image/svg+xml", headers={"cache-control": "no-cache"})
+
+
+@router.post("/scenes")
+async def take_scene(
+    request: Request,
+    scene: Annotated[UploadFile, File()],
+    inspector: TheInspector,
+    keeper: TheKeeper,
+    store: TheStore,
+    caller: TheName,
+    meshes: Annotated[list[UploadFile], File(default_factory=list)],
+) -> Response:
+    """Keep a scene file with its meshes, and show the form of its studies."""
+    there = [each for each in meshes if each.filename]  # a browser sends one of no name for none
+    found = await post_scene(scene, inspector, keeper, store, caller, request, Response(), there)
+    where = request.url_for("new_page").include_query_params(scene=found.id)
+    return RedirectResponse(f"{where.path}?{where.query}", HTTPStatus.SEE_OTHER)
 
 
 @router.post("/new")
@@ -249,9 +292,7 @@ async def make(
     request: Request, store: TheStore, examiner: TheExaminer, keeper: TheKeeper
 ) -> Response:
     """Tell what a study costs and what is wrong in the form, or accept the study and show it."""
-    given: dict[str, list[str]] = {}
-    for name, value in (await request.form()).multi_items():
-        given.setdefault(name, []).append(str(value))
+    given = _given((await request.form()).multi_items())
     scene_name = given.get("scene", [""])[0]
     scene = await run_in_threadpool(known_scene, store, scene_name)
     content, wrong = await run_in_threadpool(form.study_of, scene_name, scene, given)
@@ -316,6 +357,7 @@ def _form(
         name=content["name"],
         scenes=[*((each.name, each.name) for each in known_scenes()), *posted],
         given={key: values[0] for key, values in given.items()},
+        query_of=urlencode({**given, "scene": [name]}, doseq=True),
         first=[each for each in fields if each.first],
         rest=[each for each in fields if not each.first],
         wrong=mistakes,

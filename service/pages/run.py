@@ -8,15 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.pages.study import rank
-from solver.results.audit.figures import LIMITS
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.storage.dataset import attributes_of
+from studies.views.audited import LIMITED
 from studies.views.table import group_of
-
-OTHER = ("audit_energy", "audit_reactions")
-"""Figures with another limit under finite sliding, and under a travelling load."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +54,7 @@ def audited(run: Mapping[str, Any], scene: Scene | None) -> dict[str, list[Figur
             words=words_of(name, scene),
             unit=unit_of(name, scene),
             value=value,
-            limit=LIMITS.get(name) if name not in OTHER else None,
+            limit=LIMITED.get(name),
         )
         for name, value in run["scalars"].items()
         if group_of(name) == "audit"

@@ -10,7 +10,7 @@ import numpy as np
 
 from studies.definition.vocabulary import OK
 from studies.views.figures import FIGURES
-from studies.views.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, group_of
+from studies.views.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, group_of, varied
 
 ROWS = 25
 """Number of runs on a page of the table."""
@@ -41,13 +41,6 @@ class TablePart:
     pages: int
     sort: str
     where: Mapping[str, str]
-
-
-def varied(table: RunTable) -> list[Column]:
-    """Return the columns of the sweep that are not the same in all runs."""
-    sweep = [each for each in table.columns.values() if each.group == "sweep"]
-    several = [each for each in sweep if len(set(each.values.tolist())) > 1]
-    return several or sweep
 
 
 def usual(table: RunTable) -> list[Column]:
@@ -119,25 +112,26 @@ def chosen_run(table: RunTable, wanted: str, number: str) -> int | None:
 
 
 def described(table: RunTable) -> dict[str, Any]:
-    """Return what the scripts of the page need to know of a table."""
-    own = {each.name: each for each in table.columns.values()}
+    """Return what the scripts of the page need to know of a table.
+
+    The numbers of points are no place: what the points set is.
+    """
+    sweep = {name for name, each in table.columns.items() if each.group == "sweep"}
+    linked = sweep > {*table.axes}
+    points = [
+        name for name, labels in table.axes.items() if linked and [*labels] == [*range(len(labels))]
+    ]
     return {
         "size": table.size,
         "axes": [
-            {
-                "name": name,
-                "words": own[name].words,
-                "unit": own[name].unit,
-                "labels": list(labels),
-                "number": own[name].number,
-            }
+            {**_said(table.columns[name]), "labels": list(labels)}
             for name, labels in table.axes.items()
         ],
+        "grid": bool(table.axes) and not points,
+        "places": [_said(each) for each in varied(table) if each.name not in points],
         "numbers": [
             {
-                "name": each.name,
-                "words": each.words,
-                "unit": each.unit,
+                **_said(each),
                 "group": each.group,
                 "varies": varies(each),
                 "flags": {str(code): word for code, word in each.flags.items()},
@@ -145,3 +139,8 @@ def described(table: RunTable) -> dict[str, Any]:
             for each in usual(table)
         ],
     }
+
+
+def _said(column: Column) -> dict[str, Any]:
+    """Return name, meaning and unit of a column, and whether it has numbers."""
+    return {name: getattr(column, name) for name in ("name", "words", "unit", "number")}

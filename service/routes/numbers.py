@@ -5,30 +5,36 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from http import HTTPStatus
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, HTTPException, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import StreamingResponse
 from starlette.datastructures import Headers
 from starlette.staticfiles import NotModifiedResponse
 
 import solver
 from service.dependencies import ThePictures, TheRun, TheStore, TheTables
-from service.errors import REFUSED
+from service.errors import CONTENT, REFUSED
 from service.files import TAGS, UNCHANGED
 from service.octets import MEDIA_TYPE, octets
-from service.schemas import ContentId, TableFilter
+from service.schemas import AuditFigure, ContentId, NumbersFilter, TableFilter
 from service.table import OUTCOMES
 from studies import StudyError
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
-from studies.views.table import STATUS, csv_text
+from studies.views.audited import Worst, worst
+from studies.views.table import RUN, STATUS, RunTable, varied
+from studies.views.written import FORMS
 
 router = APIRouter()
 
-CSV = "text/csv"
+MISSING = "table.parquet needs pyarrow on the service: pip install residua-contact[parquet]"
+
 OCTETS: dict[int | str, dict[str, Any]] = {
     200: {"content": {MEDIA_TYPE: {}}, "description": "A line of JSON, then the numbers"},
 }
@@ -37,44 +43,100 @@ OCTETS: dict[int | str, dict[str, Any]] = {
 @router.get(
     "/studies/{study_id}/table.csv",
     tags=["studies"],
-    responses={200: {"content": {CSV: {}}}, **REFUSED},
+    responses={200: {"content": {FORMS["csv"].media_type: {}}}, **REFUSED},
 )
 def table(
     study_id: ContentId, which: Annotated[TableFilter, Query()], tables: TheTables
 ) -> Response:
     """Return a line for each run: its place in the sweep, its status, its numbers.
 
-    Beside the queries named below, every column is one: `?friction=0.1..0.4&hardening=none`.
+    Beside the queries named below, every column is one: `?friction=0.1..0.4&hardening=none`. A text
+    that a spreadsheet would take for a formula has an apostrophe before it.
     """
-    found = tables.get(study_id)
+    return _table("csv", tables.get(study_id), which)
+
+
+@router.get("/studies/{study_id}/table.json", tags=["studies"], responses=REFUSED)
+def table_of_objects(
+    study_id: ContentId, which: Annotated[TableFilter, Query()], tables: TheTables
+) -> Response:
+    """Return the same as `rows`, an object for each run; `columns` tells meaning and unit."""
+    return _table("json", tables.get(study_id), which)
+
+
+@router.get(
+    "/studies/{study_id}/table.parquet",
+    tags=["studies"],
+    responses={
+        200: {"content": {FORMS["parquet"].media_type: {}}},
+        406: {"description": MISSING, "content": CONTENT},
+        **REFUSED,
+    },
+)
+def table_of_columns(
+    study_id: ContentId, which: Annotated[TableFilter, Query()], tables: TheTables
+) -> Response:
+    """Return the same as a Parquet file, if the service has pyarrow."""
+    if find_spec("pyarrow") is None:
+        raise HTTPException(HTTPStatus.NOT_ACCEPTABLE, MISSING)
+    return _table("parquet", tables.get(study_id), which)
+
+
+def _table(ending: str, found: RunTable, which: TableFilter) -> Response:
+    """Return the part of a table that is asked for, in the form of an ending."""
     at = found.chosen(which.sort, which.selection)
     names = dict.fromkeys(which.columns.split(",") if which.columns else found.columns)
-    named = {"content-disposition": 'attachment; filename="table.csv"'}
-    return Response(csv_text(found, at, [*names]), media_type=CSV, headers=named)
+    form, columns = FORMS[ending], [found.column(name) for name in names]
+    named = {"content-disposition": f'attachment; filename="table.{ending}"'}
+    return StreamingResponse(form.write(columns, at), media_type=form.media_type, headers=named)
 
 
 @router.get("/studies/{study_id}/numbers", tags=["studies"], responses={**OCTETS, **REFUSED})
 def numbers(
-    study_id: ContentId,
-    name: Annotated[list[str], Query(min_length=1, max_length=100)],
-    tables: TheTables,
+    study_id: ContentId, which: Annotated[NumbersFilter, Query()], tables: TheTables
 ) -> Response:
     """Return columns of the table as octets, in the order of the sweep; NaN is no value.
 
     The first line is JSON: `arrays` lists name, type and shape of the arrays that follow, in which
-    numbers are little endian. A `status` is a number, whose word is in `statuses`.
+    numbers are little endian. A text is a number, whose word is in `words`. Beside `name`, every
+    column is a query, as of the table; `at` has the positions of the runs that meet them.
     """
     found = tables.get(study_id)
-    arrays = {}
-    for each in dict.fromkeys(name):
+    at = found.chosen("", which.selection)
+    arrays, words = {"at": at}, {}
+    for each in dict.fromkeys(which.name):
         column = found.column(each, "name")
-        if each == STATUS:
-            arrays[each] = np.array([OUTCOMES.index(word) for word in column.values])
-        elif column.number:
-            arrays[each] = column.values
+        if column.number:
+            arrays[each] = column.values[at]
+        elif column.group == "sweep" or each == STATUS:
+            known = OUTCOMES if each == STATUS else dict.fromkeys(column.values.tolist())
+            words[each] = [*known]
+            number = {word: code for code, word in enumerate(words[each])}
+            arrays[each] = np.array([number[word] for word in column.values[at]])
         else:
-            raise StudyError("name", each, "must be a column of numbers, or status")
-    return Response(octets({"statuses": OUTCOMES}, arrays), media_type=MEDIA_TYPE)
+            raise StudyError("name", each, "must be a column of numbers, of the sweep, or status")
+    return Response(octets({"words": words}, arrays), media_type=MEDIA_TYPE)
+
+
+@router.get("/studies/{study_id}/audit", tags=["studies"])
+def tell_audit(study_id: ContentId, tables: TheTables) -> list[AuditFigure]:
+    """Return the largest value of each figure of the audit, the nearest to its limit first.
+
+    Figures whose limit depends on the run are left out.
+    """
+    table = tables.get(study_id)
+    found = worst({each.name: each.values for each in table.numbers})
+    runs = table.columns[RUN].values
+    places = {each.name: each.values for each in varied(table)}
+
+    def told(each: Worst) -> AuditFigure:
+        words, run = table.columns[each.name].words, runs[each.at]
+        at = {name: values[each.at] for name, values in places.items()}
+        return AuditFigure(
+            name=each.name, words=words, value=each.value, limit=each.limit, run=run, at=at
+        )
+
+    return [*map(told, found)]
 
 
 @router.get("/runs/{run_id}/fields", tags=["runs"])

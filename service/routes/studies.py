@@ -5,19 +5,22 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import AsyncIterator
-from contextlib import suppress
+from hashlib import sha256
 from http import HTTPStatus
-from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import FileResponse
+from fastapi.responses import FileResponse, PlainTextResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import WithJsonSchema
+from starlette.datastructures import Headers
+from starlette.staticfiles import NotModifiedResponse
 
 from service import maps, overview
+from service.datasets import Datasets
 from service.dependencies import (
+    TheDatasets,
     TheDetails,
     TheExaminer,
     TheJob,
@@ -28,11 +31,13 @@ from service.dependencies import (
     TheSettings,
     TheStore,
 )
-from service.errors import REFUSED, Busy, Conflict, NotFound, QueueLost
-from service.files import NETCDF, netcdf
-from service.job import Job, StudyState
+from service.errors import REFUSED, Conflict, NotFound, QueueLost
+from service.files import NETCDF, TAGS, UNCHANGED, netcdf
+from service.history import log_of
+from service.job import Job
 from service.jobs import Jobs
 from service.maps import PICTURE
+from service.octets import MEDIA_TYPE
 from service.schemas import (
     ContentId,
     PlotQuery,
@@ -46,7 +51,9 @@ from service.schemas import (
 )
 from service.strict import StrictRoute
 from studies import Store, Study, StudyError
-from studies.errors import FileDamaged, StoreFull
+from studies.errors import StoreFull
+from studies.storage.seal import digest
+from studies.storage.tiles import METADATA
 
 log = logging.getLogger(__name__)
 
@@ -64,8 +71,6 @@ MOST_FITTED = 1000
 """Largest number of runs to which a request may fit polynomials, which takes seconds."""
 
 SUBMISSION = Study.model_json_schema() | {"examples": [EXAMPLE]}
-for _name in ("refine", "fit"):  # refused here
-    del SUBMISSION["properties"][_name]
 SUBMISSION["properties"]["priority"] = {
     "type": "integer",
     "minimum": PRIORITIES[0],
@@ -172,12 +177,19 @@ async def events(
         await asyncio.sleep(settings.poll_seconds)
 
 
+@router.get("/{study_id}/log", response_class=PlainTextResponse)
+def tell_log(job: TheJob, jobs: TheJobs, store: TheStore) -> str:
+    """Return a line for each thing that happened: states, what was waited for, ends of runs."""
+    return log_of(job, jobs, store)
+
+
 @router.get("/{study_id}/predict", responses=REFUSED)
 async def predict(
     job: TheJob,
     query: Annotated[PredictQuery, Query()],
     jobs: TheJobs,
     store: TheStore,
+    datasets: TheDatasets,
     pictures: ThePictures,
 ) -> Prediction:
     """Tell a number between the runs of a study, with its error.
@@ -186,15 +198,17 @@ async def predict(
     `?of=peak_residual_tension&load_ratio=0.62&friction=0.21`. A place outside of the runs, or
     across failed ones, is refused.
     """
-    return await pictures.alone(_predicted, job, query, jobs, store)
+    return await pictures.alone(_predicted, job, query, jobs, store, datasets)
 
 
-def _predicted(job: Job, query: PredictQuery, jobs: Jobs, store: Store) -> Prediction:
+def _predicted(
+    job: Job, query: PredictQuery, jobs: Jobs, store: Store, datasets: Datasets
+) -> Prediction:
     """Return what `predict` tells."""
     from studies import open_netcdf  # xarray takes half a second to import
     from studies.views.answers import answer
 
-    path, asked = Path(dataset(job, jobs, store).path), query.model_dump()
+    path, asked = datasets.ended(job), query.model_dump()
     at = {name: asked.pop(name) for name in query.model_extra or {}}
     study = Study.known(jobs.study(job.id), store.scene)
     with open_netcdf(path) as runs:
@@ -206,7 +220,7 @@ def _predicted(job: Job, query: PredictQuery, jobs: Jobs, store: Store) -> Predi
 
 @router.get("/{study_id}/sensitivity", responses=REFUSED)
 async def tell_sensitivity(
-    job: TheJob, jobs: TheJobs, store: TheStore, pictures: ThePictures, of: str
+    job: TheJob, datasets: TheDatasets, pictures: ThePictures, of: str
 ) -> dict[str, Any]:
     """Tell which parameter matters for a number of the runs: indices of sensitivity.
 
@@ -214,15 +228,15 @@ async def tell_sensitivity(
     alone, and with others, and how well they are known. A sample that does not bear it is refused
     with the reason.
     """
-    return await pictures.alone(_indices, job, jobs, store, of)
+    return await pictures.alone(_indices, job, datasets, of)
 
 
-def _indices(job: Job, jobs: Jobs, store: Store, of: str) -> dict[str, Any]:
+def _indices(job: Job, datasets: Datasets, of: str) -> dict[str, Any]:
     """Return what `tell_sensitivity` tells."""
     from studies import open_netcdf, sensitivity  # xarray takes half a second to import
     from studies.views.sensitivity import told
 
-    with open_netcdf(Path(dataset(job, jobs, store).path)) as runs:
+    with open_netcdf(datasets.ended(job)) as runs:
         if (size := runs["status"].size) > MOST_FITTED:
             allowed = f"at most {MOST_FITTED} are fitted here: fetch the data set, and fit it there"
             raise StudyError("runs", size, allowed)
@@ -233,8 +247,7 @@ def _indices(job: Job, jobs: Jobs, store: Store, of: str) -> dict[str, Any]:
 async def draw_study(
     job: TheJob,
     query: Annotated[PlotQuery, Query()],
-    jobs: TheJobs,
-    store: TheStore,
+    datasets: TheDatasets,
     pictures: ThePictures,
     request: Request,
 ) -> Response:
@@ -243,21 +256,61 @@ async def draw_study(
     Beside the queries named below, every axis of the sweep and dimension of the field is one:
     `?field=contact_pressure&over=friction&load_ratio=0.5&stage=loaded`.
     """
-    found = await run_in_threadpool(dataset, job, jobs, store)
-    return await pictures.of_file(request, Path(found.path), query, maps.draw_study)
+    found = await run_in_threadpool(datasets.ended, job)
+    return await pictures.of_file(request, found, query, maps.draw_study)
+
+
+@router.get("/{study_id}/fit", responses=REFUSED)
+async def tell_fit(
+    job: TheJob, jobs: TheJobs, datasets: TheDatasets, pictures: ThePictures
+) -> dict[str, Any]:
+    """Tell what a fit has found: of `parameters` each has its `value`, `sigma` and bounds.
+
+    `message` warns, such as of parameters that cannot be told apart. The lines over which it was
+    fitted are in the data set.
+    """
+    return await pictures.alone(_fitted, job, jobs, datasets)
+
+
+def _fitted(job: Job, jobs: Jobs, datasets: Datasets) -> dict[str, Any]:
+    """Return what `tell_fit` tells."""
+    from studies import open_netcdf  # xarray takes half a second to import
+    from studies.views.fits import told
+
+    if not jobs.study(job.id).get("fit"):
+        raise StudyError("fit", job.name, "is a study without a fit: submit one with an entry fit")
+    with open_netcdf(datasets.ended(job)) as found:
+        return told(found)
 
 
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)
-def dataset(job: TheJob, jobs: TheJobs, store: TheStore) -> FileResponse:
-    """Return the combined data set of a study, as its last end left it."""
+async def dataset(job: TheJob, datasets: TheDatasets) -> FileResponse:
+    """Return the combined data set of a study, as its last end left it.
+
+    Before the first end it has the runs that are there; those to come are NaN, and `missing`.
+    """
+    return netcdf(await datasets.current(job), f"{job.name}.nc")
+
+
+@router.get(
+    "/{study_id}/zarr/{key:path}", responses={200: {"content": {MEDIA_TYPE: {}}}, **UNCHANGED}
+)
+async def tile(job: TheJob, datasets: TheDatasets, request: Request, key: str) -> Response:
+    """Return a part of the data set as a Zarr store has it (version 3, consolidated metadata).
+
+    `xarray.open_zarr("http://…/studies/{study_id}/zarr")` opens it and reads the parts it needs. A
+    run that is missing has no chunks: readers take its values as NaN.
+    """
+    tiles = await datasets.tiles(job)
+    tag = sha256(f"{await asyncio.to_thread(digest, tiles.path)} {key}".encode("utf-8", "replace"))
+    headers = Headers({"etag": f'"{tag.hexdigest()[:32]}"', "cache-control": "no-cache"})
+    if TAGS.is_not_modified(headers, request.headers):
+        return NotModifiedResponse(headers)
     try:
-        return netcdf(store.dataset(job.id), f"{job.name}.nc")
-    except FileDamaged as error:
-        held = error.state is not None or job.state is StudyState.SUCCESSFUL
-    if held and job.state.final and job.state is not StudyState.DISMISSED:
-        with suppress(Conflict):
-            jobs.retry(job.id, failed=False)
-        raise Busy("the data set was lost or damaged, and is made again from the runs: ask later")
-    raise NotFound(
-        f"no data set yet: it is written when the work ends, and the study is {job.state}"
-    )
+        content = await asyncio.to_thread(tiles.content, key)
+    except LookupError as error:
+        raise Conflict(str(error)) from None
+    if content is None:
+        raise NotFound("nothing is stored under this key")
+    kind = "application/json" if key.endswith(METADATA) else MEDIA_TYPE
+    return Response(content, media_type=kind, headers=dict(headers))

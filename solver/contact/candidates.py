@@ -22,8 +22,14 @@ if TYPE_CHECKING:
     from solver.contact.system import System
     from solver.fem.operators import Operator
 
+    Array = NDArray[np.float64]
+
 _MARGIN = 0.25
 """Vertices nearer than this many element lengths are candidates."""
+_POWER = 5 / 3
+"""Power of the gap in the slip of a vertex that comes near."""
+_FELL = 0.5
+"""Ratio of normal forces that fell to those that rose, up to which a contact grows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,12 +44,16 @@ class Candidates:
     uncounted : (n,) slip before the vertex touched, not counted in ``motion`` [mm]
     forces : (n or 2n,) normal, and with friction tangential forces of the current iterate [N]
     status : (n,) of the current iterate, as in `solver.contact.problem`
-    untimed : (n,) whether the vertex touched since the last state, at a time that is not known
+    unsure : (n,) the possible error of ``uncounted`` [mm]; inf if the time of touch is not known
     rows : one per part, None for a part without contact surface
     covered : for each interface, the share of each candidate's hat function that faces the master
     gaps, slips : for each interface, gap and slip of all its vertices [mm]; the gap is inf where no
         master faces them, the slip 0 without friction
     beyond : smallest gap of the vertices that are not candidates [mm]
+    leaving : for each interface that leaves, the normal and tangential forces (2, n) that are left
+        of its last ones [N]; None for the others. Its vertices are no candidates
+    pushes : nodal forces (n,) of these on each part [N]
+    holds : for each part, whether a pair is there that may hold its rigid motions
     """
 
     vertices: tuple[NDArray[np.int64], ...]
@@ -52,12 +62,15 @@ class Candidates:
     uncounted: NDArray[np.float64]
     forces: NDArray[np.float64]
     status: NDArray[np.int64]
-    untimed: NDArray[np.bool_]
+    unsure: NDArray[np.float64]
     rows: tuple[ContactRows | None, ...]
     covered: tuple[NDArray[np.float64], ...]
     gaps: tuple[NDArray[np.float64], ...]
     slips: tuple[NDArray[np.float64], ...]
     beyond: float
+    leaving: tuple[NDArray[np.float64] | None, ...]
+    pushes: tuple[NDArray[np.float64], ...]
+    holds: tuple[bool, ...]
 
     @property
     def n(self) -> int:
@@ -81,6 +94,11 @@ class Candidates:
             nodal[rows.dofs] = forces @ rows.block
         return nodal
 
+    def all_on_part(self, part: int, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the same with the forces of pairs that leave [N]."""
+        pushes = self.pushes[part]
+        return self.on_part(part, forces, len(pushes)) + pushes
+
     def of_part(self, part: int, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the gaps and slips that displacements ``u`` (n, ...) of a part cause [mm]."""
         rows = self.rows[part]
@@ -90,8 +108,8 @@ class Candidates:
 
     def touched(self, part: int) -> NDArray[np.int64]:
         """Return the unknowns of a part on which contact forces may act."""
-        rows = self.rows[part]
-        return np.zeros(0, dtype=np.int64) if rows is None else rows.dofs
+        rows, pushed = self.rows[part], np.flatnonzero(self.pushes[part])
+        return pushed if rows is None else np.union1d(rows.dofs, pushed)
 
     def compliance(self, operators: Sequence[Operator]) -> NDArray[np.float64]:
         """Return the compliance W of the contact points: gaps and slips per force [mm/N]."""
@@ -125,10 +143,15 @@ class Candidates:
         at vertices that open or close within the increment, where the mean is not the true history.
         """
         normal, friction = 0.0, 0.0
-        each = zip(before, self.vertices, self.gaps, self.places, strict=True)
-        for state, vertices, gap, here in each:
+        each = zip(
+            before, self.vertices, self.gaps, self.places, self.leaving, self.slips, strict=True
+        )
+        for state, vertices, gap, here, left, slip in each:
             force = state.normal.copy()
             force[vertices] += self.forces[: self.n][here]
+            if left is not None:
+                force += left[0]
+                normal -= float((state.tangential + left[1]) @ slip) / 2
             moved = force > 0
             with np.errstate(invalid="ignore"):
                 opened = np.nan_to_num(gap - state.gap, posinf=0.0, neginf=0.0)
@@ -146,8 +169,9 @@ class Candidates:
     ) -> tuple[ContactState, ...]:
         """Return the contact states with these forces and statuses."""
         out = []
-        for state, vertices, here in zip(before, self.vertices, self.places, strict=True):
-            normal, tangential = np.zeros((2, len(state.normal)))
+        each = zip(before, self.vertices, self.places, self.leaving, strict=True)
+        for state, vertices, here, left in each:
+            normal, tangential = np.zeros((2, len(state.normal))) if left is None else left.copy()
             normal[vertices] = forces[: self.n][here]
             if len(forces) > self.n:
                 tangential[vertices] = forces[self.n :][here]
@@ -167,9 +191,11 @@ class Candidates:
             slipped[at] += moved[here]
             with np.errstate(invalid="ignore", divide="ignore"):
                 rates = np.stack([gap - old.gap, slip]) / span
+                earlier = np.stack([old.gap, old.earlier[0], old.rates[1] / old.rates[0]])
             rates[:, ~np.isfinite(rates).all(axis=0)] = np.nan
-            touching = new.status != OPEN
-            out.append(replace(new, touching=touching, gap=gap, rates=rates, slipped=slipped))
+            earlier[:, not _grew(old.normal, new.normal)] = np.nan
+            past = {"gap": gap, "rates": rates, "earlier": earlier}
+            out.append(replace(new, touching=new.status != OPEN, slipped=slipped, **past))
         return tuple(out)
 
 
@@ -188,9 +214,12 @@ def no_candidates(system: System) -> Candidates:
     gaps = tuple(np.full(len(i.slave_surface.edges) + 1, np.inf) for i in system.interfaces)
     slips = tuple(map(np.zeros_like, gaps))
     status = empty.astype(int)
-    known = empty.astype(bool)
     lines = BoundLines.none(0)
-    return Candidates(none, lines, *(empty,) * 3, status, known, rows, covered, gaps, slips, np.inf)
+    pushes = tuple(np.zeros(part.n) for part in system.parts)
+    return Candidates(
+        none, lines, *(empty,) * 3, status, empty, rows, covered, gaps, slips, np.inf,
+        leaving=(None,) * len(none), pushes=pushes, holds=(False,) * len(pushes),
+    )  # fmt: skip
 
 
 def find_candidates(
@@ -203,23 +232,36 @@ def find_candidates(
     """Return the candidates at displacements ``u``, a ``span`` of time after ``start``.
 
     Slips count from the state ``start`` or, where a vertex had no contact then, from the moment
-    it touched, if the rates of its approach are known from the last increment.
+    it touched, if its approach is known from the last increments.
     """
     time = start.time + span
+    shares = [interface.declared.left(start.time, time) for interface in system.interfaces]
     pairings = [
-        interface.pairing(u, time, finite=before.finite)
-        for interface, before in zip(system.interfaces, start.contacts, strict=True)
+        interface.facing(u, time, finite=before.finite)
+        if share is None or before.normal.any()
+        else interface.pairing(u, time, finite=before.finite)
+        for interface, before, share in zip(system.interfaces, start.contacts, shares, strict=True)
     ]
     vertices = [
         _near(pairing, contact, interface.floating)
-        for pairing, contact, interface in zip(pairings, contacts, system.interfaces, strict=True)
+        if share is None
+        else np.zeros(0, dtype=np.int64)
+        for pairing, contact, interface, share in zip(
+            pairings, contacts, system.interfaces, shares, strict=True
+        )
     ]
+    leaving = tuple(
+        None if share is None else share * np.stack([before.normal, before.tangential])
+        for before, share in zip(start.contacts, shares, strict=True)
+    )
+    pushes = tuple(np.zeros(part.n) for part in system.parts)
+    holds = [False] * len(system.parts)
     n = sum(len(v) for v in vertices)
     frictional = any(interface.rough for interface in system.interfaces)
     m = 2 * n if frictional else n
     motion, uncounted, beyond = np.zeros(m), np.zeros(n), np.inf
     lines: list[BoundLines] = []
-    untimed = np.zeros(n, dtype=bool)
+    unsure = np.zeros(n)
     pieces: list[list[ContactRows]] = [[] for _ in system.parts]
     slips: list[NDArray[np.float64]] = []
     for pair, (interface, pairing, at, before, normal) in enumerate(
@@ -227,10 +269,11 @@ def find_candidates(
     ):
         tangent = slice(n + normal.start, n + normal.stop)
         motion[normal] = pairing.gap[at]
-        beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
-        uncounted[normal] = np.where(before.touching, 0.0, _slip_before_contact(before, span))[at]
-        untimed[normal] = np.isnan(uncounted[normal])
-        uncounted[normal] = np.nan_to_num(uncounted[normal])
+        left = leaving[pair]
+        if left is None:
+            beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
+        approach = np.where(before.touching, 0.0, _slip_before_contact(before, span))
+        uncounted[normal], unsure[normal] = approach[:, at]
         shear = system.bound(pair, pairing, start, time).at(at)
         lines.append(shear.over(pairing.area[at]))
         for side, (number, part, surface) in enumerate(interface.sides):
@@ -239,6 +282,11 @@ def find_candidates(
             if frictional:
                 block[tangent] = pairing.tangent[side][at]
             pieces[number].append(ContactRows(*part.pull_back(surface, u[number], block, n)))
+            holds[number] |= left is None
+            if left is not None and left.any():
+                rows = left[:1] @ pairing.normal[side], left[1:] @ pairing.tangent[side]
+                dofs, both = part.pull_back(surface, u[number], np.vstack(rows), 1)
+                np.add.at(pushes[number], dofs, both.sum(axis=0))
         slip = np.zeros(len(pairing.gap))
         if frictional:
             slip = interface.slip(pairing, u, start.u)
@@ -257,24 +305,49 @@ def find_candidates(
         uncounted=uncounted,
         forces=np.concatenate([forces, gather("tangential")]) if frictional else forces,
         status=gather("status").astype(np.int64),
-        untimed=untimed,
+        unsure=unsure,
         rows=tuple(joined(p) for p in pieces),
         covered=tuple(p.covered[v] for p, v in zip(pairings, vertices, strict=True)),
         gaps=tuple(p.gap for p in pairings),
         slips=tuple(slips),
         beyond=float(beyond),
+        leaving=leaving,
+        pushes=pushes,
+        holds=tuple(holds),
     )
 
 
-def _slip_before_contact(before: ContactState, span: float) -> NDArray[np.float64]:
-    """Return the slip (n,) before contact, if gap and slip continue at their last rates [mm].
+def _slip_before_contact(before: ContactState, span: float) -> tuple[Array, Array]:
+    """Return the slip (n,) before contact, and its possible error [mm].
 
-    A vertex that would close later than ``span`` is taken to touch at its end. NaN where the gap
-    does not close, or its rates are not known.
+    Gap and slip continue at their last rates; a vertex that would close later than ``span`` is
+    taken to touch at its end. If contact grew in the last two increments, slip continues as a
+    function of the gap, ``a + b gap + c gap^(5/3)`` through the last three states, and what that
+    changes is the possible error: beyond the end of a contact that grows, surfaces move with the
+    root of the distance y to this end, gap and slip are ``y^1.5`` times a series in y, and the
+    change of slip with the gap is one in ``gap^(2/3)``.
+
+    Where the gap does not close, or its rates are not known, the slip is 0, its possible error inf.
     """
     closing, sliding = before.rates * span
     share = np.divide(before.gap, -closing, out=np.full_like(closing, np.nan), where=closing < 0)
-    return np.asarray(sliding * np.clip(share, 0.0, 1.0))
+    share = share.clip(0.0, 1.0)
+    last, first, slope = before.earlier
+    with np.errstate(invalid="ignore", divide="ignore"):
+        gaps = np.stack([before.gap + share * closing, before.gap, last, first]).clip(0.0)
+        power = np.diff(gaps**_POWER, axis=0) / np.diff(gaps, axis=0)
+        change = (sliding / closing - slope) / (power[1] - power[2]) * (power[0] - power[1])
+        more = change * share * closing
+        bends = np.isfinite(more) & (before.gap < last) & (last < first)
+    more = np.where(bends, more, 0.0)
+    known = np.isfinite(share)
+    return np.where(known, sliding * share + more, 0.0), np.where(known, more, np.inf)
+
+
+def _grew(before: Array, after: Array) -> bool:
+    """Whether normal forces (n,) of a contact mostly grew: in one that moves on as many fell."""
+    change = after - before
+    return bool(-change.sum(where=change < 0) <= _FELL * change.sum(where=change > 0))
 
 
 def _near(pairing: Pairing, contact: ContactState, floating: bool) -> NDArray[np.int64]:

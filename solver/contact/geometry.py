@@ -12,7 +12,7 @@ Int. J. Numer. Meth. Engng 79 (2009) 1354-1391.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,6 +60,12 @@ class Pairing:
     gap: NDArray[np.float64]
     normal: tuple[NDArray[np.float64], NDArray[np.float64]]
     tangent: tuple[NDArray[np.float64], NDArray[np.float64]]
+
+    @property
+    def parted(self) -> Pairing:
+        """The pairing with surfaces that face each other nowhere."""
+        none = np.zeros_like(self.area)
+        return replace(self, area=none, deformed=none, covered=none, gap=none + np.inf)
 
 
 def _combine(x: NDArray[np.float64], N: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.discretisation import Discretisation
-    from solver.fem.heat import Heat
     from solver.fem.part import Part
     from solver.fem.rigid import RigidPart
+    from solver.fem.softening import Softening
     from solver.fem.surface import Surface
     from solver.model.friction import FrictionLaw
     from solver.model.model import ContactPair, Model
@@ -40,7 +40,7 @@ class Interface:
     slave_surface: Surface
     master_surface: Surface
     law: FrictionLaw
-    hot: tuple[Heat | None, Heat | None]
+    hot: tuple[Softening | None, Softening | None]
     parts: tuple[Part, Part]
     reach: float
     reference: Pairing | None
@@ -74,8 +74,13 @@ class Interface:
         """Return gap, area and derivative rows at displacements ``u`` and a time.
 
         With ``finite`` the surfaces are paired in their current positions; without it a pair of
-        small sliding keeps the pairing before loading.
+        small sliding keeps the pairing before loading. Those of an absent pair face nowhere.
         """
+        found = self.facing(u, time, finite=finite)
+        return found.parted if self.declared.absent(time) else found
+
+    def facing(self, u: tuple[NDArray[np.float64], ...], time: float, *, finite: bool) -> Pairing:
+        """Return the pairing as if the pair were there."""
         as_meshed = self._as_meshed(u, finite)
         return replace(as_meshed, gap=as_meshed.gap + self.declared.offset(time))
 

@@ -25,8 +25,10 @@ class ContactState:
     whether the vertex had contact, so that its friction has a history. ``gap`` is inf where no
     master faces the vertex [mm]; ``slipped`` is the accumulated length of its slip in contact since
     the first increment, without regard to direction [mm]; ``rates`` (2, n) are the rates of gap and
-    slip in the last increment, NaN where not known. ``finite`` says whether the surfaces are paired
-    in their current positions, or always as before loading.
+    slip in the last increment, NaN where not known; ``earlier`` (3, n) are the gaps before the last
+    increment and before the one before, and the change of slip over that of the gap in that one,
+    NaN unless contact grew in both. ``finite`` says whether the surfaces are paired in their
+    current positions, or always as before loading.
     """
 
     normal: NDArray[np.float64]
@@ -35,6 +37,7 @@ class ContactState:
     touching: NDArray[np.bool_]
     gap: NDArray[np.float64]
     rates: NDArray[np.float64]
+    earlier: NDArray[np.float64]
     finite: bool
     slipped: NDArray[np.float64]
 
@@ -54,12 +57,14 @@ class ContactState:
         n = len(touching)
         slipped = np.zeros(n) if before is None else before.slipped
         status = np.where(touching, STICK, OPEN)
-        rates = np.full((2, n), np.nan)
-        return cls(np.zeros(n), np.zeros(n), status, touching, gap, rates, finite, slipped)
+        rates, earlier = np.full((2, n), np.nan), np.full((3, n), np.nan)
+        nothing = np.zeros(n), np.zeros(n)
+        return cls(*nothing, status, touching, gap, rates, earlier, finite, slipped)
 
     def halted(self) -> ContactState:
-        """Return the state without its rates: another motion begins."""
-        return replace(self, rates=np.full_like(self.rates, np.nan))
+        """Return the state without its past: another motion begins."""
+        unknown = {name: np.full_like(getattr(self, name), np.nan) for name in ("rates", "earlier")}
+        return replace(self, **unknown)
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,7 +61,7 @@ def _part(whole: Discretisation | RigidPart, own: list[Surface], linear_solver: 
     body = whole.body
     if body.axle is not None:
         return Wheel(whole, own, linear_solver)
-    constant = not (whole.driven.cases or whole.heat)
+    constant = not (whole.driven.cases or whole.softening)
     if body.material.elastic and body.condense and own and constant:
         return Substructure(whole, own, linear_solver)
     return whole
@@ -220,7 +220,8 @@ class System:
     def has_amplitude(self) -> bool:
         """Whether a load follows an amplitude of its own, not the time."""
         amplitudes = [load.amplitude for load in self._loads]
-        amplitudes += [contact.amplitude for contact in self.model.contacts]
+        for contact in self.model.contacts:
+            amplitudes += [contact.amplitude, contact.presence]
         return any(amplitude is not None for amplitude in amplitudes)
 
     @property
@@ -337,13 +338,23 @@ class System:
         return self.full(name).points.reshape(2, -1)
 
     def response(self, name: str, converged: Converged) -> Response:
-        """Return stress and internal variables at the points of a whole body."""
+        """Return stress and internal variables at the points of a whole body.
+
+        Stress and accumulated plastic strain are NaN in elements that are removed.
+        """
         number = self.part(name)
         if not self.parts[number].meshed:
             whole = self.full(name)
             state = converged.state
             return whole.respond(self.displacement(name, state), whole.virgin(), state.time)
-        return converged.responses[number]
+        found, gone = converged.responses[number], self.full(name).gone(converged.state.time)
+        if gone is None or not gone.any():
+            return found
+        accumulated = np.where(gone, np.nan, found.state.accumulated)
+        return found._replace(
+            stress=np.where(gone, np.nan, found.stress),
+            state=replace(found.state, accumulated=accumulated),
+        )
 
     def initial(self) -> State:
         """Return the unloaded, undeformed state."""
@@ -361,6 +372,17 @@ class System:
             contacts.append(
                 ContactState.at_rest(gap, touching, finite=interface.finite, before=before)
             )
+        return replace(state, contacts=tuple(contacts))
+
+    def joined(self, state: State, time: float) -> State:
+        """Return a state with the pairs at rest that come in before a time."""
+        contacts = list(state.contacts)
+        for k, interface in enumerate(self.interfaces):
+            pair = interface.declared
+            if pair.absent(state.time) and not pair.absent(time):
+                gap = interface.pairing(state.u, time, finite=contacts[k].finite).gap
+                touching, finite = gap <= self.touching, contacts[k].finite
+                contacts[k] = ContactState.at_rest(gap, touching, finite=finite, before=contacts[k])
         return replace(state, contacts=tuple(contacts))
 
     def moved(self, state: State, time: float) -> State:

@@ -10,9 +10,9 @@ from scipy import linalg, sparse
 
 from solver.fem import kinematics
 from solver.fem.assembly import Assembly, whole_matrix
-from solver.fem.heat import Heat
 from solver.fem.loads import (
     Superposed,
+    check_removed,
     eigenstrains,
     nodal_forces,
     prescribed,
@@ -21,6 +21,7 @@ from solver.fem.loads import (
 from solver.fem.nodes import Nodes
 from solver.fem.operators import Operators
 from solver.fem.part import Part, same_unknowns
+from solver.fem.softening import Softening
 from solver.fem.surface import edges_of, extract, shortest
 from solver.linear import solvers as linear
 from solver.mesh.elements import element_type
@@ -77,8 +78,11 @@ class Discretisation(Nodes, Part):
         self.moves = body.travelling is not None
         self._travelling: tuple[float, NDArray[np.float64]] = (np.nan, np.zeros(0))
         self.loads = nodal_forces(self)
+        check_removed(self, self.loads)
         self.eigenstrains = eigenstrains(self)
-        self.heat = Heat.of(self, self.points.reshape(2, -1))
+        per_element = self.weights.shape[1]
+        elements = np.repeat(np.arange(len(self.weights)), per_element)
+        self.softening = Softening.of(self, self.points.reshape(2, -1), elements)
         self._hold()
 
     def _hold(self) -> None:
@@ -163,11 +167,16 @@ class Discretisation(Nodes, Part):
 
     def law(self, time: float) -> Law:
         """Return the material law of its points at a time; temperature may change it."""
-        return self.heat.law(self.body.law, time) if self.heat else self.body.law
+        return self.softening.law(self.body.law, time) if self.softening else self.body.law
 
-    def hot(self, surface: Surface) -> Heat | None:
+    def gone(self, time: float) -> NDArray[np.bool_] | None:
+        """Return whether elements at the points (n_points,) are removed; None if none ever are."""
+        lost = self.softening
+        return lost.gone(time) if lost and lost.removed.cases else None
+
+    def hot(self, surface: Surface) -> Softening | None:
         """Return how heat lowers the yield stress at a surface's nodes; None if it does not."""
-        heat = Heat.of(self, self.X[:, surface.nodes])
+        heat = Softening.of(self, self.X[:, surface.nodes])
         return heat if heat and heat.strength.fields.any() else None
 
     def eigenstrain(self, time: float) -> NDArray[np.float64]:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 _INSIDE = 1e-7
 _NEWTON_STEPS = 6
 _EXACT = 1e-12
+_KNOWN = 1e-9
+"""Share of a value by unknown points or nodes that counts as rounding."""
 
 
 def _monomials(x: NDArray[np.float64], count: int) -> NDArray[np.float64]:
@@ -51,6 +53,19 @@ def recovery(part: Discretisation) -> sparse.csr_array:
     return sparse.csr_array(operator[part.same])
 
 
+def recovered(matrix: sparse.csr_array, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return nodal values (..., n_nodes) of point values (..., n_points) by `recovery`.
+
+    Elements whose points are NaN do not count; nodes of these elements alone are NaN.
+    """
+    unknown = np.isnan(points)
+    found = np.asarray((matrix @ np.where(unknown, 0.0, points).T).T)
+    if not unknown.any():
+        return found
+    known = np.asarray((matrix @ (~unknown).astype(float).T).T)
+    return np.divide(found, known, out=np.full_like(found, np.nan), where=known > _KNOWN)
+
+
 class Sampler:
     """Interpolates nodal fields of a body at given positions; NaN outside the body.
 
@@ -74,7 +89,10 @@ class Sampler:
     def __call__(self, nodal: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return values (..., n) of nodal fields (..., n_nodes)."""
         flat = np.atleast_2d(nodal).reshape(-1, nodal.shape[-1])
-        out = (self._matrix @ flat.T).T
+        unknown = np.isnan(flat)
+        out = (self._matrix @ np.where(unknown, 0.0, flat).T).T
+        if unknown.any():
+            out[(abs(self._matrix) @ unknown.astype(float).T).T > _KNOWN] = np.nan
         out[:, ~self.inside] = np.nan
         return np.asarray(out.reshape(*nodal.shape[:-1], len(self.inside)))
 

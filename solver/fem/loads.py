@@ -221,6 +221,25 @@ def _check_plane(stress: Array) -> None:
         raise ModelError("initial_stress.zz", worst, "must be zero in plane stress [MPa]")
 
 
+def check_removed(part: Nodes, loads: Superposed) -> None:
+    """Raise `ModelError` if a load acts on nodes of removed elements alone [N]."""
+    for removal in (load for load in part.body.every_load if load.removes):
+        gone = np.zeros(part.basis.element_dofs.shape[1], dtype=bool)
+        gone[part.body.region(removal.removes)] = True
+        alone = np.ones(part.X.shape[1], dtype=bool)
+        alone[part.basis.element_dofs[:, ~gone]] = False
+        for load, field in zip(loads.cases, loads.fields.T, strict=True):
+            if not field.reshape(-1, 2)[alone].any():
+                continue
+            after = [t for t in _comparing([load, removal]) if removal.factor(t) >= 1]
+            if any(load.factor(t) for t in after):
+                allowed = (
+                    f"acts on region {removal.removes} of body {part.body.name} after it is "
+                    "removed: let it end before"
+                )
+                raise ModelError(load.name, load.boundaries or part.body.name, allowed)
+
+
 def travelling_forces(part: Nodes, travelling: TravellingPressure, time: float) -> Array:
     """Return the nodal forces (n,) of a travelling pressure at a time [N]."""
     force = _tractions(part, travelling.boundary, travelling.pushing(time, part.period), 8)

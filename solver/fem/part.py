@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy import sparse
 
-    from solver.fem.heat import Heat
     from solver.fem.loads import Superposed
     from solver.fem.operators import PartOperators
+    from solver.fem.softening import Softening
     from solver.fem.surface import Surface
     from solver.materials.law import Law
     from solver.materials.state import PlasticState, Response
@@ -144,7 +144,7 @@ class Part(ABC):
         del time
         return self.body.law
 
-    def hot(self, surface: Surface) -> Heat | None:
+    def hot(self, surface: Surface) -> Softening | None:
         """Return how heat lowers the yield stress at a surface's nodes; None if it does not."""
         del surface
         return None

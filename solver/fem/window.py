@@ -20,9 +20,9 @@ import numpy as np
 
 from solver.fem.assembly import Assembly
 from solver.fem.discretisation import Discretisation, choose_pins
-from solver.fem.heat import Heat
 from solver.fem.loads import Superposed
 from solver.fem.operators import Operators, Restricted
+from solver.fem.softening import Softening
 from solver.linear.schur import SchurComplement
 from solver.linear.solvers import Singular
 
@@ -132,8 +132,9 @@ class Windowed(Discretisation):
         self.B, self.weights = whole.B[self.elements], whole.weights[self.elements]
         self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
         self.points = whole.points[:, self.elements]
-        self.heat = Heat.of(self, self.points.reshape(2, -1))
         per_element = whole.weights.shape[1]
+        elements = np.repeat(np.flatnonzero(self.elements), per_element)
+        self.softening = Softening.of(self, self.points.reshape(2, -1), elements)
         self._at = np.flatnonzero(np.repeat(self.elements, per_element))
         strains = whole.eigenstrains
         components, cases = self.B.shape[2], len(strains.cases)

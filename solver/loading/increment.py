@@ -100,7 +100,7 @@ class Increment:
     elastic_only : raise `Yielded` as soon as a point yields
     patient : use all iterations if every body hardens, so that an equilibrium exists: with little
         hardening the residual rises and falls while the energy falls
-    stiffness : elastic stiffness of contact points by their vertices, as far as known [N/mm]
+    compliance : elastic compliance of contact points by their vertices, as far as known [mm/N]
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class Increment:
         elastic_only: bool = False,
         patient: bool = False,
         tolerances: Tolerances | None = None,
-        stiffness: dict[bytes, NDArray[np.float64]] | None = None,
+        compliance: dict[bytes, NDArray[np.float64]] | None = None,
     ) -> None:
         self.system = system
         self.start = start
@@ -133,7 +133,7 @@ class Increment:
         self._began: tuple[Vectors, Candidates] | None = None  # residuals, candidates
         self._pivoted, self._blended = 0, 0
         self._softened = any(part.body.law.has_corners for part in system.parts)  # no tangent there
-        self.stiffness = {} if stiffness is None else stiffness
+        self.compliance = {} if compliance is None else compliance
 
     def solve(self) -> Converged:
         """Return the converged increment or raise `IncrementFailed` (or `Yielded`)."""
@@ -283,7 +283,8 @@ class Increment:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
             return 0.0, float(overlap < -self.system.touching), 0.0
         error = self._unbalanced(residuals, candidates, candidates.forces) / scale
-        return scale, error, candidates.violation(self._stiffness(candidates)) / scale
+        stiffness = 1 / np.diag(self._compliance(candidates))
+        return scale, error, candidates.violation(stiffness) / scale
 
     def _unbalanced(
         self, residuals: Vectors, candidates: Candidates, forces: NDArray[np.float64]
@@ -305,13 +306,13 @@ class Increment:
         met = violation < self.tolerances.contact and candidates.beyond >= 0
         return balanced and met
 
-    def _stiffness(self, candidates: Candidates) -> NDArray[np.float64]:
-        """Return the elastic stiffness of the contact points [N/mm], a scale; computed once."""
+    def _compliance(self, candidates: Candidates) -> NDArray[np.float64]:
+        """Return the elastic compliance of the contact points [mm/N], a scale; computed once."""
         key = b"".join(vertices.tobytes() for vertices in candidates.vertices)
-        if key not in self.stiffness:
-            W = candidates.compliance([o.elastic for o in self.system.operators])
-            self.stiffness[key] = 1 / np.diag(W)
-        return self.stiffness[key]
+        if key not in self.compliance:
+            elastic = [o.elastic for o in self.system.operators]
+            self.compliance[key] = candidates.compliance(elastic)
+        return self.compliance[key]
 
     # -- 3, 4: the step ------------------------------------------------------------------------
 
@@ -332,7 +333,7 @@ class Increment:
                     o.tangent(response, blend)
                     for o, response in zip(self.system.operators, responses, strict=True)
                 ]
-                step = newton_step(self.system, residuals, operators, candidates, self.contact)
+                step = newton_step(self.system, residuals, operators, candidates)
             except Singular:
                 continue
             if step and not blend and is_mechanism(self.system.parts, self.time, step.u, responses):
@@ -413,4 +414,4 @@ class Increment:
     def _timing(self, candidates: Candidates) -> Timing:
         if not candidates.n or not self.friction:
             return Timing()
-        return timing(self.system, self.start, candidates, self._stiffness(candidates))
+        return timing(self.system, self.start, candidates, self._compliance(candidates))

@@ -75,7 +75,7 @@ def narrowed(
         return None
     candidates = find_candidates(system, start, at.u, at.contacts, time - start.time)
     needed = _needed(system, candidates, yields)
-    stiffness: dict[bytes, NDArray[np.float64]] = {}
+    compliance: dict[bytes, NDArray[np.float64]] = {}
     for _ in range(_ROUNDS):
         windows = tuple(_around(system, k, windows[k], need) for k, need in enumerate(needed))
         if not any(windows):
@@ -95,7 +95,7 @@ def narrowed(
                 elastic_first=elastic_first,
                 patient=patient,
                 tolerances=longer,
-                stiffness=stiffness,
+                compliance=compliance,
             ).approach()
         except (IncrementFailed, Singular):
             return None
@@ -109,7 +109,7 @@ def narrowed(
         if all(w is None or y is None or not (y & ~w.elements).any() for w, y in inside):
             iterations, pivoted, blended = count.tolist()
             found = replace(found, iterations=iterations, pivoted=pivoted, blended=blended)
-            whole = Increment(system, start, time, tolerances=tolerances, stiffness=stiffness)
+            whole = Increment(system, start, time, tolerances=tolerances, compliance=compliance)
             converged = whole.closed(found)
             return converged and replace(converged, windows=windows)
         needed = _needed(system, found.candidates, yields)

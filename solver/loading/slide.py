@@ -90,7 +90,7 @@ def slide(
         _, apart, ways = linalg.svd(motion[:n][closed])
         apart = np.append(apart, np.zeros(len(ways) - len(apart)))
         along = ways[apart <= _ALONG * np.linalg.norm(motion, 2)].T
-        load = along.T @ (part.rigid.T @ residuals[i])
+        load = along.T @ (part.rigid.T @ (residuals[i] + candidates.pushes[i]))
         for way in (*np.eye(len(load)), load):
             power = abs(float(load @ way))
             moved = motion @ along @ way

@@ -45,7 +45,7 @@ class NewtonStep:
 
 def on_parts(system: System, candidates: Candidates, forces: NDArray[np.float64]) -> Vectors:
     """Return the nodal forces that contact forces exert on each part [N]."""
-    return tuple(candidates.on_part(i, forces, part.n) for i, part in enumerate(system.parts))
+    return tuple(candidates.all_on_part(i, forces) for i, _ in enumerate(system.parts))
 
 
 def newton_step(
@@ -53,7 +53,6 @@ def newton_step(
     residuals: Vectors,
     operators: Sequence[Operator],
     candidates: Candidates,
-    contact: bool,
 ) -> NewtonStep | None:
     """Return the step for given tangents, or None if no contact forces balance the load.
 
@@ -61,7 +60,8 @@ def newton_step(
     ----------
     residuals : external minus internal forces of each part, without contact forces [N]
     operators : inverse tangent of each part
-    contact : False separates the bodies; bodies held by contact alone then stay where they are
+
+    Bodies that only contact would hold stay where they are if there is none.
     """
     # sum all large forces before solving: the rest is small, and the rounding of the factor, about
     # 1e-16 (size of the body / smallest element)^2, is relative to this rest
@@ -72,20 +72,27 @@ def newton_step(
     begun = [operator.begin(r) for operator, r in zip(operators, balanced, strict=True)]
     for i, part in enumerate(begun):
         motion += candidates.of_part(i, part.kept)
-    floating = [part.rigid if contact else part.rigid[:, :0] for part in system.parts]
+    each = zip(system.parts, candidates.holds, strict=True)
+    floating = [part.rigid if held else part.rigid[:, :0] for part, held in each]
     solution = solve_contact(
         ContactProblem(
             W=W,
             offset=motion,
             lines=candidates.lines,
             A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
-            balance=np.concatenate([R.T @ r for R, r in zip(floating, residuals, strict=True)]),
+            balance=np.concatenate(
+                [
+                    R.T @ (r + pushed)
+                    for R, r, pushed in zip(floating, residuals, candidates.pushes, strict=True)
+                ]
+            ),
         ),
         candidates.status,
     )
     if solution is None:
         return None
-    change = on_parts(system, candidates, solution.forces - candidates.forces)
+    more = solution.forces - candidates.forces
+    change = [candidates.on_part(i, more, part.n) for i, part in enumerate(system.parts)]
     rigid = np.split(solution.rigid, np.cumsum([R.shape[1] for R in floating])[:-1])
     u = tuple(
         part.finish(c) + R @ q for part, c, R, q in zip(begun, change, floating, rigid, strict=True)

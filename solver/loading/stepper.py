@@ -206,7 +206,7 @@ class Stepper:
         If straight surfaces have moved too far for small sliding in it, it is repeated with finite
         sliding; the first solution is kept if that does not converge.
         """
-        state = point.now.state
+        state = self.system.joined(point.now.state, time)
         guess = self._predict(point.past, state, time) if contact else None
 
         tolerances = self.control.tolerances

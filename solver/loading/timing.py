@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import linalg
 
 from solver.contact.problem import STICK
 from solver.contact.state import Timing
@@ -26,22 +27,36 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-def timing(system: System, start: State, candidates: Candidates, stiffness: Array) -> Timing:
+_SHARE = 0.25
+"""Error of the slip before touch, over its change by the last term of its series (measured)."""
+
+
+def timing(system: System, start: State, candidates: Candidates, compliance: Array) -> Timing:
     """Return the timing of an increment from ``start``.
 
-    ``stiffness`` (n or 2n,) is that of the contact points, elastic [N/mm]. It bounds the uncertain
-    friction of a vertex: elastic stiffness times the slip without friction. A vertex that sticks
-    from the beginning of the increment has no slip; its tangential force is added instead.
+    ``compliance`` (n or 2n, square) is that of the contact points, elastic [mm/N]. It bounds the
+    uncertain friction of vertices. If the time of touch is not known, that is the elastic stiffness
+    times the slip without friction; a vertex that sticks from the beginning of the increment has no
+    slip, and its tangential force is added instead. If it is known, it is the change of friction by
+    the possible error of the slip before, at vertices that stick, or might without that error.
     """
     n = candidates.n
     N = np.maximum(candidates.forces[:n], 0.0)
-    bound, strained = np.zeros(n), np.zeros(n)
+    bound, unknown = np.zeros(n), np.zeros(n)
     if len(candidates.motion) > n:
         bound = candidates.lines.least(N)
         slips = zip(candidates.slips, candidates.vertices, strict=True)
         slipped = np.abs(np.concatenate([slip[at] for slip, at in slips]))
-        strained = np.abs(candidates.forces[n:]) + stiffness[n:] * slipped
-    unknown = np.where(candidates.untimed, np.minimum(bound, strained), 0.0)
+        strained = np.abs(candidates.forces[n:]) + slipped / np.diag(compliance)[n:]
+        untimed = np.isinf(candidates.unsure)
+        off = np.where(untimed, 0.0, candidates.unsure)
+        slides = (candidates.status != STICK) & (np.abs(candidates.motion[n:]) > np.abs(off))
+        sticks = np.flatnonzero((N > 0) & ~slides)
+        off[(N <= 0) | slides] = 0.0
+        if off.any():
+            tangential = compliance[n:, n:][np.ix_(sticks, sticks)]
+            off[sticks] = _SHARE * linalg.pinvh(tangential) @ off[sticks]
+        unknown = np.minimum(bound, np.where(untimed, strained, np.abs(off)))
     stuck = np.where((N > 0) & (candidates.status == STICK), bound, 0.0)
     found = np.zeros((5, len(system.interfaces)))
     each = zip(system.interfaces, candidates.vertices, candidates.places, strict=True)

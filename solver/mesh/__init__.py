@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solver.mesh.grids import grid, mapped, merged, within, without
+from solver.mesh.grids import grid, mapped, marked, merged, within, without
 from solver.mesh.lines import graded, refined
 from solver.mesh.shapes import Near, ball, disc, fillet, half_plane, pad, rectangle, ring
 
@@ -15,6 +15,7 @@ __all__ = [
     "grid",
     "half_plane",
     "mapped",
+    "marked",
     "merged",
     "pad",
     "rectangle",

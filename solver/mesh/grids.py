@@ -69,13 +69,45 @@ def within(
             allowed = f"must name boundaries of the mesh: {', '.join(known) or 'it has none'}"
             raise ModelError(f"boundaries.{name}.of", other, allowed)
     facets = np.unique(np.concatenate([np.asarray(known[other]) for other in of]))
-    inside = np.ones(len(facets), dtype=bool)
-    for at, span in zip(mesh.p[:, mesh.facets[:, facets]].mean(axis=1), (x, y), strict=True):
-        if span is not None:
-            inside &= (at >= span[0]) & (at <= span[1])
+    inside = _in_box(mesh.p[:, mesh.facets[:, facets]].mean(axis=1), x, y)
     if not inside.any():
         raise ModelError(f"boundaries.{name}", {"x": x, "y": y}, "has no facet in its box")
     return mesh.with_boundaries({name: facets[inside]})
+
+
+def marked(
+    mesh: Mesh,
+    name: str,
+    x: tuple[float, float] | None = None,
+    y: tuple[float, float] | None = None,
+) -> Mesh:
+    """Return a mesh with a new region ``name``: the elements whose middles lie in a box.
+
+    Parameters
+    ----------
+    x, y : limits of the box [mm]; None sets no limit
+
+    Raises
+    ------
+    ModelError
+        if the box has no element
+    """
+    inside = np.flatnonzero(_in_box(mesh.p[:, mesh.t].mean(axis=1), x, y))
+    if not len(inside):
+        raise ModelError(f"regions.{name}", {"x": x, "y": y}, "has no element in its box")
+    return replace(mesh, _subdomains={**(mesh.subdomains or {}), name: inside})
+
+
+def _in_box(
+    places: NDArray[np.float64],
+    x: tuple[float, float] | None,
+    y: tuple[float, float] | None,
+) -> NDArray[np.bool_]:
+    inside = np.ones(places.shape[1], dtype=bool)
+    for at, span in zip(places, (x, y), strict=True):
+        if span is not None:
+            inside &= (at >= span[0]) & (at <= span[1])
+    return inside
 
 
 def renamed(mesh: Mesh, names: Mapping[str, str]) -> Mesh:

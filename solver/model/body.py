@@ -90,6 +90,8 @@ class Body:
             load.check(self.kinematics)
             for boundary in load.boundaries:
                 self.facets(boundary, load.name, outer=load.outside)
+            if load.removes:
+                self.region(load.removes, f"{load.name}.region")
         for boundary, held in self.supports.items():
             if held not in ("x", "y", "xy"):
                 raise ModelError(f"supports.{boundary}", held, "must be x, y or xy")
@@ -130,6 +132,9 @@ class Body:
             raise ModelError("periodic", sides, "must be two names of boundaries")
         if self.kinematics == "axisymmetric":
             raise ModelError("periodic", sides, "an axisymmetric body cannot be periodic")
+        for load in self.every_load:
+            if load.removes:
+                raise ModelError(load.name, load.removes, "must not be given in a periodic body")
         for boundary in sides:
             self.facets(boundary, "periodic", outer=True)
             loads = ((load.name, load.boundaries) for load in self.every_load)
@@ -137,6 +142,19 @@ class Body:
                 if boundary in names:
                     allowed = "must not be given on a side of a periodic body"
                     raise ModelError(f"{kind}.{boundary}", boundary, allowed)
+
+    def region(self, name: str, field: str = "region") -> np.ndarray:
+        """Return the element numbers of a named set of elements, which is a part of the body.
+
+        ``field`` is the input that an error names.
+        """
+        known = self.mesh.subdomains or {}
+        elements = np.asarray(known.get(name, ()))
+        if not 0 < len(elements) < self.mesh.nelements:
+            listed = ", ".join(known) or "it has none"
+            allowed = f"must name a region of the mesh that is not all of it: {listed}"
+            raise ModelError(field, name, allowed)
+        return elements
 
     def facets(self, boundary: str, field: str = "boundary", outer: bool = False) -> np.ndarray:
         """Return the facet numbers of a named boundary.

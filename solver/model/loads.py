@@ -1,8 +1,9 @@
 """Loads of a body, each with its own amplitude over time.
 
 A kind of load is a subclass of `Load` that overrides some of its methods: a force on a boundary, a
-force per volume, an eigenstrain, a stress present before loading, a prescribed displacement, or a
-loss of stiffness and strength. The solver uses only these methods; no other code knows the kinds.
+force per volume, an eigenstrain, a stress present before loading, a prescribed displacement, a loss
+of stiffness and strength, or the removal of elements. The solver uses only these methods; no other
+code knows the kinds.
 Values are those at load factor 1. The load factor at a time is that of the amplitude; without an
 amplitude it is the time itself. A `Value` may vary in space.
 """
@@ -103,6 +104,11 @@ class Load:
     def components(self) -> dict[int, float]:
         """Prescribed displacements of its boundaries: component 0 (x) or 1 (y) -> [mm]."""
         return {}
+
+    @property
+    def removes(self) -> str:
+        """The region of the body whose elements it takes away; empty if it takes none."""
+        return ""
 
 
 LOADS: Parts[Load] = Parts("kind", alike=False)
@@ -319,6 +325,35 @@ class Temperature(Load):
             return None
         rise = self.at(x)
         return self.modulus_drop * rise, self.yield_drop * rise
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Removal(Load):
+    """The removal of the elements of a region of the body, such as by machining.
+
+    The load factor is the share that is removed: the stiffness of the elements is lost in this
+    share, and with it the forces by which they hold the others, which are so released. At 1 they
+    are gone, with a stiffness of rounding left.
+
+    Attributes
+    ----------
+    region : name of a set of elements, ``subdomains`` of the mesh
+    """
+
+    region: str
+
+    def check(self, kinematics: Kinematics) -> None:
+        """Raise `ModelError` for a load factor that is no share."""
+        del kinematics
+        share = np.zeros(1) if self.amplitude is None else np.asarray(self.amplitude.value)
+        for worst in (share.min(), share.max()):
+            if not 0 <= worst <= 1:
+                raise ModelError("removal.amplitude", float(worst), "must be a share, from 0 to 1")
+
+    @property
+    def removes(self) -> str:
+        """The region that it takes away."""
+        return self.region
 
 
 @LOADS.word("initial_stress")

@@ -50,6 +50,9 @@ class ContactPair:
     interference : overlap at load factor 1, in addition to that of the mesh [mm]: a load, which
         pushes the bodies apart with friction
     amplitude : load factor of the interference; when absent, time is the load factor
+    presence : whether the pair is there over time: its surfaces may touch while it is above 0 and
+        does not decrease. While it decreases its forces decrease with it, wherever the surfaces
+        are; at 0 there is no pair, and bodies pass through each other. When absent, always 1
     """
 
     slave: tuple[str, str]
@@ -61,8 +64,11 @@ class ContactPair:
     gap: float = 0.0
     interference: float = 0.0
     amplitude: Amplitude | None = None
+    presence: Amplitude | None = None
 
     def __post_init__(self) -> None:
+        if self.presence is not None and (least := float(np.min(self.presence.value))) < 0:
+            raise ModelError("presence", least, "must not be negative")
         if not self.shear_limit > 0:
             raise ModelError("shear_limit", self.shear_limit, "must be positive")
         if isinstance(self.friction, FrictionLaw):
@@ -87,6 +93,17 @@ class ContactPair:
         """Return the gap added at a time to the distance of the surfaces as meshed [mm]."""
         factor = time if self.amplitude is None else self.amplitude.at(time)
         return self.gap - factor * self.interference
+
+    def absent(self, time: float) -> bool:
+        """Return whether there is no pair at a time."""
+        return self.presence is not None and self.presence.at(time) == 0
+
+    def left(self, before: float, time: float) -> float | None:
+        """Return the ratio of its forces at a time to those before; None if contact finds them."""
+        if self.presence is None:
+            return None
+        was, now = self.presence.at(before), self.presence.at(time)
+        return None if now > 0 and now >= was else now / (was or 1.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -107,7 +107,7 @@ def _most(stress: Array, none: float, X: Array, away: Array) -> tuple[Array, Arr
     X, away : positions of the nodes (n_axes, n_nodes), and their distance from the middle
         (n_nodes,) [mm]
     """
-    most = stress.max(axis=1)
+    most = np.nanmax(stress, axis=1)
     same = stress >= most[:, None] - _SAME * np.abs(most[:, None])
     nodes = np.where(same, away, np.inf).argmin(axis=1)
     return most, np.where(np.abs(most) > none, X[:, nodes], np.nan)

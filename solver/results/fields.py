@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from solver.fem.fields import recovered
 from solver.tensors import not_below_zero, to_tensor, von_mises
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ class SystemFields:
 
     def recovered(self, body: str, points: Array) -> Array:
         """Return nodal values (..., n_nodes) of point values (..., n_points)."""
-        return np.asarray((self.recovery(body) @ points.T).T)
+        return recovered(self.recovery(body), points)
 
     def at_nodes(self, at: Solved, body: str) -> BodyValues:
         """Return the fields at the nodes of a body."""
@@ -123,10 +124,12 @@ class SystemFields:
 
     def _recovered(self, at: Solved, body: str) -> BodyValues:
         response, nodes = self.system.response(body, at), self.system.full(body).X.shape[1]
+        moved = self.system.displacement(body, at.state).reshape(nodes, -1).T
+        mises = not_below_zero(self.recovered(body, von_mises(response.stress)))
         return BodyValues(
-            displacement=self.system.displacement(body, at.state).reshape(nodes, -1).T,
+            displacement=np.where(np.isnan(mises), np.nan, moved),
             stress=to_tensor(self.recovered(body, response.stress)),
-            mises=not_below_zero(self.recovered(body, von_mises(response.stress))),
+            mises=mises,
             plastic_strain=not_below_zero(self.recovered(body, response.state.accumulated)),
             plastic_tensor=to_tensor(self.recovered(body, response.state.plastic_strain)),
         )

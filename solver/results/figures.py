@@ -45,14 +45,15 @@ def extremes(run: FinishedRun) -> Values:
     system = run.system
     names = system.names
     strains = {n: system.response(n, run.unloaded).state.accumulated for n in names}
-    most = max(names, key=lambda name: strains[name].max())
-    where = system.positions(most)[1, strains[most].argmax()]
+    largest = {name: float(np.nanmax(each)) for name, each in strains.items()}
+    most = max(names, key=lambda name: largest[name])
+    where = system.positions(most)[1, np.nanargmax(strains[most])]
     residual = [run.samples.fields.at_nodes(run.unloaded, name).stress[:3] for name in names]
     return {
-        MAX_PLASTIC_STRAIN: float(strains[most].max()),
-        DEPTH_OF_MAX_PLASTIC_STRAIN: float(-where) if strains[most].max() > 0 else np.nan,
-        PEAK_RESIDUAL_TENSION: float(max(r.max() for r in residual)),
-        PEAK_RESIDUAL_COMPRESSION: float(min(r.min() for r in residual)),
+        MAX_PLASTIC_STRAIN: largest[most],
+        DEPTH_OF_MAX_PLASTIC_STRAIN: float(-where) if largest[most] > 0 else np.nan,
+        PEAK_RESIDUAL_TENSION: float(max(np.nanmax(r) for r in residual)),
+        PEAK_RESIDUAL_COMPRESSION: float(min(np.nanmin(r) for r in residual)),
         PLASTIC_WORK: run.outcome.tally.plastic_work,
     }
 

@@ -86,7 +86,7 @@ class Samples:
         nodes = body.boundary_nodes(self.view.surfaces[name])
         nodes = nodes[np.argsort(self.view.axis.reached(body.X[:, nodes]))]
         stress = self.fields.at_nodes(at, name).mises[nodes]
-        stress = np.minimum(stress, self.fields.at_points(at, name)[1].max())
+        stress = np.minimum(stress, np.nanmax(self.fields.at_points(at, name)[1]))
         x = self.view.axis.reached(body.X[:, nodes]) - centre
         beyond = {"left": np.nan, "right": np.nan}
         way = {"period": body.period} if body.period else beyond

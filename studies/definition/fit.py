@@ -30,7 +30,8 @@ import numpy as np
 from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.definition.identity import canonical
-from studies.definition.measured import MeasuredLine, Numbers, Read, checked_measured, content_of
+from studies.definition.line import Read
+from studies.definition.measured import MeasuredLine, Numbers, checked_measured, content_of
 from studies.definition.parameters import Parameter, parameters_of
 from studies.definition.place import Chooser
 from studies.definition.spaced import SPACINGS, between, rounded

@@ -10,15 +10,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.parameters import is_number
 from solver.scenes import Scene
+from studies.definition.line import Read, picked
 from studies.definition.spaced import is_finite
 from studies.errors import StudyError, check_entries, nearest, one_of
 
@@ -35,17 +36,6 @@ _TURN = 0.02
 _BEYOND = 0.5
 """Largest distance from the ends of a curve to which it is continued, as a share of its range."""
 _MOST = 100_000
-
-
-class Line(NamedTuple):
-    """A variable of a run: the names of its dimensions, and its values."""
-
-    dims: tuple[str, ...]
-    values: NDArray[Any]
-
-
-Read = Callable[[str], Line | None]
-"""Gives a variable of a run by its name; None if the run has none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,13 +70,13 @@ class MeasuredLine:
             if the run has no such line, or it does not reach so far
         """
         if not self.over:
-            return np.full(len(self.values), float(self._picked(read, self.of, ()).item()))
+            return np.full(len(self.values), float(picked(read, self.of, self.at).item()))
         found = read(self.over)
         if found is None:
             raise ValueError(f"the run has no {self.over}")
         keeps = found.dims[-1:]
-        x = self._picked(read, self.over, keeps)
-        y = self._picked(read, self.of, keeps)
+        x = picked(read, self.over, self.at, keeps)
+        y = picked(read, self.of, self.at, keeps)
         known = np.isfinite(x) & np.isfinite(y)
         curve = pieces(x[known])
         own = pieces(self.places)
@@ -97,40 +87,6 @@ class MeasuredLine:
         for mine, its in zip(own, curve, strict=False):
             seen[mine] = _at(self.places[mine], x[known][its], y[known][its], self.over)
         return seen
-
-    def _picked(self, read: Read, name: str, keeps: tuple[str, ...]) -> Numbers:
-        """Return a variable over the dimensions ``keeps``, at the place on the others."""
-        found = read(name)
-        if found is None:
-            raise ValueError(f"the run has no {name}")
-        dims, values = list(found.dims), found.values
-        for dim in found.dims:
-            if dim in keeps:
-                continue
-            grid = read(dim)
-            labels = np.arange(values.shape[dims.index(dim)]) if grid is None else grid.values
-            place = self._position(name, dim, labels)
-            values = np.take(values, place, axis=dims.index(dim))
-            dims.remove(dim)
-        if dims != list(keeps):
-            raise ValueError(f"{name} is not over {', '.join(keeps)}")
-        return np.asarray(values, dtype=float)
-
-    def _position(self, name: str, dim: str, labels: NDArray[Any]) -> int:
-        if dim not in self.at:
-            if len(labels) == 1:
-                return 0
-            some = ", ".join(map(str, labels[:6].tolist()))
-            raise ValueError(f"{name} is over {dim} too: say at which, of {some}")
-        wanted = self.at[dim]
-        if labels.dtype.kind in "fiu" and is_number(wanted):
-            same = np.isclose(labels.astype(float), wanted, rtol=1e-6)
-        else:
-            same = labels.astype(str) == str(wanted)
-        if not same.any():
-            some = ", ".join(map(str, labels[:6].tolist()))
-            raise ValueError(f"{name} has no {dim} = {wanted}; it has {some}")
-        return int(np.argmax(same))
 
 
 def pieces(x: Numbers) -> list[slice]:

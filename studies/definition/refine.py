@@ -20,16 +20,17 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.definition.cells import KINK, Cell, Point, weights
+from studies.definition.line import Read
 from studies.definition.parameters import parameters_of
 from studies.definition.place import Chooser
-from studies.definition.quantity import number_of_a_run
+from studies.definition.quantity import RunNumber, checked_number
 from studies.definition.spaced import is_finite
 from studies.definition.sweep import MAXIMUM_RUNS, Axes
 from studies.definition.vocabulary import OK, taken
@@ -61,7 +62,7 @@ class Refine:
     axes : values of the axes that are numbers, in increasing order
     """
 
-    of: tuple[str, ...]
+    of: tuple[RunNumber, ...]
     until: float | Mapping[str, float]
     most: int
     halvings: int
@@ -72,7 +73,8 @@ class Refine:
         """What `checked_refine` reads."""
         until = dict(self.until) if isinstance(self.until, Mapping) else self.until
         return {
-            "of": list(self.of), "until": until, "most": self.most, "halvings": self.halvings,
+            "of": [each.content for each in self.of], "until": until, "most": self.most,
+            "halvings": self.halvings,
         }  # fmt: skip
 
     def cells(self, branches: int) -> Iterator[Cell]:
@@ -130,6 +132,11 @@ class _Halving(NamedTuple):
         return -self.miss, self.cell
 
 
+def _unread(row: Mapping[str, Any]) -> Read:
+    """Give no variable of a run: what its row has is enough."""
+    return lambda name: None
+
+
 Misses = Sequence[tuple[float, ...]]
 """Of each axis, the largest miss of each number on the edges along it."""
 
@@ -142,6 +149,7 @@ class Refinement(Chooser):
     ----------
     refine : what is asked for
     branches : parameters that the other axes set, for each combination of their positions
+    read : gives the variables of a run, by its row
     allow : what the study allows, see `taken`
     rows : the rows of the runs it has asked for; of one that the scene refuses, the reason
     asked : the runs it has asked for, with their rounds
@@ -150,10 +158,12 @@ class Refinement(Chooser):
 
     refine: Refine
     branches: Sequence[Mapping[str, Any]]
+    read: Callable[[Mapping[str, Any]], Read] = _unread
     allow: Sequence[str] = ()
     rows: dict[Wanted, Mapping[str, Any] | str] = field(default_factory=dict)
     asked: dict[Wanted, int] = field(default_factory=dict)
     settled: list[RefinedCell] = field(default_factory=list)
+    _numbers: dict[Wanted, tuple[float, ...] | None] = field(default_factory=dict)
     _lacks: dict[Cell, int] = field(default_factory=dict)
     _waits: dict[Wanted, list[Cell]] = field(default_factory=dict)
     _known: list[Cell] = field(default_factory=list)
@@ -211,6 +221,7 @@ class Refinement(Chooser):
     def tell(self, wanted: Wanted, row: Mapping[str, Any] | str) -> None:
         """Tell it of a run that it lacked, or why the scene refuses it."""
         self.rows[wanted] = row
+        self._numbers[wanted] = self._numbers_of(row)
         for cell in self._waits.pop(wanted, []):
             self._lacks[cell] -= 1
             if not self._lacks[cell]:
@@ -238,10 +249,22 @@ class Refinement(Chooser):
 
     def number(self, wanted: Wanted) -> tuple[float, ...] | None:
         """Return the numbers of a run; None if it failed, or lacks one."""
-        row = self.rows[wanted]
+        return self._numbers[wanted]
+
+    def _numbers_of(self, row: Mapping[str, Any] | str) -> tuple[float, ...] | None:
+        """Return the numbers of a row; raise `StudyError` if a variable has not the place."""
         if isinstance(row, str) or taken(str(row["status"]), self.allow) != OK:
             return None
-        found = [row["scalars"].get(name) for name in self.refine.of]
+        found, read = [], None
+        for k, each in enumerate(self.refine.of):
+            if each.whole:
+                found.append(row["scalars"].get(each.of))
+                continue
+            read = read or self.read(row)
+            try:
+                found.append(each.seen(read))
+            except ValueError as error:
+                raise StudyError(f"refine.of[{k}]", each.content, str(error)) from None
         return None if None in found else tuple(map(float, found))
 
     def _open(self, cell: Cell) -> None:
@@ -260,7 +283,7 @@ class Refinement(Chooser):
         """Return the largest misses that are allowed, by the runs of the first round."""
         until, found = self.refine.until, [each for each in map(self.number, self.asked) if each]
         if isinstance(until, Mapping):
-            return tuple(until[name] for name in self.refine.of)
+            return tuple(until[each.name] for each in self.refine.of)
         ends = [(min(each), max(each)) for each in zip(*found, strict=True)]
         least = [_ROUNDING * max(map(abs, each)) for each in ends]
         most = [until * (high - low) for low, high in ends]
@@ -406,12 +429,15 @@ def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
         raise StudyError("refine", content, "must be a table")
     check_entries("refine", content, _KEYS)
     of = content.get("of")
-    names = [of] if isinstance(of, str) else of
-    if not isinstance(names, list | tuple) or not names or len(set(map(repr, names))) < len(names):
-        allowed = "must be a list of variables with one number a run, each of them once"
-        raise StudyError("refine.of", of, allowed)
-    for name in names:
-        number_of_a_run("refine.of", name, scene)
+    if isinstance(of, list | tuple):
+        numbers_of = [checked_number(f"refine.of[{k}]", one, scene) for k, one in enumerate(of)]
+    else:
+        numbers_of = [checked_number("refine.of", of, scene)]
+    names = [one.name for one in numbers_of]
+    if not names or len(set(names)) < len(names):
+        raise StudyError(
+            "refine.of", of, "must be a list of variables with one number a run, each once"
+        )
     known = parameters_of(scene)
     numbers = {
         name: sorted(values)
@@ -421,10 +447,10 @@ def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
     if not 1 <= len(numbers) <= _MOST_AXES or any(len(each) < 2 for each in numbers.values()):
         allowed = f"needs 1 to {_MOST_AXES} axes of two numbers or more: the ends of their ranges"
         raise StudyError("refine", dict(content), allowed)
-    until = _until(content.get("until", _UNTIL), list(names))
+    until = _until(content.get("until", _UNTIL), names)
     most = _whole("most", content.get("most", _MOST), MAXIMUM_RUNS)
     halvings = _whole("halvings", content.get("halvings", _HALVINGS), _MOST_HALVINGS)
-    found = Refine(of=tuple(names), until=until, most=most, halvings=halvings, axes=numbers)
+    found = Refine(of=tuple(numbers_of), until=until, most=most, halvings=halvings, axes=numbers)
     others = math.prod(len(values) for name, values in axes.items() if name not in numbers)
     if found.first(others) > most:
         allowed = f"must be at least {found.first(others)}, the runs of the first round"

@@ -349,9 +349,22 @@ class Study(BaseModel):
             return self.asks.most
         return self.expansion.size * (self.asks.most[1] if self.asks else 1)
 
-    def stage(self, ended: int = 0) -> str:
-        """Return how many of its searches have ended, as text; empty without a goal."""
-        return f"{ended} of {self.expansion.size} searches ended" if self.goal else ""
+    @property
+    def counted(self) -> str:
+        """What the numbers by status at its end count."""
+        return "searches" if self.goal else "fits" if self.fit else "runs"
+
+    def stage(self, ended: int = 0, told: str = "") -> str:
+        """Return how far a study that chooses its runs is, as text; empty for others.
+
+        Parameters
+        ----------
+        ended : number of its programs that have ended, such as the searches of a goal
+        told : what the program of a refinement or of a fit tells
+        """
+        if self.goal:
+            return f"{ended} of {self.expansion.size} searches ended"
+        return ("ended" if ended else told or f"at most {self.size} runs") if self.asks else ""
 
     def run_ids(self) -> Iterator[str]:
         """Yield the ids of the runs, in the order of `cases`, without building the cases.

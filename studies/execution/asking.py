@@ -20,7 +20,7 @@ import numpy as np
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.fit import Fit, Fitting, standings
 from studies.definition.goal import Goal, PathLimit, Search
-from studies.definition.measured import Line, Read
+from studies.definition.line import Line, Read
 from studies.definition.place import Place
 from studies.definition.refine import Refinement
 from studies.definition.study import Study
@@ -48,7 +48,7 @@ class Asking:
     study : a study that chooses its runs
     store : the runs that are there are not computed again
     resume, since : as in `run_study`: which failed runs are taken as they are
-    only : number of the one program that is to be carried out; by default all are
+    only : number of the one search of a goal that is to be carried out; by default all are
 
     Attributes
     ----------
@@ -66,9 +66,7 @@ class Asking:
         self._study, self._store = study, store
         self._at: list[list[str]] = []
         self.places: list[Place[Any]] = []
-        for number, (at, fixed, program) in enumerate(_programs(study, store)):
-            if only not in (None, number):
-                continue
+        for at, fixed, program in _programs(study, store, only):
             self._at.append(at)
             self.places.append(
                 Place(
@@ -93,16 +91,15 @@ class Asking:
 
     @property
     def asked(self) -> list[str]:
-        """Ids of the runs that the searches of a goal have asked for, as far as they are known."""
-        if not self._study.goal:
-            return []
+        """Ids of the runs that the programs have asked for, as far as they are known."""
         rows = (row for place in self.places for row in place.program.rows.values())
-        return sorted({str(row["id"]) for row in rows})
+        return sorted({str(row["id"]) for row in rows if isinstance(row, Mapping)})
 
     @property
     def stage(self) -> str:
-        """How many of the searches of a goal have ended, as text; empty for others."""
-        return self._study.stage(sum(bool(place.program.reason) for place in self.places))
+        """How far the programs are, as text: see `Study.stage`."""
+        ended = sum(bool(place.program.reason) for place in self.places)
+        return self._study.stage(ended, self.places[0].program.told)
 
     @property
     def progress(self) -> float:
@@ -114,13 +111,15 @@ class Asking:
         while not self.ended:
             yield self._ready.popleft() if self._ready else None
 
-    def heard(self, path: str, row: Mapping[str, Any]) -> None:
-        """Tell the program of a loading path of the row of a run."""
+    def heard(self, path: str, row: Mapping[str, Any]) -> str:
+        """Tell the program of a loading path of the row of a run; return `about` of it."""
+        about = self.about(path, row)
         number = self._paths[path][0]
         place = self.places[number]
         self._waits[number].discard(place.program.key(row["parameters"]))
         if place.hear(row) and not place.program.goes_on:
             self._go_on(number)
+        return about
 
     def owed(self, path: str) -> Case | None:
         """Return the run that a path which goes on has to compute next; None if it owes none.
@@ -187,27 +186,29 @@ class Asking:
         return []
 
 
-def _programs(study: Study, store: Store) -> Iterator[tuple[list[str], dict[str, Any], Any]]:
+def _programs(
+    study: Study, store: Store, only: int | None
+) -> Iterator[tuple[list[str], dict[str, Any], Any]]:
     """Yield the programs of a study: where each is, as text, what is fixed there, and itself."""
     swept = owners(study.sweep)
     if isinstance(study.asks, Goal):
-        for case in study.cases():
+        for case in study.cases() if only is None else [study.expansion.case(only)]:
             at = [f"{axis} = {value}" for axis, value in study.place(case).items()]
             yield at, {name: case.values[name] for name in swept}, Search(study.asks)
     elif isinstance(study.asks, Fit):
         names = {name for line in study.asks.measured for name in (line.of, line.over)}
-        read = partial(_variables, store, names)
-        yield [], {}, Fitting(study.asks, standings(study.sweep), read)
+        yield [], {}, Fitting(study.asks, standings(study.sweep), partial(_read, store, names))
     elif study.asks:
         branches = {
             tuple(study.place(case)[axis] for axis in study.axes if axis not in study.asks.axes):
             {name: case.values[name] for name in swept if name not in study.asks.axes}
             for case in study.cases()
         }  # fmt: skip
-        yield [], {}, Refinement(study.asks, list(branches.values()), study.allow)
+        read = partial(_read, store, {each.of for each in study.asks.of})
+        yield [], {}, Refinement(study.asks, list(branches.values()), read, study.allow)
 
 
-def _variables(store: Store, names: Collection[str], row: Mapping[str, Any]) -> Read:
+def _read(store: Store, names: Collection[str], row: Mapping[str, Any]) -> Read:
     """Return what gives some variables of a run, and the values of their dimensions."""
     with runfile.opened(store.run_path(row["id"])) as run:
         found = {name: Line(*each) for name, each in runfile.lines(run, names).items()}

@@ -2,15 +2,18 @@
 
 Each process goes through all loading paths of the study, or all searches of its goal, from a place
 of its own, and computes those that lack runs and that it can claim (`studies.storage.claims`). It
-ends when nothing is left that it can claim. What one that was killed has left is claimed by another
-one, or computed by `run_study` at the end, which combines the runs.
+ends when nothing is left that it can claim. Of a refinement or a fit each process carries out the
+program, which asks all for the same runs, claims their paths, and waits for the runs of others.
+What one that was killed has left is claimed by another one, or computed by `run_study` at the end,
+which combines the runs.
 """
 
 from __future__ import annotations
 
+import itertools
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -30,6 +33,8 @@ _MOST_DEATHS = 2
 """Number of processes that died with a path, after which it is blamed and not tried again."""
 _LOOK = 2.0
 """Seconds after which the files of runs are listed again."""
+_WAIT = 0.5
+"""Seconds after which a process that waits for the runs of others looks again."""
 _DIED = (
     "the processes that computed this loading path died; if memory ran out, give each more, or "
     "more time if a limit of the cluster ended them"
@@ -79,14 +84,13 @@ def run_part(
     StoreBusy
         if a process that is no part computes into the directory
     StudyError
-        if the part is none, as `check_parts`, or if the directory is not writable
+        if the part is none, or the directory is not writable
     StoreFull
         if the disk is full
     """
     number, count = part
     if not 1 <= number <= count:
         raise StudyError("part", f"{number}/{count}", "must be i/n with 1 <= i <= n")
-    check_parts(study)
     with scratch() as folder:
         store = Store(directory)
         # SQLite is not made for directories that machines share
@@ -96,13 +100,6 @@ def run_part(
             emit = on_event or (lambda event: None)
             work = _PartWork(study, store, emit, should_stop or (lambda: False))
             return work.done((number - 1) / count)
-
-
-def check_parts(study: Study) -> None:
-    """Raise `StudyError` if parts cannot share a study."""
-    if study.asks and not study.goal:
-        allowed = "chooses its runs, so that parts cannot share it: use a scheduler"
-        raise StudyError("part", study.name, allowed)
 
 
 @dataclass(slots=True)
@@ -121,32 +118,48 @@ class _PartWork:
     def done(self, begin: float) -> PartOutcome:
         """Go through all units, from a place between 0 and 1 on, until none can be claimed."""
         claims = Claims(self.store.directory / "claims")
-        units = self._units()
+        asking = Asking(self.study, self.store, resume=True) if self._in_rounds else None
+        units = self._units(asking)
         first = round(begin * len(units))
-        left, count, claimed = units[first:] + units[:first], len(units), True
-        while claimed and left and not self.stop():
-            claimed = False
+        left, moved = units[first:] + units[:first], True
+        while left and not self.stop() and not (asking and asking.ended):
+            if not moved:
+                if not asking:
+                    break
+                time.sleep(_WAIT)
+            moved = False
             waiting: list[_PathUnit | _SearchUnit] = []
             for at, unit in enumerate(left):
-                self._share = 1.0 - (len(left) - at + len(waiting)) / count
+                open_ = len(left) - at + len(waiting)
+                self._share = asking.progress if asking else 1.0 - open_ / len(units)
                 if self.stop():
                     waiting += left[at:]
                     break
                 if self._complete(unit):
+                    moved = True
                     continue
                 with claims.held(unit.name) as claim:
                     if claim is None:
                         waiting.append(unit)
                         continue
-                    claimed = True
+                    moved = True
                     unit.compute(self, claim.deaths >= _MOST_DEATHS)
                     claim.done = not self.stop()
                     if not claim.done:
                         waiting.append(unit)
-            left = waiting
+            left = [*self._units(asking), *waiting] if asking else waiting
         return PartOutcome(computed=self.computed, left=len(left), stopped=self.stop())
 
-    def _units(self) -> list[_PathUnit | _SearchUnit]:
+    @property
+    def _in_rounds(self) -> bool:
+        """Whether one program asks for all runs, so that processes wait for those of others."""
+        return bool(self.study.refine or self.study.fit)
+
+    def _units(self, asking: Asking | None) -> list[_PathUnit | _SearchUnit]:
+        """Return what is to be done; of an asking program what it has asked for anew."""
+        if asking:
+            asked = itertools.takewhile(lambda each: each is not None, asking.paths())
+            return [_PathUnit(each.path.id, each.path, asking) for each in asked if each]
         if self.study.asks:
             return [_SearchUnit(case.id, k) for k, case in enumerate(self.study.cases())]
         return [_PathUnit(path.id, path) for path in self.study.paths()]
@@ -157,9 +170,7 @@ class _PartWork:
             with os.scandir(self.store.directory / "runs") as files:
                 self._there = {each.name.removesuffix(".nc") for each in files}
             self._looked = time.monotonic()
-        return isinstance(unit, _PathUnit) and all(
-            case.id in self._there for case in unit.path.cases
-        )
+        return isinstance(unit, _PathUnit) and unit.complete(self._there)
 
     def walk(self, task: PathTask, hear: Callable[[str, dict[str, Any]], str]) -> None:
         """Compute the runs of a task."""
@@ -192,10 +203,18 @@ class _PartWork:
 
 @dataclass(frozen=True, slots=True)
 class _PathUnit:
-    """A loading path of a sweep."""
+    """A loading path of a sweep, or one that a program asks for."""
 
     name: str
     path: LoadingPath
+    asking: Asking | None = None
+
+    def complete(self, there: Container[str]) -> bool:
+        """Tell whether its runs are there; then its program takes them."""
+        complete = all(case.id in there for case in self.path.cases)
+        if complete and self.asking:
+            self.asking.closed(self.path.id)
+        return complete
 
     def compute(self, part: _PartWork, hopeless: bool) -> None:
         """Compute its runs that are not there; or store that those who tried have died."""
@@ -205,7 +224,12 @@ class _PathUnit:
                 part.store.write_run(case, _DIED)
         elif cases:
             path = LoadingPath(self.path.id, self.path.parameters, cases)
-            part.walk(part.task(path), lambda path, row: "")
+            part.walk(part.task(path), self._hear)
+        if self.asking:
+            self.asking.closed(self.path.id)
+
+    def _hear(self, path: str, row: dict[str, Any]) -> str:
+        return self.asking.heard(path, row) if self.asking else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,19 +242,13 @@ class _SearchUnit:
     def compute(self, part: _PartWork, hopeless: bool) -> None:
         """Search to the end; or store that those who tried have died."""
         asking = Asking(part.study, part.store, resume=True, only=self.number)
-
-        def hear(path: str, row: dict[str, Any]) -> str:
-            place = asking.about(path, row)
-            asking.heard(path, row)
-            return place
-
         for asked in self._asked(asking, part):
             if hopeless:
                 owed = asking.owed(asked.path.id) or asked.path.cases[0]
                 part.store.write_run(owed, _DIED)
                 hopeless = False
             else:
-                part.walk(part.task(asked.path, limit=asked.limit, place=asked.place), hear)
+                part.walk(part.task(asked.path, limit=asked.limit, place=asked.place), asking.heard)
             asking.closed(asked.path.id)
 
     @staticmethod

@@ -8,7 +8,7 @@ import numpy as np
 
 from studies.definition.cases import Case
 from studies.definition.identity import canonical
-from studies.definition.refine import Refinement
+from studies.definition.refine import Refinement, Wanted
 from studies.definition.study import Study
 from studies.definition.sweep import owners
 from studies.execution.asking import Asking
@@ -31,21 +31,27 @@ def refined(study: Study, store: Store, asking: Asking, anew: bool) -> Combined:
     ran = [each for each in program.asked if not isinstance(program.rows.get(each), str)]
     order = sorted(ran, key=lambda each: (program.asked[each], each))
     chosen = study.with_points([program.sets(each) for each in order])
-    rounds = np.array([program.asked[each] + 1 for each in order], dtype=np.int32)
-    beside = _beside(study, program, list(chosen.cases()), rounds)
+    beside = _beside(study, program, list(chosen.cases()), order)
     return result(chosen, store, complete=not anew, stopped=not asking.ended, beside=beside)
 
 
-def _beside(study: Study, program: Refinement, cases: list[Case], rounds: np.ndarray) -> RunContent:
+def _beside(
+    study: Study, program: Refinement, cases: list[Case], order: list[Wanted]
+) -> RunContent:
     """Return what the data set has beside the runs."""
     scene, refine, cells = study.problem, program.refine, program.cells
     variables: dict[str, Variable] = {}
 
-    def add(name: str, dim: str, values: Any, words: str, unit: str = "") -> None:
+    def add(name: str, dims: str | list[str], values: Any, words: str, unit: str = "") -> None:
         attrs = {"long_name": words} | ({"units": unit} if unit else {})
-        variables[name] = Variable((dim,), np.asarray(values), attrs)
+        own = [dims] if isinstance(dims, str) else dims
+        array = np.asarray(values)
+        variables[name] = Variable(
+            tuple(own), array.reshape((1,) * (len(own) - 1) + array.shape), attrs
+        )
 
     add("run", "point", np.array([case.id for case in cases], dtype=object), "id of the run")
+    rounds = np.array([program.asked[each] + 1 for each in order], dtype=np.int32)
     add("round", "point", rounds, "round in which the run was asked for")
     for axis, name in enumerate(refine.axes):
         unit = layout.axis_attributes(scene, name).get("units", "")
@@ -57,8 +63,14 @@ def _beside(study: Study, program: Refinement, cases: list[Case], rounds: np.nda
         add(f"cell_{name}", "cell", layout.axis_array(values), f"{name} of the cell")
     states = np.array([each.state for each in cells], dtype=object)
     add("cell_state", "cell", states, "what became of the cell")
-    for k, name in enumerate(refine.of):
+    swept = owners(study.sweep)
+    over = [each for each in layout.usual_dimensions(scene) if each not in swept] + ["point"]
+    for k, number in enumerate(refine.of):
+        name = number.name
         left = [each.left[k] if each.left else np.nan for each in cells]
-        unit = layout.attributes_of(name, scene).get("units", "")
+        unit = layout.attributes_of(number.of, scene).get("units", "")
+        if not number.whole:
+            numbers = [np.nan if each is None else each[k] for each in map(program.number, order)]
+            add(name, over, numbers, f"what is refined of {number.of}", unit)
         add(f"cell_error_{name}", "cell", left, f"error of {name} that is left in the cell", unit)
     return RunContent(variables, {"refine": canonical(study.refine)})

@@ -324,9 +324,7 @@ class _Work:
             self.store.catalogue.put(fresh)
         for row in fresh:
             self.computed.add(row["id"])
-            place = self.asking.about(path, row) if self.asking else ""
-            if self.asking:
-                self.asking.heard(path, row)
+            place = self.asking.heard(path, row) if self.asking else ""
             self._tell(
                 "run", path=path, run=row["id"], status=self.study.taken(row["status"]),
                 message=row["message"], place=place,

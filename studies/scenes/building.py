@@ -12,7 +12,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.loading.program import Lap, Program, Stage, load_and_release, load_cycles
-from solver.mesh import within, without
+from solver.mesh import marked, within, without
 from solver.model.amplitude import Amplitude
 from solver.model.friction import FRICTION
 from solver.model.loads import LOADS
@@ -57,6 +57,7 @@ class Builder:
     mistakes: list[StudyError] = field(default_factory=list)
     absent: Collection[str] = ()
     _boundaries: dict[str, list[str]] = field(default_factory=dict, init=False)
+    _regions: dict[str, list[str]] = field(default_factory=dict, init=False)
 
     def model(self) -> Model | None:
         """Return the model, or None if there are mistakes, which are those of all tables."""
@@ -73,6 +74,9 @@ class Builder:
         contacts = [self._contact(k, contact) for k, contact in enumerate(t.contacts)]
         for side in t.results.surfaces:
             self._has_boundary("results.surfaces", *side.split("."))
+        for k, stage in enumerate(t.stages):
+            for side in stage.remove:
+                self._has_region(f"stages[{k}].remove", *side.split("."))
         if self._is_incomplete():
             return None
         return self.attempt(
@@ -118,6 +122,7 @@ class Builder:
         if mesh is None:
             return None
         self._boundaries[name] = list(mesh.boundaries or {})
+        self._regions[name] = list(mesh.subdomains or {})
         supports = {
             boundary: held
             for boundary, held in table.supports.items()
@@ -142,9 +147,24 @@ class Builder:
                 element=table.element or default_element(mesh),
                 thickness=self.scene.thickness,
                 supports=supports,
-                loads=tuple(filter(None, loads)),
+                loads=(*filter(None, loads), *self._removals(name)),
             ),
         )
+
+    def _removals(self, body: str) -> list[Load]:
+        """Return the removals of regions of a body, each in the stage that removes it."""
+        from solver.model.loads import Removal
+
+        found: dict[str, Amplitude] = {}
+        for k, (stage, *_) in enumerate(self.scene.passages):
+            for side in stage.remove:
+                found.setdefault(side, Amplitude(np.array([k, k + 1.0]), np.array([0.0, 1.0])))
+        sides = {side: side.split(".") for side in found}
+        return [
+            Removal(region=region, amplitude=found[side])
+            for side, (name, region) in sides.items()
+            if name == body and region in self._regions[body]
+        ]
 
     def _rigid(self, name: str, table: tables.RigidTable) -> RigidBody | None:
         from solver.model.rigid import Moved, Pushed, RigidBody, RigidSurface, arc
@@ -183,11 +203,20 @@ class Builder:
 
     def _has_boundary(self, field: str, body: str, boundary: str | None) -> bool:
         """Tell whether a body has a boundary, and add a mistake if not; None needs no boundary."""
-        known = self._boundaries.get(body)
-        if boundary is None or known is None or boundary in known:
+        return self._has("boundary", self._boundaries, field, body, boundary)
+
+    def _has_region(self, field: str, body: str, region: str) -> bool:
+        """Tell whether a body has a region, and add a mistake if not."""
+        return self._has("region", self._regions, field, body, region)
+
+    def _has(
+        self, what: str, of: Mapping[str, list[str]], field: str, body: str, name: str | None
+    ) -> bool:
+        known = of.get(body)
+        if name is None or known is None or name in known:
             return True
-        allowed = f"must name a boundary of {body}: {', '.join(known) or 'it has none'}"
-        self.mistakes.append(StudyError(field, boundary, allowed + nearest(boundary, known)))
+        allowed = f"must name a {what} of {body}: {', '.join(known) or 'it has none'}"
+        self.mistakes.append(StudyError(field, name, allowed + nearest(name, known)))
         return False
 
     # -- loads and contact -------------------------------------------------------------------
@@ -204,6 +233,10 @@ class Builder:
         for side, (body, boundary) in (("slave", slave), ("master", master)):
             self._has_boundary(f"contacts[{k}].{side}", body, boundary)
         amplitude = self._amplitude(f"contacts[{k}]", table.amplitude)
+        presence = None
+        if table.active is not None and self.scene.passages:
+            there = [float(stage.name in table.active) for stage, *_ in self.scene.passages]
+            presence = Amplitude(np.arange(1.0 + len(there)), np.array([*there[:1], *there]))
         return self.attempt(
             f"contacts[{k}]",
             lambda: ContactPair(
@@ -214,6 +247,7 @@ class Builder:
                 gap=table.gap,
                 interference=table.interference,
                 amplitude=amplitude,
+                presence=presence,
             ),
         )
 
@@ -324,4 +358,7 @@ def _placed_mesh(mesh: Mesh, table: tables.BodyTable) -> Mesh:
         new: within(mesh, new, each.of, each.x, each.y).boundaries[new]
         for new, each in table.boundaries.items()
     }
-    return mesh.with_boundaries(own) if own else mesh
+    mesh = mesh.with_boundaries(own) if own else mesh
+    for new, box in table.regions.items():
+        mesh = marked(mesh, new, box.x, box.y)
+    return mesh

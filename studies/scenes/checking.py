@@ -132,7 +132,8 @@ def _bodies(scene: tables.SceneFile, meshes: set[str] | None) -> Iterator[StudyE
             yield StudyError(f"{where}.part", body.part, "needs mesh")
         if body.mesh is not None and meshes is not None and body.mesh not in meshes:
             yield StudyError(f"{where}.mesh", body.mesh, "there is no such file beside the scene")
-        boxes: dict[str, tables.BoundaryTable | tables.CutTable] = {}
+        boxes: dict[str, tables.BoundaryTable | tables.CutTable | tables.RegionTable] = {}
+        boxes |= {f"regions.{other}": box for other, box in body.regions.items()}
         boxes |= {f"boundaries.{other}": box for other, box in body.boundaries.items()}
         boxes |= {f"cuts.{other}": cut for other, cut in body.cuts.items()}
         for other, span in ((o, s) for o, box in boxes.items() for s in (box.x, box.y)):
@@ -169,12 +170,20 @@ def _contacts(scene: tables.SceneFile) -> Iterator[StudyError]:
         for side in ("slave", "master"):
             body = getattr(contact, side).partition(".")[0]
             yield from _one_of(f"contacts[{k}].{side}", body, bodies)
+        names = [stage.name for stage in scene.stages]
+        for stage in contact.active or () if names else ():
+            yield from _one_of(f"contacts[{k}].active", stage, names)
+        if contact.active and not names:
+            yield StudyError(f"contacts[{k}].active", list(contact.active), "needs stages")
 
 
 def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:
     if bool(scene.stages) == (scene.loading is not None):
         given = "both" if scene.stages else None
         yield StudyError("stages", given, "must be given, or loading: one of the two")
+    for k, stage in enumerate(scene.stages):
+        for side in stage.remove:
+            yield from _one_of(f"stages[{k}].remove", side.partition(".")[0], scene.bodies)
     if scene.repeat is None:
         return
     repeated, names = list(scene.repeat.stages), [stage.name for stage in scene.stages]

@@ -116,7 +116,7 @@ def _mesh(name: str, data: bytes, arrays: bytes, part: str | None) -> Mesh:
     if not plane:
         listed = ", ".join(sorted({kind for kind, _ in blocks})) or "none"
         raise ModelError("mesh", name, f"must have cells {', '.join(_CELLS)}; it has {listed}")
-    chosen = {k: blocks[k][1] for k in plane}
+    taken = {k: np.arange(len(blocks[k][1])) for k in plane}
     if part is not None:
         parts = {key for key, own in sets.items() if any(_rows(own, k).size for k in plane)}
         if part not in parts:
@@ -125,8 +125,8 @@ def _mesh(name: str, data: bytes, arrays: bytes, part: str | None) -> Mesh:
                 part,
                 f"must be a part of {name}: {', '.join(sorted(parts)) or 'it has none'}",
             )
-        chosen = {k: blocks[k][1][_rows(sets[part], k)] for k in plane}
-    chosen = {k: cells for k, cells in chosen.items() if len(cells)}
+        taken = {k: _rows(sets[part], k) for k in plane}
+    chosen = {k: blocks[k][1][own] for k, own in taken.items() if len(own)}
     if not chosen:
         raise ModelError("mesh", name, f"must have cells {', '.join(_CELLS)}; it has none")
     kind, *others = sorted({blocks[k][0] for k in chosen})
@@ -136,7 +136,12 @@ def _mesh(name: str, data: bytes, arrays: bytes, part: str | None) -> Mesh:
         )
     mesh, number = mesh_of_cells(points[:, :2], np.vstack(list(chosen.values())), _CELLS[kind])
     lines = {k: cells[:, :2] for k, (kind, cells) in enumerate(blocks) if kind in _LINES}
-    return mesh.with_boundaries(_boundaries(mesh, number, lines, sets, nodes))
+    mesh = mesh.with_boundaries(_boundaries(mesh, number, lines, sets, nodes))
+    regions = {
+        name: np.flatnonzero(np.concatenate([np.isin(taken[k], _rows(own, k)) for k in chosen]))
+        for name, own in sets.items()
+    }
+    return replace(mesh, _subdomains={name: own for name, own in regions.items() if len(own)})
 
 
 @kept

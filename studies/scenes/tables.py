@@ -44,6 +44,13 @@ class BoundaryTable(SceneTable):
     y: Span | None = None
 
 
+class RegionTable(SceneTable):
+    """A region of a body: the elements whose middles lie in a box."""
+
+    x: Span | None = None
+    y: Span | None = None
+
+
 class CutTable(SceneTable):
     """A rectangle that is cut out of a body along lines of its mesh: a notch, or a hole.
 
@@ -65,6 +72,7 @@ class BodyTable(SceneTable):
     move: Place = (0.0, 0.0)
     cuts: dict[Label, CutTable] = Field(default_factory=dict)
     boundaries: dict[Label, BoundaryTable] = Field(default_factory=dict)
+    regions: dict[Label, RegionTable] = Field(default_factory=dict)
     supports: dict[str, Literal["x", "y", "xy"]] = Field(default_factory=dict)
 
 
@@ -173,7 +181,11 @@ else:
 
 
 class PairTable(OpenTable):
-    """Two boundaries that may touch; see `solver.ContactPair`. Its label is ``name``."""
+    """Two boundaries that may touch; see `solver.ContactPair`. Its label is ``name``.
+
+    ``active`` are the stages in which the pair is there, by default all. Its forces go to zero in
+    the stage after these.
+    """
 
     name: Label
     slave: Side
@@ -182,6 +194,7 @@ class PairTable(OpenTable):
     gap: float = 0.0
     interference: float = 0.0
     amplitude: Amplitude | None = None
+    active: Annotated[tuple[Label, ...], Field(min_length=1)] | None = None
     friction_law: str
 
 
@@ -209,12 +222,14 @@ class StageTable(SceneTable):
     """A part of the loading, in equal increments.
 
     Loads without an amplitude reach their full value at the end of the first stage. In a stage with
-    ``release`` they go to zero, and the bodies are separated.
+    ``release`` they go to zero, and the bodies are separated. ``remove`` are regions of bodies,
+    ``body.region``, whose elements are removed in it: their stress is released.
     """
 
     name: Label
     increments: Count = 10
     release: bool = False
+    remove: tuple[Side, ...] = ()
 
 
 class RepeatTable(SceneTable):

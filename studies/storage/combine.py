@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import h5netcdf
@@ -31,8 +32,11 @@ def combine(
     store: Store,
     cases: Iterable[Case],
     beside: layout.RunContent | None = None,
+    target: Path | None = None,
 ) -> Combined:
     """Write the combined data set of `study`, with what is ``beside``; return what it holds.
+
+    It gets its place in the store, unless there is another ``target``.
 
     Sweep dimensions come first: the usual ones, then the other axes. A parameter set by a linked
     axis is a coordinate over its labels. Runs are matched by *label* along labelled dimensions
@@ -49,9 +53,8 @@ def combine(
         left = {key: at for key, at in places.items() if key not in damaged}
         found = {key: at for key, at in left.items() if store.run_path(key).exists()}
         try:
-            return _combined(
-                study, store, found, [key for key in places if key not in found], beside
-            )
+            missing = [key for key in places if key not in found]
+            return _combined(study, store, found, missing, beside, target)
         except FileDamaged as error:  # the data set has parts of it: begin again
             store.set_aside(error, "the run will be computed again")
             damaged.add(error.path.stem)  # it may be there still, if it cannot be moved
@@ -63,9 +66,10 @@ def _combined(
     found: Mapping[str, tuple[int, ...]],
     missing: Sequence[str],
     beside: layout.RunContent | None,
+    elsewhere: Path | None,
 ) -> Combined:
     scene = study.problem
-    target = store.dataset_path(study.id)
+    target = elsewhere or store.dataset_path(study.id)
     usual = layout.usual_dimensions(scene)
     frame = Frame(scene=scene, axes=_axes(study, scene), usual=usual, linked=study.linked)
     ran: set[tuple[str, str]] = set()
@@ -85,9 +89,10 @@ def _combined(
                 halves.add(int(run.attrs[SYMMETRIC].item()))
     attrs = provenance(study.name, scene, study.fixed) | together(ran) | _words(study)
     attrs |= seal.SEALED | (dict(beside.attrs) if beside else {})
-    with suppress(FileDamaged):
-        store.dataset(study.id)  # a damaged or foreign one is set aside, not lost
-    with needs_room(store.directory), appearing(target) as part:
+    if elsewhere is None:
+        with suppress(FileDamaged):
+            store.dataset(study.id)  # a damaged or foreign one is set aside, not lost
+    with needs_room(target.parent), appearing(target) as part:
         with Reservoir(part) as disk:
             with h5netcdf.File(disk, "w") as file:
                 file.attrs.update(attrs | {"id": study.id, SYMMETRIC: int(halves == {1})})

@@ -25,7 +25,7 @@ SETS = "sets"
 """Attribute of an axis of labels or points: the coordinates that it sets."""
 _PIECE = 32
 """Least number of values along a dimension in a compressed chunk, if lengths differ."""
-_NO_COORDINATE = "_nc4_non_coord_"
+NO_COORDINATE = "_nc4_non_coord_"
 """Prefix of the HDF5 name of a variable that has the name of a dimension, but is no coordinate."""
 
 
@@ -179,7 +179,7 @@ class Frame:
                 values = values.reshape(values.shape[values.ndim - len(inner) :])
                 whole = np.full(tuple(map(self._extent, inner, values.shape)), np.nan)
                 whole[np.ix_(*map(places, inner))] = values
-                target = file[_NO_COORDINATE + name if name in self.ragged else name]
+                target = file[NO_COORDINATE + name if name in self.ragged else name]
                 target[(*at, *map(slice, whole.shape))] = whole
 
     def write_small(self, file: h5netcdf.File) -> None:

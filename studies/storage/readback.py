@@ -202,8 +202,8 @@ def _of_the_whole(
         KEEP: keep if record and keep and record.mesh is not None else None,
     }
     for name, value in required.items():
-        if _plain(attributes.get(name)) != value:
-            yield f"its attribute {name} is {_plain(attributes.get(name))!r}, not {value!r}"
+        if plain(attributes.get(name)) != value:
+            yield f"its attribute {name} is {plain(attributes.get(name))!r}, not {value!r}"
     parameters = build(case.scene, json.loads(attributes["parameters"]))
     if parameters != (record.parameters if record else case.parameters):
         yield "its parameters are not those of the run"
@@ -226,9 +226,9 @@ def _compared(
     if dims != expected.dims:
         found.append(f"{name} has the dimensions {dims}, not {expected.dims}")
     words = variable.attrs  # made anew each time
-    attributes = {key: _plain(words[key]) for key in words if not _internal(key)}
+    attributes = {key: plain(words[key]) for key in words if not internal(key)}
     for key, value in (dict.fromkeys(_DECODED) | {**expected.attributes}).items():
-        if attributes.get(key) != _plain(value):
+        if attributes.get(key) != plain(value):
             found.append(f"{name} has the {key} {attributes.get(key)!r}, not {value!r}")
     seen = stored
     if not text and stored.dtype.kind in "iu":
@@ -265,12 +265,12 @@ def _is_bare(variable: h5py.Dataset, scales: Mapping[Any, str]) -> bool:
     return variable.id in scales and variable.attrs.get("NAME", b"").startswith(_BARE)
 
 
-def _internal(attribute: str) -> bool:
+def internal(attribute: str) -> bool:
     """Whether HDF5 or netCDF made an attribute for internal use."""
     return attribute.isupper() or attribute.startswith("_Netcdf4")
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return the value of an attribute as a Python value; netCDF stores a number as an array."""
     if isinstance(value, bytes):
         return value.decode()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import textwrap
 from collections.abc import Sequence
 from typing import Any
@@ -23,6 +24,11 @@ def value_text(value: Any) -> str:
     if isinstance(value, float | np.floating):
         return "-" if np.isnan(value) else f"{value:z.4g}"
     return "-" if value is None else counted(value)
+
+
+def or_none(value: Any) -> Any:
+    """Return a value as JSON has it: None for NaN and infinity."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def counted(value: Any) -> str:

@@ -12,7 +12,7 @@ from studies.definition.study import Study
 from studies.errors import StudyError
 from studies.execution.run import run_study
 from studies.storage.store import Store
-from studies.views.columns import aligned, value_text
+from studies.views.columns import aligned, or_none, value_text
 from studies.views.reading import open_study
 
 
@@ -34,6 +34,21 @@ def fit(study: Study | Mapping[str, Any], store: Store, **options: Any) -> xr.Da
     if not own.fit:
         raise StudyError("fit", None, NO_FIT)
     return open_study(run_study(own, store, **options).dataset)
+
+
+def told(found: xr.Dataset) -> dict[str, Any]:
+    """Return what was found as JSON has it, without the lines over which it was fitted."""
+    names = [str(name) for name in found["parameter"].to_numpy()]
+    ends = {"value": "", "sigma": "_sigma", "lowest": "_low", "highest": "_high"}
+    parameters: dict[str, dict[str, Any]] = {
+        name: {key: or_none(found[f"{name}{end}"].item()) for key, end in ends.items()}
+        for name in names
+    }
+    for name, row in zip(names, found["correlation"].to_numpy().tolist(), strict=True):
+        parameters[name]["unit"] = found[name].attrs.get("units", "")
+        parameters[name]["correlation"] = dict(zip(names, map(or_none, row), strict=True))
+    about = ("status", "message", "condition", "misfit", "runs")
+    return {key: or_none(found[key].item()) for key in about} | {"parameters": parameters}
 
 
 def fit_table(dataset: xr.Dataset) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from studies.definition.cells import KINK, edges, weights
+from studies.definition.quantity import RunNumber
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError, one_of
 from studies.storage.frame import SETS
@@ -95,7 +96,8 @@ def _names(dataset: xr.Dataset, of: str | Sequence[str] | None) -> list[str]:
     every = {str(name): each for name, each in dataset.data_vars.items()}
     floats = [n for n, v in every.items() if v.dtype.kind == "f" and v.dims[: len(axes)] == axes]
     numbers = [name for name in floats if every[name].dims == axes]
-    refined = json.loads(dataset.attrs.get("refine", "{}")).get("of")
+    entries = json.loads(dataset.attrs.get("refine", "{}")).get("of", [])
+    refined = [each if isinstance(each, str) else RunNumber(**each).name for each in entries]
     names = [of] if isinstance(of, str) else list(of or refined or numbers)
     for name in names:
         if name not in floats:

@@ -114,7 +114,7 @@ def _fetched(url: str) -> xr.Dataset:
         dataset = xr.load_dataset(io.BytesIO(answer.content), engine="h5netcdf")
     except (httpx.HTTPError, httpx.InvalidURL, OSError, ValueError) as error:
         raise StudyError("path", url, f"must be a study of a service: {error}") from None
-    return _indexed(dataset)
+    return indexed(dataset)
 
 
 def _refusal(answer: Any) -> str:
@@ -157,7 +157,7 @@ def open_netcdf(path: Path | str) -> xr.Dataset:
         dataset = xr.open_dataset(path, engine=ENGINE)
     except OSError as error:
         raise StudyError("path", str(path), f"must be a netCDF file: {error}") from None
-    return _indexed(dataset)
+    return indexed(dataset)
 
 
 def _check(path: Path) -> None:
@@ -178,7 +178,7 @@ def _check(path: Path) -> None:
         raise StudyError("path", str(path), allowed) from None
 
 
-def _indexed(dataset: xr.Dataset) -> xr.Dataset:
+def indexed(dataset: xr.Dataset) -> xr.Dataset:
     """Return a data set whose indexes are the fractions of grids that differ between runs.
 
     Outcomes are converted to words if an earlier version of the solver stored numbers.

@@ -119,7 +119,7 @@ def _one_value(asks: Goal | Refine | Fit | None) -> str:
     """Return what a study is asked for that has one value a place; empty if it is nothing."""
     if asks is None or isinstance(asks, Fit):
         return ""
-    return asks.parameter if isinstance(asks, Goal) else asks.of[0]
+    return asks.parameter if isinstance(asks, Goal) else asks.of[0].name
 
 
 def _found(parameter: str, dataset: xr.Dataset) -> dict[str, bytes]:

@@ -15,7 +15,6 @@ R. J. (1993), An Introduction to the Bootstrap, section 11.5: the jackknife with
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -25,7 +24,7 @@ import xarray as xr
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError, one_of
 from studies.views.chaos import DEGREES, Chaos, Numbers, bears, fitted
-from studies.views.columns import aligned, value_text
+from studies.views.columns import aligned, or_none, value_text
 from studies.views.grids import parameters_over, point_axes
 from studies.views.picking import flags, select, sweep_axes
 from studies.views.plots.fields import sweep_fields
@@ -298,12 +297,8 @@ def told(found: xr.Dataset) -> dict[str, Any]:
     """Return the indices as JSON has them: by parameter, and what is told of the fit."""
     names = [str(n) for n, each in found.data_vars.items() if each.dims == ("parameter",)]
     rows = {
-        str(one["parameter"].item()): {name: _plain(one[name].item()) for name in names}
+        str(one["parameter"].item()): {name: or_none(one[name].item()) for name in names}
         for one in (found.isel(parameter=k) for k in range(found.sizes["parameter"]))
     }
-    about = {key: _plain(value) for key, value in found.attrs.items()}
+    about = {key: or_none(value) for key, value in found.attrs.items()}
     return about | {"parameters": rows}
-
-
-def _plain(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value

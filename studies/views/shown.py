@@ -42,13 +42,17 @@ class Shown(NamedTuple):
 def outline(run: xr.Dataset) -> dict[str, list[dict[str, Any]]]:
     """Return the variables of a run that are drawn as maps and as lines, with their labels.
 
-    The usual field of a map comes first.
+    The usual field of a map comes first. Of lines `along` is the dimension along which they go.
     """
-    first = usual_field(run)
+    first, sweep = usual_field(run), run["status"].dims
     maps = sorted(map_fields(run), key=lambda name: name != first)
     return {
         "maps": [_described(run, name) for name in maps if run[name].notnull().any()],
-        "lines": [_described(run, name) for name in line_fields(run) if run[name].notnull().any()],
+        "lines": [
+            _described(run, name) | {"along": line_axis(run[name], sweep)}
+            for name in line_fields(run)
+            if run[name].notnull().any()
+        ],
     }
 
 

@@ -6,13 +6,9 @@ that of a data set.
 
 from __future__ import annotations
 
-import csv
-import io
-import json
-import math
 import operator
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,20 +69,6 @@ class Column:
     def number(self) -> bool:
         """Whether it has numbers."""
         return self.values.dtype.kind == "f"
-
-    def plain(self, at: int) -> float | str | None:
-        """Return a value as JSON has it: a number, a word, or None."""
-        if not self.number or self.flags:
-            return self.text(at) or None
-        value = float(self.values[at])
-        return value if math.isfinite(value) else None
-
-    def text(self, at: int) -> str:
-        """Return a value with all its digits; empty if there is none."""
-        value = self.values[at].item() if self.number else self.values[at]
-        if not self.number:
-            return str(value)
-        return "" if math.isnan(value) else self.flags.get(int(value), f"{value!r}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,25 +156,12 @@ class RunTable:
         except ValueError:
             raise StudyError("where", condition, f"{match['value']!r} must be a number") from None
 
-    def rows(self, at: Sequence[int] | np.ndarray, names: Sequence[str]) -> Iterator[list[str]]:
-        """Yield the texts of these runs in these columns, after a line with the names."""
-        wanted = [self.column(name) for name in names]
-        yield [each.name for each in wanted]
-        for position in at:
-            yield [each.text(position) for each in wanted]
 
-
-def csv_text(table: RunTable, at: Sequence[int] | np.ndarray, names: Sequence[str]) -> str:
-    """Return these columns of these runs as CSV."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(table.rows(at, names))
-    return text.getvalue()
-
-
-def json_text(table: RunTable, at: Sequence[int] | np.ndarray, names: Sequence[str]) -> str:
-    """Return these columns of these runs as a JSON list of objects; null where there is none."""
-    columns = [table.column(name) for name in dict.fromkeys(names)]
-    return json.dumps([{each.name: each.plain(k) for each in columns} for k in at], indent=1)
+def varied(table: RunTable) -> list[Column]:
+    """Return the columns of the sweep that are not the same in all runs."""
+    sweep = [each for each in table.columns.values() if each.group == "sweep"]
+    several = [each for each in sweep if len(set(each.values.tolist())) > 1]
+    return several or sweep
 
 
 def group_of(name: str) -> str:

@@ -19,10 +19,10 @@ LAYERS = {
     ),
     "studies": (
         "errors", "toml", "appearing", "scratch", "scenes", "definition", "storage", "execution",
-        "views",
+        "views", "client",
     ),
     "residua": (
-        "neighbours", "status", "client", "cost", "progress", "keys", "slurm", "commands",
+        "neighbours", "status", "cost", "progress", "keys", "slurm", "commands",
         "arguments", "cli", "__main__",
     ),
 }  # fmt: skip

@@ -17,7 +17,7 @@ from solver.mesh import grid
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import steady_passes
 from tests.architecture.sources import PROJECT, ROOT, tracked
-from tests.marks import EXPENSIVE, FOLDERS, HERE, LONG, of_folder
+from tests.marks import EXPENSIVE, FOLDERS, HERE, of_folder
 
 
 def pulled() -> object:
@@ -92,7 +92,3 @@ def test_marks_of_folders_are_known_and_their_folders_exist() -> None:
         assert of_folder(HERE / folder / "test_any.py") == marks
         assert list((HERE / folder).glob("test_*.py"))
     assert of_folder(HERE / "test_docs.py") == ()
-
-
-def test_long_files_exist() -> None:
-    assert not [path for path in LONG if not path.is_file()]

@@ -391,7 +391,7 @@ class FakeService(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         if self.path.endswith("/dataset.nc"):
             self.answer(200, b"data")
-        elif self.path.endswith("1" * 32):
+        elif self.path.partition("?")[0].endswith("1" * 32):
             self.answer(200, {"status": "running", "progress": 40})
         else:
             self.answer(404, {"detail": "no such study"})

@@ -136,23 +136,35 @@ def test_a_study_of_the_punch_outlives_a_service_that_is_killed(mortal: Server) 
         assert bool(dataset["max_plastic_strain"].notnull().all())
 
 
-def test_a_search_outlives_a_service_that_is_killed_and_a_caller_who_stops_it(
+def refinement(name: str) -> dict[str, Any]:
+    """Return a refinement of 15 runs that takes some seconds."""
+    refine = {"of": ["max_plastic_strain"], "most": 20}
+    axes = {"load_ratio": [0.25, 0.5], "friction": [0.5, 0.75, 1.0]}
+    return fake_study(name, seconds=0.1) | {"sweep": axes, "refine": refine}
+
+
+def test_studies_that_choose_outlive_a_service_that_is_killed_and_a_caller_who_stops_them(
     mortal: Server,
 ) -> None:
     mortal.start()
+    refined_id = mortal.post(refinement("refined"))
     study_id = mortal.post(search("search"))
-    wait_until(lambda: 2 <= len(mortal.study(study_id)["runs"]))
+    wait_until(lambda: 2 <= len(mortal.study(refined_id)["runs"]))
+    assert mortal.study(refined_id)["stage"].startswith("round 1, run ")
     family = children(mortal)
     mortal.kill()
     wait_until(lambda: not alive(family))
     mortal.start()
+    refined = mortal.finished(refined_id)
+    assert (refined["status"], refined["stage"]) == ("successful", "ended")
     wait_until(lambda: mortal.study(study_id)["stage"].startswith("2 of 6"))
     assert 0.0 < mortal.study(study_id)["progress"] < 100.0
     assert mortal.client.delete(f"/studies/{study_id}").json()["status"] == "dismissed"
     assert mortal.client.post(f"/studies/{study_id}/retry").status_code == 202
     found = mortal.finished(study_id)
     assert (found["status"], found["stage"]) == ("successful", "6 of 6 searches ended")
-    assert {path.stem for path in stored(mortal)} == {run["id"] for run in found["runs"]}
+    chosen = {run["id"] for each in (refined, found) for run in each["runs"]}
+    assert {path.stem for path in stored(mortal)} == chosen
     assert repeated(mortal, stored(mortal)) == []
 
 

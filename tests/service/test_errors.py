@@ -214,6 +214,7 @@ def test_an_id_of_another_form_is_refused(service: Server, kind: str, name: str)
         f"/studies/{UNKNOWN}/dataset.nc",
         f"/studies/{UNKNOWN}/events",
         f"/studies/{UNKNOWN}/sensitivity",
+        f"/studies/{UNKNOWN}/fit",
         f"/studies/{UNKNOWN}/table.csv",
         f"/runs/{UNKNOWN}",
         f"/runs/{UNKNOWN}.nc",
@@ -345,6 +346,7 @@ def test_the_description_names_every_resource_and_its_problems(app: FastAPI) -> 
         "/studies/{study_id}/events",
         "/studies/{study_id}/dataset.nc",
         "/studies/{study_id}/sensitivity",
+        "/studies/{study_id}/fit",
         "/studies/{study_id}/predict",
         "/studies/{study_id}/table.csv",
         "/studies/{study_id}/numbers",
@@ -373,7 +375,7 @@ def test_the_example_in_the_description_is_a_study(app: FastAPI) -> None:
     post = json.loads(ask(app, "/openapi.json").text)["paths"]["/studies"]["post"]
     schema = post["requestBody"]["content"]["application/json"]["schema"]
     own = {"name", "scene", "parameters", "sweep", "points", "sample", "goal", "note", "tags"}
-    own |= {"extends", "keep", "priority", "allow"}
+    own |= {"refine", "fit", "extends", "keep", "priority", "allow"}
     assert set(schema["properties"]) == own
     (example,) = schema["examples"]
     assert Study.from_dict(example).size == 4

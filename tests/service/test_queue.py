@@ -290,11 +290,12 @@ def test_a_damaged_row_of_an_earlier_form_stays_damaged(tmp_path: Path) -> None:
         again.get("b")
 
 
-def test_of_two_searches_in_a_scene_one_waits(jobs: Jobs) -> None:
+def test_of_two_studies_that_choose_runs_in_a_scene_one_waits(jobs: Jobs) -> None:
     goal = STUDY | {"goal": {"parameter": "load_ratio"}}
+    refine = STUDY | {"refine": {"of": ["peak_contact_pressure"]}}
     jobs.accept("a", goal, [], most=12, stage="0 of 1 searches ended")
-    jobs.accept("b", goal, [], most=12)
-    jobs.accept("c", goal | {"scene": "punch"}, [], most=12)
+    jobs.accept("b", refine, [], most=12, stage="at most 12 runs")
+    jobs.accept("c", goal | {"scene": "punch"}, [], most=12, stage="0 of 1 searches ended")
     jobs.accept("d", STUDY, ["run"])
     assert [taken(jobs), taken(jobs, "a"), taken(jobs, "a", "c")] == ["a", "c", "d"]
     assert taken(jobs, "a", "c", "d") is None

@@ -125,7 +125,7 @@ def test_runs_that_a_search_of_the_queue_may_need_are_kept(place: Place) -> None
     shared = Study.from_dict({"name": "shared", "scene": "fake", "sweep": sweep})
     place.jobs.accept(shared.id, shared.to_dict(), ids(shared))
     place.jobs.finish(shared.id, StudyState.FAILED, "", standing=StudyState.ACCEPTED)
-    with pytest.raises(Conflict, match="a study searches in the scene of this run"):
+    with pytest.raises(Conflict, match="a study chooses its runs in the scene of this one"):
         place.keeper().delete_run(tried[0])
     place.keeper().purge(shared.id)
     assert place.runs() == {*tried}

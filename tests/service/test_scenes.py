@@ -51,6 +51,37 @@ def test_a_scene_has_the_id_of_its_content(service: Server, pin: str) -> None:
     assert again.json()["name"] == "pin"
 
 
+def test_a_browser_posts_a_scene_and_gets_the_form_of_its_studies(
+    service: Server, pin: str
+) -> None:
+    meshes = {"meshes": ("pin.msh", MESH)}
+    answer = service.client.post("/ui/scenes", files={"scene": ("pin.toml", PIN)} | meshes)
+    assert answer.status_code == 303
+    assert answer.headers["location"] == f"/ui/new?scene={pin}"
+    wrong = PIN.replace(b"move =", b"mvoe =").replace(b"supports =", b"sports =")
+    answer = service.client.post("/ui/scenes", files={"scene": ("pin.toml", wrong)} | meshes)
+    assert answer.status_code == 422
+    assert answer.text.count("<li>") > 1, "each mistake is told"
+    assert service.client.get(f"/ui/new?scene={pin}").status_code == 200
+
+
+def test_the_form_of_a_study_has_a_picture_of_the_meshes(service: Server, pin: str) -> None:
+    def picture(**query: str) -> str:
+        answer = service.client.get("/ui/scene.svg", params=query)
+        assert answer.headers["content-type"] == "image/svg+xml"
+        return answer.text
+
+    scene = read_scene(SCENES / "pin.toml")
+    bodies = scene.model(scene.parameters()).bodies
+    elements = sum(body.mesh.t.shape[1] for body in bodies)
+    drawn = picture(scene=pin)
+    assert f"<title>Mesh of {elements} elements: " in drawn
+    assert 0 < drawn.count("Z") <= elements, "those that the maps show"
+    assert drawn.count('class="contact"') == 2
+    assert "a field has a mistake" in picture(scene=pin, **{"p.clearance": "-1"})
+    assert "method of their own" in picture(scene="raceway").replace("</text>", " ")
+
+
 def test_the_first_words_of_a_scene_stay_and_the_answer_says_so(service: Server, pin: str) -> None:
     first = post(service, PIN, pin_msh=MESH).json()
     assert first["note"] == ""

@@ -239,7 +239,9 @@ def test_a_waiting_study_is_dismissed_without_being_computed(service: Server) ->
     waiting = service.post(fake_study("waiting", seconds=0.05))
     assert service.client.post(f"/studies/{waiting}/retry").status_code == 409
     assert service.client.delete(f"/studies/{waiting}").json()["status"] == "dismissed"
-    assert service.client.get(f"/studies/{waiting}/dataset.nc").status_code == 404
+    content = io.BytesIO(service.client.get(f"/studies/{waiting}/dataset.nc").content)
+    with xr.open_dataset(content, engine="h5netcdf") as dataset:
+        assert set(dataset["status"].to_numpy().ravel()) == {"missing"}
     service.finished(busy)
     assert service.study(waiting)["counts"] == {"pending": 4}
     assert service.client.delete(f"/studies/{busy}").status_code == 409
@@ -351,6 +353,48 @@ def test_a_goal_that_is_not_reached_fails_with_the_reason(service: Server) -> No
     assert detail["stage"] == "1 of 1 searches ended"
 
 
+def test_a_refinement_is_estimated_watched_and_predicted(service: Server) -> None:
+    study = fake_study("refined") | {"refine": {"of": ["max_plastic_strain"], "most": 30}}
+    study["sweep"] |= {"hardening": ["none", "isotropic"]}
+    most = service.client.post("/estimate", json=study).json()
+    assert (most["runs"], most["to_compute"]) == (30, 30)
+    study_id = service.post(study)
+    detail = service.finished(study_id)
+    assert (detail["status"], detail["stage"], detail["size"]) == ("successful", "ended", 30)
+    assert detail["refine"]["of"] == ["max_plastic_strain"]
+    assert detail["counts"] == {"ok": 18}, "of two branches: their number is linear"
+    places = {tuple(run["at"].values()) for run in detail["runs"]}
+    assert len(places) == 18
+    assert (0.375, 0.15, "isotropic") in places
+    at = {"load_ratio": 0.31, "friction": 0.2, "hardening": "none"}
+    url = f"/studies/{study_id}/predict"
+    told = service.client.get(url, params={"of": "max_plastic_strain", **at}).json()
+    assert (told["by"], told["value"]) == ("cells", pytest.approx(0.31))
+
+
+def test_a_fit_is_searched_and_its_answer_told(service: Server, done: dict[str, Any]) -> None:
+    line = {"of": "max_plastic_strain", "values": [0.59, 0.61], "sigma": 0.01}
+    fit = {"measured": [line], "ranges": {"load_ratio": [0.2, 0.8]}, "most": 20}
+    study = fake_study("fitted") | {"fit": fit, "sweep": {}}
+    study_id = service.post(study)
+    detail = service.finished(study_id)
+    assert (detail["status"], detail["stage"]) == ("successful", "ended")
+    assert len(detail["runs"]) == detail["counts"]["ok"] <= 20
+    assert all(run["at"].keys() == {"load_ratio"} for run in detail["runs"])
+    told = service.client.get(f"/studies/{study_id}/fit").json()
+    found = told["parameters"]["load_ratio"]
+    assert (told["status"], told["runs"]) == ("ok", len(detail["runs"]))
+    assert found["value"] == pytest.approx(0.6)
+    assert found["sigma"] == pytest.approx(0.01 / 2**0.5, rel=1e-3)
+    refused = service.client.get(f"/studies/{done['id']}/fit")
+    assert refused.json()["errors"][0]["field"] == "fit"
+    file = service.client.post("/studies", json=study | {"fit": fit | {"measured": ["a.csv"]}})
+    assert file.json()["errors"][0]["field"] == "fit.measured[0]"
+    few = fake_study("few") | {"fit": fit | {"most": 2}, "sweep": {}}
+    end = service.finished(service.post(few))
+    assert (end["status"], end["message"]) == ("failed", "1 of 1 fits: 1 not_converged")
+
+
 def test_a_study_extends_one_that_is_known(service: Server, done: dict[str, Any]) -> None:
     for named in (done["id"], fake_study("done")):
         more = {"name": "more", "extends": named, "sweep": {"friction": [0.1]}}
@@ -364,17 +408,27 @@ def test_a_study_extends_one_that_is_known(service: Server, done: dict[str, Any]
     assert refused.json()["errors"][0]["field"] == "extends"
 
 
-def test_a_goal_has_the_same_id_everywhere(tmp_path: Path) -> None:
-    file = ROOT / "data" / "studies" / "limit-load.toml"
+@pytest.mark.parametrize(
+    ("name", "entry", "stage"),
+    [
+        ("limit-load", "goal", "0 of 1 searches ended"),
+        ("refined-punch", "refine", "at most 40 runs"),
+        ("ball-fit", "fit", "at most 40 runs"),
+    ],
+)
+def test_a_study_that_chooses_its_runs_has_the_same_id_everywhere(
+    tmp_path: Path, name: str, entry: str, stage: str
+) -> None:
+    file = ROOT / "data" / "studies" / f"{name}.toml"
     settings = Settings(data=tmp_path, scheduler=NOWHERE["RESIDUA_SCHEDULER"])
     with TestClient(create_app(settings), base_url="http://localhost") as client:
         posted = client.post("/studies", json=read_study(file)).json()
-        assert posted["stage"] == "0 of 1 searches ended"
-        refused = client.post("/studies", json=read_study(file) | {"goal": {"find": "peace"}})
+        assert posted["stage"] == stage
+        refused = client.post("/studies", json=read_study(file) | {entry: {"peace": 1}})
     study = Study.from_toml(file)
     assert (posted["id"], posted["size"]) == (study.id, study.size)
     assert refused.status_code == 422
-    assert refused.json()["errors"][0]["field"] == "goal.find"
+    assert refused.json()["errors"][0]["field"] == f"{entry}.peace"
 
 
 def test_a_study_holds_the_mesh_of_a_rail(service: Server) -> None:

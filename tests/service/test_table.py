@@ -26,6 +26,7 @@ from service.settings import Settings
 from studies import Store, open_netcdf, open_study
 from studies.definition.identity import content_id
 from studies.views.table import RunTable, column_of
+from studies.views.written import FORMS
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE
 
@@ -99,6 +100,52 @@ def test_a_table_is_filtered_and_sorted(seen: Seen) -> None:
     assert header == "run"
 
 
+def test_a_table_is_the_same_in_every_form(seen: Seen) -> None:
+    asked = {"friction": "0.1..0.4", "sort": "-friction"}
+    asked["columns"] = "run,friction,status,peak_residual_tension"
+    lines = seen.lines(**asked)
+    whole = seen.client.get(f"{seen.study}/table.json", params=asked).json()
+    assert [{k: str(v) for k, v in row.items()} for row in whole["rows"]] == lines
+    units = {each["name"]: each["unit"] for each in whole["columns"]}
+    assert list(units) == list(lines[0]) and units["peak_residual_tension"] == "MPa"
+    parquet = pytest.importorskip("pyarrow.parquet", reason="the extra `parquet` is not installed")
+    answer = seen.client.get(f"{seen.study}/table.parquet", params=asked)
+    stored = parquet.read_table(io.BytesIO(answer.content))
+    assert stored.to_pylist() == whole["rows"] and len(lines) == 8
+    assert stored.schema.field("peak_residual_tension").metadata[b"units"] == b"MPa"
+
+
+def test_a_service_without_pyarrow_says_so(seen: Seen, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.routes.numbers.find_spec", lambda name: None)
+    answer = seen.client.get(f"{seen.study}/table.parquet")
+    assert answer.status_code == 406
+    assert "residua-contact[parquet]" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize("begun", ["=", "+", "-", "@", "\t", "\r"])
+def test_a_spreadsheet_takes_no_text_for_a_formula(begun: str) -> None:
+    labels = np.array([f"{begun}1+1", "a=b"], dtype=object)
+    columns = [
+        column_of("case", labels, "sweep"),
+        column_of("x", np.array([-1.5, math.nan]), "result"),
+    ]
+    text = b"".join(FORMS["csv"].write(columns, np.arange(2))).decode()
+    rows = list(csv.reader(io.StringIO(text, newline="")))
+    shown = begun.replace("\r", " ")
+    assert rows == [["case", "x"], [f"'{shown}1+1", "-1.5"], ["a=b", ""]]
+    whole = json.loads(b"".join(FORMS["json"].write(columns, np.arange(2))))
+    assert whole["rows"] == [{"case": f"{begun}1+1", "x": -1.5}, {"case": "a=b", "x": None}]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_table_is_written_in_pieces(form: str) -> None:
+    if form == "parquet":
+        pytest.importorskip("pyarrow", reason="the extra `parquet` is not installed")
+    columns = [column_of(f"c{k}", np.linspace(0.0, k, 60_000), "result") for k in range(3)]
+    sizes = [len(piece) for piece in FORMS[form].write(columns, np.arange(60_000))]
+    assert max(sizes) < 0.5 * sum(sizes)
+
+
 @pytest.mark.parametrize(("condition", "kept"), [("1e-12..", 2), ("..1e-12", 1), ("1e-12", 0)])
 def test_a_range_of_small_numbers_has_small_ends(condition: str, kept: int) -> None:
     column = column_of("audit_small", np.array([2e-13, 3e-12, 4e-11, math.nan]), "audit")
@@ -164,9 +211,23 @@ def test_numbers_are_sent_without_loss(seen: Seen) -> None:
     )
     assert {*order} == {*number.dims}
     assert np.array_equal(found["peak_residual_tension"], number.to_numpy().ravel())
-    assert {head["statuses"][int(code)] for code in found["status"]} == {"ok"}
+    assert {head["words"]["status"][int(code)] for code in found["status"]} == {"ok"}
     assert {*found["friction"]} == {0.0, 0.2, 0.4}
     assert seen.client.get(f"{seen.study}/numbers", params={"name": "run"}).status_code == 422
+
+
+def test_only_the_runs_that_meet_conditions_are_sent_and_texts_as_numbers(seen: Seen) -> None:
+    asked = {"name": ["friction", "hardening"], "friction": "0.1..0.3", "hardening": "isotropic"}
+    answer = seen.client.get(f"{seen.study}/numbers", params=asked)
+    head, found = arrays(answer.content)
+    lines = seen.lines()
+    places = [lines[int(at)] for at in found["at"]]
+    met = [each for each in lines if each["friction"] == "0.2" and each["hardening"] == "isotropic"]
+    assert places == met and len(met) == 2
+    assert [head["words"]["hardening"][int(code)] for code in found["hardening"]] == [
+        "isotropic"
+    ] * 2
+    assert {*found["friction"]} == {0.2}
 
 
 def test_the_values_of_a_run_are_those_of_its_file(seen: Seen) -> None:

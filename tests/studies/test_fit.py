@@ -19,7 +19,8 @@ from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, estimate, fit, open_study, run_study
 from studies.definition.fit import Fitted, Fitting, certainty, checked_fit, standings
 from studies.definition.identity import solver_hash
-from studies.definition.measured import Line, checked_measured, pieces
+from studies.definition.line import Line
+from studies.definition.measured import checked_measured, pieces
 from studies.execution.asking import Asking
 from studies.execution.calibrated import calibrated
 from studies.execution.task import PathTask, walk

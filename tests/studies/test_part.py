@@ -23,6 +23,18 @@ from tests.studies.conftest import write_study
 
 SWEEP = {"friction": [k / 50 for k in range(12)], "load_ratio": [0.25, 0.5]}
 GOAL = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0], "within": 0.1}
+LINE = {"of": "peak_contact_pressure", "values": [200.0, 202.0], "sigma": 1.0}
+ASKS = {
+    "goal": GOAL,
+    "refine": {"of": ["max_plastic_strain"], "until": 0.01, "halvings": 2},
+    "fit": {"measured": [LINE], "ranges": {"load_ratio": [0.2, 4.0], "half_width": [20.0, 70.0]}},
+}
+SWEPT = {
+    "goal": {"friction": SWEEP["friction"][:6]},
+    "refine": {"friction": [0.0, 0.2, 0.4], "load_ratio": [0.25, 0.5]},
+    "fit": {},
+}
+SIZES = {"": 24, "goal": 6, "refine": 15, "fit": 1}
 FORK = multiprocessing.get_context("fork")
 
 
@@ -57,13 +69,13 @@ def runs(out: Path) -> set[str]:
 
 
 @pytest.mark.processes
-@pytest.mark.parametrize("goal", [False, True])
+@pytest.mark.parametrize("asks", ["", "goal", "refine", "fit"])
 def test_eight_parts_compute_each_run_once_although_two_are_killed(
-    tmp_path: Path, goal: bool
+    tmp_path: Path, asks: str
 ) -> None:
     of, out = study(tmp_path, 0.1), tmp_path / "out"
-    if goal:
-        of = study(tmp_path, 0.05, goal=GOAL, sweep={"friction": SWEEP["friction"][:6]})
+    if asks:
+        of = study(tmp_path, 0.05, **{asks: ASKS[asks]}, sweep=SWEPT[asks])
     parts = started(of, out, 8)
 
     while len(runs(out)) < 4:
@@ -74,7 +86,7 @@ def test_eight_parts_compute_each_run_once_although_two_are_killed(
     for each in parts[2:]:
         each.join(60)
         assert each.exitcode == 0
-    if not goal:
+    if not asks:
         assert {*of.run_ids()} == runs(out), "none is lost"
     done = len(begun(tmp_path))
     outcome = run_study(of, Store(out), resume=True)
@@ -86,7 +98,7 @@ def test_eight_parts_compute_each_run_once_although_two_are_killed(
     assert not (out / "claims").exists()
     assert not list(out.rglob("*.part"))
     with open_study(out) as dataset:
-        assert dataset.status.size == (6 if goal else 24)
+        assert dataset.status.size == SIZES[asks]
 
 
 def test_one_part_computes_all_and_the_next_one_nothing(tmp_path: Path) -> None:

@@ -14,8 +14,18 @@ import numpy as np
 import pytest
 
 from solver.results.record import Record, Status
-from studies import Bounds, Store, Study, StudyError, estimate, open_study, run_study
+from studies import (
+    Bounds,
+    Store,
+    Study,
+    StudyError,
+    estimate,
+    open_study,
+    predict,
+    run_study,
+)
 from studies.definition.cells import weights
+from studies.definition.quantity import RunNumber
 from studies.definition.refine import Refine, Refinement, Wanted
 from studies.execution.asking import Asking
 from tests.studies.fakes import FAKE, Canned, FakeParameters, record
@@ -24,6 +34,7 @@ from tests.studies.test_goal import search_here
 
 OF = "peak_residual_tension"
 AXES = {"load_ratio": [0.1, 1.0], "friction": [0.0, 0.4]}
+PRESSURE = {"of": "contact_pressure", "at": {"stage": "loaded"}, "take": "largest"}
 Number = Callable[[float, float], float | None]
 
 
@@ -51,7 +62,10 @@ def refined_by(number: Number, seed: int = 0, **asked: Any) -> Refinement:
     """Refine a function over the unit square; its runs end in random order."""
     entries = {"until": 0.02, "most": 1000, "halvings": 5} | asked
     axes = {"x": [0.0, 1.0], "y": [0.0, 1.0]}
-    found, order = Refinement(Refine(of=(OF,), axes=axes, **entries), [{}]), random.Random(seed)
+    found, order = (
+        Refinement(Refine(of=(RunNumber(of=OF),), axes=axes, **entries), [{}]),
+        random.Random(seed),
+    )
     while wants := found.wants:
         wanted = order.choice(wants)
         value = number(*wanted.point)
@@ -166,7 +180,7 @@ def test_parts_are_asked_for_before_their_round_has_ended() -> None:
     """Except where the largest number of runs might not allow it."""
     for most, early in [(1000, True), (40, False)]:
         axes = {"x": [0.0, 0.5, 1.0], "y": [0.0, 1.0]}
-        asked = Refine(of=(OF,), until=0.001, most=most, halvings=5, axes=axes)
+        asked = Refine(of=(RunNumber(of=OF),), until=0.001, most=most, halvings=5, axes=axes)
         found = Refinement(asked, [{}])
         first = len(found.asked)
 
@@ -184,7 +198,7 @@ def test_parts_are_asked_for_before_their_round_has_ended() -> None:
 
 
 def test_whole_numbers_are_divided_down_to_neighbours() -> None:
-    asked = Refine(of=(OF,), until=0.001, most=100, halvings=9, axes={"n": [1, 12]})
+    asked = Refine(of=(RunNumber(of=OF),), until=0.001, most=100, halvings=9, axes={"n": [1, 12]})
     found = Refinement(asked, [{}])
     while wants := found.wants:
         n = wants[0].point[0]
@@ -254,6 +268,20 @@ def test_the_data_set_has_the_runs_as_points_and_the_error_of_each_cell(store: S
         assert area.sum().item() == pytest.approx(2 * 0.9 * 0.4)
 
 
+def test_one_value_of_a_variable_with_dimensions_is_refined(store: Store) -> None:
+    asked = study({"of": [PRESSURE]}, half_width=2.0)
+    search_here(asked, store)
+    name = "contact_pressure_loaded_largest"
+    with open_study(store.directory) as dataset:
+        assert dataset[name].attrs["units"] == "MPa"
+        assert np.allclose(dataset[name], dataset["peak_contact_pressure"])
+        found = predict(dataset, load_ratio=0.3, friction=0.1)
+        assert found[name].item() == pytest.approx(100.0 * 0.3 * 1.1 + 2.0)
+    nowhere = PRESSURE | {"at": {"stage": "cold"}}
+    with pytest.raises(StudyError, match="has no stage = cold; it has loaded, unloaded"):
+        search_here(study({"of": [nowhere]}, half_width=2.0), store)
+
+
 def test_an_interrupted_refinement_goes_on_and_asks_for_the_same_runs(tmp_path: Path) -> None:
     asked = study({"halvings": 1}, trouble="limit")
     at_once = search_here(asked, Store(tmp_path / "a"))
@@ -296,8 +324,16 @@ def test_the_estimate_is_the_most_that_it_may_take(store: Store) -> None:
     [
         ({"off": 1}, "refine.off", "did you mean of?"),
         ({"of": []}, "refine.of", "one number a run"),
-        ({"of": ["contact_pressure"]}, "refine.of", "is over stage, s"),
-        ({"of": ["peak_residual_tensio"]}, "refine.of", "did you mean peak_residual_tension?"),
+        (
+            {"of": ["contact_pressure"]},
+            "refine.of[0]",
+            'is over stage, s: give at = {stage = …, s = …}, or take = "largest"',
+        ),
+        ({"of": ["peak_residual_tensio"]}, "refine.of[0]", "did you mean peak_residual_tension?"),
+        ({"of": PRESSURE | {"take": "mean"}}, "refine.of.take", "largest"),
+        ({"of": PRESSURE | {"at": {"stag": "loaded"}}}, "refine.of.at.stag", "did you mean stage?"),
+        ({"of": {"of": OF, "take": "largest"}}, "refine.of.take", "leave it out"),
+        ({"of": [7]}, "refine.of[0]", "{of, at, take}"),
         ({"until": 0.0}, "refine.until", "a share of the range"),
         ({"until": {"other": 1.0}}, "refine.until", "for each of `of`"),
         ({"until": {OF: 10**400}}, "refine.until", "for each of `of`"),

@@ -14,6 +14,7 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
+from solver.fem.heat import Heat
 
 import solver.contact.interface
 import solver.contact.system
@@ -36,7 +37,6 @@ import solver.scenes.rolling_steady
 from solver.contact.candidates import Candidates
 from solver.contact.interface import Interface
 from solver.fem.fields import Sampler
-from solver.fem.heat import Heat
 from solver.fem.loads import Superposed
 from solver.model.loads import InitialStress, Load, Temperature
 from solver.model.model import ContactPair

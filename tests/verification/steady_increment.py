@@ -154,6 +154,7 @@ class SteadyIncrement:
             touching=(status != OPEN) | (not from_touch),
             gap=now.gap,
             rates=np.stack([closing, np.where(faces, slip, np.nan)]),
+            earlier=np.full((3, len(slip)), np.nan),
             finite=interface.finite,
             slipped=np.zeros_like(slip),
         )

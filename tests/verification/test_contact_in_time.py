@@ -79,19 +79,19 @@ def test_friction_of_an_oblique_press_hardly_depends_on_increments() -> None:
     """It was nothing in one increment, and a fifth too little in four.
 
     The increment in which the first vertices touch is divided, the slip of those that touch later
-    counts from then on. From four increments to sixteen the error falls more than fourfold, as one
-    of first order would; further it is that of the vertices, 1e-4.
+    counts from then on. From four increments to sixteen the error falls tenfold at least, as one of
+    second order would; further it is that of the vertices, 1e-4. The figure has possible errors.
     """
     exact = ratio(oblique(64))
     error = {n: abs(ratio(oblique(n)) / exact - 1) for n in (1, 4, 16)}
     assert 0.4 * FRICTION < exact < FRICTION
-    assert error[1] < 0.02
-    assert error[4] < 0.008
-    assert error[16] < min(0.001, error[4] / 4)
+    assert error[1] < 0.006
+    assert error[4] < 0.006
+    assert error[16] < min(0.0005, error[4] / 10)
     for n in error:
         audit = oblique(n).audit("loaded")
         assert audit.passed
-        assert audit.figures["audit_touch_time"] < 0.05
+        assert audit.figures["audit_touch_time"] < (0.06 if n == 1 else 0.03)
 
 
 @cache
@@ -118,21 +118,24 @@ def leaned(slave: str, aside: float, increments: int) -> Solution:
                  stages=(Stage(name="loaded", target=1.0, steps=increments),))  # fmt: skip
 
 
-@pytest.mark.parametrize(("slave", "aside"), [("plane", 0.15), ("arm", 0.08)])
-def test_shear_of_vertices_that_stuck_before_they_touched_is_not_known(
-    slave: str, aside: float
+@pytest.mark.parametrize(
+    ("slave", "aside", "claimed"),
+    [("plane", 0.15, 0.02), ("arm", 0.08, 0.03), ("plane", 0.5, 0.03), ("arm", 0.35, 0.07)],
+)
+def test_what_passes_has_the_shear_of_small_increments(
+    slave: str, aside: float, claimed: float
 ) -> None:
-    """They stick from the beginning of the increment, without slip, and bear too much shear.
+    """Of vertices that stick before they touch, and of a contact that mostly slips or rolls aside.
 
-    The mean error of shear, as a share of all friction, was 0.15 in a single increment, which
-    passed its audit.
+    The mean error of shear, as a share of all friction, was 0.15 in a single increment that was not
+    divided, and 0.29 where 85 % of the friction acts; both passed their audit.
     """
     exact = leaned(slave, aside, 24).stages["loaded"].state.contacts[0]
     for increments in (1, 2, 3, 4):
         found = leaned(slave, aside, increments)
         contact = found.stages["loaded"].state.contacts[0]
         error = np.abs(contact.tangential - exact.tangential).sum()
-        assert error < 0.05 * FRICTION * exact.normal.sum()
+        assert error < claimed * FRICTION * exact.normal.sum()
         assert found.audit("loaded").passed
 
 

@@ -15,7 +15,7 @@ export const KEYS = () => [1, 2, 3, 4, 5, 6].map((k) => colour(`k${k}`));
 
 const drawn = new Map();
 const sizes = new ResizeObserver((changes) => {
-  for (const { target } of changes) if (drawn.has(target) && target.data) Plotly.Plots.resize(target);
+  for (const { target } of changes) if (drawn.has(target) && target.data && target.clientWidth) draw(target, drawn.get(target));
 });
 
 function axis() {
@@ -42,7 +42,7 @@ export async function draw(chart, make) {
     chart.replaceChildren();
     sizes.observe(chart);
   }
-  const { traces, layout } = make();
+  const { traces, layout } = make(chart);
   const base = {
     font: { family: own().getPropertyValue("--sans"), size: 12.5, color: colour("soft") },
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
@@ -53,7 +53,8 @@ export async function draw(chart, make) {
     hovermode: "closest", dragmode: "zoom", separators: ".",
   };
   const buttons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]];
-  await Plotly.react(chart, traces, merged(base, layout), {
+  const size = { width: chart.clientWidth, height: chart.clientHeight };
+  await Plotly.react(chart, traces, { ...merged(base, layout), ...size }, {
     displaylogo: false, modeBarButtons: buttons, displayModeBar: "hover",
   });
   chart.classList.remove("busy");
@@ -88,16 +89,18 @@ export function titled(chart, words, unit) {
   return { text: lines.join("<br>") };
 }
 
+// The colour of a scale at a share of its length.
+export function mixed(colours, share) {
+  const at = share * (colours.length - 1), low = Math.min(Math.floor(at), colours.length - 2);
+  const [a, b] = [colours[low][1], colours[low + 1][1]].map((each) => [1, 3, 5].map((i) => parseInt(each.slice(i, i + 2), 16)));
+  return `rgb(${a.map((each, i) => Math.round(each + (b[i] - each) * (at - low))).join(",")})`;
+}
+
 // Colours in an order, such as those of rising loads; all stand out from the page.
 export function ordered(count) {
   const dark = matchMedia("(prefers-color-scheme: dark)").matches;
-  const [first, last] = dark ? [3, 9] : [0, 7.4];
-  return Array.from({ length: count }, (_, k) => {
-    const at = first + ((last - first) * k) / Math.max(count - 1, 1);
-    const low = Math.floor(at), share = at - low;
-    const [a, b] = [VIRIDIS[low], VIRIDIS[Math.min(low + 1, 9)]].map((each) => [1, 3, 5].map((i) => parseInt(each.slice(i, i + 2), 16)));
-    return `rgb(${a.map((each, i) => Math.round(each + (b[i] - each) * share)).join(",")})`;
-  });
+  const [first, last] = dark ? [0.33, 1] : [0, 0.82];
+  return Array.from({ length: count }, (_, k) => mixed(NUMBERS, first + ((last - first) * k) / Math.max(count - 1, 1)));
 }
 
 // Charts take tags in a text, such as links: text of others stays text.
@@ -105,5 +108,6 @@ export const plain = (said) => String(said).replaceAll("&", "&amp;").replaceAll(
 
 export const named = (words, unit) => plain(unit ? `${words} [${unit}]` : words);
 
+// In the colours of a new scheme, and in the size of a sheet of paper.
 const redraw = () => [...drawn].forEach(([chart, make]) => draw(chart, make));
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+for (const each of ["(prefers-color-scheme: dark)", "print"]) matchMedia(each).addEventListener("change", redraw);

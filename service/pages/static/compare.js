@@ -1,6 +1,6 @@
 // Runs compared: lines over each other, and the difference of two maps.
 
-import { json, octets } from "./octets.js";
+import { json, octets, rows } from "./octets.js";
 import { fail } from "./charts.js";
 import { choice, data, keep, root, select, state, words } from "./page.js";
 import { combinations, drawLines, drawMap, valuesOf } from "./pictures.js";
@@ -24,7 +24,7 @@ async function showLine(known) {
   const again = (changes) => { keep(changes); showLine(known); };
   const found = await Promise.all(runs.map((run) => octets(valuesOf(run, { field: field.name, component }))));
   const labels = combinations(found[0].head.over);
-  const label = labels.includes(state.get("line.at")) ? state.get("line.at") : labels[0];
+  const label = labels.includes(state.get("line.at")) ? state.get("line.at") : labels[largest(found)];
   const over = found[0].head.over.filter((each) => each.labels.length > 1).map(({ name }) => words(name)).join(", ");
   spot("line").replaceChildren(
     select("Line", known, field.name, (name) => again({ line: name })),
@@ -32,6 +32,13 @@ async function showLine(known) {
     ...(labels.length > 1 ? [select(over, labels.map((name) => ({ name, words: name })), label, (name) => again({ "line.at": name }))] : []),
   );
   await drawLines(charts.line, found, runs.map((_, k) => NAMES[k]), label);
+}
+
+// The line that goes farthest from zero.
+function largest(found) {
+  const reach = found.map(({ head, arrays }) => rows(arrays[head.name]).map((line) => line.reduce((most, each) => Math.max(most, Math.abs(each) || 0), 0)));
+  const most = reach[0].map((_, k) => Math.max(...reach.map((each) => each[k] ?? 0)));
+  return most.indexOf(Math.max(...most));
 }
 
 async function showDifference(known) {

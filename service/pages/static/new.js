@@ -7,8 +7,10 @@ const REST = 450;
 const copies = form.querySelectorAll(".code pre");
 let asked = null;
 
+const picture = form.querySelector("[data-scene-picture]");
+
 document.querySelector("[data-scene]").addEventListener("change", (event) => event.target.form.submit());
-form.querySelector("[data-check]").hidden = true;
+for (const each of document.querySelectorAll("[data-check], [data-take]")) each.hidden = true;
 
 const time = (seconds) => (seconds < 90 ? `${text(Number(seconds.toPrecision(2)))} s` : seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${text(Number((seconds / 3600).toPrecision(2)))} h`);
 const size = (bytes) => (bytes < 1e9 ? `${text(Number((bytes / 1e6).toPrecision(2)))} MB` : `${text(Number((bytes / 1e9).toPrecision(2)))} GB`);
@@ -41,6 +43,13 @@ function costs(estimate) {
   place.replaceChildren(...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, String(value))]));
 }
 
+// The picture depends on the parameters alone.
+function drawn() {
+  const fields = [...new FormData(form)].filter(([name, value]) => name === "scene" || (name.startsWith("p.") && value));
+  const address = `${picture.src.split("?")[0]}?${new URLSearchParams(fields)}`;
+  if (picture.dataset.shown !== address) picture.src = picture.dataset.shown = address;
+}
+
 async function check() {
   asked?.abort();
   asked = new AbortController();
@@ -56,6 +65,7 @@ async function check() {
     const found = await answer.json();
     told(found.wrong);
     costs(found.estimate);
+    if (found.estimate) drawn();
     [found.toml, found.curl, found.python].forEach((each, k) => (copies[k].textContent = each));
   } catch (error) {
     if (error.name !== "AbortError") throw error;
@@ -78,3 +88,22 @@ form.addEventListener("input", () => {
 });
 mark();
 check();
+
+const drop = document.querySelector("[data-drop]");
+for (const name of ["dragover", "dragleave", "drop"]) {
+  drop?.addEventListener(name, (event) => {
+    event.preventDefault();
+    drop.classList.toggle("over", name === "dragover");
+  });
+}
+drop?.addEventListener("drop", ({ dataTransfer }) => {
+  const post = drop.querySelector("form");
+  const files = [...dataTransfer.files];
+  for (const [input, own] of [[post.scene, true], [post.meshes, false]]) {
+    const list = new DataTransfer();
+    for (const each of files) if (each.name.endsWith(".toml") === own) list.items.add(each);
+    input.files = list.files;
+  }
+  drop.open = true;
+  if (post.reportValidity()) post.submit();
+});

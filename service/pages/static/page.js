@@ -3,16 +3,29 @@
 const found = document.location.pathname.match(/^(.*)\/ui(?:\/|$)/);
 export const root = found ? found[1] : "";
 
-export const data = () => JSON.parse(document.getElementById("data").textContent);
+export const data = (page = document) => JSON.parse(page.getElementById("data").textContent);
 
 export const state = new Map(new URLSearchParams(document.location.search));
 
-export function keep(changes) {
-  const address = new URL(document.location); // other names may be there more than once
+// Browsers bear few changes of the address: those of a slider are written when it rests.
+let waiting = 0;
+export function keep(changes, later = false) {
   for (const [name, value] of Object.entries(changes)) {
     const none = value === null || value === undefined || value === "";
-    for (const each of [state, address.searchParams]) none ? each.delete(name) : each.set(name, String(value));
+    if (none) state.delete(name);
+    else state.set(name, String(value));
+    written.set(name, none ? null : String(value));
   }
+  clearTimeout(waiting);
+  if (later) waiting = setTimeout(write, 150);
+  else write();
+}
+
+const written = new Map(); // other names may be there more than once
+function write() {
+  const address = new URL(document.location);
+  for (const [name, value] of written) value === null ? address.searchParams.delete(name) : address.searchParams.set(name, value);
+  written.clear();
   history.replaceState(null, "", address);
 }
 
@@ -71,8 +84,8 @@ export function text(value) {
   if (typeof value !== "number") return words(value);
   if (Number.isNaN(value)) return "–";
   const size = Math.abs(value);
-  if (value !== 0 && (size < 1e-4 || size >= 1e5)) return value.toExponential(3).replace(/\.?0+e/, "e").replace("-", "−");
-  return String(Number(value.toPrecision(4))).replace("-", "−");
+  if (value !== 0 && (size < 1e-4 || size >= 1e6)) return value.toExponential(3).replace(/\.?0+e/, "e").replace("-", "−");
+  return String(size < 1e4 ? Number(value.toPrecision(4)) : Math.round(value)).replace("-", "−");
 }
 
 for (const button of document.querySelectorAll("[data-copy]")) {

@@ -7,12 +7,14 @@ import { choice, element, keep, root, select, state, text, words } from "./page.
 const MOST_LINES = 8;
 const GREEK = "σ";
 const DASHES = ["solid", "dash", "dot", "dashdot"];
-const FIRST = {
-  map: () => true,
-  depth: (each) => each.name === "residual_profile",
-  contact: (each) => each.name === "contact_pressure",
-  line: (each) => each.name === "surface_residual",
+const FIRST = { depth: "residual_profile", contact: "contact_pressure", line: "surface_residual" };
+const BELONGS = {
+  depth: ({ along }) => along === "depth",
+  contact: ({ along }) => along === "s",
+  history: ({ along }) => along === "increment",
+  line: () => true,
 };
+const PARTS = ["map", ...Object.keys(BELONGS)];
 
 const query = (given) => new URLSearchParams(Object.entries(given).filter(([, value]) => value)).toString();
 
@@ -39,25 +41,26 @@ export class Pictures {
     }
     const empty = !this.fields.maps.length && !this.fields.lines.length;
     for (const each of document.querySelectorAll("[data-picture]")) each.hidden = empty;
-    if (!empty) await Promise.all(["map", "depth", "contact", "line"].map((part) => this.#part(part)));
+    if (!empty) await Promise.all(PARTS.map((part) => this.#part(part)));
   }
 
   #each(act) {
     for (const chart of document.querySelectorAll("[data-chart]")) {
-      if (["map", "depth", "contact", "line"].includes(chart.dataset.chart)) act(chart.dataset.chart, chart);
+      if (PARTS.includes(chart.dataset.chart)) act(chart.dataset.chart, chart);
     }
   }
 
   async #part(part) {
     const chart = document.querySelector(`[data-chart="${part}"]`);
     if (!chart) return;
-    const known = part === "map" ? this.fields.maps : this.fields.lines.filter((each) => this.#belongs(part, each));
+    const known = part === "map" ? this.fields.maps : this.fields.lines.filter(BELONGS[part]);
+    if (part === "history") chart.closest("figure").hidden = !known.length;
     if (!known.length) {
       document.querySelector(`[data-controls="${part}"]`).replaceChildren();
       fail(chart, "This run has no such values.");
       return;
     }
-    const field = known.find((each) => each.name === state.get(part)) ?? known.find(FIRST[part]) ?? known[0];
+    const field = known.find((each) => each.name === state.get(part)) ?? known.find(({ name }) => name === FIRST[part]) ?? known[0];
     const components = field.components ?? [];
     const component = components.includes(state.get(`${part}.component`)) ? state.get(`${part}.component`) : components[0];
     const stages = (part === "map" && field.stages) || [];
@@ -78,12 +81,6 @@ export class Pictures {
     }
   }
 
-  #belongs(part, each) {
-    if (part === "depth") return each.name.includes("profile");
-    if (part === "contact") return !each.name.includes("profile");
-    return true;
-  }
-
   #controls(part, known, field, components, component, stages, stage) {
     const again = (changes) => {
       keep(changes);
@@ -98,9 +95,9 @@ export class Pictures {
       parts.push(choice("Stage", stages.map((each) => ({ name: each, words: words(each) })), stage, (name) => again({ [`${part}.stage`]: name })));
     }
     if (part === "map") {
-      const box = element("input", { type: "checkbox", checked: state.has("scale") });
-      box.addEventListener("change", () => again({ scale: box.checked ? this.high?.toPrecision(6) : null }));
-      parts.push(element("label", { title: "other runs are drawn with these colours" }, box, "Keep colours"));
+      const scales = [{ name: "", words: "of each run" }, { name: "shared", words: "shared" }];
+      const now = state.has("scale") ? "shared" : "";
+      parts.push(element("label", { title: "shared: other runs are drawn with the colours of this one" }, "colours", choice("Colours", scales, now, (name) => again({ scale: name && this.high?.toPrecision(6) }))));
     }
     document.querySelector(`[data-controls="${part}"]`).replaceChildren(...parts);
   }
@@ -109,17 +106,23 @@ export class Pictures {
     this.high = Number(state.get("scale")) || found.head.high;
     await drawMap(chart, found, this.high);
     const note = document.querySelector('[data-note="map"]');
-    if (note) note.textContent = state.has("scale") ? `Colours end at ${text(this.high)} ${found.head.unit}, as kept.` : found.head.note;
+    if (note) note.textContent = state.has("scale") ? `Colours end at ${text(this.high)} ${found.head.unit}, of all runs.` : found.head.note;
   }
 }
 
 export function drawMap(chart, { head, arrays }, high) {
   const { across, up, name, unit } = head;
   const x = arrays[across.name].values, y = arrays[up.name].values, z = rows(arrays[name]);
+  const margin = { l: 62, r: 74, t: 10, b: 48 };
+  const side = (values) => Math.abs(values[values.length - 1] - values[0]) || 1;
+  const tall = () => { // the map fills the width, or the height: its colour bar is as tall as the map
+    const [wide, most] = [chart.clientWidth - margin.l - margin.r, chart.clientHeight - margin.t - margin.b];
+    return Math.min(most, (wide * side(y)) / side(x));
+  };
   return draw(chart, () => ({
     traces: [{
       type: "heatmap", x, y, z, zmin: head.signed ? -high : 0, zmax: high, hoverongaps: false,
-      colorscale: head.signed ? SIGNED : SEQUENTIAL, colorbar: bar(named(unit ? "" : head.words, unit).trim()),
+      colorscale: head.signed ? SIGNED : SEQUENTIAL, colorbar: { ...bar(named(unit ? "" : head.words, unit).trim()), lenmode: "pixels", len: tall() + 20 },
       hovertemplate: `${across.name} %{x:.4~g} ${plain(across.unit)}, ${up.name} %{y:.4~g} ${plain(up.unit)}<br><b>%{z:.4~g} ${plain(unit)}</b><extra></extra>`,
     }, ...(head.edge ? [{
       type: "scatter", mode: "markers", x: [-head.edge, head.edge], y: [0, 0], cliponaxis: false,
@@ -129,7 +132,7 @@ export function drawMap(chart, { head, arrays }, high) {
     layout: {
       xaxis: { title: { text: named(across.words, across.unit) }, zeroline: false, showgrid: false, constrain: "domain" },
       yaxis: { title: { text: named(up.words, up.unit) }, zeroline: false, showgrid: false, scaleanchor: "x", constrain: "domain" },
-      margin: { r: 70 },
+      margin,
     },
   }));
 }
@@ -160,13 +163,21 @@ export function drawLines(chart, found, names = [], label = null) {
     return {
       traces,
       layout: {
-        xaxis: { title: titled(chart, along.words, along.unit), zeroline: false, showgrid: false },
+        xaxis: { title: titled(chart, along.words, along.unit), zeroline: false, showgrid: false, ...(along.name === "depth" ? { range: decayed(traces) } : {}) },
         yaxis: { title: { text: head.unit ? named("", head.unit).trim() : "" } },
         showlegend: traces.length > 1,
         legend: { title: { text: names.length ? "" : over.filter(({ labels }) => labels.length > 1).map(({ name }) => words(name)).join(", ") + "&nbsp;" } },
       },
     };
   });
+}
+
+// The depth below which no line is seen to differ from zero.
+function decayed(traces) {
+  let most = 0, depth = 0;
+  for (const { y } of traces) for (const each of y) most = Math.max(most, Math.abs(each) || 0);
+  for (const { x, y } of traces) y.forEach((each, k) => Math.abs(each) > 0.01 * most && (depth = Math.max(depth, x[k])));
+  return depth ? [0, 1.1 * depth] : null;
 }
 
 export function combinations(over) {

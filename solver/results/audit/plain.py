@@ -40,6 +40,8 @@ the whole force: loads may bend and jump."""
 _GAUSS = (0.5 - 0.75**0.5 / 3, 0.5 + 0.75**0.5 / 3)
 _INSIDE = (0.5, 1e-6, 1 - 1e-6)
 """Gauss points of a chord; its middle, and its ends, where neighbours may have other loads."""
+GHOST = 1e-7
+"""Share of stiffness that elements keep when they are removed."""
 _VOLUME_DEGREE = 10
 """Polynomial degree up to which forces per volume are integrated exactly."""
 
@@ -144,9 +146,10 @@ class PlainBody:
         volume, nodes = self.volume.sum(axis=1), self._nodes
         count = self.part.X.shape[1]
         weighted = values.reshape(*values.shape[:-1], *self.volume.shape) * volume[:, None]
-        each = np.moveaxis(weighted @ to_nodes.T, -1, -2).reshape(-1, nodes.size)
-        total = np.bincount(nodes.ravel(), np.tile(volume, len(nodes)), count)
-        total[total == 0] = 1.0  # copies of a periodic body belong to no element
+        gone = np.isnan(weighted).reshape(-1, *self.volume.shape).any(axis=(0, 2))
+        each = np.moveaxis(np.nan_to_num(weighted) @ to_nodes.T, -1, -2).reshape(-1, nodes.size)
+        total = np.bincount(nodes.ravel(), np.tile(np.where(gone, 0, volume), len(nodes)), count)
+        total[total == 0] = np.nan if gone.any() else 1.0  # 1: copies of a periodic body
         sums = np.stack([np.bincount(nodes.ravel(), one, count) for one in each]) / total
         return np.asarray(sums[:, self.part.same].reshape(*values.shape[:-1], count))
 
@@ -173,7 +176,20 @@ class PlainBody:
                 factor = load_factor(load.amplitude, time)
                 stiff -= factor * lost[0]
                 strong -= factor * lost[1]
-        return stiff, strong
+        return self.left(time) * stiff, strong
+
+    def left(self, time: float) -> Array:
+        """Return the shares of stiffness (n_points,) that removal leaves; 1 where none is."""
+        left = np.ones(self.volume.shape)
+        for load in self.body.every_load:
+            if load.removes:
+                elements = np.asarray(self.body.mesh.subdomains[load.removes])
+                left[elements] -= load_factor(load.amplitude, time)
+        return np.maximum(left, GHOST).ravel()
+
+    def known(self, values: Array, time: float) -> Array:
+        """Return values (..., n_points), NaN in elements that are removed."""
+        return np.where(self.left(time) > GHOST, values, np.nan)
 
     def law(self, time: float) -> Law:
         """Return the law of the points at a time."""

@@ -61,7 +61,7 @@ class OfStates:
     def held(self, name: str, stage: str) -> tuple[Array, Array]:
         """Return the solved and the declared displacements (2, n_nodes) each [mm].
 
-        Declared are those of supports and moved boundaries, NaN elsewhere.
+        Declared are those of supports and moved boundaries, NaN elsewhere and in removed elements.
         """
         body, fields = self.plain(name).body, self.fields(name, stage)
         declared = np.full_like(fields.displacement, np.nan)
@@ -75,7 +75,8 @@ class OfStates:
                 moved[key] = moved.get(key, 0.0) + factor * load.components[key[1]]
         for (boundary, axis), value in moved.items():
             declared[axis, self.plain(name).part.boundary_nodes(boundary)] = value
-        return fields.displacement, declared
+        moved_to = fields.displacement
+        return moved_to, np.where(np.isnan(moved_to), np.nan, declared)
 
     @property
     def _travelling(self) -> TravellingPressure | None:

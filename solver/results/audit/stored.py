@@ -122,7 +122,8 @@ class _Viewed:
         for name in self._run.system.names:
             for stage in self._view.stages:
                 found, declared = source.held(name, stage)
-                self._out.add("displacement", found, declared, float(np.abs(found).max()))
+                scale = float(np.nanmax(np.abs(found)))
+                self._out.add("displacement", found, declared, scale)
 
     # -- scales --------------------------------------------------------------------------------
 
@@ -295,17 +296,18 @@ class _Viewed:
             y = np.concatenate([X[1] for X, _, _ in each])
             flow = np.concatenate([strain for _, _, strain in each])
             scale = self._strain_scale(flow)
-            self._number("max_plastic_strain", float(flow.max()), scale)
+            self._number("max_plastic_strain", float(np.nanmax(flow)), scale)
             depth = numbers.get("depth_of_max_plastic_strain", np.nan)
             if np.isfinite(depth):
                 there = np.abs(y + depth) <= np.abs(y + depth).min()
-                self._out.add("depth_of_max_plastic_strain", flow[there].max(), flow.max(), scale)
+                most = np.nanmax(flow[there]), np.nanmax(flow)
+                self._out.add("depth_of_max_plastic_strain", *most, scale)
         if "peak_residual_tension" in numbers:
             normal = np.concatenate(
                 [self._source.fields(n, self._view.unloaded).stress[:3].ravel() for n in bodies]
             )
-            self._number("peak_residual_tension", float(normal.max()), self.stress_scale)
-            self._number("peak_residual_compression", float(normal.min()), self.stress_scale)
+            self._number("peak_residual_tension", np.nanmax(normal), self.stress_scale)
+            self._number("peak_residual_compression", np.nanmin(normal), self.stress_scale)
         for k, (name, boundary) in enumerate(self._view.surfaces.items()):
             if self._stored("residual_max") is None:
                 return
@@ -313,7 +315,7 @@ class _Viewed:
             X = fields.plain.part.X
             surface = fields.plain.part.boundary_nodes(boundary)
             s = along(self._view, X[:, surface])
-            for kind, of in (("max", np.max), ("min", np.min)):
+            for kind, of in (("max", np.nanmax), ("min", np.nanmin)):
                 for prefix, stress, places, axes in (
                     ("residual", fields.stress, X, AXES[: len(X)]),
                     ("surface_residual", fields.stress[:, surface], s[None], ("s",)),
@@ -334,7 +336,7 @@ class _Viewed:
         for component in np.flatnonzero(np.isfinite(where).all(axis=0)):
             off = np.abs(places - where[:, component, None]).max(axis=0)
             there = stress[component, off <= off.min() + 1e-9 * np.abs(places).max()]
-            near = np.abs(there - own[component]).min()
+            near = np.nanmin(np.abs(there - own[component]))
             self._out.add(f"{name}_{axes[0]}", near, 0.0, self.stress_scale)
 
 

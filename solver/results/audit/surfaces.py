@@ -224,6 +224,8 @@ class Surfaces:
         if small:  # places and directions are those of the bodies at rest
             n = _normals(slave.X, slave, edges, xi)
             partner = _Partner(master.X, master, on_slave(slave.X), n, self._overlap)
+        if self.pair.presence is not None and not load_factor(self.pair.presence, state.time):
+            true.faces, partner.faces = 0 * true.faces, 0 * partner.faces  # there is no pair
         t = np.stack([-n[1], n[0]])
         apart = partner.of(xm) - on_slave(xs)
         moved = on_slave(xs - xs0) - partner.of(xm - xm0)

@@ -62,7 +62,8 @@ class StateFields:
         stress[3] /= SQRT2
         none = self._plastic is None
         flow = np.zeros(stress.shape[1]) if none else self._plastic.accumulated  # type: ignore[union-attr]
-        return stress, flow
+        known = self.plain.known
+        return known(stress, self._time), known(flow, self._time)
 
     @cached_property
     def stress(self) -> Array:
@@ -81,8 +82,8 @@ class StateFields:
 
     @property
     def displacement(self) -> Array:
-        """Displacements of the nodes."""
-        return np.asarray(self._u.reshape(-1, 2).T)
+        """Displacements of the nodes; NaN where all elements are removed."""
+        return np.where(np.isnan(self.mises), np.nan, self._u.reshape(-1, 2).T)
 
     @property
     def at_points(self) -> tuple[Array, Array, Array]:
@@ -251,6 +252,7 @@ class Located:
 
     def of(self, nodal: Array) -> Array:
         """Return nodal fields (..., n_nodes) at the places (..., n); NaN outside the body."""
-        out = np.full((*nodal.shape[:-1], self._count), np.nan)
-        out[..., self._at] = (nodal[..., self._nodes] * self._shape).sum(axis=-2)
+        out, at = np.full((*nodal.shape[:-1], self._count), np.nan), nodal[..., self._nodes]
+        each = np.where(np.isnan(at) & (np.abs(self._shape) < _INSIDE), 0.0, at * self._shape)
+        out[..., self._at] = each.sum(axis=-2)
         return out

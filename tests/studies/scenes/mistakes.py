@@ -203,6 +203,21 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "loads[0].amplitude",
         "one of pressed",
     ),
+    "unknown region that is removed": (
+        put("stages", 0, "remove", ["upper.skin"]),
+        "stages[0].remove",
+        "must name a region of upper: it has none",
+    ),
+    "region without elements": (
+        put("bodies", "upper", "regions", {"skin": {"x": [90.0, 91.0]}}),
+        "bodies.upper.regions.skin",
+        "has no element in its box",
+    ),
+    "unknown stage of a pair": (
+        put("contacts", 0, "active", ["later"]),
+        "contacts[0].active",
+        "one of pressed",
+    ),
     "output nowhere": (
         without("outputs", "least", "body"),
         "outputs.least",

@@ -1,0 +1,183 @@
+"""The data set of a study: as its last end left it, and before its first one of the runs there are.
+
+The latter is made in another process, in a folder for temporary files, when somebody asks for it,
+and again when runs have been added. One that took long is made seldom: a study that adds a run each
+second would keep a processor busy.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import time
+from collections import OrderedDict
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from service.errors import Busy, Conflict, NotFound
+from service.guarded import Guarded
+from service.job import Job, StudyState
+from service.jobs import Jobs
+from service.overview import chooses
+from studies import Store, Study
+from studies.errors import FileDamaged, StoreFull
+from studies.scratch import scratch
+from studies.storage.seal import State, state_of
+from studies.storage.tiles import Tiles
+
+KEPT = 4
+"""Number of studies whose data set is kept."""
+
+REST = 10.0
+"""Time for which a data set is kept though runs were added, as a multiple of that of making it."""
+
+SECONDS = 600.0
+"""Longest time of making one [s]."""
+
+PATIENCE = 20.0
+"""Time that a request waits for one [s]; then it is told to ask later."""
+
+WAITING = 8
+"""Number of studies whose data sets may wait to be made."""
+
+
+@dataclass(slots=True)
+class _Offered:
+    """A data set: of which state of the catalogue, where it is, and until when it stays."""
+
+    of: State | None = None
+    path: Path | None = None
+    until: float = 0.0
+    number: int = 0
+    task: asyncio.Task[Path] | None = None
+
+
+class Datasets:
+    """The data sets of the studies in the queue.
+
+    Parameters
+    ----------
+    jobs, store : the queue and the store
+    """
+
+    def __init__(self, jobs: Jobs, store: Store) -> None:
+        self.jobs, self.store = jobs, store
+        self.process = Guarded("data set", WAITING, SECONDS)
+        self.made: OrderedDict[str, _Offered] = OrderedDict()
+        self.folders = ExitStack()
+        self.folder: Path | None = None
+        self.layouts: dict[str, tuple[str, int]] = {}
+
+    def ended(self, job: Job) -> Path:
+        """Return the path of the data set that the last end of a study left, checked.
+
+        Raises
+        ------
+        NotFound
+            if there is none yet
+        Busy
+            if it was lost or damaged, and is made again
+        """
+        try:
+            return self.store.dataset(job.id)
+        except FileDamaged as error:
+            held = error.state is not None or job.state is StudyState.SUCCESSFUL
+        if held and job.state.final and job.state is not StudyState.DISMISSED:
+            with suppress(Conflict):
+                self.jobs.retry(job.id, failed=False)
+            raise Busy(
+                "the data set was lost or damaged, and is made again from the runs: ask later"
+            )
+        raise NotFound(
+            f"no data set yet: it is written when the work ends, and the study is {job.state}"
+        )
+
+    async def current(self, job: Job) -> Path:
+        """Return the path of that of `ended`, or before the first end of one of the runs there are.
+
+        Raises
+        ------
+        NotFound
+            if the study chooses its runs, and has not ended
+        Busy
+            if it is being made
+        """
+        try:
+            return await asyncio.to_thread(self.ended, job)
+        except NotFound:
+            return await self._partial(job)
+
+    async def tiles(self, job: Job) -> Tiles:
+        """Return the current data set of a study as a Zarr store; errors as `current`."""
+        path = await self.current(job)
+        found = await asyncio.to_thread(Tiles, path)
+        layout, turn = self.layouts.get(job.id, (found.layout, 0))
+        if layout != found.layout:
+            turn += 1
+        self.layouts[job.id] = found.layout, turn
+        return await asyncio.to_thread(Tiles, path, turn) if turn else found
+
+    async def _partial(self, job: Job) -> Path:
+        """Return the path of the data set of a study as it is now, or was a little before."""
+        study = await asyncio.to_thread(self.jobs.study, job.id)
+        if chooses(study):
+            raise NotFound(
+                f"no data set yet: what the study finds is known at its end, and it is {job.state}"
+            )
+        made = self.made.setdefault(job.id, _Offered())
+        self.made.move_to_end(job.id)
+        if made.task is None or made.task.done():
+            made.task = asyncio.create_task(self._current(job.id, study, made))
+        try:
+            return await asyncio.wait_for(asyncio.shield(made.task), PATIENCE)
+        except TimeoutError:
+            raise Busy("the data set is being made of the runs that are there: ask later") from None
+
+    async def _current(self, study_id: str, content: dict[str, Any], made: _Offered) -> Path:
+        of = await asyncio.to_thread(state_of, self.store.catalogue.path)
+        if made.path and (made.of == of or time.monotonic() < made.until):
+            return made.path
+        began = time.monotonic()
+        if self.folder is None:
+            self.folder = self.folders.enter_context(scratch())
+        made.number += 1
+        target = self.folder / f"{study_id}-{made.number}.nc"
+        given = content, self.store.directory.resolve(), target
+        try:
+            async with self.process.turn():
+                await self.process.call(combined, *given, name=study_id)
+        except StoreFull:  # not the data directory
+            raise OSError(errno.ENOSPC, "no room is left for temporary files") from None
+        made.of, made.path = of, target
+        now = time.monotonic()
+        made.until = now + REST * (now - began)
+        self._forget(study_id, made.number - 2)  # the one before may still be sent
+        while len(self.made) > KEPT:
+            gone, old = self.made.popitem(last=False)
+            self._forget(gone, old.number)
+        return target
+
+    def _forget(self, study_id: str, last: int) -> None:
+        """Delete the files of a study up to this number."""
+        assert self.folder is not None
+        for path in self.folder.glob(f"{study_id}-*.nc"):
+            with suppress(ValueError):
+                if int(path.stem.rpartition("-")[2]) <= last:
+                    path.unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """Delete all of them."""
+        self.folder = None
+        self.made.clear()
+        self.folders.close()
+
+
+def combined(content: dict[str, Any], directory: Path, target: Path) -> None:
+    """Write the data set of the runs of a study that are there; called in another process."""
+    from studies.storage.combine import combine
+
+    store = Store(directory)
+    study = Study.known(content, store.scene)
+    combine(study, store, study.cases(), target=target)

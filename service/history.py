@@ -1,0 +1,29 @@
+"""What happened to a study: its states, what it waited for, and the ends of its runs."""
+
+from __future__ import annotations
+
+from service.job import Job
+from service.jobs import Jobs
+from service.table import BATCH
+from studies import Store
+
+
+def log_of(job: Job, jobs: Jobs, store: Store) -> str:
+    """Return a line for each thing that happened to a study, in the order of time.
+
+    Runs that were there before it was accepted come first. Of a study that an earlier version
+    accepted only the times of its row are known.
+    """
+    lines = jobs.told(job.id)
+    if not lines:
+        begun = [(job.submitted, "accepted"), (job.started, "running")]
+        ended = [(job.finished, f"{job.state}: {job.message}".removesuffix(": "))]
+        lines = [(at, words) for at, words in begun + ended if at]
+    runs = jobs.runs(job.id)
+    for first in range(0, len(runs), BATCH):
+        for row in store.catalogue.rows(runs[first : first + BATCH]).values():
+            seconds = "" if row["cpu_seconds"] is None else f", {row['cpu_seconds']:.3g} s of CPU"
+            words = f"run {row['id']}: {row['status']}{seconds}"
+            said = " ".join(str(row["message"]).split())
+            lines.append((str(row["created"]), f"{words}: {said}" if said else words))
+    return "".join(f"{at}  {words}\n" for at, words in sorted(lines, key=lambda each: each[0]))

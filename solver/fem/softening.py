@@ -1,0 +1,90 @@
+"""Loss of stiffness and strength: by heat, and of elements that are removed.
+
+An element that is removed loses its stiffness in proportion to the share of it that is gone. So the
+forces by which it holds its neighbours go to zero along a path that has an equilibrium everywhere,
+and its work is known. `_GHOST` of the stiffness is left: its nodes follow, and the equations keep
+their form. Its yield stress stays, so that it does not yield on the way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.fem.loads import Superposed
+from solver.materials.heated import Heated
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.fem.nodes import Nodes
+    from solver.materials import Law
+
+_LEAST = 0.05
+"""Least permitted ratio of Young's modulus, and of the yield stress, to its value when cold."""
+_GHOST = 1e-7
+"""Ratio of the stiffness that elements keep when they are removed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Softening:
+    """Relative losses (n,) of Young's modulus and yield stress at places, and removal, times loads.
+
+    ``removed`` is 1 in the elements that a load removes.
+    """
+
+    modulus: Superposed
+    strength: Superposed
+    removed: Superposed
+
+    @classmethod
+    def of(
+        cls, part: Nodes, x: NDArray[np.float64], elements: NDArray[np.int64] | None = None
+    ) -> Softening | None:
+        """Return the losses that the loads of a body cause at places x (2, n); None if none.
+
+        ``elements`` (n,) are those that the places belong to; without them nothing is removed.
+        """
+        body, n = part.body, x.shape[1]
+        both = [(load, load.softening(x)) for load in body.every_load]
+        lost = [(load, shares) for load, shares in both if shares is not None]
+        gone = [
+            (load, np.isin(elements, body.region(load.removes)).astype(float))
+            for load in body.every_load
+            if load.removes and elements is not None
+        ]
+        if not (lost or gone):
+            return None
+        return cls(
+            Superposed.of(n, ((load, modulus) for load, (modulus, _) in lost)),
+            Superposed.of(n, ((load, strength) for load, (_, strength) in lost)),
+            Superposed.of(n, gone),
+        )
+
+    def law(self, cold: Law, time: float) -> Law:
+        """Return the law at a time; the cold law itself while nothing has changed."""
+        left = 1 - (1 - _GHOST) * np.minimum(self.removed.at(time), 1.0)
+        stiff = left * _left(self.modulus, "modulus_drop", time)
+        strong = self.strong(time)
+        unchanged = (stiff == 1).all() and (strong == 1).all()
+        return cold if unchanged else Heated(law=cold, stiff=stiff, strong=strong)
+
+    def gone(self, time: float) -> NDArray[np.bool_]:
+        """Return whether elements at the places (n,) are removed at a time."""
+        return np.asarray(self.removed.at(time) >= 1)
+
+    def strong(self, time: float) -> NDArray[np.float64]:
+        """Return the ratio (n,) of the yield stress at a time to its value when cold."""
+        return _left(self.strength, "yield_drop", time)
+
+
+def _left(lost: Superposed, name: str, time: float) -> NDArray[np.float64]:
+    """Return the remaining ratios at a time, or raise `ModelError` if one is below `_LEAST`."""
+    share = 1 - lost.at(time)
+    if not share.min() >= _LEAST:
+        allowed = f"must be at least {_LEAST:g} at every temperature (time {time:.6g})"
+        raise ModelError(f"1 - {name} * rise", round(float(share.min()), 6), allowed)
+    return np.asarray(share)

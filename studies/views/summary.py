@@ -1,0 +1,204 @@
+"""A short view of a study: how far it is, its axes, its audit, its failed runs.
+
+As text, and as HTML in a notebook.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from studies.definition.sweep import labels
+from studies.definition.vocabulary import MISSING, OK
+from studies.views.audited import Worst, worst
+from studies.views.columns import aligned, value_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+WIDTH = 28
+"""Number of characters of a bar."""
+
+NAMED = 4
+"""Largest number of values of an axis, and of failed runs, that are named."""
+
+_LONGEST = 100
+"""Largest number of characters of a message."""
+_HTML = """<div style="font-size: 90%; max-width: 46em">
+<div><b>{name}</b> · scene {scene} · {standing}</div>
+<div style="background: #8884; margin: 4px 0">\
+<div style="width: {percent:.1f}%; height: 6px; background: {colour}"></div></div>
+<table style="text-align: left"><tbody>
+{rows}
+</tbody></table></div>"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Failed:
+    """A run that has no result: where it is on the axes, its status, and the reason."""
+
+    place: str
+    status: str
+    message: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Summary:
+    """A study in a few lines; a notebook shows it as HTML.
+
+    Attributes
+    ----------
+    name, scene, status : of the study
+    progress : completed fraction of the work, 0 to 1
+    counts : number of runs by status
+    axes : name of each axis, with its values in words
+    audit : the figure of the audit nearest to its limit, with the place of its run; None if there
+        is none
+    failed : the first failed runs
+    """
+
+    name: str
+    scene: str
+    status: str
+    progress: float
+    counts: Mapping[str, int]
+    axes: Mapping[str, str]
+    audit: tuple[Worst, str] | None
+    failed: Sequence[Failed]
+
+    def __str__(self) -> str:
+        """Return the view as text."""
+        first = f"{self.name}: scene {self.scene}, {self._standing}"
+        rows = aligned(self._rows) if self._rows else ""
+        return f"{first}\n{bar(self.progress)}\n{rows}".rstrip()
+
+    def _repr_html_(self) -> str:
+        """Return the view as a notebook shows it."""
+        cell = '<td style="text-align: left; padding: 1px 8px">{}</td>'
+        rows = ("".join(cell.format(escape(text)) for text in row) for row in self._rows)
+        return _HTML.format(
+            name=escape(self.name),
+            scene=escape(self.scene),
+            standing=escape(self._standing),
+            percent=100.0 * self.progress,
+            colour="#b3401f" if self._lost else "#2f6f9f",
+            rows="\n".join(f"<tr>{each}</tr>" for each in rows),
+        )
+
+    @property
+    def _standing(self) -> str:
+        counted = ", ".join(f"{count} {status}" for status, count in self.counts.items())
+        return f"{self.status} ({counted})" if counted else self.status
+
+    @property
+    def _lost(self) -> int:
+        """Number of failed runs."""
+        waits = (OK, MISSING, "pending")
+        return sum(count for status, count in self.counts.items() if status not in waits)
+
+    @property
+    def _rows(self) -> list[tuple[str, str]]:
+        rows = list(self.axes.items())
+        if self.audit:
+            figure, place = self.audit
+            value, limit = value_text(figure.value), value_text(figure.limit)
+            where = f" at {place}" if place else ""
+            rows.append(("worst of the audit", f"{figure.name} = {value}, limit {limit}{where}"))
+        for each in self.failed:
+            rows.append((each.status, f"{each.place}: {each.message}"[:_LONGEST]))
+        if (more := self._lost - len(self.failed)) > 0:
+            rows.append(("", f"and {more} more failed runs"))
+        return rows
+
+
+def summary(study: xr.Dataset | Path | str) -> Summary:
+    """Return a short view of a study that is stored.
+
+    Parameters
+    ----------
+    study : its data set, or what `open_study` opens
+
+    Raises
+    ------
+    StudyError
+        if there is no such study
+    """
+    import numpy as np
+
+    from studies.views.picking import sweep_axes
+    from studies.views.reading import open_study
+
+    if isinstance(study, Path | str):
+        with open_study(study) as opened:
+            return summary(opened)
+    names = sweep_axes(study)
+    status, message = (study[name].to_numpy() for name in ("status", "message"))
+    numbers = {str(n): v.to_numpy() for n, v in study.data_vars.items() if v.dims == (*names,)}
+    first = next(iter(worst(numbers)), None)
+    words, count = np.unique(status.astype(str), return_counts=True)
+    lost = [at for at in np.ndindex(status.shape) if status[at] not in (OK, MISSING)]
+
+    def place(at: Sequence[int]) -> str:
+        here = zip(names, at, strict=True)
+        return placed({n: study[n].to_numpy()[k] for n, k in here if study.sizes[n] > 1})
+
+    counts = dict(zip(words.tolist(), count.tolist(), strict=True))
+    return Summary(
+        name=str(study.attrs["title"]),
+        scene=str(study.attrs["scene"]),
+        status="complete" if MISSING not in counts else "not complete",
+        progress=1.0 - counts.get(MISSING, 0) / status.size,
+        counts=counts,
+        axes={n: _values(study[n].to_numpy().tolist(), _unit(study[n])) for n in names},
+        audit=None
+        if first is None
+        else (first, place([int(k) for k in np.unravel_index(first.at, status.shape)])),
+        failed=[
+            Failed(place=place(at), status=str(status[at]), message=str(message[at]))
+            for at in lost[:NAMED]
+        ],
+    )
+
+
+def summary_of(
+    detail: Mapping[str, Any], audit: tuple[Worst, str] | None, failed: Sequence[Failed]
+) -> Summary:
+    """Return the view of a study of a service, from what it tells: its ``GET /studies/{id}``."""
+    return Summary(
+        name=detail["name"],
+        scene=detail["scene"],
+        status=detail["status"],
+        progress=detail["progress"] / 100.0,
+        counts=detail["counts"],
+        axes={name: _values(labels(name, axis)) for name, axis in detail["sweep"].items()},
+        audit=audit,
+        failed=failed[:NAMED],
+    )
+
+
+def placed(place: Mapping[str, Any]) -> str:
+    """Return the place of a run in words."""
+    return ", ".join(f"{name} = {value_text(value)}" for name, value in place.items())
+
+
+def bar(fraction: float) -> str:
+    """Return a bar with its percentage."""
+    filled = round(WIDTH * fraction)
+    return f"{'█' * filled}{'·' * (WIDTH - filled)} {100 * fraction:3.0f} %"
+
+
+def _values(values: Sequence[Any], unit: str = "") -> str:
+    """Return the values of an axis, of many the ends and their number."""
+    if len(values) > NAMED:
+        text = f"{value_text(values[0])} … {value_text(values[-1])} ({len(values)})"
+    else:
+        text = ", ".join(map(value_text, values))
+    return f"{text} {unit}".rstrip()
+
+
+def _unit(values: xr.DataArray) -> str:
+    unit = str(values.attrs.get("units", ""))
+    return "" if unit == "1" else unit

@@ -1,0 +1,181 @@
+"""The data set of a study while it runs, and as a Zarr store."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import uvicorn
+import xarray as xr
+from fastapi.testclient import TestClient
+
+from service import datasets
+from service.app import create_app
+from service.guarded import Guarded
+from service.settings import Settings
+from studies import Store, open_study
+from studies.storage.tiles import KEYS, Tiles
+from tests.service.servers import free_port
+from tests.studies.conftest import compute_here, fake_study
+
+AXES = {"load_ratio": [0.3, 0.9], "friction": [0.0, 0.2, 0.4], "hardening": ["none", "isotropic"]}
+
+
+class Running:
+    """A service that computes nothing, with a study of which a half has been computed."""
+
+    def __init__(self, home: Path) -> None:
+        self.study, self.store = fake_study(sweep=AXES), Store(home / "out")
+        self.half = fake_study(sweep=AXES | {"hardening": ["none"]})
+        compute_here(self.half, self.store)
+        self.app = create_app(Settings(data=self.store.directory))
+        self.jobs = self.app.state.jobs
+        self.jobs.accept(self.study.id, self.study.to_dict(), self.study.run_ids())
+        self.jobs.take()
+        self.client = TestClient(self.app, "http://localhost", raise_server_exceptions=False)
+        self.url = f"/studies/{self.study.id}"
+
+    def dataset(self, **headers: str) -> Any:
+        return self.client.get(f"{self.url}/dataset.nc", headers=headers)
+
+    @property
+    def whole(self) -> xr.Dataset:
+        """The data set of the half that has ended."""
+        return open_study(self.store.dataset_path(self.half.id))
+
+
+@pytest.fixture(autouse=True)
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make data sets in a thread of this process, which knows the fake scene."""
+
+    async def call(self: Guarded, function: Any, *given: Any, **named: Any) -> Any:
+        return await asyncio.to_thread(function, *given)
+
+    monkeypatch.setattr(Guarded, "call", call)
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+    found = Running(tmp_path_factory.mktemp("running"))
+    yield found
+    found.app.state.datasets.close()
+
+
+@contextmanager
+def served(app: Any) -> Iterator[str]:
+    """Serve an application from a thread, and give its address."""
+    port = free_port()
+    server = uvicorn.Server(uvicorn.Config(app, port=port, log_level="warning", lifespan="off"))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    while not server.started:
+        time.sleep(0.01)
+    yield f"http://127.0.0.1:{port}"
+    server.should_exit = True
+    thread.join()
+
+
+def test_a_running_study_has_a_data_set_of_the_runs_that_are_there(running: Running) -> None:
+    answer = running.dataset()
+    assert answer.status_code == 200
+    found = xr.load_dataset(io.BytesIO(answer.content), engine="h5netcdf")
+    there, missing = (found.sel(hardening=name) for name in ("none", "isotropic"))
+    ended = running.whole.sel(hardening="none")
+    xr.testing.assert_equal(there.drop_vars("hardening"), ended.drop_vars("hardening"))
+    assert set(missing["status"].to_numpy().flat) == {"missing"}
+    assert missing["residual_stress"].isnull().all()
+    assert missing["peak_residual_tension"].isnull().all()
+    assert running.dataset(**{"if-none-match": answer.headers["etag"]}).status_code == 304
+
+
+def test_a_data_set_is_made_again_when_runs_were_added_but_not_too_often(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    running = Running(tmp_path)
+    made: list[object] = []
+    combined = datasets.combined
+    monkeypatch.setattr(datasets, "combined", lambda *given: made.append(given) or combined(*given))
+    monkeypatch.setattr(datasets, "REST", 1e6)
+
+    def count() -> int:
+        return xr.load_dataset(io.BytesIO(running.dataset().content))["status"].isin("ok").sum()
+
+    assert [count(), count()] == [6, 6] and len(made) == 1
+    more = fake_study(sweep=AXES | {"load_ratio": [0.3]})
+    compute_here(more, running.store)
+    assert count() == 6, "it was made a moment ago"
+    running.app.state.datasets.made[running.study.id].until = 0.0
+    assert count() == 9 and len(made) == 2
+    running.jobs.dismiss(running.study.id)
+    assert count() == 9, "a study that was cancelled has it too"
+    folder = running.app.state.datasets.folder
+    running.app.state.datasets.close()
+    assert not folder.exists()
+
+
+def test_a_study_that_chooses_its_runs_has_none_before_its_end(running: Running) -> None:
+    goal = {"find": "first_yield", "between": [0.1, 1.0]}
+    study = {"name": "goal", "scene": "fake", "parameters": {}, "sweep": {}, "goal": goal}
+    running.jobs.accept("a" * 32, study, [], most=9, stage="0 of 1")
+    answer = running.client.get(f"/studies/{'a' * 32}/dataset.nc")
+    assert answer.status_code == 404 and "at its end" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize("ended", [True, False], ids=["ended", "running"])
+def test_xarray_opens_a_study_as_a_zarr_store(running: Running, ended: bool) -> None:
+    pytest.importorskip("zarr", reason="the extra `zarr` is not installed")
+    study = running.half if ended else running.study
+    with served(running.app) as address:
+        url = f"{address}/studies/{study.id}"
+        stored = open_study(url)
+        with xr.open_zarr(f"{url}/zarr", chunks=None) as found:
+            xr.testing.assert_equal(found.load(), stored)
+            for name, each in stored.variables.items():
+                assert found[name].attrs == each.attrs, name
+                assert (found[name].dtype == each.dtype) == (each.dtype.kind in "fi"), name
+            assert found.attrs["id"] == study.id
+
+
+def test_keys_of_a_zarr_store_are_chunks_or_nothing(running: Running) -> None:
+    def get(key: str, **headers: str) -> Any:
+        return running.client.get(f"/studies/{running.study.id}/zarr/{key}", headers=headers)
+
+    whole = get("zarr.json").json()
+    arrays = whole["consolidated_metadata"]["metadata"]
+    assert get("residual_stress/zarr.json").json() == arrays["residual_stress"]
+    sizes = arrays["residual_stress"]["chunk_grid"]["configuration"]["chunk_shape"]
+    assert sizes[:3] == [1, 1, 1], "a chunk is a run"
+    there, missing = (get(f"residual_stress/c/0/0/{k}/0/0/0") for k in (0, 1))
+    assert (there.status_code, missing.status_code) == (200, 404)
+    tag = there.headers["etag"]
+    assert get("residual_stress/c/0/0/0/0/0/0", **{"if-none-match": tag}).status_code == 304
+    for key in (
+        "", "zarr", "x", "x/c", "x/c/-1", "x/c/9", "x/c/0/0", "nothing/c/0", "nothing/zarr.json",
+        "..%2f..%2fdataset.nc", "x/c/" + "9" * 400, ".zgroup", "x/c/\ud800",
+    ):  # fmt: skip
+        assert get(key.encode("utf-8", "surrogatepass").decode("latin-1")).status_code == 404, key
+
+
+def test_one_who_read_another_layout_gets_an_error_in_place_of_values(running: Running) -> None:
+    path = running.store.dataset_path(running.half.id)
+    before = Tiles(path)
+    for turn in range(1, len(KEYS)):
+        assert before.content("x/c/0"), "the first encoding"
+        with pytest.raises(LookupError, match="open it again"):
+            Tiles(path, turn).content("x/c/0")
+    held = running.app.state.datasets
+    job = running.jobs.get(running.half.id)
+    held.layouts[job.id] = "another layout", 0
+    address = f"/studies/{job.id}/zarr/"
+    assert running.client.get(f"{address}x/c/0").status_code == 409
+    metadata = running.client.get(f"{address}x/zarr.json").json()
+    assert metadata["chunk_key_encoding"]["configuration"] == {"separator": "."}
+    assert running.client.get(f"{address}x/c.0").content == before.content("x/c/0")
+    held.layouts.clear()

@@ -1,0 +1,110 @@
+"""Pairs that come and leave: forces, the state they leave behind, balance and energy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import (
+    Amplitude,
+    Body,
+    ContactPair,
+    Material,
+    Model,
+    ModelError,
+    Moved,
+    RigidBody,
+    Stage,
+    solve,
+)
+from solver.mesh import grid
+from solver.model.rigid import arc
+
+pytestmark = pytest.mark.solves
+
+PLATE = Material(
+    youngs_modulus=2e5,
+    poisson_ratio=0.3,
+    yield_stress=300.0,
+    hardening="isotropic",
+    hardening_ratio=0.02,
+)
+MANDREL = Material(youngs_modulus=6e5, poisson_ratio=0.3)
+RISE = Amplitude([0, 1], [0, 1])
+IN, OUT = (
+    Stage(name="in", target=1.0, steps=4),
+    Stage(name="out", target=2.0, steps=4, turns=True),
+)
+
+
+def expanded(**pair):
+    """A hole of radius 5 mm that a mandrel widens far into the plastic range."""
+    y, held = np.linspace(0.0, 1.0, 3), {"bottom": "y", "top": "y"}
+    plate = Body(name="plate", mesh=grid(np.geomspace(5.0, 25.0, 15), y), material=PLATE,
+                 kinematics="axisymmetric", supports=held)  # fmt: skip
+    pin = Body(name="pin", mesh=grid(np.linspace(1.0, 5.0, 5), y), material=MANDREL,
+               kinematics="axisymmetric", supports=held)  # fmt: skip
+    contact = ContactPair(slave=("plate", "left"), master=("pin", "right"), friction=0.1,
+                          interference=0.06, amplitude=RISE, **pair)  # fmt: skip
+    return Model(bodies=(plate, pin), contacts=(contact,))
+
+
+def test_a_pair_that_leaves_leaves_the_state_of_bodies_that_are_separated():
+    """Nothing yields on the way back: the way to the state without contact does not matter."""
+    found = solve(expanded(presence=Amplitude([1, 2], [1, 0])), stages=(IN, OUT))
+    parted = solve(expanded(), stages=(IN, replace(OUT, apart=True)))
+    stress, reference = (each.stress("plate", "out") for each in (found, parted))
+    assert np.abs(reference).max() > 200.0
+    np.testing.assert_allclose(stress, reference, atol=1e-8)
+    force = np.array([increment.contact[0][0] for increment in found.history])
+    np.testing.assert_allclose(force[-5:], force[-5] * np.linspace(1, 0, 5), atol=1e-9)
+    contact = found.contact(stage="out")
+    assert np.isnan(contact.gap).all()
+    assert not contact.pressure.any()
+    for stage in ("in", "out"):
+        check = found.audit(stage)
+        assert check.passed, check.violations
+        assert check.figures["audit_energy"] < 1e-9
+
+
+def test_a_tool_passes_through_before_it_comes_and_its_forces_follow_the_surface():
+    """Under finite sliding it presses as it does alone; then it leaves, out of balance by nothing.
+
+    The first two stages would press it 1 mm deep.
+    """
+    x = np.linspace(0.0, 6.0, 13)
+    block = Body(name="block", mesh=grid(x, x - 6.0), material=PLATE,
+                 supports={"left": "x", "bottom": "xy"})  # fmt: skip
+    way = Amplitude([0, 1, 2, 3, 4], [0.0, -1.0, 0.0, -0.05, -0.05])
+
+    def tool(position, presence=None):
+        around = arc((0.0, 8.0), 8.0, (-np.pi / 2 - 0.2, -np.pi / 2 + 0.4), 48)
+        roller = RigidBody(name="roller", surfaces={"face": around}, centre=(0.0, 8.0),
+                           y=Moved(value=1.0, amplitude=position))  # fmt: skip
+        pair = ContactPair(slave=("block", "top"), master=("roller", "face"), friction=0.2,
+                           sliding="finite", presence=presence)  # fmt: skip
+        return Model(bodies=(block,), rigid=(roller,), contacts=(pair,))
+
+    press = Stage(name="press", target=3.0, steps=4)
+    alone = solve(
+        tool(Amplitude([2, 3], [0, -0.05])), stages=(Stage(name="rest", target=2.0), press)
+    )
+    through, back = Stage(name="through", target=1.0, steps=2), Stage(name="back", target=2.0)
+    stages = (through, back, press, Stage(name="gone", target=4.0, steps=3))
+    there = Amplitude([2, 3, 4], [0, 1, 0])
+    found = solve(tool(way, there), stages=stages)
+    assert not found.stages["through"].contact_forces[0].any()
+    ours, own = (each.reaction("roller", "press")[1] for each in (found, alone))
+    assert ours == pytest.approx(own, rel=1e-9)
+    force = np.array([increment.contact[0][0] for increment in found.history])[-4:]
+    np.testing.assert_allclose(force, force[0] * np.array([1, 2 / 3, 1 / 3, 0]), atol=1e-9)
+    for stage in ("press", "gone"):
+        check = found.audit(stage)
+        assert check.passed, check.violations
+
+
+def test_a_presence_below_zero_is_refused():
+    with pytest.raises(ModelError, match="presence"):
+        expanded(presence=Amplitude([0, 1], [1, -1]))
