@@ -11,7 +11,8 @@ import xarray as xr
 from studies.errors import StudyError
 from studies.storage.ugrid import keeps
 from studies.views.picking import run_file, study_of, sweep_coordinates
-from studies.views.plots.fields import line_fields, usual_field
+from studies.views.plots.fields import usual_field
+from studies.views.plots.meshed import MESH_MAPS
 from studies.views.reading import find_study, open_netcdf
 
 
@@ -37,9 +38,7 @@ def drawn_from(
 def _run_of(
     path: Path | str, dataset: xr.Dataset, field: str, selection: Mapping[str, str]
 ) -> Path | None:
-    if isinstance(path, str) or keeps(dataset) or field in line_fields(dataset):
-        return None
-    if field in dataset and dataset[field].dims == dataset["status"].dims:
+    if isinstance(path, str) or keeps(dataset) or field not in MESH_MAPS:
         return None
     found = find_study(path)
     if found.name != "dataset.nc" or not found.with_name("study.json").is_file():

@@ -17,6 +17,7 @@ from solver.mesh import grid
 from studies import Store, Study, StudyError, run_study
 from studies.scenes.scene import read_scene
 from studies.storage import ugrid
+from studies.views.kept import drawn_from
 from studies.views.reading import open_netcdf
 
 pytestmark = [pytest.mark.processes, pytest.mark.solves, pytest.mark.usefixtures("one_worker")]
@@ -187,3 +188,23 @@ def test_labels_make_another_study_of_the_same_runs() -> None:
     assert "note" not in plain.to_dict()
     again = Study.from_dict(told.to_dict(), scene=PIN)
     assert (again.id, again.note, again.tags) == (told.id, told.note, told.tags)
+
+
+def test_the_maps_of_a_study_are_drawn_on_the_mesh_of_the_run_and_numbers_over_all_runs(
+    kept: tuple[Study, Store], tmp_path: Path
+) -> None:
+    study, store = kept
+    where = store.study_directory(study.id)
+    with open_netcdf(store.dataset_path(study.id)) as dataset:
+        chosen = {"load_ratio": "0.2"}
+        with drawn_from(where, dataset, "map_mises", {**chosen, "stage": "loaded"}) as found:
+            run, left = found
+            assert left == {"stage": "loaded"}
+            assert run.attrs["id"] == next(iter(study.run_ids()))
+        for field in ("tension", "line_mises"):
+            with drawn_from(where, dataset, field, chosen) as (whole, left):
+                assert whole is dataset and left == chosen
+    out = tmp_path / "map.png"
+    select = ["--select", "load_ratio=0.5", "stage=loaded", "--deformed", "50"]
+    assert main(["plot", str(where), "--field", "map_stress", *select, "--out", str(out)]) == 0
+    assert out.read_bytes().startswith(b"\x89PNG")

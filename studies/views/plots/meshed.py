@@ -32,6 +32,8 @@ _AT_THE_END = {"residual_stress": "stress", "plastic_strain": "plastic_strain"}
 _STAGED = {"map_stress": "stress", "map_mises": "mises", "map_plastic_strain": "plastic_strain"}
 """Variables at each stage."""
 _MOVED = "map_displacement"
+MESH_MAPS = (*_AT_THE_END, *_STAGED, _MOVED)
+"""Variables that are drawn on a mesh where it is kept."""
 _NODE = "node"
 
 
@@ -61,7 +63,7 @@ def mesh_maps(run: xr.Dataset) -> list[str]:
     """Return the variables that are drawn on the mesh; none of a run without one in its plane."""
     if not keeps(run) or f"mesh_node_{AXES[2]}" in run:
         return []
-    return [*_AT_THE_END, *_STAGED, _MOVED]
+    return [*MESH_MAPS]
 
 
 def on_mesh(
