@@ -27,8 +27,9 @@ def parser() -> argparse.ArgumentParser:
     _add_run(add("run", commands.run))
     one = add("fit", commands.fit)
     one.add_argument(
-        "--measured", type=_path, nargs="+", default=[], metavar="CSV",
-        help="measured lines: columns PLACE and VALUE, named as variables of the runs, and sigma",
+        "--measured", type=_path, nargs="+", default=[], metavar="CSV[@NAME=VALUE]",
+        help="measured lines: columns PLACE and VALUE, named as variables of the runs, and sigma; "
+        "NAME=VALUE tells the place on other dimensions, such as stage=unloaded",
     )  # fmt: skip
     _add_run(one)
 
@@ -88,6 +89,17 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--port", type=_integer(0, 65535), help="default: 8000")
     one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
+
+    one = add("view", commands.view)
+    one.add_argument("path", type=_path, metavar="DIR|DATASET")
+    one.add_argument(
+        "--port", type=_integer(0, 65535), default=0, help="default: any port that is free"
+    )
+    one.add_argument("--no-browser", action="store_true", help="print the address alone")
+
+    one = add("report", commands.report)
+    one.add_argument("path", type=_place, metavar="DIR|DATASET")
+    one.add_argument("--out", "-o", type=_path, default=Path("report.html"), metavar="HTML")
 
     for more in (_add_cluster, _add_numbers, _add_access, _add_remote):
         more(add)

@@ -29,7 +29,8 @@ def run(options: argparse.Namespace) -> int:
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, run_study
     from studies.storage.store import Store
-    from studies.views.report import prepare, report
+    from studies.views.report import prepare
+    from studies.views.report import report as report_of
 
     limits = Limits(
         stall_seconds=options.stall_seconds, path_seconds=options.path_seconds,
@@ -72,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
             should_stop=lambda: bool(interrupted),
         )
     progress.close()
-    printed = report(study, store, outcome)
+    printed = report_of(study, store, outcome)
     computed = f"{len(outcome.computed)} computed in {outcome.wall_seconds:.0f} s"
     print(f"{printed.text.rstrip()}, {computed}")
     written = {outcome.dataset: outcome.anew} | dict.fromkeys(printed.files, printed.anew)
@@ -98,8 +99,7 @@ def _part(study: Study, options: argparse.Namespace) -> int:
         )  # fmt: skip
     progress.close()
     number, count = options.part
-    left = "searches" if study.asks else "loading paths"
-    others = f", {found.left} {left} are left to others" if found.left else ""
+    others = f", {found.left} loading paths are left to others" if found.left else ""
     print(f"{study.name}: part {number} of {count}: {len(found.computed)} runs computed{others}")
     return INTERRUPTED if found.stopped else OK
 
@@ -310,6 +310,25 @@ def serve(options: argparse.Namespace) -> int:
     from service.app import serve as start
 
     start(options.host, options.port, options.data, options.scheduler)
+    return OK
+
+
+def view(options: argparse.Namespace) -> int:
+    """Open pages on a folder of results, or on a data set, in the browser; nothing is computed."""
+    from service.view import view as show_pages
+
+    show_pages(options.path, options.port, not options.no_browser)
+    return OK
+
+
+def report(options: argparse.Namespace) -> int:
+    """Write a study as one HTML file that needs no server: pictures, table, audit, versions."""
+    from studies.views.archive import archive
+    from studies.views.reading import open_study
+
+    with open_study(options.path) as dataset, _written("--out", options.out) as part:
+        part.write_text(archive(dataset), encoding="utf-8")
+    print(f"wrote {options.out}")
     return OK
 
 

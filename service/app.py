@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shlex
+import socket
 import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -130,6 +131,7 @@ def assembled(settings: Settings, store: Store, jobs: Jobs, held: int | None) ->
         "details": Details(jobs, store), "tables": Tables(jobs, store),
         "pictures": Pictures(settings.map_queue, settings.map_bytes),
     }  # fmt: skip
+    app.state.only_shows = held is None
     for name, part in parts.items():
         setattr(app.state, name, part)
     # Each is outside of the previous ones, so that refused requests are measured and logged too.
@@ -187,6 +189,7 @@ def serve(
         refuse(str(error))
     except OSError as error:
         refuse(f"data = {str(settings.data)!r}: must be a directory to write in ({error.strerror})")
+    check_port(settings.host, settings.port)
     uvicorn.run(
         app,
         host=settings.host,
@@ -203,6 +206,18 @@ def serve(
         proxy_headers=settings.forwarded_allow_ips is not None,
         forwarded_allow_ips=settings.forwarded_allow_ips,
     )
+
+
+def check_port(host: str, port: int) -> None:
+    """End with one line if nobody can listen there, as when another program does."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family) as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind((host, port))
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            refuse(f"port = {port}: cannot listen on {host}, {reason}; give another by --port")
 
 
 def refuse(reason: str) -> NoReturn:

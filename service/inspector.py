@@ -23,8 +23,8 @@ from solver.errors import ModelError
 from studies import Store, StudyError
 from studies.definition.parameters import read_values
 from studies.errors import SceneError
-from studies.scenes.description import Description, mesh_names
-from studies.scenes.meshfile import FORMATS, MeshFile
+from studies.scenes.description import Description, file_names
+from studies.scenes.meshfile import FORMATS, TABLE, MeshFile
 from studies.scenes.registry import scene_named
 from studies.scenes.scene import FileScene, read_scene
 from studies.scenes.table import FILE_NAME
@@ -74,9 +74,10 @@ class Inspector:
         """
         if len(text) > LONGEST:
             raise StudyError("scene", f"{len(text)} bytes", f"must have at most {LONGEST} bytes")
+        known = (*FORMATS, TABLE)
         for name in meshes:
-            if not (FILE_NAME.fullmatch(name) and name.lower().endswith(FORMATS)):
-                allowed = f"must be the name of a file and end in one of {', '.join(FORMATS)}"
+            if not (FILE_NAME.fullmatch(name) and name.lower().endswith(known)):
+                allowed = f"must be the name of a file and end in one of {', '.join(known)}"
                 raise StudyError("meshes", name, allowed)
         self.budget.left(caller)
         async with self.process.turn(caller):
@@ -188,7 +189,7 @@ def _told(folder: Path) -> str:
 
 def _read(folder: Path) -> FileScene:
     """Return the scene in a folder; every file must be needed and valid."""
-    needed = mesh_names(Description.read(folder / _FILE).content)
+    needed = file_names(Description.read(folder / _FILE).content)
     for name in sorted({each.name for each in folder.iterdir()} - {_FILE, *needed}):
         listed = ", ".join(needed) or "(it names none)"
         raise StudyError("meshes", name, f"must be a file that the scene names: {listed}")

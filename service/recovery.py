@@ -43,7 +43,7 @@ def open_queue(
     part.unlink(missing_ok=True)
     jobs = Jobs(part)
     for study_id in store.study_ids():
-        _add(study_id, jobs, store)
+        add(study_id, jobs, store)
     jobs.resume(computed)
     # A journal of the lost file would be applied to the new one.
     path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
@@ -58,10 +58,10 @@ def _adopt(jobs: Jobs, store: Store) -> None:
             jobs.get(study_id)
         except NotFound:
             if is_id(study_id) and store.dataset_path(study_id).exists():
-                _add(study_id, jobs, store, begun=False)
+                add(study_id, jobs, store, begun=False)
 
 
-def _add(study_id: str, jobs: Jobs, store: Store, begun: bool = True) -> None:
+def add(study_id: str, jobs: Jobs, store: Store, begun: bool = True) -> None:
     """Add a study of the directory to the queue, if this version of the solver accepts it.
 
     One that the service has ``begun`` has ended if its data set is there, and all runs in it.

@@ -26,7 +26,8 @@ from studies.definition.vocabulary import STATUSES, taken
 from studies.scenes.registry import known_names, scene_named
 from studies.storage.dataset import axis_attributes
 from studies.storage.seal import state_of
-from studies.views.table import MESSAGE, RUN, STATUS, Column, RunTable, column_of, group_of
+from studies.views.figures import group_of
+from studies.views.table import MESSAGE, RUN, STATUS, Column, RunTable, column_of
 
 KEPT = 8
 """Number of tables that are kept."""

@@ -25,10 +25,12 @@ if TYPE_CHECKING:
     from solver.materials.material import Material
     from solver.model.amplitude import Amplitude
     from solver.model.body import Body
+    from solver.model.link import Link
     from solver.model.loads import Displacement, InitialStress, Pressure, Temperature, Traction
     from solver.model.model import ContactPair, Model
     from solver.model.rigid import Moved, Pushed, RigidBody
     from solver.model.singular import SingularPoint
+    from solver.model.tabulated import Tabulated
     from solver.results.audit.report import Audit
     from solver.results.record import Record, Status
     from solver.results.solution import Solution, solve
@@ -42,6 +44,7 @@ _HOMES = {
     "Displacement": "model.loads",
     "InitialStress": "model.loads",
     "LimitLoad": "errors",
+    "Link": "model.link",
     "Material": "materials.material",
     "Model": "model.model",
     "ModelError": "errors",
@@ -63,6 +66,7 @@ _HOMES = {
     "Stage": "loading.program",
     "Status": "results.record",
     "System": "contact.system",
+    "Tabulated": "model.tabulated",
     "Temperature": "model.loads",
     "Tolerances": "loading.control",
     "Traction": "model.loads",
@@ -78,6 +82,7 @@ __all__ = [
     "Displacement",
     "InitialStress",
     "LimitLoad",
+    "Link",
     "Material",
     "Model",
     "ModelError",
@@ -97,6 +102,7 @@ __all__ = [
     "Stage",
     "Status",
     "System",
+    "Tabulated",
     "Temperature",
     "Tolerances",
     "Traction",

@@ -96,6 +96,11 @@ def toml_of(data: bytes, field: str, name: str) -> dict[str, Any]:
     """
     try:
         text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        allowed = f"must be saved as UTF-8, which line {line} is not"
+        raise StudyError(field, name, allowed) from None
+    try:
         check_depth(text)
         tables = tomllib.loads(text)
         if (levels := depth(tables)) > DEEPEST:

@@ -29,9 +29,9 @@ sys.dont_write_bytecode = False
 
 
 @pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers() -> int:
-    """Return the number of test processes: one more than cores, as some wait for others."""
-    return len(os.sched_getaffinity(0)) + 1
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Return the number of test processes: one a core, and one more where tests that wait run."""
+    return len(os.sched_getaffinity(0)) + (not config.getoption("markexpr"))
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -21,31 +21,36 @@ FIRST = (
         HERE / name
         for name in (
             "test_docs.py",
-            "verification/test_mutations.py",
-            "verification/test_coarser.py",
-            "verification/test_track_ends.py",
             "verification/test_steady_laws.py",
-            "verification/test_rolling_endless.py",
-            "verification/test_rolling_table.py",
-            "verification/test_rolling.py",
-            "verification/test_rolling_elastic.py",
-            "verification/test_punch.py",
-            "verification/test_ball.py",
-            "verification/test_contact_in_time.py",
             "verification/test_shakedown.py",
             "test_examples.py",
-            "benchmarks/test_benchmarks.py",
-            "stability/test_scenes.py",
+            "verification/test_mutations.py",
+            "verification/test_rolling_table.py",
             "service/test_durability.py",
-            "service/test_together.py",
-            "studies/test_kill.py",
+            "verification/test_rolling_endless.py",
+            "verification/test_punch.py",
+            "studies/test_goal.py",
+            "benchmarks/test_benchmarks.py",
+            "verification/test_rolling.py",
+            "studies/test_fit.py",
+            "verification/test_ball.py",
+            "verification/test_track_ends.py",
             "studies/test_own_parts.py",
+            "verification/test_contact_in_time.py",
+            "verification/test_coarser.py",
+            "studies/test_kill.py",
+            "stability/test_scenes.py",
+            "verification/test_rolling_elastic.py",
+            "studies/test_grid.py",
+            "verification/test_fretting.py",
+            "verification/test_wheel_rail.py",
+            "verification/test_prism_passes.py",
             "studies/test_run.py",
         )
     ),
 )
-"""Files that take long, in the order in which they start: no core waits for them at the end.
-Those that wait a lot come last, when the folder above has ended."""
+"""Units that take long, in the order in which they start: no core waits for them at the end. One
+that starts processes and waits for them comes after some that compute."""
 
 
 class Order(LoadFileScheduling):

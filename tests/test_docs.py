@@ -41,7 +41,7 @@ BLOCK = re.compile(
     r"^```(?P<language>python|console)\n(?P<text>.*?)^```",
     re.DOTALL | re.MULTILINE,
 )
-COSTLY = re.compile(r"https?://|residua (?:run|serve|submit|status|cancel|fetch)")
+COSTLY = re.compile(r"https?://|residua (?:run|serve|view|submit|status|cancel|fetch)")
 SNIPPET = "snippet.py"
 CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
@@ -52,6 +52,7 @@ RUN = re.compile(r"run \S+ --out (?P<out>\S+)")
 FEWER = {
     "ball.toml": {"load_ratio": [1.5, 6.0], "hardening": ["none", "kinematic"]},
     "elastic-punch.toml": {"friction": [0.0, 0.4]},
+    "refined-punch.toml": {"load_ratio": [0.6, 0.9], "friction": [0.2, 0.4]},
     "wheel-rail.toml": {"passes": [1, 2]},
     "wheel-rail-lateral.toml": {"lateral_position": [-7.5, -3.0], "traction": [-0.75, 0.75]},
     "shaft-hub.toml": {"friction": [0.0, 0.2], "loading": ["interference"]},

@@ -79,6 +79,7 @@ def page(
             here=request.url.path,
             query=request.query_params,
             origin=f"{request.url.scheme}://{request.url.netloc}",
+            only_shows=request.app.state.only_shows,
             may_submit=caller is not None and caller.covers(Scope.SUBMIT),
             signed_in=COOKIE in request.cookies,
             **content,

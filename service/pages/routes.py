@@ -133,6 +133,7 @@ async def study_page(
 
 def _study(request: Request, study: Mapping[str, Any], tables: Tables) -> Response:
     table = tables.get(study["id"])
+    scene = scene_of_study(tables.store, study["scene"])
     query = dict(request.query_params)
     numbers = [each.name for each in chosen.usual(table)]
     number = query.get("number", "")
@@ -158,6 +159,7 @@ def _study(request: Request, study: Mapping[str, Any], tables: Tables) -> Respon
         request,
         "study",
         study=study,
+        scene_name=scene.name if scene else study["scene"],
         table=table,
         part=part,
         cell=_cell,
@@ -188,7 +190,7 @@ def _cell(column: Any, at: int) -> str:
 @router.get("/runs/{run_id}")
 def run_page(run: TheRun, request: Request, store: TheStore) -> Response:
     """Show a run: its maps and lines, its numbers, its audit."""
-    scene = scene_of_study(store, run["scene"])
+    scene = _scene_of_run(store, run["scene"])
     return page(
         request,
         "run",
@@ -198,6 +200,14 @@ def run_page(run: TheRun, request: Request, store: TheStore) -> Response:
         numbers=numbers_shown(run, scene),
         data={"run": run["id"]},
     )
+
+
+def _scene_of_run(store: Store, name: str) -> Scene | None:
+    """Return the scene of a run, which has the name of its scene, not the id of a posted one."""
+    if name in known_names():
+        return scene_of_study(store, name)
+    posted = store.scenes(limit=2, name=name)
+    return scene_of_study(store, posted[0].id) if len(posted) == 1 else None
 
 
 @router.get("/compare")
@@ -214,7 +224,7 @@ def compare_page(
         if row is None:
             raise NotFound(f"no run has the id {each[:40]}")
         rows.append(row)
-    scene = scene_of_study(store, rows[0]["scene"]) if rows else None
+    scene = _scene_of_run(store, rows[0]["scene"]) if rows else None
     found = compared(rows, scene)
     return page(request, "compare", rows=rows, found=found, data={"runs": ids})
 

@@ -13,7 +13,7 @@ from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.storage.dataset import attributes_of
 from studies.views.audited import LIMITED
-from studies.views.table import group_of
+from studies.views.figures import group_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -51,10 +51,10 @@ async def post_scene(
     request: Request,
     response: Response,
     meshes: Annotated[
-        list[UploadFile], File(default_factory=list, description="the meshes it names")
+        list[UploadFile], File(default_factory=list, description="the meshes and tables it names")
     ],
 ) -> KeptScene:
-    """Accept a scene file and its meshes; 200 when it is known already.
+    """Accept a scene file and the files it names; 200 when it is known already.
 
     A study names it by its `id`.
     """

@@ -1,4 +1,7 @@
-"""Candidates: the vertices near contact at given displacements, with gaps, slips and rows."""
+"""Candidates: the vertices near contact at given displacements, with gaps, slips and rows.
+
+The conditions of links, which always hold, follow after the gaps and slips.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.contact.geometry import Pairing
+    from solver.contact.links import Links
     from solver.contact.state import ContactState, State
     from solver.contact.system import System
     from solver.fem.operators import Operator
@@ -34,15 +38,16 @@ _FELL = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Candidates:
-    """Vertices near contact; gaps first, then slips since the last converged state.
+    """Vertices near contact; gaps first, then slips since the last converged state, then links.
 
     Attributes
     ----------
     vertices : for each interface, the slave vertices that are candidates
     lines : the friction bound, the least of these lines: tangential over normal force [N]
-    motion : (n or 2n,) gap, and with friction also slip [mm]
+    motion : (n or 2n, and c of links,) gap, with friction also slip, and what links violate [mm]
     uncounted : (n,) slip before the vertex touched, not counted in ``motion`` [mm]
-    forces : (n or 2n,) normal, and with friction tangential forces of the current iterate [N]
+    forces : (n or 2n, and c,) normal, with friction tangential, and link forces of the current
+        iterate [N]
     status : (n,) of the current iterate, as in `solver.contact.problem`
     unsure : (n,) the possible error of ``uncounted`` [mm]; inf if the time of touch is not known
     rows : one per part, None for a part without contact surface
@@ -54,6 +59,7 @@ class Candidates:
         of its last ones [N]; None for the others. Its vertices are no candidates
     pushes : nodal forces (n,) of these on each part [N]
     holds : for each part, whether a pair is there that may hold its rigid motions
+    links : the conditions of links, the last of the rows
     """
 
     vertices: tuple[NDArray[np.int64], ...]
@@ -71,6 +77,22 @@ class Candidates:
     leaving: tuple[NDArray[np.float64] | None, ...]
     pushes: tuple[NDArray[np.float64], ...]
     holds: tuple[bool, ...]
+    links: Links
+
+    @property
+    def frictional(self) -> bool:
+        """Whether slips and tangential forces are among the unknowns."""
+        return len(self.motion) > self.n + len(self.links)
+
+    @property
+    def along(self) -> slice:
+        """The places of slips and tangential forces; empty without friction."""
+        return slice(self.n, len(self.motion) - len(self.links))
+
+    @property
+    def linked(self) -> slice:
+        """The places of the conditions of links."""
+        return slice(len(self.motion) - len(self.links), None)
 
     @property
     def n(self) -> int:
@@ -125,16 +147,14 @@ class Candidates:
         ``|N - max(0, N - k gap)|`` and, where N > 0, ``|T - clip(T - k slip, -s, s)|`` with
         their bound s and the stiffness k of the elastic contact points.
         """
-        n, F, k = self.n, self.forces, stiffness
-        if n == 0:
-            return 0.0
-        N = F[:n]
-        worst = float(np.abs(N - np.maximum(0, N - k[:n] * self.motion[:n])).max())
-        if len(F) > n:
-            bound = self.lines.least(N)
-            wanted = np.clip(F[n:] - k[n:] * self.motion[n:], -bound, bound)
-            worst = max(worst, float(np.abs(F[n:] - wanted)[N > 0].max(initial=0.0)))
-        return worst
+        F, off = self.forces, stiffness * self.motion
+        N = F[: self.n]
+        worst = float(np.abs(N - np.maximum(0, N - off[: self.n])).max(initial=0.0))
+        if self.frictional:
+            bound, T = self.lines.least(N), F[self.along]
+            wanted = np.clip(T - off[self.along], -bound, bound)
+            worst = max(worst, float(np.abs(T - wanted)[N > 0].max(initial=0.0)))
+        return max(worst, float(np.abs(off[self.linked]).max(initial=0.0)))
 
     def work(self, before: tuple[ContactState, ...]) -> tuple[float, float]:
         """Return the work of friction and of the bodies against contact in an increment [N mm].
@@ -156,9 +176,9 @@ class Candidates:
             with np.errstate(invalid="ignore"):
                 opened = np.nan_to_num(gap - state.gap, posinf=0.0, neginf=0.0)
             normal -= float(force[moved] @ opened[moved]) / 2
-            if len(self.motion) > self.n:
-                shear = state.tangential[vertices] + self.forces[self.n :][here]
-                friction -= float(shear @ (self.motion[self.n :] + self.uncounted)[here]) / 2
+            if self.frictional:
+                shear = state.tangential[vertices] + self.forces[self.along][here]
+                friction -= float(shear @ (self.motion[self.along] + self.uncounted)[here]) / 2
         return friction, normal
 
     def states(
@@ -173,8 +193,8 @@ class Candidates:
         for state, vertices, here, left in each:
             normal, tangential = np.zeros((2, len(state.normal))) if left is None else left.copy()
             normal[vertices] = forces[: self.n][here]
-            if len(forces) > self.n:
-                tangential[vertices] = forces[self.n :][here]
+            if self.frictional:
+                tangential[vertices] = forces[self.along][here]
             statuses = np.full_like(state.status, OPEN)
             statuses[vertices] = status[here]
             out.append(replace(state, normal=normal, tangential=tangential, status=statuses))
@@ -183,7 +203,7 @@ class Candidates:
     def kept(self, before: tuple[ContactState, ...], span: float) -> tuple[ContactState, ...]:
         """Return the contact states after an increment over ``span`` of time."""
         after = self.states(before, self.forces, self.status)
-        moved = np.abs(self.motion[self.n :]) if len(self.motion) > self.n else np.zeros(self.n)
+        moved = np.abs(self.motion[self.along]) if self.frictional else np.zeros(self.n)
         moved, out = np.where(self.status == OPEN, 0.0, moved), []
         each = zip(before, after, self.vertices, self.places, self.gaps, self.slips, strict=True)
         for old, new, at, here, gap, slip in each:
@@ -205,11 +225,13 @@ def _places(vertices: Sequence[NDArray[np.int64]]) -> list[slice]:
     return [slice(first, last) for first, last in pairwise(ends)]
 
 
-def no_candidates(system: System) -> Candidates:
-    """Return an empty set of candidates: the bodies are separated."""
-    empty = np.zeros(0)
+def no_candidates(
+    system: System, u: tuple[NDArray[np.float64], ...], links: NDArray[np.float64]
+) -> Candidates:
+    """Return an empty set of candidates, with the links: the bodies are separated."""
+    empty, off = np.zeros(0), system.links.off(u, links)
     none = tuple(np.zeros(0, dtype=int) for _ in system.interfaces)
-    rows = tuple(None for _ in system.parts)
+    rows = system.links.rows
     covered = tuple(empty for _ in system.interfaces)
     gaps = tuple(np.full(len(i.slave_surface.edges) + 1, np.inf) for i in system.interfaces)
     slips = tuple(map(np.zeros_like, gaps))
@@ -217,8 +239,9 @@ def no_candidates(system: System) -> Candidates:
     lines = BoundLines.none(0)
     pushes = tuple(np.zeros(part.n) for part in system.parts)
     return Candidates(
-        none, lines, *(empty,) * 3, status, empty, rows, covered, gaps, slips, np.inf,
+        none, lines, off, empty, links, status, empty, rows, covered, gaps, slips, np.inf,
         leaving=(None,) * len(none), pushes=pushes, holds=(False,) * len(pushes),
+        links=system.links,
     )  # fmt: skip
 
 
@@ -227,9 +250,12 @@ def find_candidates(
     start: State,
     u: tuple[NDArray[np.float64], ...],
     contacts: tuple[ContactState, ...],
+    links: NDArray[np.float64],
     span: float = 0.0,
 ) -> Candidates:
     """Return the candidates at displacements ``u``, a ``span`` of time after ``start``.
+
+    ``contacts`` and ``links`` have the forces of the current iterate.
 
     Slips count from the state ``start`` or, where a vertex had no contact then, from the moment
     it touched, if its approach is known from the last increments.
@@ -258,11 +284,13 @@ def find_candidates(
     holds = [False] * len(system.parts)
     n = sum(len(v) for v in vertices)
     frictional = any(interface.rough for interface in system.interfaces)
-    m = 2 * n if frictional else n
+    m = (2 * n if frictional else n) + len(system.links)
     motion, uncounted, beyond = np.zeros(m), np.zeros(n), np.inf
+    last = slice(m - len(system.links), m)
+    motion[last] = system.links.off(u, links)
     lines: list[BoundLines] = []
     unsure = np.zeros(n)
-    pieces: list[list[ContactRows]] = [[] for _ in system.parts]
+    pieces = [_below(m, rows) for rows in system.links.rows]
     slips: list[NDArray[np.float64]] = []
     for pair, (interface, pairing, at, before, normal) in enumerate(
         zip(system.interfaces, pairings, vertices, start.contacts, _places(vertices), strict=True)
@@ -297,13 +325,13 @@ def find_candidates(
         values = [getattr(c, name)[v] for c, v in zip(contacts, vertices, strict=True)]
         return np.concatenate([np.zeros(0), *values])
 
-    forces = gather("normal")
+    forces = [gather("normal"), *([gather("tangential")] if frictional else []), links]
     return Candidates(
         vertices=tuple(vertices),
         lines=BoundLines.joined(lines),
         motion=motion,
         uncounted=uncounted,
-        forces=np.concatenate([forces, gather("tangential")]) if frictional else forces,
+        forces=np.concatenate(forces),
         status=gather("status").astype(np.int64),
         unsure=unsure,
         rows=tuple(joined(p) for p in pieces),
@@ -314,7 +342,15 @@ def find_candidates(
         leaving=leaving,
         pushes=pushes,
         holds=tuple(holds),
+        links=system.links,
     )
+
+
+def _below(m: int, rows: ContactRows | None) -> list[ContactRows]:
+    """Return the rows of links of a part as the last of m rows."""
+    if rows is None:
+        return []
+    return [ContactRows(rows.dofs, np.pad(rows.block, ((m - len(rows.block), 0), (0, 0))))]
 
 
 def _slip_before_contact(before: ContactState, span: float) -> tuple[Array, Array]:

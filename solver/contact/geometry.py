@@ -177,10 +177,14 @@ def pair(
     master: Surface,
     master_u: NDArray[np.float64],
     reach: float = np.inf,
+    *,
+    tied: bool = False,
 ) -> Pairing:
     """Pair two surfaces displaced by ``slave_u`` and ``master_u`` (2, n_nodes) [mm].
 
-    A master that lies more than ``reach`` [mm] behind the slave does not face it.
+    A master that lies more than ``reach`` [mm] behind the slave does not face it. Of a ``tied``
+    pair the rows are those of the displacement of the master relative to the slave along x and y,
+    in place of normal and tangent.
     """
     xs, xm = slave.X + slave_u, master.X + master_u
     normals = end_normals(xs, slave)
@@ -204,7 +208,8 @@ def pair(
     at = at.ravel()
     point, n = on_slave(edge, at)
     eta, distance = _project_on_master(xm, master.edges[partner], point, n)
-    return _integrate(slave, xs, master, edge, partner, at, eta, n, distance, weight)
+    ways = tuple(np.eye(2)[..., None] + 0 * n) if tied else (n, np.stack([n[1], -n[0]]))
+    return _integrate(slave, xs, master, edge, partner, at, eta, ways, distance, weight)
 
 
 def _integrate(
@@ -215,11 +220,11 @@ def _integrate(
     partner: NDArray[np.int64],
     xi: NDArray[np.float64],
     eta: NDArray[np.float64],
-    n: NDArray[np.float64],
+    ways: tuple[NDArray[np.float64], ...],
     distance: NDArray[np.float64],
     weight: NDArray[np.float64],
 ) -> Pairing:
-    """Sum the integration points into rows, one per slave vertex."""
+    """Sum the integration points into rows, one per slave vertex, along two ways (2, n) each."""
     rows, vertex = len(slave.edges) + 1, np.stack([edge, edge + 1])
     bare = np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight
     hats, deformed_hats = (bare * _area_per_xi(slave, x, edge, xi) for x in (slave.X, xs))
@@ -228,7 +233,6 @@ def _integrate(
         return np.asarray(np.bincount(vertex.ravel(), values.ravel(), rows), dtype=float)
 
     area, deformed, gap, facing = map(summed, (hats, deformed_hats, hats * distance, bare))
-    t = np.stack([-n[1], n[0]])
     sides = []
     for surface, own, at, sign in ((slave, edge, xi, -1.0), (master, partner, eta, 1.0)):
         N = shape_functions(at, surface.edges.shape[1])
@@ -236,7 +240,7 @@ def _integrate(
         place = (vertex[..., None] * size + surface.edges[own]).ravel()
         value = sign * hats[..., None] * N
         block = np.empty((2, rows, size, 2))
-        for kind, direction in enumerate((n, -t)):
+        for kind, direction in enumerate(ways):
             for axis, along in enumerate(direction):
                 each = np.bincount(place, (value * along[:, None]).ravel(), rows * size)
                 block[kind, :, :, axis] = each.reshape(rows, size)

@@ -72,7 +72,8 @@ class State:
     """A converged state of the whole system; never changed, only replaced.
 
     ``time`` is the load factor where the pressures of the bodies have no amplitude.
-    ``force_scale`` is the largest force level so far, to which tolerances refer [N].
+    ``force_scale`` is the largest force level so far, to which tolerances refer [N]. ``links`` are
+    the forces of the conditions of links (`solver.contact.links`) [N].
     """
 
     time: float
@@ -80,6 +81,7 @@ class State:
     plastic: tuple[PlasticState, ...]
     contacts: tuple[ContactState, ...]
     force_scale: float = 0.0
+    links: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,7 +183,7 @@ class Converged:
     ----------
     forces : for each part, loads and the forces of supports and prescribed motions on its
         unknowns; they balance the contact forces [N]
-    contact_forces : contact forces on the unknowns of each part [N]
+    contact_forces : forces of contact and links on the unknowns of each part [N]
     responses : stress and internal variables of each part at its points
     iterations : number of Newton iterations
     plastic_work : plastic work of the increment [N mm]

@@ -13,6 +13,7 @@ from scipy.linalg import null_space
 from scipy.sparse import csr_array
 
 from solver.contact.interface import interface_of, surfaces_of
+from solver.contact.links import Links, links_of, surfaces_of_links
 from solver.contact.slave import with_slaves
 from solver.contact.state import ContactState, State
 from solver.errors import ModelError
@@ -25,6 +26,8 @@ from solver.fem.window import Region, Windowed
 from solver.model.friction import ContactPlaces, lines_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from solver.contact.geometry import Pairing
@@ -34,10 +37,13 @@ if TYPE_CHECKING:
     from solver.fem.operators import PartOperators
     from solver.fem.part import Part
     from solver.fem.surface import Surface
+    from solver.materials.law import Law
     from solver.materials.state import Response
     from solver.model.friction import BoundLines
+    from solver.model.link import Side
     from solver.model.loads import Load
     from solver.model.model import Model
+    from solver.model.rigid import RigidBody
 
     Array = NDArray[np.float64]
 
@@ -67,6 +73,13 @@ def _part(whole: Discretisation | RigidPart, own: list[Surface], linear_solver: 
     return whole
 
 
+def _reach(body: RigidBody, model: Model, linked: Mapping[Side, Surface]) -> float:
+    """Return the largest distance from a rigid body's centre to what it moves by links [mm]."""
+    moved = (linked[link.slave].X for link in model.links if link.rigid == body.name)
+    away = (np.hypot(*(X - np.reshape(body.centre, (2, 1)))).max() for X in moved)
+    return float(max(away, default=0.0))
+
+
 class System:
     """A model's parts, operators and interfaces, built once and shared by all its runs.
 
@@ -75,18 +88,24 @@ class System:
     model : the model; slave and master of a pair are exchanged where that is better
     names : names of the meshed bodies
     all_names : these names, then those of the rigid bodies, in the order of ``parts``
-    surfaces : for each part, its contact surfaces in the numbering of the whole body
+    surfaces : for each part, its surfaces in contact or links in the numbering of the whole body
+    links : conditions of links between the unknowns of the parts
     """
 
     def __init__(self, model: Model, linear_solver: str = "auto") -> None:
         round_axis = model.bodies[0].kinematics == "axisymmetric"
         self._wholes = {body.name: Discretisation(body) for body in model.bodies}
-        rigid = {body.name: RigidPart(body, round_axis) for body in model.rigid}
+        linked = surfaces_of_links(model, self._wholes)
+        rigid = {
+            body.name: RigidPart(body, round_axis, _reach(body, model, linked))
+            for body in model.rigid
+        }
         wholes: dict[str, Discretisation | RigidPart] = {**self._wholes, **rigid}
         self._chains = wholes
         surfaces = surfaces_of(model, wholes)
         self.model = model = with_slaves(model, surfaces)
-        own = [[chain for (name, _), chain in surfaces.items() if name == body] for body in wholes]
+        every = [*surfaces.items(), *linked.items()]
+        own = [[chain for (name, _), chain in every if name == body] for body in wholes]
         self.surfaces, self._linear_solver = own, linear_solver
         self.names = [body.name for body in model.bodies]
         self.all_names = list(wholes)
@@ -98,6 +117,7 @@ class System:
             interface_of(contact, self.parts, self.all_names, surfaces)
             for contact in model.contacts
         )
+        self.links: Links = links_of(model, self.parts, self.all_names, linked)
 
         self._windows: dict[int, tuple[bytes, Windowed, PartOperators]] = {}
         self._least: tuple[float, tuple[float, float]] = (np.nan, (0.0, 0.0))
@@ -118,6 +138,7 @@ class System:
             kinds = (pairing.normal, pairing.tangent)[: 2 if interface.rough else 1]
             for kind, gaps in zip(kinds, (len(pairing.area), 0), strict=False):
                 rows.append(self.rigid_rows(interface, kind, u, gaps))
+        rows.append(self._linked_motions())
         A = np.vstack([np.zeros((0, ends[-1])), *rows])
         loose = null_space(A, rcond=1e-9) if len(A) else np.eye(ends[-1])
         for part, size, end in zip(self.parts, sizes, ends, strict=True):
@@ -127,6 +148,15 @@ class System:
                     getattr(part.body, "supports", {}),
                     f"body {part.body.name!r} can move freely: support it, or hold it by contact",
                 )
+
+    def _linked_motions(self) -> Array:
+        """Return how the rigid motions of all parts violate the conditions of links (c, n)."""
+        each = zip(self.parts, self.links.rows, strict=True)
+        return np.hstack([
+            np.zeros((len(self.links), part.rigid.shape[1]))
+            if rows is None else rows.block @ part.rigid[rows.dofs]
+            for part, rows in each
+        ])  # fmt: skip
 
     def rigid_rows(
         self,
@@ -154,7 +184,8 @@ class System:
         """
         at, found = self._least
         if at != time:  # an increment asks for it, and then its energy
-            force, energy = np.array([part.clamped(time) for part in self.parts]).T
+            each = [part.clamped(time) for part in self.parts]
+            force, energy = np.array([*each, self.links.clamped(self.parts, time)]).T
             found = LEAST * float(np.linalg.norm(force)), LEAST_ENERGY * float(energy.sum())
             self._least = time, found
         return found
@@ -182,6 +213,13 @@ class System:
             known = self._windows[number] = region.key, made, inverses
         return known[1]
 
+    def during(self, start: State) -> System:
+        """Return the system in an increment that begins at a state, some motions of it locked."""
+        each = zip(self.parts, start.u, strict=True)
+        parts = tuple(part.during(start.time, u) for part, u in each)
+        unchanged = all(one is other for one, other in zip(parts, self.parts, strict=True))
+        return self if unchanged else self.within(parts)
+
     def within(self, parts: tuple[Part, ...]) -> System:
         """Return the system with the last windows in the place of some of its parts."""
         small = copy(self)
@@ -195,6 +233,11 @@ class System:
             for interface in self.interfaces
         )
         return small
+
+    @property
+    def laws(self) -> list[Law]:
+        """The material laws of the meshed bodies."""
+        return [body.material for body in self.model.bodies]
 
     @property
     def n_unknowns(self) -> int:
@@ -360,7 +403,7 @@ class System:
         """Return the unloaded, undeformed state."""
         u = tuple(part.start() for part in self.parts)
         plastic = tuple(part.virgin() for part in self.parts)
-        return self.at_rest(State(0.0, u, plastic, ()))
+        return self.at_rest(State(0.0, u, plastic, (), links=np.zeros(len(self.links))))
 
     def at_rest(self, state: State) -> State:
         """Return a state without contact forces; vertices that touch stick."""
@@ -375,11 +418,14 @@ class System:
         return replace(state, contacts=tuple(contacts))
 
     def joined(self, state: State, time: float) -> State:
-        """Return a state with the pairs at rest that come in before a time."""
+        """Return a state with the pairs at rest that come in before a time.
+
+        These are pairs that were absent, or of bodies that were separated: their gap is not known.
+        """
         contacts = list(state.contacts)
         for k, interface in enumerate(self.interfaces):
-            pair = interface.declared
-            if pair.absent(state.time) and not pair.absent(time):
+            apart = not np.isfinite(contacts[k].gap).any()
+            if apart and not interface.declared.absent(time):
                 gap = interface.pairing(state.u, time, finite=contacts[k].finite).gap
                 touching, finite = gap <= self.touching, contacts[k].finite
                 contacts[k] = ContactState.at_rest(gap, touching, finite=finite, before=contacts[k])

@@ -22,7 +22,7 @@ from solver.fem.nodes import Nodes
 from solver.fem.operators import Operators
 from solver.fem.part import Part, same_unknowns
 from solver.fem.softening import Softening
-from solver.fem.surface import edges_of, extract, shortest
+from solver.fem.surface import edges_of, extract, gathered, shortest
 from solver.linear import solvers as linear
 from solver.mesh.elements import element_type
 
@@ -54,6 +54,7 @@ class Discretisation(Nodes, Part):
     loads : nodal forces (n,) of pressures and tractions [N]
     condensable : ``loads`` plus the nodal forces of the eigenstrain in an elastic body [N]
     free : unknowns that no support holds, without periodic copies
+    driven : prescribed displacements (n,) [mm]
     active : unknowns of ``free`` that are not pinned
     rigid : (n, n_rigid) rigid motions the supports leave free
     """
@@ -100,9 +101,9 @@ class Discretisation(Nodes, Part):
         self.free = free
         self.active = choose_pins(motions, free)
 
-    def chain(self, boundary: str) -> Surface:
-        """Return the surface of a named boundary, which must be one open chain."""
-        return extract(self, boundary)
+    def chain(self, boundary: str, any_shape: bool = False) -> Surface:
+        """Return the surface of a named boundary: one open chain, unless any shape is allowed."""
+        return gathered(self, boundary) if any_shape else extract(self, boundary)
 
     def operators(self, surfaces: list[Surface], linear_solver: str) -> Operators:
         """Return the inverse stiffnesses of this part, for its contact surfaces."""
@@ -225,8 +226,8 @@ class Discretisation(Nodes, Part):
             nodal += np.bincount(self.dofs.ravel(), each.sum(axis=1).ravel(), self.n)
         if self.driven.cases:
             moved = self.driven.at(time)
-            nodal += np.abs(self._diagonal * moved)
-            energy += float(moved @ (self._diagonal * moved)) / 2
+            nodal += np.abs(self.diagonal * moved)
+            energy += float(moved @ (self.diagonal * moved)) / 2
         return float(np.linalg.norm(nodal)), energy
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from skfem import CellBasis
 
 from solver.errors import ModelError
+from solver.fem.cells import smooth_cells
 from solver.fem.surface import edges_of
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.model.loads import checked
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Push = Callable[[Array, Array], Array | None]
 
-_DEGREE = 7
-"""Polynomial degree up to which forces per volume are integrated exactly."""
 _ACCURATE, _HALVINGS = 1e-9, 40
 """Error of the nodal force of a part of an edge, over the largest nodal force, above which the part
 is halved, and how often at most: tractions may bend and jump."""
@@ -88,19 +86,23 @@ def nodal_forces(part: Nodes) -> Superposed:
 def _body_forces(part: Nodes, load: Load) -> Array | None:
     """Return the nodal forces (n,) of a load's force per volume [N]; None if it has none.
 
-    They are integrated with more points than the stress.
+    They are integrated by Gauss's rule on cells on which they are smooth.
     """
     if load.body_force(part.X[:, :0]) is None:
         return None
-    basis = CellBasis(part.body.mesh, part.basis.elem, intorder=_DEGREE)
-    x = np.asarray(basis.global_coordinates())
-    flat = x.reshape(2, -1)
-    given = checked(f"{load.name}.body_force", load.body_force(flat), flat.shape, "N/mm3")
-    force = given.reshape(x.shape) * basis.dx * part.measure(x)
-    nodes = part.same[basis.element_dofs]
-    nodal = np.zeros((part.X.shape[1], 2))
-    for own, (shape, *_) in zip(nodes, basis.basis, strict=True):
-        np.add.at(nodal, own, (force * np.asarray(shape)).sum(axis=2).T)
+
+    def force(x: Array) -> Array:
+        flat = x.reshape(2, -1)
+        given = checked(f"{load.name}.body_force", load.body_force(flat), flat.shape, "N/mm3")
+        return given.reshape(x.shape) * part.measure(x)
+
+    basis, rule = part.basis, np.polynomial.legendre.leggauss(4)
+    cells = smooth_cells(basis, force)
+    local, x, area = cells.points(rule, rule)
+    given, nodal = force(x) * area, np.zeros((part.X.shape[1], 2))
+    for k, own in enumerate(part.same[basis.element_dofs]):
+        shape = np.asarray(basis.elem.lbasis(local, k)[0])
+        np.add.at(nodal, own[cells.element], (given * shape).sum(axis=2).T)
     return nodal.ravel()
 
 

@@ -46,6 +46,7 @@ class Part(ABC):
     nodes : (2, n_nodes) positions of the nodes that the unknowns belong to, node by node [mm]
     body : as declared
     loads : nodal forces (n,) of the body's loads [N]
+    driven : prescribed motions (n,) [mm]
     copied : (n,) for each unknown the one whose value it takes
     free : unknowns that no support holds
     active : those of them that are not pinned to hold its rigid motions
@@ -58,6 +59,7 @@ class Part(ABC):
     nodes: NDArray[np.float64]
     body: Body | RigidBody
     loads: Superposed
+    driven: Superposed
     copied: NDArray[np.int64]
     free: NDArray[np.int64]
     active: NDArray[np.int64]
@@ -104,6 +106,11 @@ class Part(ABC):
     def surface(self, surface: Surface) -> Surface:
         """Return a surface of the whole body in this part's numbering."""
         return surface
+
+    def during(self, time: float, u: NDArray[np.float64]) -> Part:
+        """Return the part in an increment that begins at a time with unknowns u, some locked."""
+        del time, u
+        return self
 
     def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Return the whole body's displacements [mm]; those of a wheel in its hub's frame."""
@@ -164,7 +171,7 @@ class Part(ABC):
         return self.loads.grows(before, after)
 
     @cached_property
-    def _diagonal(self) -> NDArray[np.float64]:
+    def diagonal(self) -> NDArray[np.float64]:
         """The diagonal (n,) of the elastic stiffness [N/mm]."""
         return np.asarray(self.elastic_matrix().diagonal())
 
@@ -174,7 +181,7 @@ class Part(ABC):
         Internal forces are differences of stiffness times displacement. Both may be large where
         forces are small: in long thin elements, and in a stiff body on a soft one.
         """
-        return _ROUNDING * float(np.linalg.norm(self._diagonal * u))
+        return _ROUNDING * float(np.linalg.norm(self.diagonal * u))
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Return the unknowns with prescribed motions at their values for a time."""

@@ -6,6 +6,7 @@ motion with a force (`Pushed`) is free, the others are prescribed.
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ from solver.fem.operators import Fixed
 from solver.fem.part import Part
 from solver.fem.surface import Surface
 from solver.linear.solvers import Begun
-from solver.model.rigid import Moved, RigidBody
+from solver.model.rigid import Moved, Pushed, RigidBody
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -49,22 +50,28 @@ class Unmoved:
 
 
 class RigidPart(Part):
-    """A part with the unknowns x, y and the arc of its rotation."""
+    """A part with the unknowns x, y and the arc of its rotation.
+
+    Parameters
+    ----------
+    reach : largest distance from its centre to boundaries that it moves by links [mm]
+    """
 
     body: RigidBody
     meshed = False
 
-    def __init__(self, body: RigidBody, axisymmetric: bool) -> None:
+    def __init__(self, body: RigidBody, axisymmetric: bool, reach: float = 0.0) -> None:
         self.body = body
         self.n = 3
         self._axisymmetric = axisymmetric
         centre = np.asarray(body.centre, dtype=float)
         points = [np.asarray(curve.points, dtype=float) for curve in body.surfaces.values()]
-        self.nodes = np.hstack(points)
+        self.nodes = np.hstack([np.zeros((2, 0)), *points])
         self._first = dict(zip(
             body.surfaces, np.cumsum([0, *(p.shape[1] for p in points)]).tolist(), strict=False
         ))  # fmt: skip
-        arm = float(np.linalg.norm(self.nodes - centre[:, None], axis=0).max())
+        away = np.linalg.norm(self.nodes - centre[:, None], axis=0)
+        arm = float(away.max(initial=reach)) or 1.0
         self.frame = MovingFrame(centre=centre, radius=arm)
         # a moment acts as a force at the arm
         scale = np.diag([1.0, 1.0, arm])
@@ -72,17 +79,31 @@ class RigidPart(Part):
         each = list(zip(body.every_load, moved, np.eye(3), scale, strict=True))
         self.loads = Superposed.of(3, ((m, m.value * e / s.sum()) for m, held, e, s in each
                                        if not held))  # fmt: skip
-        self._driven = Superposed.of(3, ((m, m.value * s) for m, held, _, s in each if held))
+        self.driven = Superposed.of(3, ((m, m.value * s) for m, held, _, s in each if held))
         self._held = np.array(moved)
+        self._locked = np.full(3, np.nan)
         self.free = np.flatnonzero(~self._held)
         self.active = np.zeros(0, dtype=np.int64)
         self.rigid = np.eye(3)[:, self.free]
         self.copied = np.arange(3)
 
+    def during(self, time: float, u: Array) -> RigidPart:
+        """See `Part.during`."""
+        each = self.body.every_load
+        stays = np.array([isinstance(m, Pushed) and m.locked <= time for m in each])
+        if not stays.any():
+            return self
+        here = copy(self)
+        here._locked = np.where(stays, u, np.nan)
+        here.free = self.free[~stays[self.free]]
+        here.rigid = np.eye(3)[:, here.free]
+        return here
+
     # -- its surfaces --------------------------------------------------------------------------
 
-    def chain(self, boundary: str) -> Surface:
+    def chain(self, boundary: str, any_shape: bool = False) -> Surface:
         """Return a surface by its name."""
+        del any_shape
         curve = self.body.surfaces[boundary]
         count = np.asarray(curve.points).shape[1]
         step = 2 if curve.quadratic else 1
@@ -101,6 +122,13 @@ class RigidPart(Part):
         """Return the motion of the body."""
         return self.frame.motion(u)
 
+    def linear(self, X: Array) -> Array:
+        """Return the displacements (2 n, 3) of places X (2, n) by its unknowns, small rotations."""
+        x, y = (X - self.frame.centre[:, None]) / self.frame.radius
+        one, zero = np.ones_like(x), np.zeros_like(x)
+        each = np.array([[one, zero, -y], [zero, one, x]])
+        return np.asarray(np.moveaxis(each, -1, 0).reshape(-1, 3))
+
     def motion(self, surface: Surface, u: Array) -> Array:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
         return self.frame.displacements(u, surface.X)
@@ -115,20 +143,19 @@ class RigidPart(Part):
 
     def moved(self, u: Array, time: float) -> Array:
         """Return ``u`` with prescribed motions at their values for a time."""
-        return np.where(self._held, self._driven.at(time), u)
+        u = np.where(np.isnan(self._locked), u, self._locked)
+        return np.where(self._held, self.driven.at(time), u)
 
     @property
     def travels(self) -> bool:
         """Whether it is pushed or moved."""
-        return super().travels or bool(self._driven.fields.any())
+        return super().travels or bool(self.driven.fields.any())
 
     def turn(self, before: float, after: float) -> float:
         """Return the prescribed rotation between two times [rad]; 0 if it is free to turn."""
         if not self._held[2]:
             return 0.0
-        return (
-            float(abs(self._driven.at(after)[2] - self._driven.at(before)[2])) / self.frame.radius
-        )
+        return float(abs(self.driven.at(after)[2] - self.driven.at(before)[2])) / self.frame.radius
 
     def start(self) -> Array:
         """Return the unknowns (3,) before any load."""

@@ -81,6 +81,7 @@ class Substructure(Part):
         self.n = len(kept)
         self.nodes = whole.X[:, nodes]
         self.copied = np.arange(self.n)
+        self.driven = Superposed.of(self.n, ())
         self.rigid = whole.rigid[kept]
         self.free = np.flatnonzero(np.isin(kept, whole.free))
         self.active = choose_pins(self.rigid, self.free)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
+from solver.mesh.edges import shape_derivatives, shape_functions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -69,6 +70,17 @@ class Surface:
         """Mean length (n_edges + 1,) of the one or two edges at each vertex [mm]."""
         return at_vertices(self.lengths) / at_vertices(np.ones(len(self.edges)))
 
+    @cached_property
+    def areas(self) -> NDArray[np.float64]:
+        """Area (n_nodes,) of each node: the integral of its shape function [mm2]."""
+        xi, weights = np.polynomial.legendre.leggauss(4)
+        count = self.edges.shape[1]
+        N, xe = shape_functions(xi, count), self.X[:, self.edges]
+        along = np.linalg.norm(xe @ shape_derivatives(xi, count).T, axis=0)
+        each = (along * self.depth(xe @ N.T) * weights) @ N
+        areas = np.bincount(self.edges.ravel(), each.ravel(), len(self.nodes))
+        return np.asarray(areas, dtype=float)
+
     @property
     def dofs(self) -> NDArray[np.int64]:
         """(2 n_nodes,) unknowns of the body, node by node."""
@@ -107,6 +119,17 @@ def edges_of(part: Nodes, boundary: str) -> NDArray[np.int64]:
     return np.hstack([ends, basis.facet_dofs[0][facets][:, None]])
 
 
+def gathered(part: Nodes, boundary: str) -> Surface:
+    """Return the surface of a named boundary of any shape, its edges in no order."""
+    edges = edges_of(part, boundary)
+    nodes, local = np.unique(edges, return_inverse=True)
+    return Surface(nodes, local.reshape(edges.shape), part.X[:, nodes], _thickness(part))
+
+
+def _thickness(part: Nodes) -> float | None:
+    return None if part.body.kinematics == "axisymmetric" else part.body.thickness
+
+
 def extract(part: Nodes, boundary: str) -> Surface:
     """Return the surface of a named boundary, which must be one open chain.
 
@@ -131,10 +154,9 @@ def extract(part: Nodes, boundary: str) -> Surface:
             allowed = "a contact surface of a periodic body must run over the whole period"
             raise ModelError("boundary", boundary, allowed)
         nodes, X, chain = _repeated(part.same[nodes], X, chain)
-    thickness = None if part.body.kinematics == "axisymmetric" else part.body.thickness
     first, last = edges[order[0]], edges[order[-1]]
     beyond = (_goes_on(part, first, 0), _goes_on(part, last, 1))
-    return Surface(nodes, chain, X, thickness, (True, True) if part.period else beyond)
+    return Surface(nodes, chain, X, _thickness(part), (True, True) if part.period else beyond)
 
 
 def _goes_on(part: Nodes, edge: NDArray[np.int64], at: int) -> bool:

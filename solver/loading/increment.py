@@ -78,6 +78,7 @@ class Balanced:
 
     u: Vectors
     contacts: tuple[ContactState, ...]
+    links: NDArray[np.float64]
     responses: tuple[Response, ...]
     residuals: Vectors
     candidates: Candidates
@@ -118,7 +119,7 @@ class Increment:
         tolerances: Tolerances | None = None,
         compliance: dict[bytes, NDArray[np.float64]] | None = None,
     ) -> None:
-        self.system = system
+        self.system = system = system.during(start)
         self.start = start
         self.time = time
         self.guess = guess
@@ -156,13 +157,13 @@ class Increment:
     def _iterate(self) -> Balanced:
         tolerances = self.tolerances
         origin = self.system.moved(self.guess or self.start, self.time)
-        u, contacts = origin.u, origin.contacts
+        u, contacts, links = origin.u, origin.contacts, origin.links
         responses = self._respond(u)
         residuals = self._residuals(u, responses)
         best, since_best, softest, moving = np.inf, 0, SoftestStep(), False
         series, begun, crawled = Series(), 0.0, 0
         for iteration in range(tolerances.iterations + 1):
-            candidates = self._candidates(u, contacts)
+            candidates = self._candidates(u, contacts, links)
             self._began = self._began or (residuals, candidates)
             scale, error, violation = self._errors(residuals, candidates)
             since_best = 0 if error < best else since_best + 1
@@ -178,6 +179,7 @@ class Increment:
                 return Balanced(
                     u=u,
                     contacts=contacts,
+                    links=links,
                     responses=responses,
                     residuals=residuals,
                     candidates=candidates,
@@ -196,7 +198,7 @@ class Increment:
                     failure.why = softest
                 failure.why = self._slide((residuals, candidates)) or failure.why
                 raise
-            if iteration >= _LATE:
+            if iteration >= _LATE and not self.system.links.springy:
                 softest = softer(softest, self.system.parts, step.u, responses)
             before, found = u, self._search(u, residuals, candidates, step, error * scale)
             share, u, responses, residuals = found
@@ -209,6 +211,7 @@ class Increment:
                 responses = self._respond(u)
                 residuals = self._residuals(u, responses)
             contacts = candidates.states(contacts, forces, step.status)
+            links = forces[candidates.linked]
             if self.elastic_only and any(r.yielding.any() for r in responses):
                 raise Yielded
         # a residual that stops at rounding is no plastic flow; bodies that flow without resistance
@@ -217,7 +220,8 @@ class Increment:
         raise IncrementFailed(
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
             f"and a contact violation of {violation:.1e}",
-            self._slide() or (self._judged(softest, u, responses, contacts) if flows else None),
+            self._slide()
+            or (self._judged(softest, u, responses, contacts, links) if flows else None),
         )
 
     def _slide(self, *places: tuple[Vectors, Candidates]) -> Slide | None:
@@ -235,16 +239,20 @@ class Increment:
         u: Vectors,
         responses: Sequence[Response],
         contacts: tuple[ContactState, ...],
+        links: NDArray[np.float64],
     ) -> SoftestStep:
         """Return the softest step, with whether the kinematic theorem excludes equilibrium.
 
         The theorem is not applied if a motion is prescribed: the work of its force is not known.
+        Nor is it with springs, whose force grows without limit.
         """
+        if self.system.links.springy:
+            return flow
         parts = self.system.parts
         moved = [now - before for now, before in zip(u, self.start.u, strict=True)]
         if any(np.delete(move, part.free).any() for part, move in zip(parts, moved, strict=True)):
             return flow
-        candidates = self._candidates(u, contacts)
+        candidates = self._candidates(u, contacts, links)
         inner = on_parts(self.system, candidates, candidates.forces)
         forces = [r + c for r, c in zip(self._residuals(u, responses), inner, strict=True)]
         proven = collapses(parts, self.time, moved, forces, responses)
@@ -261,11 +269,13 @@ class Increment:
         each = zip(self.system.parts, u, responses, strict=True)
         return tuple(part.residual(self.time, ui, response) for part, ui, response in each)
 
-    def _candidates(self, u: Vectors, contacts: tuple[ContactState, ...]) -> Candidates:
+    def _candidates(
+        self, u: Vectors, contacts: tuple[ContactState, ...], links: NDArray[np.float64]
+    ) -> Candidates:
         if not self.contact:
-            return no_candidates(self.system)
+            return no_candidates(self.system, u, links)
         span = self.time - self.start.time
-        found = find_candidates(self.system, self.start, u, contacts, span)
+        found = find_candidates(self.system, self.start, u, contacts, links, span)
         return found if self.friction else found.smooth()
 
     def _errors(self, residuals: Vectors, candidates: Candidates) -> tuple[float, float, float]:
@@ -281,7 +291,8 @@ class Increment:
         scale = max(self.start.force_scale, level, self._least)
         if scale == 0:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
-            return 0.0, float(overlap < -self.system.touching), 0.0
+            off = overlap < -self.system.touching or candidates.motion[candidates.linked].any()
+            return 0.0, float(off), 0.0
         error = self._unbalanced(residuals, candidates, candidates.forces) / scale
         stiffness = 1 / np.diag(self._compliance(candidates))
         return scale, error, candidates.violation(stiffness) / scale
@@ -310,8 +321,11 @@ class Increment:
         """Return the elastic compliance of the contact points [mm/N], a scale; computed once."""
         key = b"".join(vertices.tobytes() for vertices in candidates.vertices)
         if key not in self.compliance:
-            elastic = [o.elastic for o in self.system.operators]
-            self.compliance[key] = candidates.compliance(elastic)
+            W = candidates.compliance([o.elastic for o in self.system.operators])
+            last = np.arange(len(W))[candidates.linked]
+            own = W[last, last] + candidates.links.compliance
+            W[last, last] = np.where(own > 0, own, np.diag(W).max(initial=1.0))
+            self.compliance[key] = W
         return self.compliance[key]
 
     # -- 3, 4: the step ------------------------------------------------------------------------
@@ -401,7 +415,9 @@ class Increment:
             contact_work=candidates.work(self.start.contacts),
             plastic_work=sum(work for work, _ in spent),
             dissipation=float(np.min([0.0, *(least for _, least in spent)])),
-            state=State(self.time, u, tuple(r.state for r in responses), contacts, found.scale),
+            state=State(
+                self.time, u, tuple(r.state for r in responses), contacts, found.scale, found.links
+            ),
             responses=responses,
             iterations=found.iterations,
             pivoted=found.pivoted,

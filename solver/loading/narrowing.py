@@ -55,14 +55,16 @@ def narrowed(
 ) -> Converged | None:
     """Return an increment from ``start`` to ``time`` that was solved in windows.
 
-    None if nothing yields, if windows would be large, if a body comes loose, or if the increment
-    fails in them.
+    None if nothing yields, if windows would be large, if a body comes loose, if links act outside
+    of windows, or if the increment fails in them.
 
     Parameters
     ----------
     before : the last increment, which ended at ``start``
     guess : predicted state, if any
     """
+    if len(system.links):
+        return None
     windows = before.windows or (None,) * len(system.parts)
     longer = replace(tolerances, iterations=int(_PATIENCE * tolerances.iterations))
     begin, count = system.moved(start, time), np.zeros(3, dtype=int)
@@ -73,7 +75,7 @@ def narrowed(
     yields: Yields = [now if now is None or was is None else now | was for now, was in both]
     if not before.windows and not any(own is not None and own.any() for own in yields):
         return None
-    candidates = find_candidates(system, start, at.u, at.contacts, time - start.time)
+    candidates = find_candidates(system, start, at.u, at.contacts, at.links, time - start.time)
     needed = _needed(system, candidates, yields)
     compliance: dict[bytes, NDArray[np.float64]] = {}
     for _ in range(_ROUNDS):
@@ -136,7 +138,9 @@ def _expanded(
         u=u,
         responses=responses,
         residuals=tuple(part.residual(time, ui, response) for part, ui, response in forces),
-        candidates=find_candidates(system, start, u, found.contacts, time - start.time),
+        candidates=find_candidates(
+            system, start, u, found.contacts, start.links, time - start.time
+        ),
     )
 
 

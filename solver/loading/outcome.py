@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from solver.contact.state import Converged, State
+    from solver.loading.cycle import Cycle
     from solver.loading.slide import Slide
 
 
@@ -110,6 +111,7 @@ class Outcome:
     last : the last state reached
     points : states at the ends of the stages of the last lap, by name
     traces : values that the walker's ``trace`` returned, one for each complete lap
+    cycles : the cycles of repeated stages
     history : values that its ``watch`` returned, for the first state and after each increment
     error : why the program did not reach its end; None if it did
     settled : the refinement of its increments
@@ -119,6 +121,7 @@ class Outcome:
     last: Any
     points: Mapping[str, Any] = field(default_factory=dict)
     traces: tuple[Any, ...] = ()
+    cycles: tuple[Cycle, ...] = ()
     history: tuple[Any, ...] = ()
     error: NotConverged | None = None
     settled: Settled = field(default_factory=Settled)

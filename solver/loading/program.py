@@ -33,6 +33,10 @@ class Stage:
     apart : whether the last increment separates the bodies
     turns : whether another motion begins: previous rates of gap and slip are then not used
     refined : whether `Program.refined` divides its increments
+    stops : times between, in order, at which an increment ends too, as where an amplitude bends.
+        ``steps`` are shared out between them, at least one each
+    cycle : for a stage that is repeated, which time it is, from 1; 0 for another one. Its state is
+        kept under its name, and that of the time before as ``NAME_before``
     """
 
     name: str
@@ -42,6 +46,8 @@ class Stage:
     apart: bool = False
     turns: bool = False
     refined: bool = False
+    stops: tuple[float, ...] = ()
+    cycle: int = 0
 
     def __post_init__(self) -> None:
         if self.steps < 1:
@@ -53,6 +59,15 @@ class Stage:
 
     def times(self, start: float) -> list[float]:
         """Return the times at which its increments end."""
+        if self.stops:
+            ends = (start, *self.stops, self.target)
+            shares = [(end - begin) / (self.target - start) for begin, end in pairwise(ends)]
+            counts = [max(1, math.ceil(self.steps * share - ROUNDING)) for share in shares]
+            return [
+                begin + (end - begin) * k / count if k < count else end
+                for (begin, end), count in zip(pairwise(ends), counts, strict=True)
+                for k in range(1, count + 1)
+            ]
         if not self.step:
             way, steps = self.target - start, self.steps
             if self.target == 0.0:  # equal shares of the time at the start
@@ -81,7 +96,8 @@ class Lap:
     def targets(self, first: bool) -> Iterator[Target]:
         """Yield the ends of its increments; ``first`` says whether it is the first lap."""
         now, begins = self.start, None if first else self.start
-        for stage in self.stages:
+        following = [*self.stages[1:], None]
+        for stage, after in zip(self.stages, following, strict=True):
             times = stage.times(now)
             for k, time in enumerate(times):
                 last = k + 1 == len(times)
@@ -91,7 +107,9 @@ class Lap:
                     turns=stage.turns and k == 0,
                     apart=stage.apart and last,
                     keeps=stage.name if last else "",
-                    closes=last and stage is self.stages[-1],
+                    closes=last and after is None,
+                    cycle=stage.cycle,
+                    repeats=last and stage.cycle > 0 and (not after or after.cycle != stage.cycle),
                 )
                 begins = None
             now = stage.target
@@ -101,7 +119,10 @@ class Lap:
         """Number of its increments."""
         starts = [self.start, *(stage.target for stage in self.stages[:-1])]
         pairs = zip(self.stages, starts, strict=True)
-        return sum(len(stage.times(now)) if stage.step else stage.steps for stage, now in pairs)
+        return sum(
+            len(stage.times(now)) if stage.step or stage.stops else stage.steps
+            for stage, now in pairs
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +130,8 @@ class Target:
     """The end of an increment of a program.
 
     ``begins`` is the time at which a later lap begins with this increment, ``keeps`` the name of
-    the stage that ends with it, ``closes`` says whether the lap ends with it.
+    the stage that ends with it, ``closes`` says whether the lap ends with it. ``cycle`` is that of
+    its stage, and ``repeats`` says whether the cycle ends with it.
     """
 
     time: float
@@ -118,6 +140,8 @@ class Target:
     apart: bool = False
     keeps: str = ""
     closes: bool = False
+    cycle: int = 0
+    repeats: bool = False
 
 
 @dataclass(frozen=True)

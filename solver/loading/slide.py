@@ -85,7 +85,7 @@ def slide(
     bound = candidates.lines.least(N)
     for i, part in enumerate(system.parts):
         motion = candidates.of_part(i, part.rigid)
-        if len(motion) == n or not motion.size:
+        if not candidates.frictional or not motion.size or motion[candidates.linked].any():
             continue
         _, apart, ways = linalg.svd(motion[:n][closed])
         apart = np.append(apart, np.zeros(len(ways) - len(apart)))
@@ -94,7 +94,7 @@ def slide(
         for way in (*np.eye(len(load)), load):
             power = abs(float(load @ way))
             moved = motion @ along @ way
-            most = float(bound @ np.abs(moved[n:])) + abs(float(N @ moved[:n]))
+            most = float(bound @ np.abs(moved[candidates.along])) + abs(float(N @ moved[:n]))
             if power > most > 0:
                 return Slide(body=part.body.name, ratio=power / most)
     return None

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.complementarity import solve_contact
+from solver.contact.links import eliminated
 from solver.contact.problem import ContactProblem
 
 if TYPE_CHECKING:
@@ -72,25 +73,33 @@ def newton_step(
     begun = [operator.begin(r) for operator, r in zip(operators, balanced, strict=True)]
     for i, part in enumerate(begun):
         motion += candidates.of_part(i, part.kept)
-    each = zip(system.parts, candidates.holds, strict=True)
-    floating = [part.rigid if held else part.rigid[:, :0] for part, held in each]
-    solution = solve_contact(
-        ContactProblem(
-            W=W,
-            offset=motion,
-            lines=candidates.lines,
-            A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
-            balance=np.concatenate(
-                [
-                    R.T @ (r + pushed)
-                    for R, r, pushed in zip(floating, residuals, candidates.pushes, strict=True)
-                ]
-            ),
+    each = zip(system.parts, candidates.holds, candidates.links.rows, strict=True)
+    floating = [
+        part.rigid if held or linked is not None else part.rigid[:, :0]
+        for part, held, linked in each
+    ]
+    links, last = len(candidates.links), np.arange(len(W))[candidates.linked]
+    W[last, last] += candidates.links.compliance
+    motion[last] -= candidates.links.compliance * candidates.forces[last]
+    problem = ContactProblem(
+        W=W,
+        offset=motion,
+        lines=candidates.lines,
+        A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
+        balance=np.concatenate(
+            [
+                R.T @ (r + pushed)
+                for R, r, pushed in zip(floating, residuals, candidates.pushes, strict=True)
+            ]
         ),
-        candidates.status,
     )
+    if links:
+        touched = np.repeat(candidates.holds, [R.shape[1] for R in floating])
+        problem, whole = eliminated(problem, links, touched)
+    solution = solve_contact(problem, candidates.status)
     if solution is None:
         return None
+    solution = whole(solution) if links else solution
     more = solution.forces - candidates.forces
     change = [candidates.on_part(i, more, part.n) for i, part in enumerate(system.parts)]
     rigid = np.split(solution.rigid, np.cumsum([R.shape[1] for R in floating])[:-1])

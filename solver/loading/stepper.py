@@ -81,6 +81,7 @@ class Stepper:
         at_rest = Increment(self.system, state, state.time, contact=False).solve()
         each = zip(self.system.parts, state.u, at_rest.responses, strict=True)
         stored = sum(elastic_energy(part, u, found, state.time) for part, u, found in each)
+        stored += self.system.links.energy(state.links)
         scale = max(stored, self.system.least(state.time)[1])
         now = replace(at_rest, state=state, energy=Energy(stored=stored, scale=scale))
         return Point(now, (), tally or Tally(), self._watched((), now), _facing(state))
@@ -386,6 +387,7 @@ def extrapolate(past: Sequence[State], now: State, time: float) -> State | None:
         now,
         u=tuple(n + share * (n - b) for b, n in zip(before.u, now.u, strict=True)),
         contacts=tuple(contact(b, n) for b, n in zip(before.contacts, now.contacts, strict=True)),
+        links=now.links + share * (now.links - before.links),
     )
 
 

@@ -34,27 +34,28 @@ _SHARE = 0.25
 def timing(system: System, start: State, candidates: Candidates, compliance: Array) -> Timing:
     """Return the timing of an increment from ``start``.
 
-    ``compliance`` (n or 2n, square) is that of the contact points, elastic [mm/N]. It bounds the
-    uncertain friction of vertices. If the time of touch is not known, that is the elastic stiffness
-    times the slip without friction; a vertex that sticks from the beginning of the increment has no
-    slip, and its tangential force is added instead. If it is known, it is the change of friction by
-    the possible error of the slip before, at vertices that stick, or might without that error.
+    ``compliance`` (n or 2n, and links, square) is that of the contact points, elastic [mm/N]. It
+    bounds the uncertain friction of vertices. If the time of touch is not known, that is the
+    elastic stiffness times the slip without friction; a vertex that sticks from the beginning of
+    the increment has no slip, and its tangential force is added instead. If it is known, it is the
+    change of friction by the possible error of the slip before, at vertices that stick, or might
+    without that error.
     """
     n = candidates.n
     N = np.maximum(candidates.forces[:n], 0.0)
     bound, unknown = np.zeros(n), np.zeros(n)
-    if len(candidates.motion) > n:
-        bound = candidates.lines.least(N)
+    if candidates.frictional:
+        bound, along = candidates.lines.least(N), candidates.along
         slips = zip(candidates.slips, candidates.vertices, strict=True)
         slipped = np.abs(np.concatenate([slip[at] for slip, at in slips]))
-        strained = np.abs(candidates.forces[n:]) + slipped / np.diag(compliance)[n:]
+        strained = np.abs(candidates.forces[along]) + slipped / np.diag(compliance)[along]
         untimed = np.isinf(candidates.unsure)
         off = np.where(untimed, 0.0, candidates.unsure)
-        slides = (candidates.status != STICK) & (np.abs(candidates.motion[n:]) > np.abs(off))
+        slides = (candidates.status != STICK) & (np.abs(candidates.motion[along]) > np.abs(off))
         sticks = np.flatnonzero((N > 0) & ~slides)
         off[(N <= 0) | slides] = 0.0
         if off.any():
-            tangential = compliance[n:, n:][np.ix_(sticks, sticks)]
+            tangential = compliance[along, along][np.ix_(sticks, sticks)]
             off[sticks] = _SHARE * linalg.pinvh(tangential) @ off[sticks]
         unknown = np.minimum(bound, np.where(untimed, strained, np.abs(off)))
     stuck = np.where((N > 0) & (candidates.status == STICK), bound, 0.0)

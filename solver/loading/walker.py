@@ -15,13 +15,14 @@ import numpy as np
 
 from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.loading.bearing import excess_shear
+from solver.loading.cycle import Cycle
 from solver.loading.outcome import Outcome, PathEnded, Settled, Tally
 from solver.loading.program import shared
 from solver.loading.refinement import HALVINGS
 from solver.loading.stepper import Stepper, turned
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from solver.contact.state import Converged
     from solver.contact.system import System
@@ -42,7 +43,8 @@ class _Walk:
     """A walk so far.
 
     ``points`` are those of the present lap, ``work`` is the plastic work before it [N mm]; ``past``
-    has the points of earlier laps, and whether anything yielded in them.
+    has the points of earlier laps, and whether anything yielded in them; ``cycles`` are those of
+    repeated stages, and ``cycle`` is the state in which the present one began.
     """
 
     point: Point
@@ -50,6 +52,8 @@ class _Walk:
     traces: tuple[Any, ...] = ()
     work: float = 0.0
     past: tuple[tuple[Points, bool], ...] = ()
+    cycles: tuple[Cycle, ...] = ()
+    cycle: Converged | None = None
     error: NotConverged | None = None
 
 
@@ -60,6 +64,7 @@ class Walker:
     ----------
     trace : (states at the ends of a lap's stages, by name) -> value kept in `Outcome.traces`
     refinement : criterion by which increments are halved; without it the program's own are used
+    until : (cycles of repeated stages so far) -> whether the others may be left out
     watch : (converged increment) -> value kept in `Outcome.history`
     report : called after every increment
     """
@@ -71,10 +76,11 @@ class Walker:
         *,
         trace: Callable[[Points], Any] | None = None,
         refinement: StepRefinement | None = None,
+        until: Callable[[Sequence[Cycle]], bool] | None = None,
         report: Report | None = None,
         watch: Watch | None = None,
     ) -> None:
-        self._system = system
+        self._system, self._until = system, until
         self._trace = trace
         self._refinement = refinement
         self._stepper = Stepper(system, control, report, watch)
@@ -129,6 +135,7 @@ class Walker:
                 last=walk.point.now,
                 points=walk.points,
                 traces=walk.traces,
+                cycles=walk.cycles,
                 history=walk.point.history,
                 error=walk.error or self._never_facing(walk.point),
                 settled=settled,
@@ -189,6 +196,12 @@ class Walker:
                 return replace(walk, point=ended.point, error=ended.error)
             if targets[at].closes:
                 walk = self._closed(walk, program)
+            if targets[at].repeats and self._until and self._until(walk.cycles):
+                rest = range(at + 1, len(targets))
+                after = next((k for k in rest if not targets[k].cycle), len(targets))
+                if after <= end:  # the loads are those at the end of the last cycle
+                    point = self._stepper.again(walk.point, targets[after - 1].time)
+                    walk, at = replace(walk, point=point), after - 1
             at += 1
         return walk
 
@@ -197,10 +210,18 @@ class Walker:
         if target.begins is not None:
             point = self._stepper.again(walk.point, target.begins)
             walk = replace(walk, point=point, points={}, work=point.tally.plastic_work)
+        begun = walk.cycle or walk.point.now if target.cycle else None
         point = turned(walk.point) if target.turns else walk.point
         point = self._stepper.reach(point, target.time, contact=not target.apart)
-        points = {**walk.points, target.keeps: point.now} if target.keeps else walk.points
-        return replace(walk, point=point, points=points)
+        points = dict(walk.points)
+        if target.keeps:
+            if target.cycle and target.keeps in points:
+                points[f"{target.keeps}_before"] = points[target.keeps]
+            points[target.keeps] = point.now
+        cycles = walk.cycles
+        if target.repeats and begun:
+            cycles, begun = (*cycles, Cycle.between(begun, point.now)), None
+        return replace(walk, point=point, points=points, cycles=cycles, cycle=begun)
 
     def _closed(self, walk: _Walk, program: Program) -> _Walk:
         """Return the walk with the results of its lap, which is complete."""

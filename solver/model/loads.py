@@ -27,7 +27,7 @@ from solver.parts import Parts
 Array = NDArray[np.float64]
 Field = Callable[[Array], Array]
 Value = float | Field
-"""A number, or a function of position: (positions (2, n) [mm]) -> (n,)."""
+"""A number, or a function of position: (positions (2, n) [mm]) -> (n,), such as a `Tabulated`."""
 
 _ALWAYS = Amplitude.constant(1.0)
 _VECTOR, _TENSOR = ("x", "y"), ("xx", "yy", "zz", "xy")
@@ -156,8 +156,7 @@ class Traction(BoundaryLoad):
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a component that is not finite."""
         del kinematics
-        for axis in ("x", "y"):
-            _check_value(f"traction.{self.boundary}.{axis}", getattr(self, axis), "MPa")
+        _check_components(f"traction.{self.boundary}", self, _VECTOR, "MPa")
 
     def push(self, x: Array, along: Array) -> Array:
         """Return the forces (2, n) on pieces of the boundary [N/mm]."""
@@ -176,8 +175,7 @@ class BodyForce(Load):
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a component that is not finite."""
         del kinematics
-        for axis in ("x", "y"):
-            _check_value(f"body_force.{axis}", getattr(self, axis), "N/mm3")
+        _check_components("body_force", self, _VECTOR, "N/mm3")
 
     def body_force(self, x: Array) -> Array:
         """Return the force per volume (2, n) at positions x [N/mm3]."""
@@ -412,8 +410,7 @@ class InitialStress(Load):
         """Raise `ModelError` if the stress is neither components nor a function of position."""
         del kinematics
         each = {name: getattr(self, name) for name in _TENSOR}
-        for name, value in each.items():
-            _check_value(f"initial_stress.{name}", value, "MPa")
+        _check_components("initial_stress", self, _TENSOR, "MPa")
         if self.stress is not None and not callable(self.stress):
             raise ModelError("initial_stress.stress", self.stress, "must be a function of position")
         if self.stress is not None and any(each.values()):
@@ -434,6 +431,11 @@ def _check_value(field: str, value: object, unit: str) -> None:
         _finite(field, value, unit)
 
 
+def _check_components(field: str, load: Load, names: tuple[str, ...], unit: str) -> None:
+    for name in names:
+        _check_value(f"{field}.{name}", getattr(load, name), unit)
+
+
 def _finite(field: str, value: object, unit: str) -> None:
     if not isinstance(value, int | float | np.number) or not np.isfinite(float(value)):
         raise ModelError(field, value, f"must be finite [{unit}]")
@@ -452,7 +454,11 @@ def _components(field: str, load: Load, names: tuple[str, ...], x: Array, unit: 
 
 def _values(field: str, value: Value, x: Array, unit: str) -> Array:
     """Return a number or a function of position at positions x (n,), or raise `ModelError`."""
-    return checked(field, value(x) if callable(value) else value, (x.shape[1],), unit)
+    try:
+        found = value(x) if callable(value) else value
+    except ModelError as error:  # of a table
+        raise ModelError(field, error.value, error.allowed) from None
+    return checked(field, found, (x.shape[1],), unit)
 
 
 def checked(field: str, value: object, shape: tuple[int, ...], unit: str) -> Array:

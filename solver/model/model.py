@@ -12,6 +12,7 @@ from solver.errors import ModelError
 from solver.materials.doubts import doubts
 from solver.model.body import Body
 from solver.model.friction import Coulomb, FrictionLaw
+from solver.model.link import Link
 from solver.model.rigid import Pushed, RigidBody
 from solver.model.singular import SingularPoint
 
@@ -115,12 +116,14 @@ class Model:
     bodies : bodies with different names and the same kinematics
     rigid : rigid bodies, with names of their own
     contacts : pairs of boundaries that may touch, of bodies of one thickness
+    links : boundaries that are tied, kept rigid, or held by springs
     singular : points around which large strain is not judged: it depends on the mesh
     """
 
     bodies: tuple[Body, ...]
     contacts: tuple[ContactPair, ...] = ()
     rigid: tuple[RigidBody, ...] = ()
+    links: tuple[Link, ...] = ()
     singular: tuple[SingularPoint, ...] = ()
 
     def __post_init__(self) -> None:
@@ -144,6 +147,36 @@ class Model:
             elastic = all(self.body(name, side).material.elastic for side, (name, _) in sides)
             contact.law.check_bodies(elastic=elastic)
         self._check_pairs()
+        for k, link in enumerate(self.links):
+            self._check_link(f"links[{k}]", link)
+        for body in self.rigid:
+            if not body.surfaces and all(link.rigid != body.name for link in self.links):
+                allowed = "must be 1 or more, unless a link moves a boundary with the body"
+                raise ModelError(f"rigid.{body.name}.surfaces", {}, allowed)
+
+    def _check_link(self, name: str, link: Link) -> None:
+        """Refuse bodies that a link cannot join, and surfaces that something else holds too."""
+        sides = zip(("slave", "master"), link.sides, strict=False)
+        for side, (of, boundary) in sides:
+            body = self.body(of, f"{name}.{side}")
+            if not isinstance(body, Body):
+                allowed = "must be a boundary of a body with a mesh: name a rigid body by rigid"
+                raise ModelError(f"{name}.{side}", (of, boundary), allowed)
+            if body.axle is not None or body.periodic is not None:
+                allowed = "must be of a body without an axle that is not periodic"
+                raise ModelError(f"{name}.{side}", (of, boundary), allowed)
+            body.facets(boundary, f"{name}.{side}", outer=True)
+            for j, pair in enumerate(self.contacts):
+                if any(self._overlap((of, boundary), each) for each in (pair.slave, pair.master)):
+                    allowed = f"shares facets with contacts[{j}]: link or contact, not both"
+                    raise ModelError(f"{name}.{side}", (of, boundary), allowed)
+        if link.master is not None and self._overlap(*link.sides):
+            allowed = f"shares facets with slave {link.slave}: must be another surface"
+            raise ModelError(f"{name}.master", link.master, allowed)
+        if link.rigid is not None and not isinstance(
+            self.body(link.rigid, f"{name}.rigid"), RigidBody
+        ):
+            raise ModelError(f"{name}.rigid", link.rigid, "must be a rigid body")
 
     def _check_pairs(self) -> None:
         """Refuse two thicknesses, a surface paired with itself, and two surfaces paired twice."""

@@ -1,4 +1,4 @@
-"""Rigid bodies, given by their surfaces, such as an indenter or a plate."""
+"""Rigid bodies: an indenter or a plate given by its surfaces, or a point that moves boundaries."""
 
 from __future__ import annotations
 
@@ -31,9 +31,16 @@ class Moved(Load):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pushed(Load):
-    """A free motion with a force [N] or a moment [N mm] on it, given at load factor one."""
+    """A free motion with a force [N] or a moment [N mm] on it, given at load factor one.
+
+    Attributes
+    ----------
+    locked : time from which the motion stays as it is then, as that of a tightened bolt: in all
+        increments that begin at or after it
+    """
 
     value: float = 0.0
+    locked: float = np.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -91,12 +98,12 @@ def arc(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RigidBody:
-    """A body that does not deform, given by its surfaces alone.
+    """A body that does not deform, given by its surfaces and its centre.
 
     Attributes
     ----------
     name : unique in its model
-    surfaces : contact surfaces by name
+    surfaces : contact surfaces by name; none where it only moves boundaries by links
     centre : the point (x, y) to which displacements and moments refer [mm]
     x, y, rotation : the three motions, each prescribed (`Moved`; zero by default) or free with a
         force or moment on it (`Pushed`); rotation is positive counter-clockwise
@@ -104,7 +111,7 @@ class RigidBody:
     """
 
     name: str
-    surfaces: Mapping[str, RigidSurface]
+    surfaces: Mapping[str, RigidSurface] = field(default_factory=dict)
     centre: tuple[float, float] = (0.0, 0.0)
     x: Moved | Pushed = field(default_factory=Moved)
     y: Moved | Pushed = field(default_factory=Moved)
@@ -112,8 +119,6 @@ class RigidBody:
     thickness: float = 1.0
 
     def __post_init__(self) -> None:
-        if not self.surfaces:
-            raise ModelError("surfaces", {}, "must be at least one")
         for name, curve in self.surfaces.items():
             curve.check(name)
         if not np.isfinite(self.centre).all():
@@ -126,6 +131,8 @@ class RigidBody:
                 raise ModelError(name, motion, "must be Moved or Pushed")
             if not np.isfinite(motion.value):
                 raise ModelError(name, motion.value, "must be finite")
+            if isinstance(motion, Pushed) and np.isnan(motion.locked):
+                raise ModelError(f"{name}.locked", motion.locked, "must be a time")
 
     @property
     def every_load(self) -> tuple[Moved | Pushed, ...]:
@@ -145,7 +152,8 @@ class RigidBody:
         """Return the number of a surface (1,)."""
         del outer
         if boundary not in self.surfaces:
-            allowed = "must name a surface of the rigid body: " + ", ".join(self.surfaces)
+            known = ", ".join(self.surfaces) or "it has none"
+            allowed = f"must name a surface of the rigid body: {known}"
             raise ModelError(field, boundary, allowed)
         return np.array([list(self.surfaces).index(boundary)])
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.results.outputs import output
 from solver.results.places import FRACTION
-from solver.results.quantities import declare
+from solver.results.quantities import declare, placed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,7 +25,10 @@ CONTACT_SHEAR = declare(
     "contact_shear", "contact shear on the lower body, or the master, along s", "MPa", dims=_LINE
 )
 CONTACT_GAP = declare("contact_gap", "gap between the contact surfaces", "mm", dims=_LINE)
-CONTACT_SLIP = declare("contact_slip", "slip of the slave along s", "mm", dims=_PAIRS)
+CONTACT_SLIP = declare(
+    "contact_slip", "slip of the slave along s", "mm", dims=_PAIRS,
+    beside=placed("contact", "x", "y", "s"),
+)  # fmt: skip
 CONTACT_PRESSURE_DEFORMED = declare(
     "contact_pressure_deformed", "contact pressure over the deformed area", "MPa", dims=_PAIRS
 )

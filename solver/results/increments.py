@@ -56,8 +56,8 @@ def over_increments(
 
     Returns
     -------
-    reactions [N] and motions [mm, rad] (n_parts, n_times), contact forces (n_pairs, n_times) [N];
-    NaN for increments that were not computed
+    reactions [N] and, where there are rigid bodies, motions [mm, rad] (n_parts, n_times), contact
+    forces (n_pairs, n_times) [N]; NaN for increments that were not computed
     """
     kept = _in_order(history, times)
     lost = (np.nan, np.nan, np.nan)
@@ -69,10 +69,10 @@ def over_increments(
         INCREMENT_TIME: np.array(times),
         REACTION[0]: reactions[..., 0],
         REACTION[1]: reactions[..., 1],
-        MOTION[0]: motions[..., 0],
-        MOTION[1]: motions[..., 1],
-        ROTATION: motions[..., 2],
     }
+    if any(observed.motions for observed in history):  # of rigid bodies alone
+        for k, motion in enumerate((*MOTION, ROTATION)):
+            out[motion] = motions[..., k]
     if pairs:
         none = [lost[:2]] * len(pairs)
         forces = np.array([o.contact if o else none for o in kept])

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.results.quantities import along_axes, declare, declare_along
+from solver.results.quantities import along_axes, declare, declare_along, placed
+from solver.tensors import AXES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,7 +34,11 @@ _STATES = ("line", "stage", "fraction")
 LINE_AT = declare_along("line_{}", "position along {} of a point of the line", "mm", dims=_LINE)
 LINE_S = declare("line_s", "distance from the start of the line", "mm", dims=_LINE)
 LINE_STRESS = declare(
-    "line_stress", "stress along the line", "MPa", dims=("line", "stage", "component", "fraction")
+    "line_stress",
+    "stress along the line",
+    "MPa",
+    dims=("line", "stage", "component", "fraction"),
+    beside=placed("line", *AXES, "s"),
 )
 LINE_MISES = declare("line_mises", "von Mises stress along the line", "MPa", dims=_STATES)
 LINE_STRAIN = declare(
@@ -43,7 +48,11 @@ LINE_STRAIN = declare(
 _POINT = ("point", "stage")
 POINT_AT = declare_along("point_{}", "position of the point along {}", "mm", dims=("point",))
 POINT_STRESS = declare(
-    "point_stress", "stress at the point", "MPa", dims=("point", "stage", "component")
+    "point_stress",
+    "stress at the point",
+    "MPa",
+    dims=("point", "stage", "component"),
+    beside=placed("point", *AXES),
 )
 POINT_MISES = declare("point_mises", "von Mises stress at the point", "MPa", dims=_POINT)
 POINT_STRAIN = declare(

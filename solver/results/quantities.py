@@ -130,6 +130,11 @@ def in_space(name: str, long_name: str, units: str, **more: Any) -> Quantity:
     return IN_SPACE[name]
 
 
+def placed(prefix: str, *names: str) -> dict[str, str]:
+    """Return the attribute of a variable whose positions are ``PREFIX_NAME``: its coordinates."""
+    return {"coordinates": " ".join(f"{prefix}_{name}" for name in names)}
+
+
 def along_axes(quantities: tuple[Quantity, ...], values: Any) -> dict[Quantity, Any]:
     """Return the values (n_axes, ...) by the quantities of `declare_along` for their axes."""
     return dict(zip(quantities, values, strict=False))

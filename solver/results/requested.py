@@ -30,7 +30,9 @@ _UNITS = {"stress": "MPa", "mises": "MPa", "plastic_strain": "1", "displacement"
 _TENSORS = {"stress": "stress", "plastic_strain": "plastic_tensor"}
 """Tensors by the names of requests, and of `BodyValues`."""
 EXTREME = ("maximum", "minimum")
-OF_CONTACT = ("pressure", "shear", "gap", "slip")
+FORCES = ("pressure", "shear")
+"""Fields of a contact whose integral is a force: over the area, not along the surface."""
+OF_CONTACT = (*FORCES, "gap", "slip")
 """Fields of a contact of which a number can be requested."""
 
 
@@ -51,7 +53,8 @@ class RequestedNumber:
     name : name of the variable; the position adds ``_x``, ``_y`` (and ``_z``)
     of : the field, one of `of_body` or `OF_CONTACT`. In a body ``mises`` and ``plastic_strain`` are
         taken at integration points, other fields at nodes
-    take : ``maximum``, ``minimum``, ``integral`` along a line or contact, or ``extent``, the length
+    take : ``maximum``, ``minimum``, ``integral`` along a line or contact, of ``pressure`` and
+        ``shear`` over its area, which is a force [N]; or ``extent``, the length
         along which the value is above zero; for ``pressure`` it is the length of contact
     stage : name of the state
     minus : name of a state whose values are taken off; empty for none. Not of a contact
@@ -74,16 +77,26 @@ class RequestedNumber:
     description: str = ""
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
-        """The number and, for an extreme value, its position along all axes; a run may have two."""
+    def is_force(self) -> bool:
+        """Whether it is the resultant of a contact."""
+        return self.take == "integral" and self.of in FORCES
+
+    @property
+    def words(self) -> str:
+        """What it is, of which place and when."""
         places = {"body": self.body, "line": self.line, "contact": self.contact}
         where = next(f"{kind} {name}" for kind, name in places.items() if name is not None)
         what = self.of.replace(".", " ").replace("_", " ")
         when = f"{self.stage} minus {self.minus}" if self.minus else self.stage
-        usual = f"{self.take} of {what} of {where}, stage {when}"
+        return f"{self.take} of {what} of {where}, stage {when}"
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The number and, for an extreme value, its position along all axes; a run may have two."""
         units = _UNITS[self.of.partition(".")[0]]
-        units = {"extent": "mm", "integral": f"{units} mm".removeprefix("1 ")}.get(self.take, units)
-        number = Quantity(name=self.name, long_name=self.description or usual, units=units)
+        along = "N" if self.is_force else f"{units} mm".removeprefix("1 ")
+        units = {"extent": "mm", "integral": along}.get(self.take, units)
+        number = Quantity(name=self.name, long_name=self.description or self.words, units=units)
         if self.take not in EXTREME:
             return (number,)
         return number, *(
@@ -119,6 +132,8 @@ class RequestedNumber:
             found: tuple[float, ...] = (contacts[self.contact].length,)
         else:
             values, X = self._sought(fields, at, lines, contacts)
+            if self.is_force:
+                values = values * contacts[str(self.contact)].depth
             if before is not None:
                 values = values - self._sought(fields, before, lines, contacts)[0]
             found = self._found(values, X)

@@ -6,7 +6,7 @@ import logging
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from solver.results import saved
 from solver.results.audit.pairs import untouched
 from solver.results.audit.report import Audit, audit
 from solver.results.contact_result import ContactResult, contact_result
+from solver.results.cycles import decided, shakedown_of
 from solver.results.fields import SystemFields
 from solver.results.history import Observed, observe
 from solver.results.mesh_fields import MeshFields, mesh_fields
@@ -34,8 +35,10 @@ if TYPE_CHECKING:
 
     from solver.contact.state import Converged
     from solver.fem.frame import RigidMotion
+    from solver.loading.cycle import Cycle
     from solver.loading.program import Stage
     from solver.model.model import Model
+    from solver.results.shakedown import Shakedown
 
 
 _LOG = logging.getLogger("solver")
@@ -51,12 +54,14 @@ class Solution:
     stages : the converged states at the ends of the stages, by name
     tally : cost of the run
     history : a few numbers of the initial state and of every increment
+    cycles : the cycles of stages that are repeated
     """
 
     system: System
     stages: Mapping[str, Converged]
     tally: Tally
     history: tuple[Observed, ...] = ()
+    cycles: tuple[Cycle, ...] = ()
     _fields: SystemFields = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -168,7 +173,7 @@ class Solution:
 
     def save(self, path: str | Path) -> None:
         """Write the model and its states to a file, for `load`."""
-        content = {name: getattr(self, name) for name in ("stages", "tally", "history")}
+        content = {name: getattr(self, name) for name in ("stages", "tally", "history", "cycles")}
         saved.write(Path(path), {"model": self.system.model, **content})
 
     @classmethod
@@ -179,6 +184,18 @@ class Solution:
         """
         content = saved.read(Path(path))
         return cls(system=System(content.pop("model")), **content)
+
+    def shakedown(self) -> Shakedown:
+        """Return the shakedown state that the cycles tend to, and the plastic strain of a cycle.
+
+        Raises
+        ------
+        ModelError
+            if no stage is repeated
+        """
+        if not self.cycles:
+            raise ModelError("stages", list(self.stages), "must have some with a cycle")
+        return shakedown_of(self.cycles, self.system.laws)
 
     def audit(self, stage: str = "loaded") -> Audit:
         """Return the audit: figures of a state, violated conditions and warnings.
@@ -197,6 +214,7 @@ def solve(
     *,
     load: float = 1.0,
     stages: Sequence[Stage] = (),
+    until: Literal["shaken_down"] | None = None,
     control: PathControl | None = None,
     linear_solver: str = "auto",
     progress: Callable[[float], None] | None = None,
@@ -207,7 +225,10 @@ def solve(
     ----------
     load : load factor: multiple of all loads of the model
     stages : stages to solve instead of ``load``, for loads with amplitudes, which are functions of
-        time; the solution then has the states at their ends
+        time; the solution then has the states at their ends. Those of one `Stage.cycle` follow one
+        another, and have the same names in the next
+    until : ``shaken_down`` leaves out cycles after the shakedown state is decided: their loads must
+        be the same at the end of each
     control : increments and tolerances; by default twenty increments of loading
     linear_solver : ``auto``, ``pardiso`` or ``superlu``
     progress : called after each increment with the completed fraction of the increments, up to 1;
@@ -227,7 +248,9 @@ def solve(
     """
     if not (np.isfinite(load) and load > 0):
         raise ModelError("load", load, "must be positive and finite")
-    names = [stage.name for stage in stages]
+    if until not in (None, "shaken_down"):
+        raise ModelError("until", until, "must be shaken_down or None")
+    names = [(stage.name, stage.cycle) for stage in stages]
     if len(set(names)) < len(names):
         raise ModelError("stages", names, "must have different names")
     control = control or PathControl(load_step=load / 20)
@@ -240,7 +263,9 @@ def solve(
         _LOG.warning("%s", doubt)
     system = System(model, linear_solver)
     follow = _IncrementCount(program, progress)
-    walker = Walker(system, control, watch=partial(observe, system), report=follow)
+    ends = partial(decided, laws=system.laws) if until else None
+    watch = partial(observe, system)
+    walker = Walker(system, control, watch=watch, report=follow, until=ends)
     (outcome,) = walker.walk([program])
     if outcome.error is not None:
         raise outcome.error
@@ -249,6 +274,7 @@ def solve(
         stages=outcome.points,
         tally=outcome.tally,
         history=outcome.history,
+        cycles=outcome.cycles,
     )
 
 

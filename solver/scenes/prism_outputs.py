@@ -8,6 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.model.friction import PatchStatus
+from solver.results.cycles import (
+    SHAKEDOWN_STATE,
+    STEADY_NET_INCREMENT,
+    STEADY_PLASTIC_INCREMENT,
+)
 from solver.results.quantities import declare
 from solver.results.shakedown import Shakedown, ShakedownState, classify
 from solver.scenes.passes import (
@@ -18,13 +23,7 @@ from solver.scenes.passes import (
     PASS_PLASTIC_INCREMENT,
     PASS_SURFACE_ADVANCE,
 )
-from solver.scenes.rolling import (
-    CREEPAGE,
-    LONGITUDINAL_FORCE,
-    SHAKEDOWN_STATE,
-    STEADY_NET_INCREMENT,
-    STEADY_PLASTIC_INCREMENT,
-)
+from solver.scenes.rolling import CREEPAGE, LONGITUDINAL_FORCE
 from solver.scenes.scene import Sketch
 
 if TYPE_CHECKING:

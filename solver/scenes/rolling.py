@@ -20,13 +20,17 @@ import numpy as np
 
 from solver.loading.refinement import StepRefinement
 from solver.results.contact import contact
+from solver.results.cycles import (
+    SHAKEDOWN_STATE,
+    STEADY_NET_INCREMENT,
+    STEADY_PLASTIC_INCREMENT,
+)
 from solver.results.extremes import residual_extremes
 from solver.results.figures import cost, extremes
 from solver.results.free_surface import FreeSurface
 from solver.results.maps import maps, surfaces
 from solver.results.quantities import declare
 from solver.results.record import Status
-from solver.results.shakedown import ShakedownState
 from solver.scenes.passes import Trace, passes, shakedown_of
 from solver.scenes.rolling_effort import effort
 from solver.scenes.rolling_model import model, sketch
@@ -112,15 +116,6 @@ AXLE_ROTATION = declare(
     "axle_rotation",
     "rotation of the wheel at mid-track, counter-clockwise, from its mesh", "rad",
 )  # fmt: skip
-SHAKEDOWN_STATE = declare(
-    "shakedown_state", "shakedown state that the passes tend to", flags=ShakedownState
-)
-STEADY_PLASTIC_INCREMENT = declare(
-    "steady_plastic_increment", "limit of the plastic strain accumulated in a cycle"
-)
-STEADY_NET_INCREMENT = declare(
-    "steady_net_increment", "limit of the signed plastic strain that a cycle leaves"
-)
 
 
 def method(parameters: RollingParameters) -> Method:

@@ -87,6 +87,7 @@ class Scene:
     method : (parameters) -> method that computes runs that differ in ``branch``; without it
         `by_increments`
     trace : (samples, states of a lap) -> data stored for each lap in ``outcome.traces``
+    until : (parameters) -> whether repeated stages end when their shakedown state is decided
     watch : (parameters, samples, converged increment) -> data stored for it in ``outcome.history``
     refinement : (parameters) -> how increments are halved, or None for those of the program
     effort : (parameters, values of ``branch``) -> work of the loading path, in microseconds or, if
@@ -115,6 +116,7 @@ class Scene:
     places: Callable[[Any], NamedPlaces] | None = None
     method: Callable[[Any], Method] | None = None
     trace: Callable[[Samples, Mapping[str, Any]], Any] | None = None
+    until: Callable[[Any], bool] | None = None
     watch: Callable[[Any, Samples, Any], Any] | None = None
     refinement: Callable[[Any], StepRefinement | None] | None = None
     effort: Callable[[Any, Sequence[float]], Effort] | None = None
@@ -247,6 +249,7 @@ def by_increments(
     from solver.loading.walker import Walker
     from solver.results.audit.pairs import untouched
     from solver.results.audit.report import audit
+    from solver.results.cycles import decided
     from solver.results.samples import Samples
     from solver.results.tractions import tractions_of
 
@@ -269,6 +272,7 @@ def by_increments(
         Control(),
         trace=partial(scene.trace, samples) if scene.trace else None,
         refinement=scene.refinement(last) if scene.refinement else None,
+        until=partial(decided, laws=system.laws) if scene.until and scene.until(last) else None,
         report=report,
         watch=partial(scene.watch, last, samples) if scene.watch else None,
     )

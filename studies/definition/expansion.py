@@ -130,14 +130,6 @@ class Expansion:
         """Yield the runs, the last axis running fastest."""
         return map(self._case, self._indices())
 
-    def case(self, number: int) -> Case:
-        """Return one run by its number in the order of `cases`."""
-        index = []
-        for axis in reversed(self._sets):
-            number, at = divmod(number, len(axis.settings))
-            index.append(at)
-        return self._case(tuple(reversed(index)))
-
     def paths(self) -> Iterator[LoadingPath]:
         """Yield the loading paths, in the order in which `cases` comes upon them."""
         branch = self._scene.branch

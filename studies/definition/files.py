@@ -34,7 +34,8 @@ def read_study(
     Parameters
     ----------
     path : of the study
-    measured : tables of measured lines, in place of those that a fit names
+    measured : tables of measured lines, in place of those that a fit names; the place of one on
+        other dimensions may be behind its name: ``crater.csv@stage=unloaded,pass=2``
     chain : largest number of studies in files that it extends, one by the other
 
     Raises
@@ -53,7 +54,7 @@ def read_study(
         raise StudyError("fit", tables["fit"], "must be a table")
     if isinstance(fit := tables.get("fit"), dict):
         if measured:
-            fit["measured"] = [{"rows": read_table(each, "--measured")} for each in measured]
+            fit["measured"] = [_at_place(str(each), "--measured") for each in measured]
         elif "measured" in fit:
             lines = fit["measured"] if isinstance(fit["measured"], list) else [fit["measured"]]
             fit["measured"] = [
@@ -92,6 +93,23 @@ def _with_rows(line: Any, field: str, folder: Path) -> Any:
         return line
     rest = {key: value for key, value in given.items() if key != "file"}
     return rest | {"rows": read_table(folder / given["file"], field)}
+
+
+def _at_place(text: str, field: str) -> dict[str, Any]:
+    """Return the rows of a measured line, and its place, which may be behind the file's name."""
+    name, _, places = text.rpartition("@")
+    if not name or "=" not in places:
+        return {"rows": read_table(text, field)}
+    at: dict[str, Any] = {}
+    for each in places.split(","):
+        dim, sign, value = each.partition("=")
+        if not (dim and sign and value):
+            raise StudyError(field, text, "must be FILE, or FILE@NAME=VALUE,NAME=VALUE")
+        try:
+            at[dim] = float(value)
+        except ValueError:
+            at[dim] = value
+    return {"rows": read_table(name, field), "at": at}
 
 
 def read_table(path: Path | str, field: str) -> list[dict[str, str]]:

@@ -10,9 +10,7 @@ References
 ----------
 Branch, M. A., Coleman, T. F. and Li, Y. (1999), A subspace, interior, and conjugate gradient method
 for large-scale bound-constrained minimization problems, SIAM J. Sci. Comput. 21: the method of
-`scipy.optimize.least_squares`. Belsley, D. A., Kuh, E. and Welsch, R. E. (1980), Regression
-Diagnostics, section 3.2: condition indices, and the shares of variances by which parameters are
-found that cannot be told apart.
+`scipy.optimize.least_squares`.
 """
 
 from __future__ import annotations
@@ -50,12 +48,8 @@ _DIGITS = 6
 """Digits of a share of the range: runs are asked for at these places."""
 _TOLERANCE = 1e-3
 """Least change of the sum of squares, as a share of it, and of the shares of the ranges."""
-_CONDITION = 30.0
-"""Condition index from which parameters cannot be told apart (reference, section 3.2)."""
-_SHARE = 0.5
-"""Share of the variance of a parameter that a direction makes if the parameter is in it."""
-_WEAK = 1e-6
-"""Least length of a column of the Jacobian matrix over that of the longest."""
+_WIDEST = 0.2
+"""Widest difference to either side for the standard deviations, as a share of the range."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,10 +112,12 @@ class Fit:
         """Their standard deviations."""
         return np.concatenate([each.sigma for each in self.measured])
 
-    @property
-    def told(self) -> bool:
-        """Whether all standard deviations were given."""
-        return all(each.told for each in self.measured)
+    def spread(self, seen: Numbers) -> float:
+        """Return the variance of differences over sigma if some sigma were not given; else 1."""
+        freedom = len(self.values) - len(self.free)
+        if freedom <= 0 or all(each.told for each in self.measured):
+            return 1.0
+        return float(np.sum(((seen - self.values) / self.sigma) ** 2)) / freedom
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -320,8 +316,8 @@ class Fitting(Chooser):
             seen = self._all(values)
             assert seen is not None
             self.answer = Fitted(np.array(values), found.x.round(_DIGITS), seen, found.jac)
-            with suppress(_Ends):  # no runs are left: differences to one side tell less well
-                self.answer = self.answer._replace(jacobian=self._central(found.x, found.jac))
+            with suppress(_Ends):  # no runs are left: narrow differences tell less well
+                self.answer = self.answer._replace(jacobian=self._wide(self.answer))
             self.reason = FOUND
         except _Lacking as lacking:
             self._wants = lacking.keys
@@ -370,22 +366,28 @@ class Fitting(Chooser):
             self.answer = self.answer._replace(jacobian=found)
         return found
 
-    def _central(self, shares: Numbers, forward: Numbers) -> Numbers:
-        """Return the Jacobian matrix of central differences, where there are runs on both sides.
+    def _wide(self, answer: Fitted) -> Numbers:
+        """Return the Jacobian matrix of central differences over what the parameters may be.
 
-        What a change of the mesh makes turns its columns apart, and the parameters would seem to be
-        better known than they are: on twice the width it is half as much.
+        That is two standard deviations to both sides. What a change of the mesh makes turns the
+        columns of narrow differences apart: parameters that are nearly alike in what was measured
+        would seem to be better known than they are. A column stays where runs fail, or at a bound.
         """
-        here, steps = shares.round(_DIGITS), self._stepped(shares)
-        others = [(2.0 * here - step).round(_DIGITS) for step in steps]
-        inside = [bool(((each >= 0.0) & (each <= 1.0)).all()) for each in others]
-        pairs = zip(others, inside, strict=True)
-        self._ask([self._values(each) for each, within in pairs if within])
-        found = forward.copy()
-        for k, (one, other) in enumerate(zip(steps, others, strict=True)):
-            ends = [self._all(self._values(each)) for each in (one, other) if inside[k]]
-            if len(ends) == 2 and ends[0] is not None and ends[1] is not None:
-                found[:, k] = (ends[0] - ends[1]) / (one[k] - other[k]) / self.fit.sigma
+        assert answer.jacobian is not None
+        here, found = answer.shares, answer.jacobian.copy()
+        sigma = np.sqrt(self.fit.spread(answer.seen) * np.diag(np.linalg.pinv(found.T @ found)))
+        room = np.minimum(here, 1.0 - here)
+        widths = np.minimum(np.clip(2.0 * sigma, self.fit.step, _WIDEST), room).round(_DIGITS)
+        pairs = [
+            [(here + side * width * unit).round(_DIGITS) for side in (1.0, -1.0)]
+            for width, unit in zip(widths, np.eye(len(here)), strict=True)
+        ]
+        wide = [k for k, width in enumerate(widths) if width >= self.fit.step / 2.0]
+        self._ask([self._values(each) for k in wide for each in pairs[k]])
+        for k in wide:
+            ends = [self._all(self._values(each)) for each in pairs[k]]
+            if ends[0] is not None and ends[1] is not None:
+                found[:, k] = (ends[0] - ends[1]) / (2.0 * widths[k]) / self.fit.sigma
         return found
 
     def _stepped(self, shares: Numbers) -> list[Numbers]:
@@ -428,69 +430,6 @@ class Fitting(Chooser):
 
     def _over_sigma(self, seen: Numbers) -> Numbers:
         return (seen - self.fit.values) / self.fit.sigma
-
-
-class Certainty(NamedTuple):
-    """How well parameters are known.
-
-    Attributes
-    ----------
-    covariance : (n, n) of the values; NaN where the lines say nothing
-    correlation : (n, n)
-    condition : of the Jacobian matrix with columns of length 1
-    warning : which parameters cannot be told apart, or change nothing; empty if there are none
-    """
-
-    covariance: Numbers
-    correlation: Numbers
-    condition: float
-    warning: str
-
-
-def certainty(fit: Fit, answer: Fitted) -> Certainty:
-    """Return how well the parameters of an answer with a Jacobian matrix are known.
-
-    Where not all standard deviations were given, they are scaled so that the differences have them.
-    """
-    assert answer.jacobian is not None
-    names, slopes = list(fit.free), [
-        each.slope(value) for each, value in zip(fit.free.values(), answer.values, strict=True)
-    ]  # fmt: skip
-    lengths = np.linalg.norm(answer.jacobian, axis=0)
-    idle = lengths <= _WEAK * max(lengths.max(initial=0.0), 1e-300)
-    count = len(names)
-    inverse = np.full((count, count), np.nan)
-    warnings = [f"{names[k]} changes nothing in what was measured" for k in np.flatnonzero(idle)]
-    condition = math.inf
-    if (used := np.flatnonzero(~idle)).size:
-        unit = answer.jacobian[:, used] / lengths[used]
-        _, sizes, rows = np.linalg.svd(unit, full_matrices=False)
-        sizes = np.maximum(sizes, 1e-15 * sizes[0])
-        own = (rows.T / sizes**2) @ rows / np.outer(lengths[used], lengths[used])
-        inverse[np.ix_(used, used)] = own
-        condition = math.inf if idle.any() else float(sizes[0] / sizes[-1])
-        shares = rows**2 / sizes[:, None] ** 2
-        shares /= shares.sum(axis=0)
-        for size, share in zip(sizes, shares, strict=True):
-            if sizes[0] / size >= _CONDITION:
-                apart = [names[used[k]] for k in np.flatnonzero(share > _SHARE)]
-                if len(apart) > 1:
-                    warnings.append(f"{_listed(apart)} cannot be told apart by what was measured")
-    spread = 1.0
-    freedom = len(fit.values) - count
-    if not fit.told and freedom > 0:
-        spread = float(np.sum(((answer.seen - fit.values) / fit.sigma) ** 2)) / freedom
-    covariance = spread * inverse * np.outer(slopes, slopes)
-    sigma = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.outer(sigma, sigma)
-    text = "; ".join(dict.fromkeys(warnings))
-    if text and math.isfinite(condition):
-        text += f": the condition of the Jacobian matrix is {condition:.3g}"
-    return Certainty(covariance, correlation, condition, text)
-
-
-def _listed(names: list[str]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _position(sets: Mapping[str, Any]) -> str:

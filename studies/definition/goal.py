@@ -6,10 +6,15 @@ search brackets this value and narrows the bracket. What it asks for next depend
 that it has asked for: a search that begins anew asks for the same runs, which are in the store.
 
 A round is one run: the middle of the bracket, or, for ``at``, the point of the method ITP
-(interpolate, truncate, project), which needs at most one run more than bisection. Where the
-parameter is the branch of its scene, one loading path serves several values: it rises through a few
-values to the first one beyond. Where the path can go on from any of its states, it is one path to
-the end of the search; otherwise each round is a path through a few values in the bracket.
+(interpolate, truncate, project), which needs at most one run more than bisection. Where the bracket
+is halved, its first ends are taken on trust: one of them is computed only if the search comes to
+it. Where the goal at other places lets expect it (`studies.definition.neighbours`), such a search
+begins there, with a bracket that is narrow enough, and makes steps of doubled width if it missed.
+
+Where the parameter is the branch of its scene, one loading path serves several values: it rises
+through a few values to the first one beyond. Where the path can go on from any of its states, it is
+one path to the end of the search; otherwise each round is a path through a few values in the
+bracket.
 
 References
 ----------
@@ -52,6 +57,8 @@ _KEYS = ("parameter", "find", "of", "at", "first_above", "first_below", "within"
 _KINDS = ("at", "first_above", "first_below")
 _PARTS = 4
 """Parts into which a round of a loading path divides the bracket."""
+_STEPS = 3
+"""Steps of a search that began where its goal was expected, before it halves what is left."""
 _ROUNDING = 1.0001
 """Factor on the width of a narrow bracket, whose ends are rounded."""
 _SLACK = 1
@@ -87,6 +94,11 @@ class Goal:
     goes_on: bool = False
 
     @property
+    def halves(self) -> bool:
+        """Whether a search halves its bracket by single runs."""
+        return not self.branch and self.kind != "at"
+
+    @property
     def parts(self) -> int:
         """Parts into which a round divides the bracket."""
         return _PARTS if self.branch and not self.goes_on else 2
@@ -119,6 +131,10 @@ class Goal:
     def most(self) -> tuple[int, int]:
         """Largest number of rounds of a search, and of its runs."""
         low, high = self.between
+        if self.halves:
+            parts = (self.scaled(high) - self.scaled(low)) / self.tolerance
+            runs = 1 + _STEPS + math.ceil(max(0.0, math.log2(parts) - 1e-9)) + 1
+            return runs, runs
         first = _PARTS if self.branch else 1
         width = (self.scaled(high) - self.scaled(low)) / first
         more = math.ceil(max(0.0, math.log(width / self.tolerance, self.parts) - 1e-9))
@@ -220,6 +236,7 @@ class Search:
     Attributes
     ----------
     goal : what is searched
+    expected : where it is expected, if that is known
     rows : the rows of the runs that it has asked for, by value of the parameter
     reason : why the search has ended; empty until then
     low, high : the bracket; NaN where there is no end yet
@@ -228,6 +245,7 @@ class Search:
     """
 
     goal: Goal
+    expected: float | None = None
     rows: dict[float, Mapping[str, Any]] = field(default_factory=dict)
     reason: str = ""
     low: float = math.nan
@@ -239,6 +257,9 @@ class Search:
 
     def __post_init__(self) -> None:
         low, high = self.goal.between
+        if self.goal.halves:
+            self._round = self._halved()
+            return
         inner = self.goal.split(low, high, _PARTS) if self.goal.branch else []
         self._round = [low, *inner, high]
 
@@ -333,7 +354,9 @@ class Search:
                 self.high = value
                 break
             self.low = value
-        if math.isnan(self.high):
+        if self.goal.halves and (values := self._halved()):
+            self._round = values
+        elif math.isnan(self.high):
             self.reason = NEVER
         elif math.isnan(self.low):
             self.reason = ALREADY
@@ -344,6 +367,29 @@ class Search:
             split = self.goal.split(self.low, self.high, self.goal.parts)
             self._round = self._interpolated() or split
         return True
+
+    def _halved(self) -> list[float]:
+        """Return the next value of a search that halves its bracket; none at its end."""
+        goal, (first, last) = self.goal, self.goal.between
+        low = first if math.isnan(self.low) else self.low
+        high = last if math.isnan(self.high) else self.high
+        if not goal.narrow(low, high):
+            return self._stepped(low, high) or goal.split(low, high, 2)
+        ends = ((first, self.low), (last, self.high))
+        return [end for end, known in ends if math.isnan(known) and end not in self.rows][:1]
+
+    def _stepped(self, low: float, high: float) -> list[float]:
+        """Return the first value where a goal is expected, or that of the next step from there."""
+        goal, steps = self.goal, len(self.rows)
+        if self.expected is None or steps > _STEPS:
+            return []
+        if not steps:
+            inside = min(max(self.expected, low), high)
+            return goal.inside(low, high, [goal.scaled(inside) - goal.tolerance / 2])
+        width = goal.tolerance * 2 ** (steps - 1)
+        if math.isnan(self.high):
+            return goal.inside(low, high, [goal.scaled(low) + width])
+        return goal.inside(low, high, [goal.scaled(high) - width]) if math.isnan(self.low) else []
 
     def _over(self, value: float) -> float | None:
         """Return how far the number of a run is from the threshold, positive beyond it."""

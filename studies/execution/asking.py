@@ -21,6 +21,7 @@ from studies.definition.cases import Case, LoadingPath
 from studies.definition.fit import Fit, Fitting, standings
 from studies.definition.goal import Goal, PathLimit, Search
 from studies.definition.line import Line, Read
+from studies.definition.neighbours import Neighbours
 from studies.definition.place import Place
 from studies.definition.refine import Refinement
 from studies.definition.study import Study
@@ -48,7 +49,6 @@ class Asking:
     study : a study that chooses its runs
     store : the runs that are there are not computed again
     resume, since : as in `run_study`: which failed runs are taken as they are
-    only : number of the one search of a goal that is to be carried out; by default all are
 
     Attributes
     ----------
@@ -61,12 +61,11 @@ class Asking:
         store: Store,
         resume: bool = False,
         since: int = 0,
-        only: int | None = None,
     ) -> None:
         self._study, self._store = study, store
         self._at: list[list[str]] = []
         self.places: list[Place[Any]] = []
-        for at, fixed, program in _programs(study, store, only):
+        for at, fixed, program in _programs(study, store):
             self._at.append(at)
             self.places.append(
                 Place(
@@ -81,6 +80,13 @@ class Asking:
         self._paths: dict[str, tuple[int, list[Any]]] = {}
         self._waits: list[set[Any]] = [set() for _ in self.places]
         self._ready: deque[Asked] = deque()
+        self._neighbours: Neighbours | None = None
+        self._after: dict[int, list[int]] = {}
+        if isinstance(study.asks, Goal) and study.asks.halves:
+            self._neighbours = Neighbours([place.fixed for place in self.places])
+            for number, before in enumerate(self._neighbours.before):
+                for each in before:
+                    self._after.setdefault(each, []).append(number)
         for number in range(len(self.places)):
             self._go_on(number)
 
@@ -133,6 +139,16 @@ class Asking:
             return None
         return next(place.runs(wanted[:1]).cases())
 
+    @property
+    def goes_on(self) -> bool:
+        """Whether each program has one loading path, to its end."""
+        return all(place.program.goes_on for place in self.places)
+
+    def place(self, path: str) -> Place[Any]:
+        """Return the program of a path that goes on, as it is now, for who carries it on."""
+        place = self.places[self._paths[path][0]]
+        return replace(place, program=deepcopy(place.program))
+
     def stored(self, path: str, since: int) -> list[Mapping[str, Any]]:
         """Return the rows of the runs of a program that have been stored since a time [ns].
 
@@ -157,6 +173,26 @@ class Asking:
         return ", ".join([*self._at[number], *text]) + f" ({program.told})"
 
     def _go_on(self, number: int) -> None:
+        """Go on with a program, and with those that wait for its end."""
+        if self._begun(number):
+            self._ask(number)
+        if self.places[number].program.reason:
+            for each in self._after.pop(number, ()):
+                self._go_on(each)
+
+    def _begun(self, number: int) -> bool:
+        """Return whether a search may begin: those by which its goal is expected have ended."""
+        program, near = self.places[number].program, self._neighbours
+        if near is None or not near.before[number] or program.rows or program.expected is not None:
+            return True
+        before = [self.places[each].program for each in near.before[number]]
+        if not all(each.reason for each in before):
+            return False
+        expected = near.foreseen(number, [each.found for each in before])
+        self.places[number].program = replace(program, expected=expected)
+        return True
+
+    def _ask(self, number: int) -> None:
         """Take the runs of a program that are in the store, and ask for those that are not."""
         place, waits = self.places[number], self._waits[number]
         while True:
@@ -172,7 +208,10 @@ class Asking:
             # rounds share the id of a path, and one may begin before the last has ended
             own = replace(path, id=path.cases[0].id)
             self._paths[own.id] = number, [place.program.key(case.values) for case in own.cases]
-            self._ready.append(_asked(own, place))
+            if place.program.goes_on:
+                self._ready.append(Asked(replace(own, cases=()), None, self.place(own.id)))
+            else:
+                self._ready.append(Asked(own, place.program.limit, None))
 
     def _lacking(self, number: int, waits: Collection[Any]) -> list[Any]:
         """Take the runs of a program that are in the store; return the keys of the others."""
@@ -186,13 +225,11 @@ class Asking:
         return []
 
 
-def _programs(
-    study: Study, store: Store, only: int | None
-) -> Iterator[tuple[list[str], dict[str, Any], Any]]:
+def _programs(study: Study, store: Store) -> Iterator[tuple[list[str], dict[str, Any], Any]]:
     """Yield the programs of a study: where each is, as text, what is fixed there, and itself."""
     swept = owners(study.sweep)
     if isinstance(study.asks, Goal):
-        for case in study.cases() if only is None else [study.expansion.case(only)]:
+        for case in study.cases():
             at = [f"{axis} = {value}" for axis, value in study.place(case).items()]
             yield at, {name: case.values[name] for name in swept}, Search(study.asks)
     elif isinstance(study.asks, Fit):
@@ -217,10 +254,3 @@ def _read(store: Store, names: Collection[str], row: Mapping[str, Any]) -> Read:
 
 def _short(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _asked(path: LoadingPath, place: Place[Any]) -> Asked:
-    if place.program.goes_on:
-        own = replace(place, program=deepcopy(place.program))
-        return Asked(replace(path, cases=()), None, own)
-    return Asked(path, place.program.limit, None)

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from studies.definition.fit import FAILED, Certainty, Fitting, certainty
+from studies.definition.certainty import Certainty, certainty
+from studies.definition.fit import FAILED, Fitting
 from studies.definition.identity import canonical
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK, STOPPED

@@ -1,9 +1,9 @@
 """Compute a part of a study: one process of many, which meet in the directory alone.
 
-Each process goes through all loading paths of the study, or all searches of its goal, from a place
-of its own, and computes those that lack runs and that it can claim (`studies.storage.claims`). It
-ends when nothing is left that it can claim. Of a refinement or a fit each process carries out the
-program, which asks all for the same runs, claims their paths, and waits for the runs of others.
+Each process goes through all loading paths of the study, from a place of its own, and computes
+those that lack runs and that it can claim (`studies.storage.claims`). Of a study that chooses its
+runs each process carries out all programs: they ask for the same runs, whoever computes them. It
+ends when nothing is left that it can claim, and no run of others can make a program ask for more.
 What one that was killed has left is claimed by another one, or computed by `run_study` at the end,
 which combines the runs.
 """
@@ -13,15 +13,15 @@ from __future__ import annotations
 import itertools
 import os
 import time
-from collections.abc import Callable, Container, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Container
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
 from studies.errors import StudyError
-from studies.execution.asking import Asking
+from studies.execution.asking import Asked, Asking
 from studies.execution.run import StudyEvent
 from studies.execution.task import PathTask, walk
 from studies.scratch import scratch
@@ -48,8 +48,8 @@ class PartOutcome:
     Attributes
     ----------
     computed : ids of the runs that it has computed
-    left : number of loading paths, or of searches, that lack runs at its end: others have claimed
-        them, or it was stopped
+    left : number of loading paths that lack runs at its end: others have claimed them, or it was
+        stopped
     stopped : whether it was stopped
     """
 
@@ -118,17 +118,17 @@ class _PartWork:
     def done(self, begin: float) -> PartOutcome:
         """Go through all units, from a place between 0 and 1 on, until none can be claimed."""
         claims = Claims(self.store.directory / "claims")
-        asking = Asking(self.study, self.store, resume=True) if self._in_rounds else None
+        asking = Asking(self.study, self.store, resume=True) if self.study.asks else None
         units = self._units(asking)
         first = round(begin * len(units))
         left, moved = units[first:] + units[:first], True
         while left and not self.stop() and not (asking and asking.ended):
             if not moved:
-                if not asking:
+                if asking is None or asking.goes_on:
                     break
                 time.sleep(_WAIT)
             moved = False
-            waiting: list[_PathUnit | _SearchUnit] = []
+            waiting: list[_Unit] = []
             for at, unit in enumerate(left):
                 open_ = len(left) - at + len(waiting)
                 self._share = asking.progress if asking else 1.0 - open_ / len(units)
@@ -138,7 +138,7 @@ class _PartWork:
                 if self._complete(unit):
                     moved = True
                     continue
-                with claims.held(unit.name) as claim:
+                with claims.held(unit.path.id) as claim:
                     if claim is None:
                         waiting.append(unit)
                         continue
@@ -150,27 +150,20 @@ class _PartWork:
             left = [*self._units(asking), *waiting] if asking else waiting
         return PartOutcome(computed=self.computed, left=len(left), stopped=self.stop())
 
-    @property
-    def _in_rounds(self) -> bool:
-        """Whether one program asks for all runs, so that processes wait for those of others."""
-        return bool(self.study.refine or self.study.fit)
+    def _units(self, asking: Asking | None) -> list[_Unit]:
+        """Return what is to be done; of programs what they have asked for anew."""
+        if asking is None:
+            return [_Unit(path) for path in self.study.paths()]
+        asked = itertools.takewhile(lambda each: each is not None, asking.paths())
+        return [_Unit(each.path, asking, each) for each in asked if each]
 
-    def _units(self, asking: Asking | None) -> list[_PathUnit | _SearchUnit]:
-        """Return what is to be done; of an asking program what it has asked for anew."""
-        if asking:
-            asked = itertools.takewhile(lambda each: each is not None, asking.paths())
-            return [_PathUnit(each.path.id, each.path, asking) for each in asked if each]
-        if self.study.asks:
-            return [_SearchUnit(case.id, k) for k, case in enumerate(self.study.cases())]
-        return [_PathUnit(path.id, path) for path in self.study.paths()]
-
-    def _complete(self, unit: _PathUnit | _SearchUnit) -> bool:
+    def _complete(self, unit: _Unit) -> bool:
         """Whether the runs of a unit were there when the files were listed last."""
         if time.monotonic() - self._looked > _LOOK:
             with os.scandir(self.store.directory / "runs") as files:
                 self._there = {each.name.removesuffix(".nc") for each in files}
             self._looked = time.monotonic()
-        return isinstance(unit, _PathUnit) and unit.complete(self._there)
+        return unit.complete(self._there)
 
     def walk(self, task: PathTask, hear: Callable[[str, dict[str, Any]], str]) -> None:
         """Compute the runs of a task."""
@@ -202,16 +195,17 @@ class _PartWork:
 
 
 @dataclass(frozen=True, slots=True)
-class _PathUnit:
+class _Unit:
     """A loading path of a sweep, or one that a program asks for."""
 
-    name: str
     path: LoadingPath
     asking: Asking | None = None
+    asked: Asked | None = None
 
     def complete(self, there: Container[str]) -> bool:
         """Tell whether its runs are there; then its program takes them."""
-        complete = all(case.id in there for case in self.path.cases)
+        cases = self.path.cases  # of a path that goes on they are not known
+        complete = bool(cases) and all(case.id in there for case in cases)
         if complete and self.asking:
             self.asking.closed(self.path.id)
         return complete
@@ -219,41 +213,28 @@ class _PathUnit:
     def compute(self, part: _PartWork, hopeless: bool) -> None:
         """Compute its runs that are not there; or store that those who tried have died."""
         cases = tuple(case for case in self.path.cases if not part.store.run_path(case.id).exists())
-        if hopeless:
+        path = replace(self.path, cases=cases)
+        if self.asking and self.asked:
+            self._ask(part, path, hopeless, self.asking, self.asked)
+        elif hopeless:
             for case in cases:
                 part.store.write_run(case, _DIED)
         elif cases:
-            path = LoadingPath(self.path.id, self.path.parameters, cases)
-            part.walk(part.task(path), self._hear)
-        if self.asking:
-            self.asking.closed(self.path.id)
+            part.walk(part.task(path), lambda path, row: "")
 
-    def _hear(self, path: str, row: dict[str, Any]) -> str:
-        return self.asking.heard(path, row) if self.asking else ""
-
-
-@dataclass(frozen=True, slots=True)
-class _SearchUnit:
-    """The search at one place of the axes of a study with a goal."""
-
-    name: str
-    number: int
-
-    def compute(self, part: _PartWork, hopeless: bool) -> None:
-        """Search to the end; or store that those who tried have died."""
-        asking = Asking(part.study, part.store, resume=True, only=self.number)
-        for asked in self._asked(asking, part):
-            if hopeless:
-                owed = asking.owed(asked.path.id) or asked.path.cases[0]
-                part.store.write_run(owed, _DIED)
-                hopeless = False
-            else:
-                part.walk(part.task(asked.path, limit=asked.limit, place=asked.place), asking.heard)
-            asking.closed(asked.path.id)
-
-    @staticmethod
-    def _asked(asking: Asking, part: _PartWork) -> Iterator[Any]:
-        for asked in asking.paths():
-            if asked is None or part.stop():
-                return
-            yield asked
+    def _ask(
+        self, part: _PartWork, path: LoadingPath, hopeless: bool, asking: Asking, asked: Asked
+    ) -> None:
+        """Compute what its program asks for, if it still does."""
+        place, cases = asked.place, path.cases
+        if place:
+            owed = asking.owed(path.id)
+            place, cases = asking.place(path.id), (owed,) if owed else ()
+        elif len(cases) < len(self.path.cases):
+            cases = ()  # its program takes what is there, and asks anew
+        if hopeless and cases:
+            for case in cases[:1] if asked.limit else cases:
+                part.store.write_run(case, _DIED)
+        elif cases:
+            part.walk(part.task(path, limit=asked.limit, place=place), asking.heard)
+        asking.closed(path.id)

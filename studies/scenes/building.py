@@ -21,18 +21,23 @@ from studies.errors import StudyError, nearest
 from studies.scenes import tables
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.shape_tables import ArcTable, mesh_of
+from studies.scenes.table import TabulatedTable
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from skfem import Mesh
 
     from solver.materials.law import Law
     from solver.model.body import Body
     from solver.model.friction import FrictionLaw
+    from solver.model.link import Link
     from solver.model.loads import Load
     from solver.model.model import ContactPair, Model
     from solver.model.rigid import RigidBody
+    from solver.model.tabulated import Tabulated
 
 T = TypeVar("T")
+_MOTIONS = ("x", "y", "rotation")
 _NOT_OF_MODEL = (
     "name", "summary", "parameters.", "derived.", "stages", "loading", "results.", "outputs.",
     "singular", "allow", "accuracy", "checks", "advice",
@@ -72,6 +77,7 @@ class Builder:
         bodies = [self._body(name, body, laws) for name, body in t.bodies.items()]
         rigid = [self._rigid(name, body) for name, body in t.rigid.items()]
         contacts = [self._contact(k, contact) for k, contact in enumerate(t.contacts)]
+        links = [self._link(k, link) for k, link in enumerate(t.links)]
         for side in t.results.surfaces:
             self._has_boundary("results.surfaces", *side.split("."))
         for k, stage in enumerate(t.stages):
@@ -85,6 +91,7 @@ class Builder:
                 bodies=tuple(filter(None, bodies)),
                 rigid=tuple(filter(None, rigid)),
                 contacts=tuple(filter(None, contacts)),
+                links=tuple(filter(None, links)),
                 singular=tuple(SingularPoint(**each.model_dump()) for each in t.singular),
             ),
         )
@@ -156,7 +163,7 @@ class Builder:
         from solver.model.loads import Removal
 
         found: dict[str, Amplitude] = {}
-        for k, (stage, *_) in enumerate(self.scene.passages):
+        for k, (stage, _) in enumerate(self.scene.passages):
             for side in stage.remove:
                 found.setdefault(side, Amplitude(np.array([k, k + 1.0]), np.array([0.0, 1.0])))
         sides = {side: side.split(".") for side in found}
@@ -183,11 +190,12 @@ class Builder:
                 return None
             surfaces[each] = RigidSurface(points=chain)
         motions: dict[str, Moved | Pushed] = {}
-        for axis in ("x", "y", "rotation"):
+        for axis in _MOTIONS:
             motion: tables.MotionTable = getattr(table, axis)
             amplitude = self._amplitude(f"rigid.{name}.{axis}", motion.amplitude)
             if motion.pushed is not None:
-                motions[axis] = Pushed(value=motion.pushed, amplitude=amplitude)
+                locked = self.scene.end_of(motion.locked) if motion.locked else math.inf
+                motions[axis] = Pushed(value=motion.pushed, amplitude=amplitude, locked=locked)
             else:
                 motions[axis] = Moved(value=motion.moved or 0.0, amplitude=amplitude)
         return self.attempt(
@@ -222,9 +230,11 @@ class Builder:
     # -- loads and contact -------------------------------------------------------------------
 
     def _load(self, k: int, table: tables.LoadTable) -> Load | None:
-        where = f"loads[{k}]"
+        where, files = f"loads[{k}]", self.meshes
+        if files is not None and any(t.file not in files for t in table.tabulated.values()):
+            return None  # reported already
         amplitude = self._amplitude(where, getattr(table, "amplitude", None))
-        return self.attempt(where, lambda: load_of(table, amplitude))
+        return self.attempt(where, lambda: load_of(table, amplitude, files))
 
     def _contact(self, k: int, table: tables.ContactTable) -> ContactPair | None:
         from solver.model.model import ContactPair
@@ -235,7 +245,7 @@ class Builder:
         amplitude = self._amplitude(f"contacts[{k}]", table.amplitude)
         presence = None
         if table.active is not None and self.scene.passages:
-            there = [float(stage.name in table.active) for stage, *_ in self.scene.passages]
+            there = [float(stage.name in table.active) for stage, _ in self.scene.passages]
             presence = Amplitude(np.arange(1.0 + len(there)), np.array([*there[:1], *there]))
         return self.attempt(
             f"contacts[{k}]",
@@ -251,6 +261,23 @@ class Builder:
             ),
         )
 
+    def _link(self, k: int, table: tables.LinkTable) -> Link | None:
+        from solver.model.link import Link
+
+        sides = [(body, boundary) for body, _, boundary in (s.partition(".") for s in table.sides)]
+        for name, (body, boundary) in zip(("slave", "master"), sides, strict=False):
+            self._has_boundary(f"links[{k}].{name}", body, boundary)
+        given = table.model_dump(include={"rigid", "components", "distributed"})
+        return self.attempt(
+            f"links[{k}]",
+            lambda: Link(
+                slave=sides[0],
+                master=sides[1] if table.master else None,
+                stiffness=table.stiffness or math.inf,
+                **given,
+            ),
+        )
+
     def _amplitude(self, where: str, given: tables.Amplitude | None) -> Amplitude | None:
         """Return a load factor over time; stage k ends at time k."""
         passages = self.scene.passages
@@ -259,32 +286,89 @@ class Builder:
                 allowed = "needs stages: with loading all loads grow together"
                 self.mistakes.append(StudyError(f"{where}.amplitude", given, allowed))
             return None
-        values = [0.0]
-        for stage, *_ in passages:
+        times, values = [0.0], [0.0]
+        for k, (stage, _) in enumerate(passages):
             usual = 1.0 if given is None else values[-1]
-            values.append((given or {}).get(stage.name, 0.0 if stage.release else usual))
-        return Amplitude(np.arange(len(values), dtype=float), np.array(values))
+            factor = (given or {}).get(stage.name, 0.0 if stage.release else usual)
+            field = f"{where}.amplitude.{stage.name}"
+            found = self.attempt(field, partial(course_of, factor, values[-1], self.meshes))
+            for time, value in [(1.0, values[-1])] if found is None else found.tolist():
+                times.append(k + time)
+                values.append(value)
+        return Amplitude(np.array(times), np.array(values))
 
 
-def program_of(scene: tables.SceneFile) -> Program:
-    """Return the loading history."""
+def course_of(
+    given: float | tables.Course | tables.CourseTable,
+    before: float | None,
+    files: Mapping[str, MeshFile] | None,
+) -> NDArray[np.float64]:
+    """Return the share of a stage (0-1] and the load factor of each knot of a course (n, 2).
+
+    Parameters
+    ----------
+    before : load factor at the beginning of the stage; None if not known
+    files : files beside the scene; None if they are not at hand
+
+    Raises
+    ------
+    ModelError
+        for a table that is none, or that does not begin with the factor before
+    """
+    if isinstance(given, tables.CourseTable):
+        if files is None or given.file not in files:
+            return np.array([[1.0, before or 0.0]])  # reported already
+        course = files[given.file].columns("time", given.column)
+    else:
+        course = np.array([[1.0, given]] if isinstance(given, int | float) else given)
+    time, factor = course.T
+    if time[0] < 0 or not (np.diff(time) > 0).all() or not time[-1] > 0:
+        raise ModelError("time", time.tolist(), "must increase from 0 or later")
+    if time[0] == 0:
+        if before is not None and not math.isclose(factor[0], before, rel_tol=1e-9, abs_tol=1e-12):
+            allowed = f"must be {before:g}, with which the stage begins, or left out"
+            raise ModelError("factor", float(factor[0]), allowed)
+        course = course[1:]
+    return course / [time[-1], 1.0]
+
+
+def program_of(scene: tables.SceneFile, files: Mapping[str, MeshFile] | None = None) -> Program:
+    """Return the loading history; an increment ends where an amplitude bends."""
     loading = scene.loading
     if loading is not None:
         step = loading.step or loading.factor
         if loading.cycles is None:
             return load_and_release(loading.factor, step, loading.release_increments)
         return load_cycles(loading.factor, step, loading.release_increments, loading.cycles)
+    bends = _bends(scene, files)
     stages = tuple(
         Stage(
-            name=kept,
+            name=stage.name,
             target=float(k + 1),
             steps=stage.increments,
             apart=stage.release,
             turns=k > 0,
+            stops=tuple(k + share for share in bends.get(stage.name, ())),
+            cycle=cycle,
         )
-        for k, (stage, kept, _) in enumerate(scene.passages)
+        for k, (stage, cycle) in enumerate(scene.passages)
     )
     return Program(laps=(Lap(stages),), place=_place(scene.passages))
+
+
+def _bends(scene: tables.SceneFile, files: Mapping[str, MeshFile] | None) -> dict[str, list[float]]:
+    """Return for each stage the shares of it at which an amplitude bends, in order."""
+    motions = [getattr(body, axis) for body in scene.rigid.values() for axis in _MOTIONS]
+    found: dict[str, set[float]] = {}
+    for table in (*scene.loads, *scene.contacts, *motions):
+        for stage, given in (getattr(table, "amplitude", None) or {}).items():
+            if not isinstance(given, int | float):
+                try:
+                    course = course_of(given, None, files)
+                except ModelError:  # a mistake of the amplitude
+                    continue
+                found.setdefault(stage, set()).update(course[:-1, 0].round(12).tolist())
+    return {stage: sorted(shares) for stage, shares in found.items()}
 
 
 def _place(passages: list[tables.Passage]) -> Any:
@@ -292,7 +376,7 @@ def _place(passages: list[tables.Passage]) -> Any:
 
     def words(time: float) -> str:
         k = min(max(math.ceil(time - 1e-9) - 1, 0), len(passages) - 1)
-        stage, _, cycle = passages[k]
+        stage, cycle = passages[k]
         return f"{time - k:.4g} of stage {stage.name}" + (f" in cycle {cycle}" if cycle else "")
 
     return words
@@ -316,11 +400,28 @@ def friction_of(table: tables.PairTable) -> FrictionLaw:
     return FRICTION.made(table.friction_law, table)
 
 
-def load_of(table: Any, amplitude: Amplitude | None = None) -> Load:
-    """Return the load of a table."""
+def load_of(
+    table: Any,
+    amplitude: Amplitude | None = None,
+    files: Mapping[str, MeshFile] | None = None,
+) -> Load:
+    """Return the load of a table; ``files`` are those beside the scene, None if not at hand."""
     kind = LOADS[table.kind]
     given = {n: getattr(table, n) for n in table.model_fields_set - {"kind", "body", "amplitude"}}
+    for name, each in table.tabulated.items():
+        given[name] = _table_of(f"{name}.file", each, files)
     return kind(**given, **{"amplitude": amplitude} if kind.varies else {})
+
+
+def _table_of(field: str, given: TabulatedTable, files: Mapping[str, MeshFile] | None) -> Tabulated:
+    """Return a table of values of a load."""
+    if files is None:
+        raise ModelError(field, given.file, "is not at hand: read the scene from its file")
+    try:
+        return files[given.file].table(given.column).times(given.times)
+    except ModelError as error:
+        allowed = f"{error.allowed}; it has {error.value}"
+        raise ModelError(field, given.file, allowed) from None
 
 
 def default_element(mesh: Mesh) -> str:

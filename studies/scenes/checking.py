@@ -30,10 +30,11 @@ def contradictions(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Ite
 
     Parameters
     ----------
-    meshes : names of the mesh files beside the scene file; None leaves this check out
+    meshes : names of the files beside the scene file; None leaves this check out
     """
-    yield from _bodies(scene, None if meshes is None else set(meshes))
-    yield from _loads(scene)
+    files = None if meshes is None else set(meshes)
+    yield from _bodies(scene, files)
+    yield from _loads(scene, files)
     yield from _contacts(scene)
     yield from _stages(scene)
     yield from _results(scene)
@@ -146,11 +147,21 @@ def _bodies(scene: tables.SceneFile, meshes: set[str] | None) -> Iterator[StudyE
             if motion.moved is not None and motion.pushed is not None:
                 allowed = "must be moved or pushed, not both"
                 yield StudyError(f"rigid.{name}.{axis}", "both", allowed)
+            if motion.locked is None:
+                continue
+            if motion.pushed is None:
+                yield StudyError(f"rigid.{name}.{axis}.locked", motion.locked, "needs pushed")
+            stages = [stage.name for stage in scene.stages]
+            yield from _one_of(f"rigid.{name}.{axis}.locked", motion.locked, stages)
 
 
-def _loads(scene: tables.SceneFile) -> Iterator[StudyError]:
+def _loads(scene: tables.SceneFile, files: set[str] | None) -> Iterator[StudyError]:
     for k, load in enumerate(scene.loads):
         yield from _one_of(f"loads[{k}].body", load.body, scene.bodies)
+        for name, each in load.tabulated.items():
+            if files is not None and each.file not in files:
+                allowed = "there is no such file beside the scene"
+                yield StudyError(f"loads[{k}].{name}.file", each.file, allowed)
     amplitudes = [(f"loads[{k}]", getattr(a, "amplitude", None)) for k, a in enumerate(scene.loads)]
     amplitudes += [(f"contacts[{k}]", a.amplitude) for k, a in enumerate(scene.contacts)]
     amplitudes += [
@@ -160,8 +171,12 @@ def _loads(scene: tables.SceneFile) -> Iterator[StudyError]:
     ]
     names = [stage.name for stage in scene.stages]
     for where, amplitude in amplitudes:
-        for stage in amplitude or {} if names else {}:
+        for stage, course in (amplitude or {}).items() if names else ():
             yield from _one_of(f"{where}.amplitude", stage, names)
+            file = getattr(course, "file", None)
+            if file is not None and files is not None and file not in files:
+                allowed = "there is no such file beside the scene"
+                yield StudyError(f"{where}.amplitude.{stage}.file", file, allowed)
 
 
 def _contacts(scene: tables.SceneFile) -> Iterator[StudyError]:
@@ -175,6 +190,11 @@ def _contacts(scene: tables.SceneFile) -> Iterator[StudyError]:
             yield from _one_of(f"contacts[{k}].active", stage, names)
         if contact.active and not names:
             yield StudyError(f"contacts[{k}].active", list(contact.active), "needs stages")
+    for k, link in enumerate(scene.links):
+        for side, boundary in zip(("slave", "master"), link.sides, strict=False):
+            yield from _one_of(f"links[{k}].{side}", boundary.partition(".")[0], scene.bodies)
+        if link.rigid is not None:
+            yield from _one_of(f"links[{k}].rigid", link.rigid, scene.rigid)
 
 
 def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:
@@ -193,6 +213,9 @@ def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:
         first = names.index(repeated[0])
         if names[first : first + len(repeated)] != repeated:
             allowed = f"must be stages one after the other, in their order: {', '.join(names)}"
+            yield StudyError("repeat.stages", repeated, allowed)
+        if all(stage.release for stage in scene.stages if stage.name in repeated):
+            allowed = "must hold a stage that loads the bodies: they are released once"
             yield StudyError("repeat.stages", repeated, allowed)
 
 

@@ -70,14 +70,14 @@ class Readable(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """The content of a scene file and of the meshes it names.
+    """The content of a scene file and of the files it names.
 
     Attributes
     ----------
     file : name of the file, for messages
     content : its tables, as read from TOML or JSON
-    meshes : mesh files by the name that bodies give; None if they are not at hand, so that no
-        model can be built
+    meshes : meshes and tables of values by the names that bodies and loads give; None if they are
+        not at hand, so that no model can be built
     shipped : whether it is a scene of the package, which studies call by its name
     """
 
@@ -88,7 +88,7 @@ class Description:
 
     @classmethod
     def read(cls, path: Path | str, *, shipped: bool = False) -> Self:
-        """Read a scene file, and the meshes beside it.
+        """Read a scene file, and the meshes and tables beside it.
 
         Raises
         ------
@@ -98,7 +98,7 @@ class Description:
         path = Path(path)
         content = toml_of(read_bytes(path, "scene"), "scene", path.name)
         meshes = {}
-        for name in mesh_names(content):
+        for name in file_names(content):
             if (path.parent / name).is_file():  # a missing one is a mistake of the scene file
                 meshes[name] = MeshFile(name, read_bytes(path.parent / name, "scene"))
         return cls(path.name, content, meshes, shipped)
@@ -109,7 +109,7 @@ class Description:
 
     @cached_property
     def digest(self) -> str:
-        """Content id of the file and its meshes, 32 hexadecimal digits; texts do not count."""
+        """Content id of the file and those it names, 32 hexadecimal digits; texts do not count."""
         content = json.dumps(_without_texts(self.content), sort_keys=True, default=str)
         meshes = sorted((self.meshes or {}).items())
         parts = [content, *(f"{name} {_digest(mesh.data)}" for name, mesh in meshes)]
@@ -262,16 +262,23 @@ class Description:
         return tree, mistakes
 
 
-def mesh_names(content: Mapping[str, Any]) -> list[str]:
-    """Return the names of the mesh files of bodies, without paths to other folders."""
+def file_names(content: Mapping[str, Any]) -> list[str]:
+    """Return the names of the meshes of bodies and tables of loads, without paths to folders."""
     bodies = content.get("bodies")
-    found = (
-        [each.get("mesh") for each in bodies.values() if isinstance(each, Mapping)]
-        if isinstance(bodies, Mapping)
-        else []
-    )
+    each = bodies.values() if isinstance(bodies, Mapping) else ()
+    found = [body.get("mesh") for body in each if isinstance(body, Mapping)]
+    found += _files([content.get(key) for key in ("loads", "contacts", "rigid")])
     plain = [name for name in found if isinstance(name, str) and FILE_NAME.fullmatch(name)]
     return list(dict.fromkeys(plain))
+
+
+def _files(tree: Any) -> Iterator[Any]:
+    """Yield the entries `file` of all tables in a part of the tree."""
+    if isinstance(tree, Mapping):
+        yield from [tree["file"]] if "file" in tree else []
+    each = tree.values() if isinstance(tree, Mapping) else tree
+    for entry in each if isinstance(each, Iterable) and not isinstance(each, str) else ():
+        yield from _files(entry)
 
 
 def _open(tables: Any) -> list[Mapping[str, Any]]:

@@ -35,15 +35,17 @@ def effort_of(
         for a body that cannot be meshed with these values
     """
     elements, unknowns = 0, _free_motions(scene)
-    sides = [side.split(".") for pair in scene.contacts for side in (pair.slave, pair.master)]
+    joined = [side for pair in scene.contacts for side in (pair.slave, pair.master)]
+    joined += [side for link in scene.links for side in link.sides]
+    sides = [side.split(".") for side in joined]
     for name, body in scene.bodies.items():
         size = _size_of(description, name, body)
         elements += size.elements
         own = {boundary for of, boundary in sides if of == name}
-        loads = [load_of(load) for load in scene.loads if load.body == name]
+        loads = [load_of(load.plain) for load in scene.loads if load.body == name]
         driven = any(each.components or each.softening(np.zeros((2, 0))) is not None
                      for each in loads)  # fmt: skip
-        # an elastic body is condensed to its contact surfaces
+        # an elastic body is condensed to its surfaces in contact and links
         condensed = size.on(own) if own and not driven and is_elastic(scene, body) else None
         held = [(b, "xy".index(axis)) for b, axes in body.supports.items() for axis in axes]
         held += [(b, axis) for each in loads for b in each.boundaries for axis in each.components]

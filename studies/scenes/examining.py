@@ -101,7 +101,7 @@ def _bodies_apart(system: System) -> Iterator[StudyError]:
     state = system.initial()
     for number, (name, part) in enumerate(zip(system.all_names, system.parts, strict=True)):
         own = [i for i in system.interfaces if number in (i.slave, i.master)]
-        if not part.rigid.shape[1] or not own:
+        if not part.rigid.shape[1] or not own or system.links.rows[number] is not None:
             continue
         gap = min(float(i.pairing(state.u, 0.0).gap.min()) for i in own)
         # the gap of a curved surface is a mean around the point where it touches

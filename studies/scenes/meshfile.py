@@ -1,4 +1,4 @@
-"""Meshes of bodies from mesh files, read by meshio."""
+"""The files beside a scene file: meshes of bodies, read by meshio, and tables of values."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from solver.errors import ModelError
 from solver.memory import kept
 from solver.mesh.cells import facets_of, mesh_of_cells
 from solver.mesh.section_mesh import FOOT, RUNNING, SectionMesh
+from solver.model.tabulated import Tabulated, columns_of
 from studies.scenes.meshdata import MeshData
 from studies.scratch import scratch
 
@@ -26,8 +27,14 @@ OUTLINE = "outline"
 FORMATS = (".msh", ".vtk", ".vtu", ".mesh", ".bdf", ".nas")
 """Endings of mesh files in formats that do not refer to other files."""
 
+TABLE = ".csv"
+"""Ending of a file with a table of values."""
+
 MOST_POINTS = 1_000_000
 """Largest number of points of a mesh file."""
+
+MOST_LINES = 100_000
+"""Largest number of lines of a table of values."""
 
 _CELLS = {"quad": 4, "quad8": 4, "quad9": 4, "triangle": 3, "triangle6": 3}
 """Cells of meshio that a body may have -> number of their corners."""
@@ -40,7 +47,7 @@ _NUMBERS = ("gmsh:physical", "medit:ref", "nastran:ref")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MeshFile:
-    """The content of a mesh file.
+    """The content of a mesh file, or of a table of values.
 
     Attributes
     ----------
@@ -54,8 +61,41 @@ class MeshFile:
     arrays: bytes = b""
 
     def read(self) -> Self:
-        """Return the file with its arrays, so that nobody else needs to read its data."""
+        """Return the file with its arrays, so that nobody else needs to read its data.
+
+        A table is text, which needs none.
+        """
+        if self.name.endswith(TABLE):
+            return self
         return replace(self, arrays=_read(self.name, self.data).packed())
+
+    def columns(self, *names: str) -> NDArray[np.float64]:
+        """Return columns (n, n_names) of a table of numbers.
+
+        Raises
+        ------
+        ModelError
+            if the file is no such table
+        """
+        return np.stack(list(columns_of(self._text(), names).values()), axis=1)
+
+    def _text(self) -> str:
+        if self.data.count(b"\n") > MOST_LINES:
+            raise ModelError("table", "too many lines", f"must have at most {MOST_LINES} lines")
+        try:
+            return self.data.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise ModelError("table", self.name, f"cannot be read: {error}") from None
+
+    def table(self, column: str) -> Tabulated:
+        """Return the table of values of a column.
+
+        Raises
+        ------
+        ModelError
+            if the file is no such table
+        """
+        return Tabulated.of(self._text(), column)
 
     def mesh(self, part: str | None) -> Mesh:
         """Return the part of this name, or all cells, with named boundaries.

@@ -94,7 +94,7 @@ def _located(schema: Mapping[str, Any], loc: Where) -> tuple[Where, list[str]]:
         if branch is not None:
             node = branch
             continue
-        if options and isinstance(part, str) and not any(_TABLES & o.keys() for o in options):
+        if isinstance(part, str) and not all(_TABLES & o.keys() for o in options):
             continue  # the name of a branch: float, str
         node = next(iter(options), node)
         kept.append(part)

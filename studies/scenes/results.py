@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,7 +48,13 @@ def view_of(scene: tables.SceneFile) -> View:
 
 def numbers_of(scene: tables.SceneFile) -> list[RequestedNumber]:
     """Return the numbers that a scene file requests."""
-    return [RequestedNumber(name=name, **each.model_dump()) for name, each in scene.outputs.items()]
+    found = [RequestedNumber(name=n, **each.model_dump()) for n, each in scene.outputs.items()]
+    return [
+        replace(each, description=f"{each.words}, of the half that is computed")
+        if scene.symmetric and each.is_force and not each.description
+        else each
+        for each in found
+    ]
 
 
 def places_of(scene: tables.SceneFile) -> NamedPlaces:

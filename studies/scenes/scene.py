@@ -13,6 +13,7 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.loading.program import Program, walked
 from solver.parameters import Accuracy, by_accuracy, check, described
+from solver.results.cycles import over_cycles
 from solver.results.figures import cost
 from solver.results.named_places import NamedPlaces, at_named_places
 from solver.results.outputs import outputs
@@ -110,8 +111,10 @@ def _scene_of(description: Description, scene: tables.SceneFile) -> FileScene:
         outputs=(
             *(partial(_output, description, word) for word in scene.results.words),
             partial(_at_places, description),
+            *([_over_cycles] if scene.repeat else []),
         ),
         costs=(cost,),
+        until=partial(_until, description),
         watch=partial(_watch, description),
         effort=partial(_effort, description),
         warnings=partial(_warnings, description),
@@ -148,7 +151,7 @@ def _model(description: Description, parameters: Any) -> Model:
 
 
 def _program(description: Description, parameters: Any) -> Program:
-    return program_of(_tables(description, parameters))
+    return program_of(_tables(description, parameters), description.meshes)
 
 
 def _effort(description: Description, parameters: Any, values: Sequence[Any]) -> Effort:
@@ -175,9 +178,19 @@ def _output(description: Description, word: str, run: FinishedRun) -> Values:
 
 
 def _at_places(description: Description, run: FinishedRun) -> Values:
-    program = _program(description, run.parameters)
-    times = [0.0, *(target.time for target in program.targets)]
+    program, cycles = _program(description, run.parameters), len(run.outcome.cycles)
+    times = [0.0, *(each.time for each in program.targets if each.cycle <= cycles)]
     return at_named_places(run, _places(description, run.parameters), times)
+
+
+def _over_cycles(run: FinishedRun) -> Values:
+    laws = [run.system.full(name).body.material for name in run.system.names]
+    return over_cycles(run.outcome.cycles, laws)
+
+
+def _until(description: Description, parameters: Any) -> bool:
+    repeat = _tables(description, parameters).repeat
+    return repeat is not None and repeat.until is not None
 
 
 def _watch(

@@ -31,14 +31,27 @@ def _field(text: str) -> Field:
 
 FieldText = Annotated[str, AfterValidator(_field)]
 """A function of position: an expression of ``x`` and ``y``."""
-Place = tuple[float, float]
-Span = tuple[float, float]
-Count = Annotated[int, Interval(ge=1, le=10_000)]
-Side = Annotated[str, StringConstraints(pattern=r"^[^.]+\.[^.]+$")]
-"""A boundary of a body: ``body.boundary``."""
 
 
 class SceneTable(BaseModel):
     """A table without unknown entries; numbers are finite."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class TabulatedTable(SceneTable):
+    """A function of position: a column of a CSV file beside the scene, times a factor.
+
+    Its header names ``x``, ``y`` or both, and the column; it is linear between these positions.
+    """
+
+    file: FileName
+    column: Label = "value"
+    times: float = 1.0
+
+
+Place = tuple[float, float]
+Span = tuple[float, float]
+Count = Annotated[int, Interval(ge=1, le=10_000)]
+Side = Annotated[str, StringConstraints(pattern=r"^[^.]+\.[^.]+$")]
+"""A boundary of a body: ``body.boundary``."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterable, Mapping
 from types import NoneType, UnionType
 from typing import (
@@ -11,6 +12,7 @@ from typing import (
     Any,
     Literal,
     NamedTuple,
+    Self,
     TypeAlias,
     Union,
     get_args,
@@ -24,6 +26,7 @@ from pydantic import Field, StringConstraints, create_model
 
 from solver.errors import ModelError
 from solver.mesh.lines import closer
+from solver.model.link import Components
 from solver.model.loads import LOADS, Load
 from solver.parameters import Accuracy, Length, Stress
 from solver.parts import Declared, declared
@@ -31,7 +34,17 @@ from solver.results.outputs import outputs
 from solver.results.requested import OF_CONTACT, RequestedNumber, of_body
 from solver.scenes.material_parameters import ContactParameters, MaterialParameters
 from studies.scenes.shape_tables import ArcTable, GradedTable, LineTable, Shape
-from studies.scenes.table import Count, FieldText, FileName, Label, Place, SceneTable, Side, Span
+from studies.scenes.table import (
+    Count,
+    FieldText,
+    FileName,
+    Label,
+    Place,
+    SceneTable,
+    Side,
+    Span,
+    TabulatedTable,
+)
 
 # -- bodies ------------------------------------------------------------------------------------
 
@@ -111,25 +124,37 @@ Material = _material()
 # -- rigid bodies --------------------------------------------------------------------------------
 
 
-Amplitude = dict[Label, float]
-"""Stage -> load factor at its end; a stage left out keeps that of the one before."""
+class CourseTable(SceneTable):
+    """Load factors in a CSV file beside the scene: its columns ``time`` and ``column``."""
+
+    file: FileName
+    column: Label = "factor"
+
+
+Course = Annotated[tuple[tuple[float, float], ...], Field(min_length=1)]
+"""Times from the beginning of a stage, up to its end, and load factors; linear between them."""
+Amplitude = dict[Label, float | Course | CourseTable]
+"""Stage -> load factor at its end, or within it; one left out keeps that of the one before."""
 
 
 class MotionTable(SceneTable):
-    """A motion of a rigid body: prescribed (``moved``), or free under a force (``pushed``)."""
+    """A motion of a rigid body: prescribed (``moved``), or free under a force (``pushed``).
+
+    From the end of the stage ``locked`` on, a free motion stays as it is then.
+    """
 
     moved: float | None = None
     pushed: float | None = None
     amplitude: Amplitude | None = None
+    locked: Label | None = None
 
 
 class RigidTable(SceneTable):
     """A rigid body: its surfaces by name, its centre and motions."""
 
-    surfaces: Annotated[
-        dict[Label, Annotated[LineTable | GradedTable | ArcTable, Field(discriminator="kind")]],
-        Field(min_length=1),
-    ]
+    surfaces: dict[
+        Label, Annotated[LineTable | GradedTable | ArcTable, Field(discriminator="kind")]
+    ] = Field(default_factory=dict)
     centre: Place = (0.0, 0.0)
     x: MotionTable = MotionTable()
     y: MotionTable = MotionTable()
@@ -143,6 +168,17 @@ class LoadTable(SceneTable):
     """Base of the tables of loads."""
 
     body: str
+
+    @property
+    def tabulated(self) -> dict[str, TabulatedTable]:
+        """Its entries that are tables of values."""
+        each = ((name, getattr(self, name)) for name in type(self).model_fields)
+        return {name: entry for name, entry in each if isinstance(entry, TabulatedTable)}
+
+    @property
+    def plain(self) -> Self:
+        """The load with zero in the place of tables of values, which needs no files."""
+        return self.model_copy(update=dict.fromkeys(self.tabulated, 0.0))
 
 
 def _load(word: str, kind: type[Load]) -> type[LoadTable]:
@@ -161,13 +197,13 @@ def _load(word: str, kind: type[Load]) -> type[LoadTable]:
 def _in_file(hint: Any) -> Any:
     """Return the type of a parameter in a file; None if it is a function of another kind.
 
-    A number that may be a function of position is an expression there.
+    A number that may be a function of position is an expression or a table of values there.
     """
     if get_origin(hint) not in (Union, UnionType):
         return None if get_origin(hint) is Callable else hint
     kept = tuple(each for each in get_args(hint) if get_origin(each) is not Callable)
     if len(kept) < len(get_args(hint)) and float in kept:
-        kept += (FieldText,)
+        kept += (TabulatedTable, FieldText)  # a wrong text is told last
     return None if kept == (NoneType,) else Union[kept]  # noqa: UP007
 
 
@@ -211,6 +247,22 @@ else:
     ContactTable = _contact()
 
 
+class LinkTable(SceneTable):
+    """A boundary that is tied, kept rigid, or held by springs; see `solver.Link`."""
+
+    slave: Side
+    master: Side | None = None
+    rigid: str | None = None
+    components: Components = "xy"
+    stiffness: Annotated[float, Interval(gt=0.0)] | None = None
+    distributed: bool = False
+
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """The boundaries that it joins."""
+        return (self.slave,) if self.master is None else (self.slave, self.master)
+
+
 class SingularTable(SceneTable):
     """A point at which strain is unbounded; see `solver.SingularPoint`."""
 
@@ -236,11 +288,12 @@ class RepeatTable(SceneTable):
     """Stages that follow one another, and how many times they are gone through.
 
     A state at the end of each is stored of the last time, and of the time before with the name
-    ``NAME_before``.
+    ``NAME_before``. With ``until`` they end when the shakedown state is decided, before that many.
     """
 
     stages: Annotated[tuple[Label, ...], Field(min_length=1)]
     times: Annotated[int, Interval(ge=2, le=1000)]
+    until: Literal["shaken_down"] | None = None
 
 
 class LoadingTable(SceneTable):
@@ -483,6 +536,7 @@ class SceneFile(SceneTable):
     bodies: Annotated[dict[Label, BodyTable], Field(min_length=1)]
     rigid: dict[Label, RigidTable] = Field(default_factory=dict)
     contacts: tuple[ContactTable, ...] = ()
+    links: tuple[LinkTable, ...] = ()
     singular: tuple[SingularTable, ...] = ()
     allow: tuple[Literal["large_strain"], ...] = ()
     loads: tuple[AnyLoad, ...] = ()
@@ -532,20 +586,27 @@ class SceneFile(SceneTable):
         found: list[Passage] = []
         for stage in self.stages:
             if stage.name not in repeated:
-                found.append(Passage(stage, stage.name))
+                found.append(Passage(stage))
             elif self.repeat and stage is group[0]:
-                for left in reversed(range(self.repeat.times)):
-                    ends = ("", "_before")[left] if left < 2 else None
-                    kept = ("" if ends is None else each.name + ends for each in group)
-                    cycle = self.repeat.times - left
-                    found += map(Passage, group, kept, [cycle] * len(group))
+                for cycle in range(1, self.repeat.times + 1):
+                    found += (Passage(each, cycle) for each in group)
         return found
+
+    def end_of(self, stage: str) -> float:
+        """Return the time at the end of a stage, the first time that it is gone through."""
+        names = [each.stage.name for each in self.passages]
+        return names.index(stage) + 1.0 if stage in names else math.inf
 
     @property
     def stage_names(self) -> list[str]:
         """Names of the states at the ends of stages that are stored."""
-        kept = [each.kept for each in self.passages if each.kept]
-        return kept or ["loaded", "unloaded"]
+        group = list(self.repeat.stages) if self.repeat else []
+        found: list[str] = []
+        for stage in self.stages:
+            if group and stage.name == group[0]:
+                found += (f"{name}_before" for name in group)
+            found.append(stage.name)
+        return found or ["loaded", "unloaded"]
 
 
 class Passage(NamedTuple):
@@ -554,10 +615,8 @@ class Passage(NamedTuple):
     Attributes
     ----------
     stage : its table
-    kept : name of the state at its end; empty if it is not stored
     cycle : number of the time, from 1; 0 for a stage that is not repeated
     """
 
     stage: StageTable
-    kept: str
     cycle: int = 0

@@ -68,10 +68,13 @@ class Frame:
         """Number of values on each sweep dimension."""
         return tuple(len(values) for values in self.axes.values())
 
-    @property
-    def auxiliary(self) -> dict[str, str]:
-        """CF attribute of a variable over the sweep: its coordinates that are not dimensions."""
-        return {"coordinates": " ".join(self.linked)} if self.linked else {}
+    def _with_auxiliary(self, attributes: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the attributes of a variable over the sweep with its auxiliary coordinates.
+
+        These are coordinates that are not dimensions, those of the sweep and its own.
+        """
+        every = [*self.linked, *attributes.get("coordinates", "").split()]
+        return dict(attributes) | ({"coordinates": " ".join(every)} if every else {})
 
     def learn(self, run: h5py.File, at: tuple[int, ...]) -> None:
         """Add the grids and variables of one run, and its small values."""
@@ -168,7 +171,7 @@ class Frame:
                 shuffle=True,
                 fletcher32=True,
             )
-            variable.attrs.update(attributes | self.auxiliary)
+            variable.attrs.update(self._with_auxiliary(attributes))
 
     def fill(self, file: h5py.File, run: h5py.File, at: tuple[int, ...]) -> None:
         """Write the fields of one run in their place."""
@@ -185,7 +188,7 @@ class Frame:
     def write_small(self, file: h5netcdf.File) -> None:
         """Write the variables that are in memory."""
         for name, (values, attributes) in self.small.items():
-            _write(file, name, tuple(self.axes), values, attributes | self.auxiliary)
+            _write(file, name, tuple(self.axes), values, self._with_auxiliary(attributes))
 
     def _extent(self, dimension: str, length: int) -> int:
         """Return the end up to which a run with this length writes along a dimension."""

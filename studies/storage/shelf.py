@@ -20,7 +20,7 @@ from solver.scenes import Scene
 from studies.appearing import appearing
 from studies.definition.parameters import parameters_of
 from studies.errors import CatalogueDamaged, FileDamaged, StoreBusy
-from studies.scenes.description import Description, mesh_names
+from studies.scenes.description import Description, file_names
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.scene import FileScene, file_scene
 from studies.storage.database import Database
@@ -117,7 +117,7 @@ def _made(folder: Path, whole: bool) -> FileScene | None:
         return None
     try:
         saved = content_of(folder / _FILE, name)
-        names = mesh_names(saved["content"]) if whole else []
+        names = file_names(saved["content"]) if whole else []
         meshes = {each: _mesh(folder / each, name) for each in names}
         found = Description(saved["file"], saved["content"], meshes if whole else None)
         if whole and found.digest != scene_id:
@@ -138,10 +138,10 @@ def _mesh(path: Path, name: str) -> MeshFile:
 
 
 class Index(Database):
-    """The index of the scenes of a directory."""
+    """The index of the scenes of a directory; its file may be in another one."""
 
-    def __init__(self, directory: Path) -> None:
-        super().__init__(directory / "scenes.sqlite", CatalogueDamaged, StoreBusy)
+    def __init__(self, directory: Path, lists: Path) -> None:
+        super().__init__(lists / "scenes.sqlite", CatalogueDamaged, StoreBusy)
         self.scenes = directory / "scenes"
 
     def follow(self, read: Callable[[str], Scene | None], refused: Collection[str]) -> None:

@@ -70,13 +70,18 @@ class Store:
     ----------
     directory : the directory; the first write creates it
     held : whether the caller already has the writer's lock, as the service has for its children
+    aside : folder of the catalogue and the index of scenes, for a directory that is only read:
+        nothing is written or moved in it
     """
 
-    def __init__(self, directory: Path | str, held: bool = False) -> None:
+    def __init__(
+        self, directory: Path | str, held: bool = False, aside: Path | None = None
+    ) -> None:
         self.directory = Path(directory)
-        self.held = held
+        self.held, self.aside = held, aside
         self._refused: set[str] = set()
-        self.catalogue = Catalogue(self.directory / "catalogue.sqlite", self.directory / "runs")
+        self._lists = aside or self.directory
+        self.catalogue = Catalogue(self._lists / "catalogue.sqlite", self.directory / "runs")
 
     def run_path(self, run_id: str) -> Path:
         """Return the path of the file of a run."""
@@ -133,7 +138,7 @@ class Store:
 
     def _indexed(self, ask: Callable[[shelf.Index], Found]) -> Found:
         """Return what is asked of the index of scenes, which follows the files first."""
-        index = shelf.Index(self.directory)
+        index = shelf.Index(self.directory, self._lists)
 
         def asked() -> Found:
             with suppress(StoreFull):  # then the latest ones are missing
@@ -364,8 +369,14 @@ class Store:
             self.put_aside(error.path, error.reason, then)
 
     def put_aside(self, path: Path, reason: str, then: str) -> None:
-        """Move a file or directory, if there is one, to ``unreadable/``, and log it in one line."""
+        """Move a file or directory, if there is one, to ``unreadable/``, and log it in one line.
+
+        In a directory that is only read it stays.
+        """
         if not path.exists():
+            return
+        if self.aside:
+            _LOG.warning("%s cannot be read: %s", path.name, reason)
             return
         here = path.relative_to(self.directory)
         target = self.directory / "unreadable" / ".".join(here.parts[1:] or here.parts)
@@ -402,7 +413,7 @@ class Store:
         try:
             known = self.catalogue.stamps()
         except CatalogueDamaged as error:
-            anew = Store(self.directory, held=True)
+            anew = Store(self.directory, held=True, aside=self.aside)
             with self._writable(), appearing(path) as part:
                 anew.catalogue = Catalogue(part)
                 anew._follow({})

@@ -1,8 +1,10 @@
-"""The numbers of a run that tables and pages show first."""
+"""What the numbers of a run tell, and which of them tables and pages show first."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+
+from solver.results.audit.figures import AUDIT
 
 FIGURES: Mapping[str, str] = {
     "surface_residual_max": "largest residual {component} surface {body}",
@@ -33,3 +35,16 @@ FIGURES: Mapping[str, str] = {
 }
 """Variables in a table of runs, if the scene has them, and their headings. A variable over bodies
 and components has a column for the first component of each body."""
+
+EFFORT = (
+    "increments", "cut_increments", "iterations", "median_iterations", "inner_fallbacks",
+    "blended_tangents", "cpu_seconds", "degrees_of_freedom",
+)  # fmt: skip
+"""Numbers that say how hard a run was to solve."""
+
+
+def group_of(name: str) -> str:
+    """Return what a number of a run tells: ``result``, ``effort`` or ``audit``."""
+    if name in AUDIT or name.startswith("audit_"):
+        return "audit"
+    return "effort" if name in EFFORT else "result"

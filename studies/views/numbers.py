@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import xarray as xr
 
+from studies.views.figures import group_of
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import sweep_fields
-from studies.views.table import STATUS, Column, RunTable, group_of
+from studies.views.table import STATUS, Column, RunTable
 
 
 def table_of(dataset: xr.Dataset) -> RunTable:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from studies.definition.cells import KINK, edges, weights
+from studies.definition.points import POINT
 from studies.definition.quantity import RunNumber
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError, one_of
@@ -114,6 +115,9 @@ def _placed(dataset: xr.Dataset, at: Mapping[str, Any], whole: bool) -> _Between
     for name, value in at.items():
         if name not in coordinates:
             raise StudyError(name, value, one_of(name, list(coordinates)))
+        if name == POINT:
+            others = ", ".join(each for each in coordinates if each not in (POINT, CASE))
+            raise StudyError(name, value, f"only numbers the runs: give what it sets, {others}")
         words = dataset[name].dtype.kind not in "fiu"
         if words or (not whole and f"cell_{name}" in dataset):
             chosen = select(chosen, {name: value})

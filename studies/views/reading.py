@@ -152,7 +152,7 @@ def open_netcdf(path: Path | str) -> xr.Dataset:
     StudyError
         if it is not a netCDF file, or was damaged or replaced in its store
     """
-    _check(Path(path))
+    check(Path(path))
     try:
         dataset = xr.open_dataset(path, engine=ENGINE)
     except OSError as error:
@@ -160,7 +160,7 @@ def open_netcdf(path: Path | str) -> xr.Dataset:
     return indexed(dataset)
 
 
-def _check(path: Path) -> None:
+def check(path: Path) -> None:
     """Raise `StudyError` if a file in a store is not what its place says."""
     whole = path.absolute()
     if whole.name == "dataset.nc" and is_id(whole.parent.name):

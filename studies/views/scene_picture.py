@@ -48,7 +48,8 @@ def scene_svg(scene: Scene, parameters: Any) -> str:
 
     A scene without a model of meshes in a plane has a sentence instead.
     """
-    if scene.method and scene.method(parameters) is not by_increments:
+    own_path = type(scene).path is not Scene.path
+    if own_path or (scene.method and scene.method(parameters) is not by_increments):
         return sentence("These runs are computed by a method of their own: no mesh is drawn.")
     model = scene.model(parameters)
     meshes = {body.name: body.mesh for body in model.bodies}

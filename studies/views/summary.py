@@ -152,7 +152,7 @@ def summary(study: xr.Dataset | Path | str) -> Summary:
         status="complete" if MISSING not in counts else "not complete",
         progress=1.0 - counts.get(MISSING, 0) / status.size,
         counts=counts,
-        axes={n: _values(study[n].to_numpy().tolist(), _unit(study[n])) for n in names},
+        axes={n: values_text(study[n].to_numpy().tolist(), _unit(study[n])) for n in names},
         audit=None
         if first is None
         else (first, place([int(k) for k in np.unravel_index(first.at, status.shape)])),
@@ -173,7 +173,7 @@ def summary_of(
         status=detail["status"],
         progress=detail["progress"] / 100.0,
         counts=detail["counts"],
-        axes={name: _values(labels(name, axis)) for name, axis in detail["sweep"].items()},
+        axes={name: values_text(labels(name, axis)) for name, axis in detail["sweep"].items()},
         audit=audit,
         failed=failed[:NAMED],
     )
@@ -190,9 +190,9 @@ def bar(fraction: float) -> str:
     return f"{'█' * filled}{'·' * (WIDTH - filled)} {100 * fraction:3.0f} %"
 
 
-def _values(values: Sequence[Any], unit: str = "") -> str:
-    """Return the values of an axis, of many the ends and their number."""
-    if len(values) > NAMED:
+def values_text(values: Sequence[Any], unit: str = "", most: int = NAMED) -> str:
+    """Return the values of an axis, of more than ``most`` the ends and their number."""
+    if len(values) > most:
         text = f"{value_text(values[0])} … {value_text(values[-1])} ({len(values)})"
     else:
         text = ", ".join(map(value_text, values))

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from solver.results.audit.figures import AUDIT
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.errors import StudyError, one_of
@@ -33,12 +32,6 @@ MOST_VALUES = 100
 """Largest number of numbers that a query names of a column."""
 
 RANGE = re.compile(r"(?P<low>[^.]*(?:\.\d[^.]*)?)\.\.(?P<high>.*)", re.DOTALL)
-
-EFFORT = (
-    "increments", "cut_increments", "iterations", "median_iterations", "inner_fallbacks",
-    "blended_tangents", "cpu_seconds", "degrees_of_freedom",
-)  # fmt: skip
-"""Numbers that say how hard a run was to solve."""
 
 NUMBERS = ("result", "effort", "audit")
 """Groups of columns with the numbers of runs, the main ones first."""
@@ -162,13 +155,6 @@ def varied(table: RunTable) -> list[Column]:
     sweep = [each for each in table.columns.values() if each.group == "sweep"]
     several = [each for each in sweep if len(set(each.values.tolist())) > 1]
     return several or sweep
-
-
-def group_of(name: str) -> str:
-    """Return what a number of a run tells: ``result``, ``effort`` or ``audit``."""
-    if name in AUDIT or name.startswith("audit_"):
-        return "audit"
-    return "effort" if name in EFFORT else "result"
 
 
 def column_of(

@@ -6,7 +6,7 @@ import json
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -23,13 +23,31 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*[A-Za-z_]
 """A number in a message, not the digits of a name."""
 _AWAY = "audit_plastic_strain"
 _MARK = "*"
-_FOOTNOTE = (
+FOOTNOTE = (
     f"\n{_MARK} taken at a singular point, where strain is unbounded: the number depends on the "
     "mesh and need not\n  converge as the mesh is refined\n"
 )
 
 NAMED = 4
 """Largest number of runs that are named for a message; further ones are counted."""
+
+
+class RunCells(NamedTuple):
+    """The texts of a table of runs.
+
+    Attributes
+    ----------
+    headings, units, rows : a text for each column
+    keys, words : number of the first columns that tell where a run is; of those that are words
+    marked : whether some number was taken at a singular point, and has a mark
+    """
+
+    headings: list[str]
+    units: list[str]
+    rows: list[list[str]]
+    keys: int
+    words: int
+    marked: bool
 
 
 def runs_table(dataset: xr.Dataset) -> str:
@@ -39,6 +57,15 @@ def runs_table(dataset: xr.Dataset) -> str:
     strain are those after unloading. Increments, and cut increments if there are any, show how hard
     the run was to solve. Numbers taken at a singular point are marked.
     """
+    cells = run_cells(dataset)
+    units = [*map(_bracketed, cells.units)]
+    lines = [*stacked(cells.headings), units, *cells.rows]
+    table = in_blocks(lines, cells.keys, right=cells.words)
+    return f"{table}\n{FOOTNOTE}" if cells.marked else table
+
+
+def run_cells(dataset: xr.Dataset) -> RunCells:
+    """Return the texts of `runs_table`."""
     places = {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
     keys = sum(name == axis for name, axis in places.items())
     figures = list(_figures(dataset))
@@ -56,9 +83,8 @@ def runs_table(dataset: xr.Dataset) -> str:
         place = dict(zip(sweep_axes(dataset), at, strict=True))
         where = [value_text(values[name][place[axis]]) for name, axis in places.items()]
         rows.append([*where, str(values["status"][at]), *(str(each[at]) for each in cells)])
-    table = in_blocks([*stacked(headings), units, *rows], keys, right=len(places) + 1)
-    marked = any(spoiled.any() for *_, spoiled in figures)
-    return f"{table}\n{_FOOTNOTE}" if marked else table
+    marked = any(bool(spoiled.any()) for *_, spoiled in figures)
+    return RunCells(headings, units, rows, keys, len(places) + 1, marked)
 
 
 def _cells(values: xr.DataArray, spoiled: xr.DataArray) -> np.ndarray:
@@ -165,7 +191,7 @@ def run_details(dataset: xr.Dataset) -> str:
         lines.append(["message", message])
     rank = dataset["status"].ndim
     lines += [
-        [str(name), f"{_figure(each)} {_unit(each)}".rstrip()]
+        [str(name), f"{_figure(each)} {_bracketed(_unit(each))}".rstrip()]
         for name, each in dataset.data_vars.items()
         if each.ndim == rank
         and name not in {"status", "message"}
@@ -184,5 +210,9 @@ def _figure(variable: xr.DataArray) -> str:
 
 
 def _unit(variable: xr.DataArray) -> str:
-    unit = variable.attrs.get("units", "")
-    return "" if unit in {"", "1"} else f"[{unit}]"
+    unit = str(variable.attrs.get("units", ""))
+    return "" if unit == "1" else unit
+
+
+def _bracketed(unit: str) -> str:
+    return f"[{unit}]" if unit else ""

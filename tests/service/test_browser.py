@@ -47,6 +47,14 @@ def study(service: Server, browser: Any) -> str:
 
 
 @pytest.fixture(scope="module")
+def open_study_page(context: Any, service: Server, study: str) -> Iterator[Any]:
+    """Give the page of the study, which tests share: each says what of it is drawn."""
+    with opened(context, f"{base(service)}/ui/studies/{study}") as page:
+        page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
+        yield page
+
+
+@pytest.fixture(scope="module")
 def dataset(service: Server, study: str) -> xr.Dataset:
     return open_study(f"http://127.0.0.1:{service.port}/studies/{study}")
 
@@ -72,66 +80,70 @@ def cell(page: Any, x: float, y: float) -> tuple[float, float]:
     )
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_no_page_has_a_serious_barrier(
-    context: Any, service: Server, study: str, scheme: str
+def test_no_page_has_a_serious_barrier_or_is_wider_than_a_phone(
+    context: Any, open_study_page: Any, service: Server, study: str
 ) -> None:
     both = runs(service, study)[:2]
     waited = {
         "/ui": "table.list",
-        f"/ui/studies/{study}": DRAWN.format("map"),
         f"/ui/runs/{both[0]}": DRAWN.format("map"),
         f"/ui/compare?run={both[0]}&run={both[1]}": DRAWN.format("difference"),
         "/ui/new?scene=punch": "[data-estimate] dd",
         "/ui/health": ".tiles",
         "/ui/sign-in": "form.stack",
     }
+    open_study_page.wait_for_selector(DRAWN.format("map"))
+    see(open_study_page, dark=True)
+    open_study_page.set_viewport_size({"width": 1280, "height": 900})
+    open_study_page.emulate_media(color_scheme="light")
     for path, there in waited.items():
-        if scheme == "dark" and "/studies/" not in path and "new" not in path:
-            continue  # the others have the same colours
-        with opened(context, base(service) + path, scheme) as page:
+        with opened(context, base(service) + path) as page:
             page.wait_for_selector(there)
-            assert not barriers(page), path
+            see(page, dark="new" in path)  # the others have the same colours
 
 
-def test_no_page_is_wider_than_a_phone(context: Any, service: Server, study: str) -> None:
-    for path in ("/ui/new", f"/ui/studies/{study}"):
-        with opened(context, base(service) + path, width=390) as page:
-            page.wait_for_timeout(300)
-            assert page.evaluate("document.documentElement.scrollWidth") == 390, path
+def see(page: Any, *, dark: bool) -> None:
+    """Look for barriers, also in the dark, and at the width of a phone."""
+    assert not barriers(page), page.url
+    if dark:
+        page.emulate_media(color_scheme="dark")
+        assert not barriers(page, "color-contrast"), page.url
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert page.evaluate("document.documentElement.scrollWidth") == 390, page.url
 
 
 def test_values_under_the_pointer_and_of_a_clicked_run_are_those_of_the_data_set(
-    context: Any, service: Server, study: str, dataset: xr.Dataset
+    open_study_page: Any, service: Server, study: str, dataset: xr.Dataset
 ) -> None:
-    with opened(context, base(service) + f"/ui/studies/{study}?number={NUMBER}") as page:
-        page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
-        shown = page.evaluate("document.querySelector('[data-chart=sweep]').data[0].z")
-        stored = dataset[NUMBER].isel(hardening=0).transpose("load_ratio", "friction")
-        assert np.array_equal(shown, stored)
-        page.wait_for_selector("[data-chart=sweep][data-ready]")
-        page.wait_for_selector(DRAWN.format("map"))
-        page.mouse.move(*cell(page, 0.3, 0.8))
-        said = page.locator(".hoverlayer .hovertext").text_content()
-        value = stored.sel(friction=0.3, load_ratio=0.8).item()
-        assert float(re.search(r"[\d.]+", said)[0]) == float(f"{value:.4g}")
-        run = chosen_id(service, study, 0.4, 0.0)
-        page.mouse.move(*cell(page, 0.0, 0.4))
-        page.wait_for_selector(".hoverlayer .hovertext:has-text('load ratio 0.4')")
-        with page.expect_response(f"**/runs/{run}/values?field=residual_stress**"):
-            page.mouse.click(*cell(page, 0.0, 0.4))
-        page.wait_for_selector("[data-chart=map]:not(.busy)")
-        assert f"run={run}" in page.url
-        at = dataset.isel(hardening=0).sel(friction=0.0, load_ratio=0.4)
-        main = page.locator(".figures .main dd").inner_text()
-        assert main.split()[0] == f"{at[NUMBER].item():.4g}"
-        x, z = page.evaluate(
-            "(({x, z}) => [[...x], z.map((row) => [...row])])"
-            "(document.querySelector('[data-chart=map]').data[0])"
-        )
-        half = np.array(z, dtype=np.float32)[:, np.array(x) >= 0.0]
-        stored = at["residual_stress"].sel(component="xx").to_numpy().astype(np.float32)
-        assert np.array_equal(half, stored, equal_nan=True)
+    page = open_study_page
+    page.select_option("[data-controls=sweep] select >> nth=0", NUMBER)
+    page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
+    shown = page.evaluate("document.querySelector('[data-chart=sweep]').data[0].z")
+    stored = dataset[NUMBER].isel(hardening=0).transpose("load_ratio", "friction")
+    assert np.array_equal(shown, stored)
+    page.wait_for_selector("[data-chart=sweep][data-ready]")
+    page.wait_for_selector(DRAWN.format("map"))
+    page.mouse.move(*cell(page, 0.3, 0.8))
+    said = page.locator(".hoverlayer .hovertext").text_content()
+    value = stored.sel(friction=0.3, load_ratio=0.8).item()
+    assert float(re.search(r"[\d.]+", said)[0]) == float(f"{value:.4g}")
+    run = chosen_id(service, study, 0.4, 0.0)
+    page.mouse.move(*cell(page, 0.0, 0.4))
+    page.wait_for_selector(".hoverlayer .hovertext:has-text('load ratio 0.4')")
+    with page.expect_response(f"**/runs/{run}/values?field=residual_stress**"):
+        page.mouse.click(*cell(page, 0.0, 0.4))
+    page.wait_for_selector("[data-chart=map]:not(.busy)")
+    assert f"run={run}" in page.url
+    at = dataset.isel(hardening=0).sel(friction=0.0, load_ratio=0.4)
+    main = page.locator(".figures .main dd").inner_text()
+    assert main.split()[0] == f"{at[NUMBER].item():.4g}"
+    x, z = page.evaluate(
+        "(({x, z}) => [[...x], z.map((row) => [...row])])"
+        "(document.querySelector('[data-chart=map]').data[0])"
+    )
+    half = np.array(z, dtype=np.float32)[:, np.array(x) >= 0.0]
+    stored = at["residual_stress"].sel(component="xx").to_numpy().astype(np.float32)
+    assert np.array_equal(half, stored, equal_nan=True)
 
 
 def chosen_id(server: Server, study: str, load: float, friction: float) -> str:
@@ -141,16 +153,68 @@ def chosen_id(server: Server, study: str, load: float, friction: float) -> str:
     return run
 
 
-def test_the_table_is_sorted_and_filtered(context: Any, service: Server, study: str) -> None:
-    with opened(context, base(service) + f"/ui/studies/{study}") as page:
-        page.fill("[name='where.friction']", "0.1..0.4")
-        page.click("text=Filter")
-        page.wait_for_function("document.querySelectorAll('.runs tbody tr').length === 2")
-        page.click(".runs thead a:has-text('load ratio')")
-        page.wait_for_selector(".runs th[aria-sort=descending]")
-        loads = page.locator(".runs tbody tr td:nth-child(2)").all_inner_texts()
-        assert loads == ["0.8", "0.4"]
-        assert "sort=-load_ratio" in page.url and "where.friction=0.1..0.4" in page.url
+def test_the_table_is_sorted_and_filtered(open_study_page: Any) -> None:
+    page = open_study_page
+    page.fill("[name='where.friction']", "0.1..0.4")
+    page.click("text=Filter")
+    page.wait_for_selector(".lead:has-text('2 of 4')")
+    page.click(".runs thead a:has-text('load ratio')")
+    page.wait_for_selector(".runs th[aria-sort=descending]")
+    loads = page.locator(".runs tbody tr td:nth-child(2)").all_inner_texts()
+    assert loads == ["0.8", "0.4"]
+    assert "sort=-load_ratio" in page.url and "where.friction=0.1..0.4" in page.url
+    page.click("text=All runs")
+    page.wait_for_selector(".lead:has-text('4 of 4')")
+    assert "where" not in page.url
+
+
+def test_a_range_drawn_on_a_parallel_axis_is_a_condition_of_the_table(
+    open_study_page: Any,
+) -> None:
+    page = open_study_page
+    page.locator(".parallel").scroll_into_view_if_needed()
+    page.wait_for_selector(".parallel.drawn")
+    box = page.locator("[data-parallel]").bounding_box()
+    x, top, low = box["x"] + 66, box["y"] + 76, box["y"] + box["height"] - 17
+    page.mouse.move(x, top)
+    page.mouse.down()
+    page.mouse.move(x, top + 0.3 * (low - top))
+    page.mouse.up()
+    page.wait_for_selector(".lead:has-text('2 of 4')")
+    assert {*page.locator(".runs tbody tr td:nth-child(1)").all_inner_texts()} == {"0.3"}
+    name = page.evaluate(
+        "[...new URLSearchParams(location.search)].find(([n]) => n.match('where'))"
+    )
+    assert name[0] == "where.friction" and float(name[1].split("..")[1]) == 0.3
+    page.mouse.click(x, top + 0.5 * (low - top))
+    page.wait_for_selector(".lead:has-text('4 of 4')")
+    page.mouse.move(box["x"] + 100, low - 3)
+    assert page.locator("[data-tip]").inner_text().splitlines()[1:] == [
+        "friction 0",
+        "load ratio 0.4",
+    ]
+
+
+def test_contours_and_marks_show_the_runs_as_they_are_stored(
+    open_study_page: Any, dataset: xr.Dataset
+) -> None:
+    page, stored = open_study_page, dataset[NUMBER].isel(hardening=0)
+    page.select_option("[data-controls=sweep] select >> nth=0", NUMBER)
+    for kind, there in (("Contours", ".contourlayer"), ("Marks", ".scatterlayer .point")):
+        page.click(f"[data-controls=sweep] button:text-is('{kind}')")
+        page.wait_for_selector(f"[data-chart=sweep] {there}")
+        said = page.evaluate(
+            "document.querySelector('[data-chart=sweep]').data.filter((each) => each.text).at(0)"
+        )
+        assert len(said["text"]) == stored.size
+        for x, y, text in zip(said["x"], said["y"], said["text"], strict=True):
+            at = {"friction": x, "load_ratio": y}
+            if kind == "Marks":
+                at = {"load_ratio": x, "friction": y}
+            value = stored.sel(at).item()
+            assert text.startswith(f"<b>{float(f'{value:.4g}'):g} MPa</b>")
+            assert f"friction {at['friction']:g}" in text
+    assert "kind=marks" in page.url
 
 
 def test_runs_are_chosen_by_keys_and_compared(context: Any, service: Server, study: str) -> None:
@@ -175,31 +239,47 @@ def test_runs_are_chosen_by_keys_and_compared(context: Any, service: Server, stu
         assert f"run={first}&run={last}" in page.url
 
 
-def test_charts_take_text_of_others_as_text(context: Any, service: Server, study: str) -> None:
-    with opened(context, base(service) + f"/ui/studies/{study}") as page:
-        page.wait_for_selector("[data-chart=sweep] .heatmaplayer image")
-        title = page.evaluate(
-            """async () => {
-                const style = document.querySelector("link[rel=stylesheet]").href;
-                const { named } = await import(style.replace("style.css", "charts.js"));
-                const chart = document.querySelector("[data-chart=sweep]");
-                const text = named("<a href='/x'>a & b", "1/s");
-                await Plotly.relayout(chart, { "xaxis.title.text": text });
-                const drawn = chart.querySelector(".xtitle");
-                return [drawn.querySelectorAll("a").length, drawn.textContent];
-            }"""
+def test_charts_take_text_of_others_as_text(open_study_page: Any) -> None:
+    title = open_study_page.evaluate(
+        """async () => {
+            const style = document.querySelector("link[rel=stylesheet]").href;
+            const { named } = await import(style.replace("style.css", "charts.js"));
+            const chart = document.querySelector("[data-chart=sweep]");
+            const text = named("<a href='/x'>a & b", "1/s");
+            await Plotly.relayout(chart, { "xaxis.title.text": text });
+            const drawn = chart.querySelector(".xtitle");
+            return [drawn.querySelectorAll("a").length, drawn.textContent];
+        }"""
+    )
+    assert title == [0, "<a href='/x'>a & b [1/s]"]
+
+
+def test_a_study_of_points_is_watched_to_its_end_and_its_runs_are_marks(
+    context: Any, service: Server
+) -> None:
+    points = [
+        {"load_ratio": 0.2, "friction": 0.1},
+        {"load_ratio": 0.4, "friction": 0.05},
+        {"load_ratio": 0.3, "friction": 0.2, "behaviour": "limit"},
+    ]
+    watched = {"name": "watched", "scene": "fake", "parameters": {"seconds": 0.5}}
+    study_id = service.post(watched | {"points": points})
+    with opened(context, base(service) + f"/ui/studies/{study_id}?x=load_ratio") as page:
+        page.wait_for_selector("[data-live=status] .failed", timeout=60_000)
+        page.wait_for_selector(".counts li:has(.ok) b")
+        assert page.locator(".counts li:has(.ok) b").inner_text() == "2"
+        assert page.locator(".runs tbody .status.limit_load").count() == 1
+        page.wait_for_selector(
+            "[data-note=sweep]:has-text('Of 3 runs shown, without a value: 1 no')"
         )
-        assert title == [0, "<a href='/x'>a & b [1/s]"]
-
-
-def test_a_study_is_watched_to_its_end(context: Any, service: Server) -> None:
-    study_id = service.post(fake_study("watched", seconds=0.5))
-    with opened(context, base(service) + f"/ui/studies/{study_id}") as page:
-        page.evaluate("window.same = true")
-        page.wait_for_selector("[data-live=status] .successful", timeout=60_000)
-        page.wait_for_selector(".counts .ok + b, .counts li:has(.ok) b")
-        assert page.locator(".counts li:has(.ok) b").inner_text() == "4"
-        assert page.locator(".runs tbody .status.ok").count() == 4
+        shown = page.evaluate(
+            "document.querySelector('[data-chart=sweep]').data.filter((each) => each.text)"
+            ".map(({ name, x, y, text }) => [name ?? '', x, y, text])"
+        )
+        (_, x, y, _), (reason, u, v, said) = shown
+        assert {*zip(x, y, strict=True)} == {(0.2, 0.1), (0.4, 0.05)}
+        assert (reason, u, v) == ("no equilibrium", [0.3], [0.2])
+        assert "load ratio 0.3" in said[0] and "friction 0.2" in said[0]
 
 
 def test_a_study_is_made_by_the_form(context: Any, service: Server) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import logging.config
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from service.app import create_app
+from service.app import check_port, create_app
 from service.settings import Settings
 from tests.architecture.sources import ROOT
 from tests.service.servers import Server, environment, fake_study
@@ -124,3 +125,18 @@ def test_an_unknown_form_is_refused(tmp_path: Path) -> None:
         check=False,
     )
     assert answer.returncode == 2 and "RESIDUA_LOG_FORMAT" in answer.stderr
+
+
+def test_a_port_in_use_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        with pytest.raises(SystemExit) as ended:
+            check_port("127.0.0.1", port)
+    assert ended.value.code == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert f"port = {port}" in told
+    assert "--port" in told
+    check_port("127.0.0.1", 0)

@@ -51,6 +51,17 @@ def test_a_scene_has_the_id_of_its_content(service: Server, pin: str) -> None:
     assert again.json()["name"] == "pin"
 
 
+def test_a_table_of_values_is_posted_with_its_scene(service: Server) -> None:
+    strip, table = ((SCENES / f"peened.{end}").read_bytes() for end in ("toml", "csv"))
+    answer = post(service, strip, peened_csv=table)
+    assert answer.status_code == 201, answer.text
+    assert answer.json()["id"] == read_scene(SCENES / "peened.toml").id
+    other = post(service, strip, peened_csv=table + b"1.5,0\n").json()["id"]
+    assert other != answer.json()["id"]
+    wrong = post(service, strip, peened_csv=b"z,xx\n0,1\n").json()["errors"]
+    assert [each["field"] for each in wrong] == ["loads[0].xx.file"]
+
+
 def test_a_browser_posts_a_scene_and_gets_the_form_of_its_studies(
     service: Server, pin: str
 ) -> None:
@@ -181,6 +192,9 @@ def test_a_study_of_a_posted_scene_has_the_ids_and_numbers_of_the_file(
     assert service.client.get(f"{run}/line.png", params=asked, headers=tag).status_code == 304
     for wrong in ({"field": "residual_stress"}, asked | {"lyne": "below"}, asked | {"line": "no"}):
         assert service.client.get(f"{run}/line.png", params=wrong).status_code == 422
+
+    page = service.client.get(f"/ui/runs/{done['runs'][0]['id']}").text
+    assert "yield stress of the plate" in page
 
 
 def test_a_run_that_keeps_its_fields_is_sent_for_paraview(

@@ -22,6 +22,7 @@ from solver import (
 from solver.materials import PlaneStress
 from solver.mesh import grid, mapped
 from solver.results.audit.law import increment_error
+from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.report import audit
 from solver.scenes.punch import PunchParameters, model
 from tests.verification.bodies import block
@@ -85,6 +86,29 @@ def test_a_little_load_left_on_is_noticed(solution):
     unloaded = replace(solution.unloaded, responses=responses)
     check = audit(solution.system, solution.loaded, unloaded, 0.0)
     assert any("audit_contact_after_unloading" in text for text in check.violations)
+
+
+def test_a_closed_gap_has_a_floor_from_the_forces_in_the_model():
+    """A block is hardly pressed, and 0.012 nm away; another one is pressed, or not."""
+    x, y, held = np.linspace(-2.0, 2.0, 5), np.linspace(0.0, 2.0, 3), {"bottom": "xy"}
+    steel = Material(youngs_modulus=2e5, poisson_ratio=0.3)
+    base = block("base", x, y - 2.0, material=steel, supports=held)
+    top = block("top", x, y, material=steel, pressure={"top": 0.1}, supports={"left": "x"})
+
+    def closed(beside, gap):
+        other = block("other", x + 9.0, y, material=steel, pressure=beside, supports=held)
+        pair = ContactPair(slave=("top", "bottom"), master=("base", "top"))
+        found = solve(Model(bodies=(top, base, other), contacts=(pair,)))
+        state, raised = found.loaded.state, found.system.part("top")
+        u = tuple(ui + (gap if k == raised else 0.0) for k, ui in enumerate(state.u))
+        audited = AuditedPair(found.system, 0, replace(found.loaded, state=replace(state, u=u)))
+        assert audited.figures["audit_closed_gap"] == pytest.approx(gap)
+        return audited.figures["audit_closed_gap"] <= audited.limits["audit_closed_gap"]
+
+    assert closed({}, 3e-9)  # in proportion to the bodies
+    assert not closed({}, 1.2e-8)
+    assert closed({"top": 1e4}, 1.2e-8)
+    assert not closed({"top": 1e4}, 2.4e-8)
 
 
 # -- contact on the deformed bodies --------------------------------------------------------------

@@ -116,6 +116,28 @@ def test_a_pressure_that_varies_is_integrated_and_audited() -> None:
     assert found.audit().passed
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layer(Load):
+    """A weight per volume of 2 N/mm3 on one side of a line only: the line crosses elements."""
+
+    slope: float
+
+    def body_force(self, x: Array) -> Array:
+        return 2.0 * (x[1] + 3.3 < self.slope * (x[0] - 2.0)) * np.array([[0.0], [-1.0]])
+
+
+@pytest.mark.parametrize("element", ["quad8", "tri6"])
+@pytest.mark.parametrize("slope", [0.0, 0.4])
+def test_a_force_per_volume_may_jump_within_elements(element: str, slope: float) -> None:
+    """The line passes the middle of the block at a depth of 3.3 of 6, whatever its slope."""
+    found = solve(Model(bodies=(block(element, Layer(slope=slope)),)))
+    force = found.system.full("block").external(1.0).reshape(-1, 2)
+    assert force.sum(axis=0) == pytest.approx([0.0, -2.0 * 4 * 2.7], abs=1e-5)
+    turn = force[:, 1] @ (found.nodes("block")[0] - 2.0)
+    assert turn == pytest.approx(-2.0 * slope * 4.0**3 / 12, abs=1e-5)
+    assert found.audit().passed, found.audit().violations
+
+
 def test_a_condensed_body_has_its_force_per_volume() -> None:
     upper = block(load=Weight(weight=20.0), supports={"left": "x"})
     lower = replace(block(), name="lower", mesh=block().mesh.translated((0.0, -6.0)))

@@ -15,6 +15,7 @@ from solver import (
     Model,
     ModelError,
     Moved,
+    Pressure,
     RigidBody,
     Stage,
     solve,
@@ -108,3 +109,23 @@ def test_a_tool_passes_through_before_it_comes_and_its_forces_follow_the_surface
 def test_a_presence_below_zero_is_refused():
     with pytest.raises(ModelError, match="presence"):
         expanded(presence=Amplitude([0, 1], [1, -1]))
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_bodies_that_were_separated_meet_again_where_they_are(friction):
+    """The upper block has sprung back: to close its gap is work that its pressure does."""
+    x = np.linspace(0.0, 4.0, 5)
+    there = Amplitude([0, 1, 2, 3, 4], [0, 1, 0, 1, 0])
+    upper = Body(name="upper", mesh=grid(x, x / 2), material=PLATE, supports={"left": "x"},
+                 loads=(Pressure(boundary="top", value=280.0, amplitude=there),))  # fmt: skip
+    lower = Body(name="lower", mesh=grid(x, x / 2 - 2), material=PLATE, supports={"bottom": "xy"})
+    pair = ContactPair(slave=("upper", "bottom"), master=("lower", "top"), friction=friction)
+    stages = [
+        Stage(name=name, target=2.0 * k + time, steps=2, apart=name == "free", cycle=k + 1)
+        for k in (0, 1)
+        for time, name in ((1, "pressed"), (2, "free"))
+    ]
+    found = solve(Model(bodies=(upper, lower), contacts=(pair,)), stages=stages)
+    check = found.audit("pressed")
+    assert check.passed, check.violations
+    assert check.figures["audit_energy"] < 1e-9

@@ -192,7 +192,6 @@ def test_a_turn_in_one_increment_is_divided(turn: float) -> None:
 @pytest.mark.parametrize(
     ("own", "message"),
     [
-        ({"surfaces": {}}, "surfaces = .*: must be at least one"),
         (
             {"surfaces": {"base": RigidSurface(points=np.zeros((2, 1)))}},
             "surfaces.base .* two or more",

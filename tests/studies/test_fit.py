@@ -17,7 +17,8 @@ from residua.cli import main
 from solver.errors import ModelError
 from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, estimate, fit, open_study, run_study
-from studies.definition.fit import Fitted, Fitting, certainty, checked_fit, standings
+from studies.definition.certainty import certainty
+from studies.definition.fit import Fitted, Fitting, checked_fit, standings
 from studies.definition.identity import solver_hash
 from studies.definition.line import Line
 from studies.definition.measured import checked_measured, pieces
@@ -251,7 +252,7 @@ def test_an_interrupted_fit_goes_on_and_asks_for_the_same_runs(tmp_path: Path) -
     one = study(measured(0.02))
     at_once = fit_here(one, Store(tmp_path / "a"))
     store, parts = Store(tmp_path / "b"), []
-    while some := fit_here(one, store, most=2):
+    while some := fit_here(one, store, most=5):
         parts += some
     assert sorted(parts) == sorted(at_once), "the same runs, and none twice"
     with open_study(tmp_path / "a") as a, open_study(tmp_path / "b") as b:
@@ -456,6 +457,11 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
     assert one.fit["measured"] == [
         {"of": "contact_half_width", "values": [50.5, 51.0], "sigma": [0.5, 0.5]}
     ]
+    (tmp_path / "p.csv").write_text(PRESSURE)
+    two = Study.from_toml(file, [tmp_path / "b.csv", tmp_path / "p.csv@stage=loaded"])
+    assert [line.get("at") for line in two.fit["measured"]] == [None, {"stage": "loaded"}]
+    with pytest.raises(StudyError, match="must be FILE, or FILE@NAME=VALUE"):
+        Study.from_toml(file, [tmp_path / "p.csv@stage=loaded,pass"])
     with pytest.raises(StudyError, match=r"fit\.measured = None: is missing"):
         Study.from_toml(file)
     for text, allowed in (
@@ -469,11 +475,12 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
 
 
 @pytest.mark.processes
+@pytest.mark.usefixtures("one_worker")
 def test_a_killed_fit_is_taken_up_and_computes_no_run_twice(tmp_path: Path) -> None:
     marks, out, file = tmp_path / "marks", tmp_path / "out", tmp_path / "study.toml"
     marks.mkdir()
     (tmp_path / "p.csv").write_text(PRESSURE)
-    file.write_text(FAKE_FIT.format(seconds=0.4, mark=marks) + LINES)
+    file.write_text(FAKE_FIT.format(seconds=0.2, mark=marks) + LINES)
     before = runs_before_a_kill("fit", file, out, 4)
     outcome = run_study(Study.from_toml(file), Store(out), workers=1)
     assert outcome.ok

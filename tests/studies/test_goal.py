@@ -20,6 +20,7 @@ from solver.results.record import Record
 from studies import Bounds, Store, Study, StudyError, StudyEvent, estimate, open_study, run_study
 from studies.definition.goal import Goal, Search, checked_goal
 from studies.definition.identity import solver_hash
+from studies.definition.neighbours import Neighbours
 from studies.execution.asking import Asking
 from studies.execution.goals import answers
 from studies.execution.limits import Limits
@@ -95,9 +96,11 @@ def search_here(study: Study, store: Store, most: int = 10**6) -> list[str]:
     return computed
 
 
-def searched(goal: Goal, number: Callable[[float], float | None]) -> Search:
+def searched(
+    goal: Goal, number: Callable[[float], float | None], expected: float | None = None
+) -> Search:
     """Search with a function of the parameter; None stands for a limit load."""
-    search = Search(goal)
+    search = Search(goal, expected)
     while wanted := search.wants:
         value = random.choice(wanted)
         known = number(value)
@@ -156,6 +159,64 @@ def test_no_equilibrium_is_beyond_and_told_apart() -> None:
     assert searched(goal, lambda value: None).reason == "already"
 
 
+def test_a_bracket_that_is_halved_has_its_ends_on_trust_until_the_search_comes_to_one() -> None:
+    asked = {"parameter": "friction", "of": "peak_contact_pressure", "first_above": 0.0}
+    goal = checked_goal(asked | {"between": [0.1, 0.4]}, FAKE)
+    inside = searched(goal, lambda value: value - 0.25)
+    assert (inside.reason, {0.1, 0.4} & inside.rows.keys()) == ("passed", set())
+    for root, reason in ((0.05, "already"), (0.5, "never"), (0.1001, "passed")):
+        found = searched(goal, lambda value, root=root: value - root)
+        assert found.reason == reason
+        assert (0.4 if root > 0.4 else 0.1) in found.rows
+        assert math.isnan(found.found) == (reason != "passed")
+
+
+@pytest.mark.parametrize("off", [-8.0, -1.2, 0.0, 0.4, 3.0, 30.0])
+def test_a_search_begins_where_its_goal_is_expected(off: float) -> None:
+    """Runs by the distance, in widths of the last bracket: two if it is less than half of one."""
+    asked = {"parameter": "friction", "of": "peak_contact_pressure", "first_above": 0.0}
+    goal = checked_goal(asked | {"between": [0.1, 0.4]}, FAKE)
+    found = searched(goal, lambda value: value - 0.2, 0.2 * 0.99**off)
+    assert found.low <= 0.2 <= found.high <= found.low / (1.0 - 0.01001)
+    most = {0.0: 2, 0.4: 2, -1.2: 2, 3.0: 6}
+    assert len(found.rows) <= most.get(off, goal.most[1])
+
+
+def test_searches_wait_for_those_by_which_their_goal_is_expected(tmp_path: Path) -> None:
+    """The goal is friction = (120 - half_width) / 80 - 1; places between take few runs."""
+    goal = {"parameter": "friction", "of": "peak_contact_pressure", "first_above": 120.0}
+    widths = [20.0 + 1.5 * k for k in range(9)]
+    asked = study(goal | {"between": [0.05, 0.9]}, {"half_width": widths}, load_ratio=0.8)
+    at_once = search_here(asked, Store(tmp_path / "a"))
+    store, parts = Store(tmp_path / "b"), []
+    while some := search_here(asked, store, most=5):
+        parts += some
+    assert sorted(parts) == sorted(at_once), "the same runs, and none twice"
+    with open_study(tmp_path / "a") as dataset:
+        found, runs = (dataset[name].to_numpy().ravel() for name in ("friction", "runs"))
+    assert found == pytest.approx((120.0 - np.array(widths)) / 80.0 - 1.0, rel=0.006)
+    assert runs[[0, -1]].tolist() == [9, 9]
+    assert runs[1:-1].mean() <= 3.0
+
+
+def test_words_part_the_places_that_foresee_each_other() -> None:
+    sets = [{"x": x, "word": word} for word in "ab" for x in (0.0, 1.0, 2.0, 3.0)]
+    near = Neighbours(sets)
+    assert [set(each) for each in near.before] == [
+        set(), {0, 3}, {0, 3}, set(), set(), {4, 7}, {4, 7}, set()
+    ]  # fmt: skip
+    assert near.foreseen(1, [1.0, 7.0]) == pytest.approx(3.0)
+    assert near.foreseen(1, [math.nan, 7.0]) == pytest.approx(7.0)
+    assert near.foreseen(1, [math.nan, math.nan]) is None
+    path = Neighbours([{"x": x, "traction": float(x > 0)} for x in range(5)])
+    assert path.before[1] == [0, 2, 4], "a number of two values does not count beside another"
+    grid = Neighbours([{"x": x, "y": y} for x in range(5) for y in range(5)])
+    smooth = [3.0 + 0.3 * (k // 5) - 0.05 * (k % 5) ** 2 for k in range(25)]
+    last = max(range(25), key=lambda k: len(grid.before[k]))
+    values = [smooth[k] for k in grid.before[last]]
+    assert grid.foreseen(last, values) == pytest.approx(smooth[last], abs=0.03)
+
+
 def test_a_run_that_fails_its_audit_is_before_the_limit_load_and_has_no_number() -> None:
     limit = checked_goal({"find": "limit_load", "between": [0.1, 4.0]}, FAKE)
     row = {"id": "a", "status": "audit_failed", "scalars": {"peak_contact_pressure": 1.0}}
@@ -207,7 +268,7 @@ def test_an_interrupted_search_goes_on_and_asks_for_the_same_runs(
     asked = study(PRESSURE, scene=scene, trouble="limit")
     at_once = search_here(asked, Store(tmp_path / "a"))
     store, parts = Store(tmp_path / "b"), []
-    while some := search_here(asked, store, most=3):
+    while some := search_here(asked, store, most=7):
         parts += some
     assert sorted(parts) == sorted(at_once), "the same runs, and none twice"
     with open_study(tmp_path / "a") as one, open_study(tmp_path / "b") as other:
@@ -491,17 +552,18 @@ def test_progress_grows_to_the_end_and_a_stopped_search_says_so(store: Store) ->
 
 
 @pytest.mark.processes
+@pytest.mark.usefixtures("one_worker")
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_killed_search_is_taken_up_and_computes_no_run_twice(tmp_path: Path, scene: str) -> None:
     marks, out = tmp_path / "marks", tmp_path / "out"
     marks.mkdir()
     file = tmp_path / "study.toml"
     file.write_text(
-        f'name = "goal"\nscene = "{scene}"\n[parameters]\nseconds = 0.4\nmark = "{marks}"\n'
-        "[sweep]\nfriction = [0.0, 0.1, 0.2, 0.3]\n"
+        f'name = "goal"\nscene = "{scene}"\n[parameters]\nseconds = 0.2\nmark = "{marks}"\n'
+        "[sweep]\nfriction = [0.0, 0.1, 0.2]\n"
         '[goal]\nof = "peak_contact_pressure"\nat = 120\nbetween = [0.1, 4.0]\n'
     )
-    before = runs_before_a_kill("run", file, out, 8)
+    before = runs_before_a_kill("run", file, out, 6)
     outcome = run_study(Study.from_toml(file), Store(out), workers=1)
     assert outcome.ok
     assert not before & set(outcome.computed)

@@ -28,7 +28,7 @@ swift_exponent = 0.3
 
 [bodies.bar]
 material = "steel"
-shape = { kind = "rectangle", x = [0, 4], y = [0, 1], size = 0.5 }
+shape = { kind = "rectangle", x = [0, 4], y = [0, 1], size = 1.0 }
 supports = { left = "x", bottom = "y" }
 
 [[loads]]

@@ -164,6 +164,8 @@ def test_a_number_that_was_not_refined_tells_a_branch(store: Store) -> None:
         assert found[OF].item() == pytest.approx(0.9, abs=0.05)
         with pytest.raises(StudyError, match=r"half_width = 30\.0: must be one of 50\.0, 20\.0"):
             predict(dataset, **at, half_width=30.0)
+        with pytest.raises(StudyError, match="only numbers the runs: give what it sets"):
+            predict(dataset, **at, half_width=20.0, point=3)
 
 
 def test_a_switch_tells_a_branch_and_is_one_of_the_run_to_add(store: Store) -> None:

@@ -5,7 +5,7 @@ import { element, state, text, words } from "./page.js";
 import { column, known, met, number, on, raw, shades, study, tell, told, value, wordsAt } from "./runs.js";
 import { filter } from "./table.js";
 
-const TOP = 74, BOTTOM = 16, SIDE = 66, NEAR = 14, WIDE = 10, MOST = 9, NARROW = 96, SHADES = 24, MOVED = 4;
+const TOP = 74, BOTTOM = 16, SIDE = 66, NEAR = 14, WIDE = 10, MOST = 9, NARROW = 96, SHADES = 24, MOVED = 4, END = 0.03;
 const canvas = document.querySelector("[data-parallel]");
 const tip = document.querySelector("[data-tip]");
 const section = canvas.closest("section");
@@ -32,6 +32,7 @@ async function draw() {
     return { run, there, paint: there ? paint : "off", shares: axes.map((axis) => axis.share(raw(run, axis))) };
   });
   canvas.setAttribute("aria-label", `${lines.length} runs as lines over ${axes.map(({ name }) => words(name)).join(", ")}`);
+  section.classList.add("drawn");
   paint();
 }
 
@@ -240,15 +241,17 @@ canvas.addEventListener("pointerup", (event) => {
     }
     return;
   }
-  const axis = axes[brush.axis], [from, to] = [brush.from, brush.to].sort((a, b) => a - b);
+  const axis = axes[brush.axis], [from, to] = [brush.from, brush.to].map(snapped).sort((a, b) => a - b);
   const moved = Math.abs(at.y - brush.y) > MOVED;
   brush = null;
   filter({ [`where.${axis.name}`]: moved ? condition(axis, axis.at(from), axis.at(to)) : null });
 });
 
+const snapped = (share) => (share < END ? 0 : share > 1 - END ? 1 : share);
+
 function condition(axis, low, high) {
   const words = axis.labels ?? (Object.keys(axis.flags ?? {}).length ? axis.flags : null);
-  if (words) return Object.entries(words).filter(([code]) => code >= low && code <= high).map(([, word]) => word).join(",") || null;
+  if (words) return Object.entries(words).filter(([code]) => code > low - 0.3 && code < high + 0.3).map(([, word]) => word).join(",") || null;
   return `${Number(low.toPrecision(4))}..${Number(high.toPrecision(4))}`;
 }
 

@@ -7,10 +7,10 @@ import { choice, element, keep, root, select, state, text, words } from "./page.
 const MOST_LINES = 8;
 const GREEK = "σ";
 const DASHES = ["solid", "dash", "dot", "dashdot"];
-const FIRST = { depth: "residual_profile", contact: "contact_pressure", line: "surface_residual" };
+const FIRST = { depth: /^residual_profile$/, contact: /pressure$/, line: /^surface_residual$/ };
 const BELONGS = {
   depth: ({ along }) => along === "depth",
-  contact: ({ along }) => along === "s",
+  contact: ({ along }) => along !== "depth" && along !== "increment",
   history: ({ along }) => along === "increment",
   line: () => true,
 };
@@ -54,13 +54,9 @@ export class Pictures {
     const chart = document.querySelector(`[data-chart="${part}"]`);
     if (!chart) return;
     const known = part === "map" ? this.fields.maps : this.fields.lines.filter(BELONGS[part]);
-    if (part === "history") chart.closest("figure").hidden = !known.length;
-    if (!known.length) {
-      document.querySelector(`[data-controls="${part}"]`).replaceChildren();
-      fail(chart, "This run has no such values.");
-      return;
-    }
-    const field = known.find((each) => each.name === state.get(part)) ?? known.find(({ name }) => name === FIRST[part]) ?? known[0];
+    chart.closest("figure").hidden = !known.length;
+    if (!known.length) return;
+    const field = known.find((each) => each.name === state.get(part)) ?? known.find(({ name }) => FIRST[part]?.test(name)) ?? known[0];
     const components = field.components ?? [];
     const component = components.includes(state.get(`${part}.component`)) ? state.get(`${part}.component`) : components[0];
     const stages = (part === "map" && field.stages) || [];

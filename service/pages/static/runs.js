@@ -17,8 +17,12 @@ export const tell = (what) => heard.dispatchEvent(new Event(what));
 export const on = (what, act) => heard.addEventListener(what, act);
 
 let columns = new Map();
+let before = new Map(); // until the new ones have come
 let texts = {};
-export const forget = () => (columns = new Map());
+export function forget() {
+  before = new Map([...before, ...columns]);
+  columns = new Map();
+}
 
 export async function columnsOf(names) {
   const known = columns; // a change of the study begins anew: an answer under way is of before
@@ -45,7 +49,7 @@ export async function met() {
 }
 
 export const number = () => study.numbers.find(({ name }) => name === state.get("number")) ?? study.numbers[0];
-export const column = (name) => columns.get(name);
+export const column = (name) => columns.get(name) ?? before.get(name);
 export const statusOf = (run) => texts[STATUS][column(STATUS)[run]];
 export const value = (run, { name }) => (statusOf(run) === "ok" ? column(name)[run] : NaN);
 export const raw = (run, { name }) => column(name)[run];

@@ -4,7 +4,7 @@ import "./chosen.js";
 import "./parallel.js";
 import { data, renew } from "./page.js";
 import { address, forget, study, tell } from "./runs.js";
-import { drawSweep } from "./sweep.js";
+import "./sweep.js";
 import "./table.js";
 
 const REST = 1000;
@@ -21,12 +21,11 @@ function watch() {
     if (!fresh) return;
     const now = data(fresh);
     const begun = study.at === null && now.at !== null;
-    if (begun && !document.querySelector("[data-picture]")) document.location.reload();
+    if (begun && !document.querySelector("[data-picture]")) return document.location.reload();
     forget();
     Object.assign(study, { numbers: now.numbers, places: now.places, size: now.size }, final ? { live: false } : {}, begun ? { at: now.at } : {});
     tell(begun ? "chosen" : "runs");
   });
 }
 
-drawSweep();
 if (study.live) watch();

@@ -12,6 +12,7 @@ const several = axes.filter(({ labels }) => labels.length > 1);
 const KINDS = { cells: "Cells", contours: "Contours", lines: "Lines", marks: "Marks" };
 const GROUPS = { result: "Results", effort: "Effort", audit: "Audit" };
 const MOST_LINES = 12;
+const MOST_MARKS = 2500;
 
 const places = (run) => axes.map(({ labels }, k) => Math.floor(run / strides[k]) % labels.length);
 const position = (place) => place.reduce((sum, index, k) => sum + index * strides[k], 0);
@@ -57,20 +58,21 @@ function held(x, y) {
   });
 }
 
-export async function drawSweep() {
+async function drawSweep() {
   const what = number(), possible = kinds();
   if (!what || !possible.length) {
-    document.querySelector(".study .sweep").classList.add("empty");
+    document.querySelector(".study .sweep").classList.add("bare");
     fail(chart, what ? "Nothing is swept: the study has one run." : study.live ? "The first numbers come with the first run." : "No run has a number.");
     return;
   }
-  document.querySelector(".study .sweep").classList.remove("empty");
+  document.querySelector(".study .sweep").classList.remove("bare");
   const kind = kindNow(possible);
   const asked = (drawSweep.asked = Symbol(kind));
   const [values] = await known(what);
   const kept = kind === "marks" ? await met() : null;
   if (drawSweep.asked !== asked) return; // something else has been chosen meanwhile
   const shown = kind === "marks" ? marked(what, values.length, kept) : gridded();
+  document.getElementById("sweep-title").textContent = what.words.charAt(0).toUpperCase() + what.words.slice(1);
   controls(what, kind, possible, shown);
   const range = state.get("span") === "shown" ? shown.runs.map((run) => value(run, what)) : Array.from(values, (_, run) => value(run, what));
   shown.shade = shades(what, range);
@@ -82,7 +84,7 @@ export async function drawSweep() {
     });
     chart.dataset.ready = "yes";
   }
-  note(what, shown.runs);
+  note(what, shown);
 }
 
 function choose(run) {
@@ -103,15 +105,18 @@ function gridded() {
 function marked(what, count, kept) {
   const { x, y } = markedPlaces();
   const at = (run, place) => (place.number ? raw(run, place) : plain(words(wordsAt(place.name)[raw(run, place)])));
-  const runs = Array.from({ length: count }, (_, run) => run).filter((run) => kept === null || kept.has(run));
-  return { x, y, runs, spotOf: (run) => [at(run, x), y ? at(run, y) : value(run, what)] };
+  const every = Array.from({ length: count }, (_, run) => run).filter((run) => kept === null || kept.has(run));
+  const runs = every.length > MOST_MARKS ? every.filter((_, k) => k % Math.ceil(every.length / MOST_MARKS) === 0) : every;
+  return { x, y, runs, of: every.length, spotOf: (run) => [at(run, x), y ? at(run, y) : value(run, what)] };
 }
 
-function note(what, runs) {
+function note(what, { runs, of = runs.length }) {
   const count = new Map();
   for (const run of runs) if (Number.isNaN(value(run, what))) count.set(statusOf(run), (count.get(statusOf(run)) ?? 0) + 1);
   const listed = [...count].map(([each, times]) => `${times} ${reason(each)}`);
-  document.querySelector('[data-note="sweep"]').textContent = listed.length ? `Of ${runs.length} runs shown, without a value: ${listed.join(", ")}.` : "";
+  const some = of > runs.length ? [`${runs.length} of ${of} runs are drawn: a filter of the table makes them fewer.`] : [];
+  if (listed.length) some.push(`Of ${runs.length} runs shown, without a value: ${listed.join(", ")}.`);
+  document.querySelector('[data-note="sweep"]').textContent = some.join(" ");
 }
 
 function axisLayout(axis, labels) {
@@ -303,3 +308,4 @@ chart.addEventListener("keydown", (event) => {
 const redraw = () => drawSweep().catch((error) => fail(chart, error.message));
 for (const what of ["number", "chosen", "runs"]) on(what, redraw);
 on("filter", () => kindNow(kinds()) === "marks" && redraw());
+redraw();

@@ -84,12 +84,19 @@ class AuditedBody:
         return self.plain.forces(self.stress)
 
     @cached_property
+    def linked(self) -> Array:
+        """Nodal forces (n_nodes, 2) of links on the whole body [N]."""
+        number, state = self._system.part(self.name), self._converged.state
+        force = self._system.links.on_part(number, state.links, self.part.n)
+        return np.asarray(self.part.on_whole(force).reshape(-1, 2))
+
+    @cached_property
     def lacking(self) -> Array:
-        """Nodal forces (n_nodes, 2) that contact and supports must add to the loads [N]."""
+        """Nodal forces (n_nodes, 2) that contact and supports must add to loads and links [N]."""
         whole = self.plain.part
         wheel = self.plain.body.axle is not None  # its load acts on the hub
         external = np.zeros(whole.n) if wheel else whole.external(self._converged.state.time)
-        return self.balancing - external.reshape(-1, 2)
+        return self.balancing - external.reshape(-1, 2) - self.linked
 
     def applied(self) -> Array:
         """Return the resultant of the loads (2,) [N]."""

@@ -32,7 +32,8 @@ _LITTLE = 1e-4
 def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
     """Return the nodal forces (n_nodes, 2) of contact on each whole body, in its own frame [N]."""
     state = converged.state
-    candidates = find_candidates(system, state, state.u, state.contacts)
+    unlinked = np.zeros_like(state.links)
+    candidates = find_candidates(system, state, state.u, state.contacts, unlinked)
     out = {}
     for body in system.model.bodies:
         i = system.part(body.name)
@@ -64,9 +65,10 @@ def _beyond_rounding(body: AuditedBody, force: Array) -> float:
 def left_on(bodies: Sequence[AuditedBody]) -> float:
     """Return the out-of-balance force of the stress of released bodies at free nodes [N].
 
-    Neither loads nor contact act on released bodies: their stress must balance itself.
+    Neither loads nor contact act on released bodies: their stress must balance itself and links.
     """
-    return float(np.linalg.norm([_beyond_rounding(body, body.balancing) for body in bodies]))
+    left = [_beyond_rounding(body, body.balancing - body.linked) for body in bodies]
+    return float(np.linalg.norm(left))
 
 
 def _of_pairs(body: AuditedBody, pairs: Sequence[AuditedPair]) -> tuple[Array, NDArray[np.bool_]]:
@@ -120,7 +122,7 @@ def action_reaction(
 def reactions(
     bodies: Sequence[AuditedBody], pairs: Sequence[AuditedPair], converged: Converged
 ) -> float:
-    """Return the sum of loads, contact forces and reactions of a body, over the force level.
+    """Return the sum of loads, forces of contact and links, and reactions, over the force level.
 
     The resultant of pressures comes from the shape of their boundary, that of forces per volume
     from separate points, that of a wheel from the amplitude of its axle; reactions come from the
@@ -136,7 +138,7 @@ def reactions(
             total = np.array([0.0, total[1] - force])
         else:
             held = np.where(body.held, contact - body.lacking, 0.0)
-            total = total + body.applied() - held.sum(axis=0)
+            total = total + body.applied() + body.linked.sum(axis=0) - held.sum(axis=0)
             if body.plain.body.kinematics == "axisymmetric":
                 total[0] = 0.0  # radial forces balance around the axis
         worst = max(worst, float(np.abs(total).max()), float(np.abs(body.misapplied()).max()))

@@ -8,6 +8,7 @@ import numpy as np
 
 from solver.model.rigid import Moved, RigidBody
 from solver.results.audit.compared import AREA, LEAST_STRAIN, LIMIT, MEASURED, Compared, some
+from solver.results.audit.links import linked
 from solver.results.audit.plain import load_factor
 from solver.results.audit.sources import between
 from solver.results.audit.values import Located, flowed
@@ -168,6 +169,7 @@ class NamedPlacesCheck:
                     recorded = self._field(f"contact_{name}_force")[k, near[-1]]
                     self._out.add(f"contact_{name}_force", recorded, own, state.force_scale)
             for j, name in enumerate(self._source.system.all_names):
+                contact[name] += linked(self._source.system, state, name)
                 body = self._source.system.model.body(name)
                 self._part(body, j, int(near[-1]), contact[name], state, measured=finite)
 
@@ -207,6 +209,7 @@ class NamedPlacesCheck:
             )
             values, X, s = _on_slave(found, kind), found.X, found.s
             share = self._share(found, kind)
+            values = values * found.depth if number.is_force else values
             if kind in ("pressure", "shear") and np.isnan(values[found.closed]).any():
                 return
             if (kind, number.take) == ("pressure", "extent"):
@@ -220,7 +223,7 @@ class NamedPlacesCheck:
             if number.minus:
                 values = values - self._values(number, number.minus, kind, part)[0]
             s = _lengths(X)
-        scale = self._scale(kind, values)
+        scale = self._scale(kind, values)  # of a force, force per length
         if not np.isfinite(values).any():
             return
         if number.take in ("maximum", "minimum"):

@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from skfem import CellBasis
 
+from solver.fem.cells import smooth_cells
 from solver.fem.surface import edges_of
 from solver.materials.heated import Heated
 from solver.mesh.edges import shape_functions
@@ -42,8 +42,6 @@ _INSIDE = (0.5, 1e-6, 1 - 1e-6)
 """Gauss points of a chord; its middle, and its ends, where neighbours may have other loads."""
 GHOST = 1e-7
 """Share of stiffness that elements keep when they are removed."""
-_VOLUME_DEGREE = 10
-"""Polynomial degree up to which forces per volume are integrated exactly."""
 
 
 def load_factor(amplitude: Amplitude | None, time: float) -> float:
@@ -287,17 +285,25 @@ class PlainBody:
         return total
 
     def _on_volume(self, load: Load) -> Array:
-        """Return the moments (3, 2) of a load's force per volume, integrated over elements."""
+        """Return the moments (3, 2) of a load's force per volume, integrated over elements.
+
+        Only the cells are those of the solver.
+        """
         if load.body_force(self.points) is None:
             return np.zeros((3, 2))
-        basis = CellBasis(self.body.mesh, self.part.basis.elem, intorder=_VOLUME_DEGREE)
-        x = np.asarray(basis.global_coordinates())
-        given = np.asarray(load.body_force(x.reshape(2, -1)))
-        force = np.broadcast_to(given, (2, x[0].size)).reshape(x.shape)
-        force = force * basis.dx * self._depth(x)
-        nodal = np.array([(force * np.asarray(b[0])).sum(axis=2) for b in basis.basis])
-        at = self.part.X[:, basis.element_dofs]
-        return self.moments(nodal.swapaxes(0, 1).reshape(2, -1), at.reshape(2, -1))
+
+        def force(x: Array) -> Array:
+            given = np.asarray(load.body_force(x.reshape(2, -1)))
+            return np.broadcast_to(given, (2, x[0].size)).reshape(x.shape) * self._depth(x)
+
+        basis, rule = self.part.basis, np.polynomial.legendre.leggauss(6)
+        cells = smooth_cells(basis, force)
+        local, x, area = cells.points(rule, rule)
+        given, total = force(x) * area, np.zeros((3, 2))
+        for k, own in enumerate(basis.element_dofs):
+            nodal = (given * np.asarray(basis.elem.lbasis(local, k)[0])).sum(axis=2)
+            total += self.moments(nodal, self.part.X[:, own[cells.element]])
+        return total
 
     def elastic_energy(self, stress: Array, time: float) -> float:
         """Return the energy of a Mandel stress (4, n_points) at a time [N mm]."""

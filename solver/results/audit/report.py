@@ -14,6 +14,7 @@ from solver.results.audit.bodies import AuditedBody
 from solver.results.audit.contact_error import contact_error
 from solver.results.audit.figures import LIMITS
 from solver.results.audit.forces import action_reaction, imbalance, left_on, reactions
+from solver.results.audit.links import links_error
 from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.plain import PlainBody
 from solver.results.audit.theory import strain_of
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
     from solver.fem.discretisation import Discretisation
 
 _SURFACE_SHEAR = 1.1
-_TURNING = 0.02  # energy error under finite sliding: contact normals rotate within an increment
-TRAVELLING = 5e-3  # of the force: elements integrate a Hertz pressure with its steep ends
+_REACTIONS, _TRAVELLING = 1e-5, 5e-3  # elements integrate a Hertz pressure with its steep ends
+_ENERGY, _TURNING = 1e-5, 0.02  # with finite sliding contact normals rotate within an increment
 _FORCE = 1e-6  # of the force level
 
 
@@ -92,7 +93,8 @@ def audit(
         "audit_yield": beyond,
         "audit_increment_error": _largest(*(body.increment_error() for body in bodies)),
         **{name: _largest(0.0, *(pair.figures[name] for pair in pairs)) for name in names},
-        "audit_energy": _energy_error(bodies, loaded),
+        "audit_links": _largest(*(links_error(system, converged) for converged in states)),
+        "audit_energy": _energy_error(bodies, loaded, system.links.energy(loaded.state.links)),
         "audit_touch_time": loaded.timing.unknown,
         "audit_slip_resolution": loaded.timing.passage,
         "audit_dissipation": least_dissipation,
@@ -126,11 +128,14 @@ def _laws(bodies: Sequence[AuditedBody], released: Sequence[AuditedBody]) -> tup
     return broken, beyond
 
 
-def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged) -> float:
-    """Return the error of the energy balance, over the largest term of the balance so far."""
+def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged, springs: float) -> float:
+    """Return the error of the energy balance, over the largest term of the balance so far.
+
+    ``springs`` is the energy of the springs of links [N mm].
+    """
     work = loaded.energy
     terms = np.array([
-        sum(body.stored() for body in bodies), -work.stored, work.plastic, work.friction,
+        sum(body.stored() for body in bodies) + springs, -work.stored, work.plastic, work.friction,
         work.contact, -work.external,
     ])  # fmt: skip
     level = max(float(np.abs(terms).max()), work.scale)
@@ -192,11 +197,11 @@ def _violations(
     loaded: Converged,
     pairs: Sequence[AuditedPair],
 ) -> tuple[str, ...]:
-    limits = limits_at(loaded.state.force_scale or 1.0)
-    if any(contact.finite for contact in loaded.state.contacts):
-        limits["audit_energy"] = _TURNING
-    if any(body.travelling for body in system.model.bodies):
-        limits["audit_reactions"] = TRAVELLING
+    limits = limits_at(
+        loaded.state.force_scale or 1.0,
+        travelling=any(body.travelling for body in system.model.bodies),
+        turning=any(contact.finite for contact in loaded.state.contacts),
+    )
     yield_stress = max(
         (p.body.material.yield_stress for p in system.parts if not p.body.material.elastic),
         default=1.0,
@@ -205,9 +210,18 @@ def _violations(
     return broken(figures, limits, yield_stress) + found
 
 
-def limits_at(scale: float) -> dict[str, float]:
-    """Return the limits of the figures that every kind of run has, for a force level [N]."""
+def limits_at(scale: float, *, travelling: bool = False, turning: bool = False) -> dict[str, float]:
+    """Return the limits of the figures that every kind of run has.
+
+    Parameters
+    ----------
+    scale : force level [N]
+    travelling : whether a pressure travels along a body
+    turning : whether contact normals turn within an increment
+    """
     return LIMITS | {
+        "audit_reactions": _TRAVELLING if travelling else _REACTIONS,
+        "audit_energy": _TURNING if turning else _ENERGY,
         "audit_tension": _FORCE * scale,
         "audit_friction_excess": _FORCE * scale,
         "audit_contact_after_unloading": _FORCE * scale,

@@ -90,6 +90,11 @@ class Tractions:
         whole = (share > 1 - _WHOLE) | (share < _WHOLE)
         return whole & np.append(whole[1:], True) & np.append(True, whole[:-1])
 
+    @property
+    def depth(self) -> Array:
+        """Depth across the plane at the vertices [mm]."""
+        return self._depth(self.X)
+
     def _depth(self, x: Array) -> Array:
         """Return the depth at positions x (2, ...) [mm]: thickness, or 2 pi r."""
         if self._model.bodies[0].kinematics == "axisymmetric":

@@ -74,7 +74,7 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
     "no function of position": (
         put("loads", 0, "value", "1 - q*x"),
         "loads[0].value",
-        "must be a number or an expression of x and y; this one q is unknown",
+        "must be a number, a table or an expression of x and y; this one q is unknown",
     ),
     "a field that has no value": (
         put("loads", 0, "value", "sqrt(x - 1e9)"),
@@ -101,7 +101,7 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
     "unknown entry of a motion": (
         rigid(y={"pushd": -1.0}),
         "rigid.plate.y.pushd",
-        "there are moved, pushed, amplitude; did you mean pushed?",
+        "there are moved, pushed, amplitude, locked; did you mean pushed?",
     ),
     "missing entry": (without("loads", 0, "boundary"), "loads[0].boundary", "must be given"),
     "unknown kind": (
@@ -202,6 +202,14 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         put("loads", 0, "amplitude", {"later": 1.0}),
         "loads[0].amplitude",
         "one of pressed",
+    ),
+    "a release repeated alone": (
+        lambda content: content.update(
+            stages=[*content["stages"], {"name": "free", "release": True}],
+            repeat={"stages": ["free"], "times": 2},
+        ),
+        "repeat.stages",
+        "must hold a stage that loads the bodies",
     ),
     "unknown region that is removed": (
         put("stages", 0, "remove", ["upper.skin"]),
@@ -350,6 +358,33 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
     ),
     "allowed what is nothing": (put("allow", ["everything"]), "allow[0]", "large_strain"),
     "rigid without surface": (rigid(surfaces={}), "rigid.plate.surfaces", "1 or more"),
+    "link to no body": (put("links", [{"slave": "uper.top"}]), "links[0].slave", "mean upper?"),
+    "link to no boundary": (put("links", [{"slave": "upper.tp"}]), "links[0].slave", "mean top?"),
+    "link that contact bears": (
+        put("links", [{"slave": "upper.bottom"}]),
+        "links[0].slave",
+        "link or contact, not both",
+    ),
+    "tie of a boundary with itself": (
+        put("links", [{"slave": "upper.top", "master": "upper.top"}]),
+        "links[0].master",
+        "must be another surface",
+    ),
+    "spring without stiffness": (
+        put("links", [{"slave": "upper.top", "stiffness": 0.0}]),
+        "links[0].stiffness",
+        "greater than 0",
+    ),
+    "lock at no stage": (
+        rigid(y={"pushed": -1.0, "locked": "presed"}),
+        "rigid.plate.y.locked",
+        "did you mean pressed?",
+    ),
+    "lock of a prescribed motion": (
+        rigid(y={"moved": -1.0, "locked": "pressed"}),
+        "rigid.plate.y.locked",
+        "needs pushed",
+    ),
     "rigid of one name": (
         lambda t: rigid()(t) or t["rigid"].update(upper=t["rigid"].pop("plate")),
         "rigid",

@@ -196,6 +196,50 @@ def test_the_mesh_counts_in_the_id(tmp_path: Path) -> None:
     assert Description.read(tmp_path / "pin.toml").digest != pin.id
 
 
+def test_a_table_of_values_counts_in_the_id_and_is_kept_with_its_scene(tmp_path: Path) -> None:
+    for name in ("peened.toml", "peened.csv"):
+        (tmp_path / name).write_bytes((ROOT / "data/scenes" / name).read_bytes())
+    scene = read_scene(tmp_path / "peened.toml")
+    store = Store(tmp_path / "out")
+    store.keep_scene(scene.id, scene.description)
+    kept = store.scene(scene.id)
+    assert kept is not None
+    loads = [kept.model(kept.parameters(intensity=i)).bodies[0].loads for i in (1.0, 2.0)]
+    depth = np.array([[2.0], [1.0]])
+    once, twice = (load[0].initial_stress(depth)[0, 0] for load in loads)
+    assert once == pytest.approx(-262.5)
+    assert twice == pytest.approx(2 * once)
+    with (tmp_path / "peened.csv").open("a") as file:
+        file.write("1.5,0\n")
+    assert Description.read(tmp_path / "peened.toml").digest != scene.id
+
+
+@pytest.mark.parametrize(
+    ("given", "field", "told"),
+    [
+        ({"file": "none.csv"}, "loads[0].value.file", "there is no such file beside the scene"),
+        ({"file": "p.csv", "column": "q"}, "loads[0].value.file", "must have the columns"),
+        ({"file": "short.csv"}, "pressure.top", "must be inside the table: x from 0 to 2 mm"),
+        ({"file": "../p.csv"}, "loads[0].value.file", "must"),
+        ({"file": "p.csv", "colum": "q"}, "loads[0].value.colum", "did you mean column?"),
+    ],
+)
+def test_a_wrong_table_of_values_is_told_once(
+    tmp_path: Path, given: dict[str, str], field: str, told: str
+) -> None:
+    (tmp_path / "p.csv").write_text("x,value\n-10,1\n10,2\n")
+    (tmp_path / "short.csv").write_text("x,value\n0,1\n2,2\n")
+    entry = ", ".join(f'{key} = "{each}"' for key, each in given.items())
+    text = BLOCKS.replace("value = 150.0", f"value = {{ {entry} }}")
+    assert text != BLOCKS
+    (tmp_path / "blocks.toml").write_text(text)
+    with pytest.raises(SceneError) as caught:
+        read_scene(tmp_path / "blocks.toml")
+    ((mistake),) = caught.value.mistakes
+    assert mistake.field == field
+    assert told in mistake.allowed
+
+
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Study, Store, xr.Dataset]]:
     """Sweep the blocks from a study file."""

@@ -1,0 +1,204 @@
+"""Pages on a folder of results or on one data set: nothing is computed, nothing is written there.
+
+Catalogue, queue and the files of single runs, which the pages need, are in a folder for temporary
+files.
+"""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import signal
+import socket
+import sys
+import threading
+import time
+import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import uvicorn
+from fastapi import FastAPI
+
+from service.app import assembled
+from service.connections import limited
+from service.errors import Conflict, NotFound
+from service.job import Job, StudyState, verdict
+from service.jobs import Jobs, put
+from service.recovery import add
+from service.settings import Settings
+from studies import Store, StudyError
+from studies.scratch import scratch
+from studies.storage.seal import state_of
+
+log = logging.getLogger(__name__)
+
+HOST = "127.0.0.1"
+LOOK = 5.0
+"""Time between two looks for new results [s]."""
+
+FRESH = 600.0
+"""Age of its newest run up to which a study that has not ended is taken as running [s]."""
+
+ELSEWHERE = "it has not ended, and no run was added lately"
+"""What is told of a study that was begun."""
+
+
+class ViewedFolder:
+    """A folder of results, as a store and a queue in which nothing waits.
+
+    Parameters
+    ----------
+    directory : the folder
+    aside : folder for catalogue and queue
+    """
+
+    def __init__(self, directory: Path, aside: Path) -> None:
+        self.store = Store(directory, held=True, aside=aside)
+        with suppress(FileNotFoundError):  # a torn copy is found damaged, and made again
+            shutil.copyfile(directory / "catalogue.sqlite", self.store.catalogue.path)
+        self.jobs = Jobs(aside / "jobs.sqlite")
+        self._seen: dict[str, object] = {}
+
+    def look(self) -> None:
+        """Bring catalogue and queue to what is in the folder now."""
+        self.store.reconcile()
+        for study_id in self.store.study_ids():
+            state = state_of(self.store.dataset_path(study_id))
+            if self._seen.get(study_id, 0) != state:
+                self._take(study_id)
+                self._seen[study_id] = state
+            if state is None:
+                self._follow(study_id)
+
+    def _take(self, study_id: str) -> None:
+        """Take a study, or its end, into the queue."""
+        try:
+            job = self.jobs.get(study_id)
+        except NotFound:
+            add(study_id, self.jobs, self.store, begun=False)
+            add(study_id, self.jobs, self.store)
+            return
+        end, message = verdict(self.store.outcomes(study_id), job.stage)
+        self._put(job, state=end, message=message, progress=100.0)
+
+    def _follow(self, study_id: str) -> None:
+        """Write how far a study is that has no data set yet."""
+        with suppress(Conflict, NotFound):
+            job, runs = self.jobs.get(study_id), self.jobs.runs(study_id)
+            times = self.store.modified(runs).values()
+            fresh = max(times, default=0) / 1e9 > time.time() - FRESH
+            state = StudyState.RUNNING if fresh else StudyState.DISMISSED
+            progress = 100.0 * len(times) / max(job.size, 1)
+            self._put(job, state=state, message="" if fresh else ELSEWHERE, progress=progress)
+
+    def _put(self, job: Job, **changes: object) -> None:
+        if any(getattr(job, name) != value for name, value in changes.items()):
+            with self.jobs.transaction() as connection:
+                put(connection, job, **changes)
+
+
+@contextmanager
+def application(path: Path) -> Iterator[tuple[FastAPI, str]]:
+    """Give the pages on a folder or a data set, and the path of the first one.
+
+    Parameters
+    ----------
+    path : an output directory, or what `studies.open_study` opens: a study in it, a data set
+
+    Raises
+    ------
+    StudyError
+        if there is neither
+    """
+    with scratch() as folder:
+        settings = Settings(data=folder, host=HOST, root_path="", require_keys=False)
+        if (path / "studies").is_dir():
+            shown = ViewedFolder(path, folder)
+            shown.look()
+            _tell_others(path, shown)
+            ended = threading.Event()
+            watch = threading.Thread(target=_watch, args=(shown, ended))
+            watch.start()
+            try:
+                yield assembled(settings, shown.store, shown.jobs, None), "/ui"
+            finally:
+                ended.set()
+                watch.join()
+            return
+        from studies.views.reading import find_study
+        from studies.views.unpacked import Unpacked
+
+        store = Unpacked(find_study(path), folder)
+        jobs = Jobs(folder / "jobs.sqlite")
+        jobs.accept(store.study_id, store.content, store.run_ids)
+        counts = store.catalogue.counts(store.run_ids)
+        jobs.finish(store.study_id, *verdict(counts), standing=StudyState.ACCEPTED)
+        yield assembled(settings, store, jobs, None), f"/ui/studies/{store.study_id}"
+
+
+def _watch(shown: ViewedFolder, ended: threading.Event) -> None:
+    while not ended.wait(LOOK):
+        try:
+            shown.look()
+        except Exception:
+            log.exception("the folder cannot be read now")
+
+
+def _tell_others(path: Path, shown: ViewedFolder) -> None:
+    """Tell which studies are not shown: those of another version of the solver."""
+    known = {job.id for job in shown.jobs.page(limit=-1, offset=0)[0]}
+    for study_id in shown.store.study_ids():
+        if study_id not in known:
+            dataset = path / "studies" / study_id / "dataset.nc"
+            told = f"residua view {dataset}" if dataset.is_file() else "it has no data set"
+            reason = "is of another version of the solver"
+            print(f"studies/{study_id} {reason}: {told}", file=sys.stderr)
+
+
+def view(path: Path, port: int = 0, browser: bool = True) -> None:
+    """Show pages on a folder or a data set until Ctrl-C, to this machine alone.
+
+    Parameters
+    ----------
+    path : as for `application`
+    port : where to listen; 0 for any free port
+    browser : whether to open them in the browser
+
+    Raises
+    ------
+    StudyError
+        if there is nothing to show, or the port is in use
+    """
+    try:
+        listening = socket.create_server((HOST, port))
+    except OSError as error:
+        allowed = f"must be free, or left out for any free one ({error.strerror})"
+        raise StudyError("--port", port, allowed) from None
+    with listening, application(path) as (app, first):
+        url = f"http://{HOST}:{listening.getsockname()[1]}{first}"
+        print(f"{url}  (Ctrl-C ends it)", flush=True)
+        if browser:
+            threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
+        _Server(
+            uvicorn.Config(
+                app, http=limited(app.state.settings), ws="none", log_level="warning",
+                access_log=False, timeout_graceful_shutdown=1, server_header=False,
+            )
+        ).run(sockets=[listening])  # fmt: skip
+
+
+class _Server(uvicorn.Server):
+    """A server for which Ctrl-C is the usual end: it does not send itself the signal again."""
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """End at a signal."""
+        ends = signal.SIGINT, signal.SIGTERM
+        before = {each: signal.signal(each, self.handle_exit) for each in ends}
+        try:
+            yield
+        finally:
+            for each, handler in before.items():
+                signal.signal(each, handler)

@@ -1,0 +1,292 @@
+"""Links of a model as linear conditions between the unknowns of its parts.
+
+Each condition is ``C u + compliance F = 0`` with a force F of any sign, which acts on the parts by
+``C' F``. In a Newton step they are eliminated exactly, together with the rigid motions that they
+hold; what is left is a contact problem like any other, symmetric.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from solver.contact.geometry import pair
+from solver.contact.overlap import largest_overlap
+from solver.contact.problem import ContactProblem, ContactSolution
+from solver.contact.rows import ContactRows, joined
+from solver.errors import ModelError
+from solver.fem.rigid import RigidPart
+from solver.linear.solvers import Singular
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from solver.fem.discretisation import Discretisation
+    from solver.fem.part import Part
+    from solver.fem.surface import Surface
+    from solver.model.link import Link, Side
+    from solver.model.model import Model
+
+    Array = NDArray[np.float64]
+
+_DEPENDENT = 1e-9
+"""Ratio of what is left of a condition without the others to the condition; below it the condition
+follows from them. Also the least singular value of the rigid motions that links hold."""
+_LITTLE = 1e-9
+"""Ratio of the area of a node to the largest; below it no spring acts there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Links:
+    """The conditions of all links.
+
+    Attributes
+    ----------
+    rows : for each part, the derivatives C (c, ...) on its unknowns; None if no link acts on it
+    compliance : (c,) of springs [mm/N], 0 where a link is rigid
+    whose : (c,) number of the link of each condition
+    """
+
+    rows: tuple[ContactRows | None, ...]
+    compliance: Array
+    whose: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        """Return the number of conditions."""
+        return len(self.compliance)
+
+    @property
+    def springy(self) -> bool:
+        """Whether springs resist any motion."""
+        return bool(self.compliance.any())
+
+    def off(self, u: Sequence[Array], forces: Array) -> Array:
+        """Return how far the conditions (c,) are not met by unknowns and forces [mm]."""
+        out = self.compliance * forces
+        for own, rows in zip(u, self.rows, strict=True):
+            if rows is not None:
+                out = out + rows.block @ own[rows.dofs]
+        return np.asarray(out)
+
+    def energy(self, forces: Array) -> float:
+        """Return the energy of the springs [N mm]."""
+        return float(self.compliance @ forces**2) / 2
+
+    def clamped(self, parts: Sequence[Part], time: float) -> tuple[float, float]:
+        """Return the force [N] and energy [N mm] of prescribed motions on linked nodes alone."""
+        moved, force, energy = np.zeros(len(self)), 0.0, 0.0
+        each = [(p, rows) for p, rows in zip(parts, self.rows, strict=True) if rows is not None]
+        for part, rows in each:
+            if part.driven.cases:
+                moved += rows.block @ part.driven.at(time)[rows.dofs]
+        for part, rows in each if moved.any() else ():
+            nodal, stiffness = np.abs(rows.block).T @ np.abs(moved), part.diagonal[rows.dofs]
+            force = float(np.hypot(force, np.linalg.norm(stiffness * nodal)))
+            energy += float(stiffness @ nodal**2) / 2
+        return force, energy
+
+    def on_part(self, part: int, forces: Array, size: int) -> Array:
+        """Return the forces (size,) that forces of the conditions (c,) exert on a part [N]."""
+        nodal, rows = np.zeros(size), self.rows[part]
+        if rows is not None:
+            nodal[rows.dofs] = forces @ rows.block
+        return nodal
+
+
+def eliminated(
+    problem: ContactProblem, links: int, touched: NDArray[np.bool_]
+) -> tuple[ContactProblem, Callable[[ContactSolution], ContactSolution]]:
+    """Return the contact problem without its last conditions, and the way back to all unknowns.
+
+    Parameters
+    ----------
+    links : number of conditions, the last of ``offset``, ``W`` and ``A``; their force has any sign
+    touched : (k,) whether contact may hold the rigid motion: those that no link and no contact
+        holds stay zero
+
+    Raises
+    ------
+    Singular
+        if a tangent has lost its stiffness against the links
+    """
+    m = len(problem.offset) - links
+    W, offset, A = problem.W, problem.offset, problem.A
+    size = np.abs(A[m:]).max(initial=0.0) or 1.0
+    _, sizes, ways = linalg.svd(A[m:] / size)
+    rank = int((sizes > _DEPENDENT).sum())
+    held, loose = ways[:rank].T, ways[rank:].T
+    _, moved, ways = linalg.svd(loose[touched])
+    loose = loose @ ways[: int((moved > _DEPENDENT).sum())].T
+    # of forces and motions, which differ in magnitude by the compliance
+    held = held * (np.abs(np.diag(W)[m:]).max() / size)
+    S = np.zeros((links + rank,) * 2)
+    S[:links, :links] = W[m:, m:]
+    S[:links, links:] = A[m:] @ held
+    S[links:, :links] = S[:links, links:].T
+    by_force = np.vstack([W[m:, :m], (A[:m] @ held).T])
+    alone = np.concatenate([offset[m:], held.T @ problem.balance])
+    try:
+        inverse = np.linalg.solve(S, np.column_stack([by_force, alone]))
+    except np.linalg.LinAlgError as error:  # what is linked flows without stiffness
+        raise Singular("links cannot hold bodies without stiffness") from error
+    change = by_force.T @ inverse
+    rest = replace(
+        problem,
+        W=W[:m, :m] - (change[:, :m] + change[:, :m].T) / 2,
+        offset=offset[:m] - change[:, m],
+        A=A[:m] @ loose,
+        balance=loose.T @ problem.balance,
+    )
+
+    def whole(found: ContactSolution) -> ContactSolution:
+        own = -(inverse[:, :m] @ found.forces + inverse[:, m])
+        return replace(
+            found,
+            forces=np.concatenate([found.forces, own[:links]]),
+            rigid=held @ own[links:] + loose @ found.rigid,
+        )
+
+    return rest, whole
+
+
+def surfaces_of_links(
+    model: Model, wholes: Mapping[str, Discretisation | RigidPart]
+) -> dict[Side, Surface]:
+    """Return the surfaces of all links in the numbering of the whole bodies."""
+    tied = {side for link in model.links if link.master for side in link.sides}
+    every = {side for link in model.links for side in link.sides}
+    return {side: wholes[side[0]].chain(side[1], side not in tied) for side in sorted(every)}
+
+
+def links_of(
+    model: Model, parts: Sequence[Part], names: Sequence[str], surfaces: Mapping[Side, Surface]
+) -> Links:
+    """Return the conditions of all links of a model.
+
+    Raises
+    ------
+    ModelError
+        where motions contradict supports or other links
+    """
+    pieces: list[list[ContactRows]] = [[] for _ in parts]
+    compliance, places, whose = [np.zeros(0)], [np.zeros((2, 0))], [np.zeros(0, dtype=int)]
+    each = [_conditions(f"links[{k}]", link, parts, names, surfaces)
+            for k, link in enumerate(model.links)]  # fmt: skip
+    ends = np.cumsum([0, *(len(own.compliance) for own in each)])
+    for k, own in enumerate(each):
+        for number, rows in own.rows:
+            block = np.zeros((ends[-1], rows.block.shape[1]))
+            block[ends[k] : ends[k + 1]] = rows.block
+            pieces[number].append(ContactRows(rows.dofs, block))
+        compliance.append(own.compliance)
+        places.append(own.X)
+        whose.append(np.full(len(own.compliance), k))
+    made = Links(
+        tuple(joined(own) for own in pieces), np.concatenate(compliance), np.concatenate(whose)
+    )
+    kept = _independent(made, parts, np.hstack(places))
+    cut = tuple(r and ContactRows(r.dofs, r.block[kept]) for r in made.rows)
+    return Links(cut, made.compliance[kept], made.whose[kept])
+
+
+@dataclass(frozen=True, slots=True)
+class _LinkRows:
+    """The conditions of one link: rows by number of the part, compliance (c,), places X (2, c)."""
+
+    rows: list[tuple[int, ContactRows]]
+    compliance: Array
+    X: Array
+
+
+def _conditions(
+    name: str, link: Link, parts: Sequence[Part], names: Sequence[str],
+    surfaces: Mapping[Side, Surface],
+) -> _LinkRows:  # fmt: skip
+    number, slave = names.index(link.slave[0]), surfaces[link.slave]
+    rows: list[tuple[int, ContactRows]] = []
+    if link.master is None:
+        areas = np.tile(slave.areas, len(link.axes))
+        nodes = np.tile(np.arange(len(slave.nodes)), len(link.axes))
+        axes = np.repeat(link.axes, len(slave.nodes))
+        block = np.eye(2 * len(slave.nodes))[2 * nodes + axes]
+        X = slave.X[:, nodes]
+    else:
+        bodies = [parts[names.index(of)].body for of, _ in link.sides]
+        at_rest = [np.zeros_like(surfaces[side].X) for side in link.sides]
+        master = surfaces[link.master]
+        pairing = pair(slave, at_rest[0], master, at_rest[1], largest_overlap(*bodies), tied=True)
+        at = np.flatnonzero(pairing.area > 0)
+        if not len(at):
+            allowed = "these surfaces do not face each other: check boundaries and positions"
+            raise ModelError(name, link.sides, allowed)
+        areas = np.tile(pairing.area[at], len(link.axes))
+        ways = [(pairing.normal, pairing.tangent)[axis] for axis in link.axes]
+        block, others = (np.vstack([way[side][at] for way in ways]) for side in (0, 1))
+        X = np.tile(slave.X[:, slave.vertices[at]], len(link.axes))
+        other = names.index(link.master[0])
+        rows.append((other, ContactRows(parts[other].surface(master).dofs, others)))
+    if link.rigid is not None:
+        reference = names.index(link.rigid)
+        part = parts[reference]
+        assert isinstance(part, RigidPart)
+        motion = block @ part.linear(slave.X)
+        if link.distributed:
+            used = motion.any(axis=0)
+            weighted = motion[:, used].T * areas
+            block = np.linalg.solve(weighted @ motion[:, used], weighted) @ block
+            motion, X = np.eye(3)[used], np.tile(X.mean(axis=1, keepdims=True), int(used.sum()))
+            areas = np.full(len(block), np.inf)
+        rows.append((reference, ContactRows(np.arange(3), -motion)))
+    elif link.master is None and not link.grounded:  # the slave moves as one
+        first = np.repeat(np.arange(len(link.axes)) * len(slave.nodes), len(slave.nodes))
+        block = block - block[first]
+        others_ = np.arange(len(block)) != first
+        block, areas, X = block[others_], areas[others_], X[:, others_]
+    rows.append((number, ContactRows(parts[number].surface(slave).dofs, block)))
+    if np.isinf(link.stiffness):
+        return _LinkRows(rows, np.zeros(len(areas)), X)
+    acts = areas > _LITTLE * areas.max()
+    rows = [(k, ContactRows(own.dofs, own.block[acts])) for k, own in rows]
+    return _LinkRows(rows, 1 / (link.stiffness * areas[acts]), X[:, acts])
+
+
+def _independent(made: Links, parts: Sequence[Part], X: Array) -> NDArray[np.int64]:
+    """Return the conditions that do not follow from supports and the others.
+
+    Raises `ModelError` for one that follows from them but for prescribed motions, which contradict.
+    """
+    each = [(p, rows) for p, rows in zip(parts, made.rows, strict=True) if rows is not None]
+    cases = sum(len(part.driven.cases) for part, _ in each)
+    free, driven = [np.zeros((len(made), 0))], np.zeros((len(made), cases))
+    for part, rows in each:
+        free.append(rows.block[:, np.isin(rows.dofs, part.free)])
+        own = rows.block @ part.driven.fields[rows.dofs]
+        cases -= own.shape[1]
+        driven[:, cases : cases + own.shape[1]] = own
+    rigid = np.flatnonzero(made.compliance == 0)
+    if not len(rigid):
+        return np.arange(len(made))
+    G, moves = np.hstack(free)[rigid], driven[rigid]
+    size = np.linalg.norm(G, axis=1)
+    G = np.divide(G, size[:, None], out=np.zeros_like(G), where=size[:, None] > 0)
+    R, order = linalg.qr(G.T, mode="r", pivoting=True)
+    rank = int((np.abs(np.diag(R)) > _DEPENDENT).sum())
+    kept, others = order[:rank], order[rank:]
+    follow = np.linalg.lstsq(G[kept].T, G[others].T)[0].T
+    scale = np.where(size > 0, size, 1.0)[:, None]
+    off = np.abs(moves[others] / scale[others] - follow @ (moves[kept] / scale[kept]))
+    wrong = others[(off > _DEPENDENT * np.abs(moves).max(initial=0.0)).any(axis=1)]
+    if len(wrong):
+        x, y = X[:, rigid[wrong[0]]]
+        raise ModelError(
+            f"links[{made.whose[rigid[wrong[0]]]}]", f"({x:g}, {y:g})",
+            "must not move what supports, motions or other links move in another way: shorten one "
+            "of the boundaries by an element, or leave a component out",
+        )  # fmt: skip
+    return np.setdiff1d(np.arange(len(made)), rigid[others])

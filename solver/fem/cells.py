@@ -1,0 +1,107 @@
+"""Cells of elements on which a field is smooth, although it may bend and jump within an element.
+
+An element is the image of the unit square; that of a triangle has one side drawn together to a
+point. Cells begin as whole squares. Where the integral of the field differs between Gauss's and
+Lobatto's rule, the cell is halved along the direction in which it differs more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+    from skfem import CellBasis
+
+    Array = NDArray[np.float64]
+    Rule = tuple[Array, Array]
+
+_ACCURATE, _HALVINGS, _MOST = 1e-7, 40, 200_000
+"""Error of the integral over a cell, over the largest integral over an element, above which the
+cell is halved; how often at most, and up to which number of cells."""
+_END = 1 - 1e-9
+_LOBATTO = (
+    np.array([-_END, -((3 / 7) ** 0.5), 0.0, (3 / 7) ** 0.5, _END]),
+    np.array([1 / 10, 49 / 90, 32 / 45, 49 / 90, 1 / 10]),
+)
+"""Lobatto's rule, as exact as four Gauss points; its ends show jumps beyond these."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """Rectangles that fill the unit squares of elements.
+
+    Attributes
+    ----------
+    basis : of the elements
+    element : (n,) the elements of the cells
+    corner, size : (2, n) lowest corners and sides of the cells
+    """
+
+    basis: CellBasis
+    element: NDArray[np.int64]
+    corner: Array
+    size: Array
+
+    def share(self, *rules: Rule) -> Array:
+        """Return the shares (n, k) of points in the unit squares."""
+        (_, wa), (_, wb) = rules
+        return np.asarray(self.size.prod(axis=0)[:, None] * np.outer(wa, wb).ravel() / 4)
+
+    def points(self, *rules: Rule) -> tuple[Array, Array, Array]:
+        """Return local and global positions (2, n, k) of points, and their areas (n, k) [mm2].
+
+        Parameters
+        ----------
+        rules : places and weights on [-1, 1], along both sides of the cells
+        """
+        (a, _), (b, _) = rules
+        own = np.stack(np.broadcast_arrays(a[:, None], b)).reshape(2, 1, -1)
+        local = self.corner[..., None] + self.size[..., None] * (1 + own) / 2
+        area = self.share(*rules)
+        if self.basis.mesh.t.shape[0] == 3:
+            left = 1 - local[0]
+            local, area = np.stack([local[0], left * local[1]]), left * area
+        mapping = self.basis.mapping
+        area = area * np.abs(mapping.detDF(local, tind=self.element))
+        return local, np.asarray(mapping.F(local, tind=self.element)), area
+
+    def __getitem__(self, some: NDArray[np.bool_]) -> Cells:
+        return Cells(self.basis, self.element[some], self.corner[:, some], self.size[:, some])
+
+    def halves(self, axis: NDArray[np.int64]) -> Cells:
+        """Return both halves of all cells, divided along an axis each (n,)."""
+        across = axis == [[0], [1]]
+        size = np.where(across, 0.5, 1.0) * self.size
+        corners = np.hstack([self.corner, self.corner + across * size])
+        return Cells(self.basis, np.tile(self.element, 2), corners, np.tile(size, 2))
+
+
+def smooth_cells(basis: CellBasis, field: Callable[[Array], Array]) -> Cells:
+    """Return cells on each of which ``field``, (2, n, k) -> (2, n, k), is smooth."""
+    gauss, n = np.polynomial.legendre.leggauss(4), basis.mesh.nelements
+    some, done = Cells(basis, np.arange(n), np.zeros((2, n)), np.ones((2, n))), []
+    _, x, area = some.points(gauss, gauss)
+    whole, areas = float((np.abs(field(x)) * area).sum(axis=-1).max(initial=0.0)), area.sum(axis=1)
+    for left in reversed(range(_HALVINGS + 1)):
+        gauss_value, *others = (
+            (field(some.points(*rules)[1]) * some.share(*rules)).sum(axis=-1)
+            for rules in ((gauss, gauss), (_LOBATTO, gauss), (gauss, _LOBATTO), (_LOBATTO,) * 2)
+        )
+        off = np.abs(np.array(others) - gauss_value).max(axis=1) * areas[some.element]
+        halved = (off.max(axis=0) > _ACCURATE * whole) & (left > 0 and n < _MOST)
+        done.append(some[~halved])
+        if not halved.any():
+            break
+        some = some[halved].halves(np.where(off[0] > off[1], 0, 1)[halved])
+        n = len(some.element)
+    element, corner, size = (
+        np.concatenate([getattr(cells, name) for cells in done], axis=-1)
+        for name in ("element", "corner", "size")
+    )
+    return Cells(basis, element, corner, size)

@@ -1,0 +1,57 @@
+"""What a cycle of repeated stages adds: plastic strain and dissipated work."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from typing import Self
+
+    from numpy.typing import NDArray
+
+    from solver.contact.state import Converged
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cycle:
+    """A cycle of repeated stages.
+
+    Attributes
+    ----------
+    points : (n,) numbers of the points of all parts, part after part, that flow in it
+    accumulated : (n,) equivalent plastic strain that they accumulate
+    net : (n,) equivalent of the signed plastic strain that is left
+    dissipated : plastic work and work of friction, which are the areas of all loops of force over
+        displacement when a cycle closes [N mm]
+    before : largest plastic strain accumulated before it
+    """
+
+    points: NDArray[np.int64]
+    accumulated: Array
+    net: Array
+    dissipated: float
+    before: float
+
+    @classmethod
+    def between(cls, start: Converged, end: Converged) -> Self:
+        """Return the cycle between two converged states."""
+        both = list(zip(start.state.plastic, end.state.plastic, strict=True))
+        more = np.concatenate([new.accumulated - old.accumulated for old, new in both])
+        flow = np.hstack([new.plastic_strain - old.plastic_strain for old, new in both])
+        points = np.flatnonzero(more)
+        terms = (
+            getattr(at.energy, name) for at in (start, end) for name in ("plastic", "friction")
+        )
+        plastic, friction, plastic_after, friction_after = terms
+        return cls(
+            points=points,
+            accumulated=more[points],
+            net=np.sqrt(2 / 3 * (flow[:, points] ** 2).sum(axis=0)),
+            dissipated=plastic_after + friction_after - plastic - friction,
+            before=max(float(old.accumulated.max(initial=0.0)) for old, _ in both),
+        )

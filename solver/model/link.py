@@ -1,0 +1,68 @@
+"""Links: boundaries that are tied, kept rigid, held by springs, or moved by a rigid body."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal, get_args
+
+from annotated_types import Interval, Unit
+
+from solver.errors import ModelError
+
+Components = Literal["x", "y", "xy"]
+Side = tuple[str, str]
+"""Name of a body and of its boundary."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Link:
+    """Linear conditions on the displacements of a boundary, the slave.
+
+    Without ``rigid`` and ``master`` the slave moves as one: its components are the same at all its
+    nodes. With a stiffness it is held by springs to the ground instead.
+
+    Attributes
+    ----------
+    slave : body and boundary
+    master : body and boundary to which the slave is tied; their nodes need not match
+    rigid : the rigid body whose motion the slave follows; with a master, the motion of the slave
+        relative to the master, such as the shortening of a bolt. Rotations are small
+    components : of the displacement that it holds
+    stiffness : of springs between the two, force per area and displacement [N/mm3]; inf is rigid
+    distributed : whether only the mean motion of the slave is that of ``rigid``: its force and
+        moment act on the slave by a linear traction, and it may deform
+    """
+
+    slave: Side
+    master: Side | None = None
+    rigid: str | None = None
+    components: Components = "xy"
+    stiffness: Annotated[float, Interval(gt=0.0), Unit("N/mm3")] = math.inf
+    distributed: bool = False
+
+    def __post_init__(self) -> None:
+        if self.components not in get_args(Components):
+            raise ModelError("components", self.components, "must be x, y or xy")
+        if not self.stiffness > 0:
+            raise ModelError("stiffness", self.stiffness, "must be positive [N/mm3]")
+        if self.distributed and (
+            self.rigid is None or self.master or math.isfinite(self.stiffness)
+        ):
+            allowed = "needs a rigid body, and neither a master nor springs"
+            raise ModelError("distributed", self.distributed, allowed)
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Its components: 0 (x), 1 (y)."""
+        return tuple("xy".index(axis) for axis in self.components)
+
+    @property
+    def grounded(self) -> bool:
+        """Whether springs hold it to the ground."""
+        return self.rigid is None and self.master is None and math.isfinite(self.stiffness)
+
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """The boundaries that it joins."""
+        return (self.slave,) if self.master is None else (self.slave, self.master)

@@ -1,0 +1,229 @@
+"""A study as one HTML file, for a mail or an archive: no server, no script, no other file."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import re
+from base64 import b64encode
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from studies.definition.parameters import parameters_of
+from studies.errors import StudyError
+from studies.scenes.registry import known_names, scene_named
+from studies.storage.dataset import attributes_of
+from studies.views.audited import worst
+from studies.views.columns import value_text
+from studies.views.figures import FIGURES, group_of
+from studies.views.picking import one_run, sweep_axes, sweep_coordinates
+from studies.views.plots.fields import line_fields, map_fields, sweep_fields, usual_field
+from studies.views.plots.lines import line_figure
+from studies.views.plots.maps import map_figure
+from studies.views.plots.sweep import sweep_figure
+from studies.views.summary import placed, values_text
+from studies.views.tables import FOOTNOTE, messages, run_cells
+
+LISTED = 500
+"""Largest number of runs in the table."""
+
+DRAWN = 4
+"""Largest number of numbers that are drawn over the sweep."""
+
+SPELT = 12
+"""Largest number of values of an axis that are all named."""
+
+COLUMNS = 9
+"""Largest number of columns of a part of the table that fit a page, beside those of the place."""
+
+LINES = ("residual_profile", "contact_pressure")
+"""Lines of the chosen run that are drawn, where it has them."""
+
+DECADES = 6
+"""Length of a meter: it begins at the limit over ten to this power."""
+
+_DPI = 130
+
+
+def archive(dataset: xr.Dataset) -> str:
+    """Return a study as an HTML document: what was computed, pictures, runs, audit, versions.
+
+    Parameters
+    ----------
+    dataset : its data set, as `open_study` gives it
+    """
+    axes = [name for name in sweep_axes(dataset) if dataset.sizes[name] > 1]
+    table = run_cells(dataset)
+    keys = range(table.words)
+    rest = range(table.words, len(table.headings))
+    words, count = np.unique(dataset["status"].to_numpy().astype(str), return_counts=True)
+    attrs = dataset.attrs
+    return _template().render(
+        name=attrs["title"],
+        scene=attrs["scene"],
+        created=str(attrs.get("created", "")).replace("T", " ").removesuffix("+00:00") + " UTC",
+        tags=str(attrs.get("tags", "")).split(),
+        note=attrs.get("note", ""),
+        counts=dict(zip(words.tolist(), count.tolist(), strict=True)),
+        summary=_summary(str(attrs["scene"]), dataset["status"].size),
+        axes=[_axis(dataset, name) for name in _varied(dataset)],
+        parameters=_fixed(dataset),
+        figures=[*_figures(dataset, axes)],
+        table=table._replace(rows=table.rows[:LISTED]),
+        left=max(len(table.rows) - LISTED, 0),
+        blocks=[
+            [*keys, *rest[first : first + COLUMNS]]
+            for first in range(0, max(len(rest), 1), COLUMNS)
+        ],
+        footnote=FOOTNOTE.strip(),
+        messages=messages(dataset).strip(),
+        audit=[*_audit(dataset)],
+        made=_made(attrs),
+        id=attrs.get("id", ""),
+    )
+
+
+def _template() -> Any:
+    found = Environment(
+        loader=PackageLoader("studies.views"), autoescape=True, undefined=StrictUndefined
+    )
+    found.filters["words"] = lambda name: str(name).replace("_", " ")
+    return found.get_template("archive.html")
+
+
+def _summary(scene: str, size: int) -> str:
+    runs = "1 run" if size == 1 else f"{size} runs"
+    if scene not in known_names():
+        return f"{runs} of the scene {scene}."
+    about = scene_named(scene).summary.rstrip(".")
+    return f"{runs}. {about[:1].upper()}{about[1:]}."
+
+
+def _varied(dataset: xr.Dataset) -> list[str]:
+    """Return the coordinates that differ between runs, without the numbers of points."""
+    names = {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
+    numbered = {axis for name, axis in names.items() if name != axis}
+    return [n for n in names if n not in numbered or dataset[n].dtype.kind not in "iuf"]
+
+
+def _axis(dataset: xr.Dataset, name: str) -> dict[str, str]:
+    """Return name, meaning, unit and values of an axis."""
+    values = dataset[name]
+    return {
+        "name": name,
+        "words": str(values.attrs.get("long_name", "")),
+        "unit": _unit(values.attrs),
+        "text": values_text(values.to_numpy().tolist(), most=SPELT),
+    }
+
+
+def _fixed(dataset: xr.Dataset) -> list[dict[str, str]]:
+    """Return name, meaning, unit and value of what all runs share: given, or axes of one value."""
+    given = json.loads(dataset.attrs.get("parameters", "{}"))
+    given |= {n: dataset[n].item() for n in sweep_axes(dataset) if dataset.sizes[n] == 1}
+    scene = str(dataset.attrs["scene"])
+    known = parameters_of(scene_named(scene)) if scene in known_names() else {}
+    return [
+        {
+            "name": name,
+            "words": known[name].description.replace("`", "") if name in known else "",
+            "unit": _plain(known[name].unit) if name in known else "",
+            "value": "none" if value in (None, [], "") else _exact(value),
+        }
+        for name, value in given.items()
+    ]
+
+
+def _exact(value: Any) -> str:
+    """Return a value as it was given; of a table what it is."""
+    return f"{value:.10g}" if isinstance(value, float) else value_text(value)
+
+
+def _figures(dataset: xr.Dataset, axes: list[str]) -> Iterator[dict[str, Any]]:
+    """Yield pictures: the main numbers over the sweep, a map and lines of one run."""
+    singles = [name for name in sweep_fields(dataset) if _is_main(name)]
+    singles.sort(key=lambda name: name not in FIGURES)
+    numbers = [name for name in singles if _varies(dataset[name])] if axes else []
+    for name in numbers[:DRAWN]:
+        try:
+            yield _figure(sweep_figure(dataset, name), _words(dataset[name]))
+        except StudyError:  # such as a number that no run has
+            continue
+    try:
+        run = one_run(dataset)
+    except StudyError:  # no run succeeded
+        return
+    place = placed({name: run[name].item() for name in axes})
+    where = f" of the run at {place}" if place else ""
+    field = usual_field(run)
+    if field in map_fields(run):
+        component = "xx" if "component" in run[field].dims else None
+        text = f"{_words(run[field])}{f', {component},' if component else ''}{where}"
+        yield _figure(map_figure(run, field, component), text, whole=True)
+    for name in LINES:
+        if name in line_fields(run) and run[name].notnull().any():
+            yield _figure(line_figure(run, name), f"{_words(run[name])}{where}")
+
+
+def _figure(drawn: Any, words: str, whole: bool = False) -> dict[str, Any]:
+    content = io.BytesIO()
+    drawn.savefig(content, format="png", dpi=_DPI)
+    picture = b64encode(content.getvalue()).decode()
+    return {"png": picture, "words": words[:1].upper() + words[1:], "whole": whole}
+
+
+def _is_main(name: str) -> bool:
+    """Whether a number tells of the result: not of the effort, the audit, or a position."""
+    return group_of(name) == "result" and not re.search(r"^depth_of_|_[xyzs]$", name)
+
+
+def _varies(values: xr.DataArray) -> bool:
+    known = values.to_numpy()[values.notnull().to_numpy()]
+    return known.dtype.kind in "fiu" and known.size > 0 and bool((known != known[0]).any())
+
+
+def _audit(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
+    """Yield the largest value of each figure of the audit, its limit, and its run."""
+    status = dataset["status"]
+    numbers = {str(n): v.to_numpy() for n, v in dataset.data_vars.items() if v.dims == status.dims}
+    for each in worst(numbers):
+        at = np.unravel_index(each.at, status.shape)
+        here = {n: dataset[n].to_numpy()[k] for n, k in zip(status.dims, at, strict=True)}
+        decades = DECADES + (math.log10(each.share) if each.share > 0.0 else -DECADES)
+        yield {
+            "name": each.name,
+            "words": str(attributes_of(each.name).get("long_name", each.name)),
+            "value": value_text(each.value),
+            "limit": value_text(each.limit),
+            "percent": round(100.0 * min(max(decades / DECADES, 0.0), 1.0), 1),
+            "place": placed({str(n): v for n, v in here.items() if dataset.sizes[n] > 1}),
+        }
+
+
+def _made(attrs: Mapping[Any, Any]) -> dict[str, str]:
+    """Return versions and other marks of what computed the runs."""
+    found = {"study": attrs.get("id"), "computed": attrs.get("created"), "by": attrs.get("source")}
+    found |= {"linear solver": attrs.get("linear_solver"), "commit": attrs.get("commit")}
+    found["sources of the solver"] = attrs.get("solver_source")
+    found |= json.loads(attrs.get("versions", "{}"))
+    return {name: str(value) for name, value in found.items() if value}
+
+
+def _words(values: xr.DataArray) -> str:
+    unit = _unit(values.attrs)
+    words = str(values.attrs.get("long_name", str(values.name).replace("_", " ")))
+    return f"{words} [{unit}]" if unit else words
+
+
+def _unit(attrs: Mapping[Any, Any]) -> str:
+    return _plain(str(attrs.get("units", "")))
+
+
+def _plain(unit: str) -> str:
+    """Return a unit; nothing for a ratio."""
+    return "" if unit == "1" else unit

@@ -1,0 +1,64 @@
+"""Load factors within a stage: listed, or in a CSV file beside the scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from studies.errors import SceneError
+from studies.scenes.description import Description
+from studies.scenes.meshfile import MeshFile
+from studies.scenes.scene import FileScene, file_scene
+from tests.studies.scenes.conftest import blocks
+
+CSV = {"pulse.csv": MeshFile("pulse.csv", b"time, half, factor\n0,0.25,0.5\n2,0.5,1\n10,0.1,0.2\n")}
+
+
+def pulsed(course: Any, files: dict[str, MeshFile] | None = None) -> FileScene:
+    """Return the blocks with a second stage of five increments, before it half of the load."""
+    content = blocks()
+    content["stages"] += [{"name": "pulse", "increments": 5}]
+    content["loads"][0]["amplitude"] = {"pressed": 0.5, "pulse": course}
+    return file_scene(Description("blocks.toml", content, files or {}), built=True)
+
+
+@pytest.mark.solves
+def test_the_force_follows_the_course_and_an_increment_ends_at_each_of_its_knots() -> None:
+    """Times of a table are from the beginning of the stage to its end, in any unit."""
+    scene = pulsed([[0.2, 1.0], [1.0, 0.2]])
+    (*_, record) = scene.path(scene.parameters(), [0.0], lambda done: None)
+    assert record.status.name == "OK", record.message
+    time, force = record.fields["increment_time"][1], record.fields["contact_normal_force"][1][0]
+    np.testing.assert_allclose(time, [0, 0.5, 1, 1.2, 1.4, 1.6, 1.8, 2])
+    np.testing.assert_allclose(force / 600.0, [0, 0.25, 0.5, 1, 0.8, 0.6, 0.4, 0.2], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "course", [[[0, 0.5], [2, 1.0], [10, 0.2]], {"file": "pulse.csv"}, [[0.2, 1.0], [1, 0.2]]]
+)
+def test_a_list_and_a_file_are_the_same_course(course: Any) -> None:
+    scene = pulsed(course, CSV)
+    parameters = scene.parameters()
+    (load,) = scene.model(parameters).bodies[0].loads
+    np.testing.assert_allclose(load.amplitude.time, [0, 1, 1.2, 2])
+    np.testing.assert_allclose(load.amplitude.value, [0, 0.5, 1, 0.2])
+    times = [target.time for target in scene.program(parameters).targets]
+    np.testing.assert_allclose(times, [0.5, 1, 1.2, 1.4, 1.6, 1.8, 2])
+    assert scene.program(parameters).count == len(times)
+
+
+@pytest.mark.parametrize(
+    ("course", "words"),
+    [
+        ([[0, 0.3], [1, 1]], "pulse.factor = 0.3: must be 0.5, with which the stage begins"),
+        ([[1, 0.3], [0.5, 1]], "pulse.time = .*must increase"),
+        ({"file": "other.csv"}, "pulse.file = 'other.csv': there is no such file"),
+        ({"file": "pulse.csv", "column": "third"}, "must have the columns time, third"),
+        ({"file": "pulse.csv", "column": "half"}, "pulse.factor = 0.25: must be 0.5"),
+    ],
+)
+def test_a_wrong_course_is_refused(course: Any, words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        pulsed(course, CSV)

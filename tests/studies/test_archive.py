@@ -1,0 +1,79 @@
+"""A study as one HTML file."""
+
+from __future__ import annotations
+
+import base64
+import re
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from residua.cli import main
+from studies import Store, Study, open_study, summary
+from studies.views.archive import archive
+from studies.views.columns import value_text
+from tests.studies.conftest import compute_here, fake_study
+
+
+@pytest.fixture(scope="module")
+def dataset(computed: tuple[Study, Store]) -> xr.Dataset:
+    study, store = computed
+    return open_study(store.dataset_path(study.id)).load()
+
+
+def test_the_file_needs_nothing_else(computed: tuple[Study, Store], tmp_path: Path) -> None:
+    study, store = computed
+    target = tmp_path / "report.html"
+    assert main(["report", str(store.directory), "-o", str(target)]) == 0
+    text = target.read_text()
+    assert "<script" not in text and "http:" not in text and "https:" not in text
+    sources = re.findall(r'(?:src|href)="([^"]*)"', text)
+    assert len(sources) >= 2 and all(each.startswith("data:image/png;base64,") for each in sources)
+    for each in sources:
+        assert base64.b64decode(each.partition(",")[2]).startswith(b"\x89PNG")
+    assert study.id in text
+
+
+def test_it_has_the_numbers_of_the_data_set(dataset: xr.Dataset) -> None:
+    text = archive(dataset)
+    numbers = dataset["peak_contact_pressure"].to_numpy().ravel()
+    for each in numbers:
+        assert f">{value_text(each)}" in text
+    for name in ("load_ratio", "friction"):
+        values = ", ".join(value_text(each) for each in dataset[name].to_numpy())
+        assert f"<td>{values}" in text
+    view = summary(dataset)
+    if view.audit:
+        assert f"<code>{view.audit[0].name}</code>" in text
+    assert "<h2>How it was computed</h2>" in text and dataset.attrs["solver_source"] in text
+
+
+def test_failed_runs_are_told_and_texts_are_texts(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    sweep = {"load_ratio": [0.3, 0.9]}
+    study = Study.from_dict(
+        {"name": "told", "scene": "fake", "note": "a < b & c", "tags": ["rail"], "sweep": sweep}
+    )
+    compute_here(study, store)
+    with open_study(store.dataset_path(study.id)) as whole:
+        found = whole.load()
+    for name in ("status", "message"):
+        found[name] = found[name].astype(object)
+    found["status"][{"load_ratio": 1}] = "limit_load"
+    found["message"][{"load_ratio": 1}] = "the punch <sinks>"
+    text = archive(found)
+    for each in ("a &lt; b &amp; c", "the punch &lt;sinks&gt;", "limit load", "rail"):
+        assert each in text
+    found["status"][:] = "limit_load"
+    assert "<img" not in archive(found), "no run has a picture"
+    view = summary(found)
+    assert len(view.failed) == 2 and "load_ratio = 0.9: the punch <sinks>" in str(view)
+
+
+def test_a_study_of_one_run_and_of_many_columns(tmp_path: Path) -> None:
+    store, study = Store(tmp_path), fake_study("one", sweep={"load_ratio": [0.9]})
+    compute_here(study, store)
+    with open_study(store.dataset_path(study.id)) as one:
+        text = archive(one)
+    assert "What varies" not in text and "What is fixed" in text and "1 run" in text
