@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from skfem import Mesh
 
     from solver.model.body import Body
+    from solver.model.link import Link
     from solver.model.model import Model
 
     Array = np.ndarray
@@ -40,6 +41,7 @@ _PANEL, _LEGEND = (4.4, 5.4), 3.3
 _FILLS = ("#dfe8f3", "#f6ead7", "#e2efdd", "#f1dfe9", "#e8e8e8")
 _PAIRS = ("#d62728", "#1f77b4", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2")
 _RESULTS = "#7b3fa0"
+_LINKED = "#0f766e"
 _MARGIN, _WORTHWHILE = 0.1, 0.35
 """Frame around what is drawn, over its larger side; largest ratio of the sides of the close-up to
 those of the whole for a second panel."""
@@ -57,12 +59,14 @@ class _Subject:
     ----------
     own : bodies, pairs, springs and curves
     rigid : rigid bodies
+    links : boundaries that are tied, kept rigid, or held by springs
     axes : names of the horizontal and vertical coordinate
     middle : what x = 0 is, if it is drawn as a line of symmetry
     """
 
     own: Sketch
     rigid: Sequence[RigidBody] = ()
+    links: Sequence[Link] = ()
     axes: tuple[str, str]
     middle: str = ""
 
@@ -156,7 +160,9 @@ def _shown(scene: Scene, parameters: Any, view: View) -> _Subject:
     middle = "axis of rotation" if turned else "line of symmetry" if view.symmetric else ""
     pairs = tuple((pair.slave, pair.master) for pair in model.contacts)
     own = Sketch(model.bodies, pairs)
-    return _Subject(own=own, rigid=model.rigid, axes=view.map_axes, middle=middle)
+    return _Subject(
+        own=own, rigid=model.rigid, links=model.links, axes=view.map_axes, middle=middle
+    )
 
 
 # -- what is seen ----------------------------------------------------------------------------------
@@ -268,6 +274,8 @@ def _draw(
             )
             _label(axes, outward(body.mesh, body.mesh.boundaries[name])[0], name, inch)
         handles |= draw_supports(axes, body, inch, shown.own.springs.get(body.name, ()))
+    for link in shown.links:
+        handles |= _draw_link(axes, shown.own.bodies, link)
     for each in acting(shown.own.bodies, shown.rigid):
         handles |= draw_acting(axes, each, inch)
     if shown.middle:
@@ -276,6 +284,22 @@ def _draw(
             [], [], color="0.3", linewidth=0.8, linestyle=(0, (8, 2, 1, 2))
         )
     return handles | _draw_results(axes, view, places)
+
+
+def _draw_link(axes: Axes, bodies: Sequence[Body], link: Link) -> dict[str, Any]:
+    """Draw the boundaries of a link; return its entry of the legend."""
+    known = {body.name: body for body in bodies}
+    sides = [side for side in (link.slave, link.master) if side is not None]
+    for name, boundary in sides:
+        if name in known:
+            lines = _polylines(known[name].mesh, known[name].facets(boundary))
+            pieces = list(lines.transpose(2, 1, 0))
+            axes.add_collection(LineCollection(pieces, colors=_LINKED, linewidths=2.4))
+    kind = "springs" if math.isfinite(link.stiffness) else "link"
+    last = link.rigid or ("ground" if link.grounded else "")
+    ends = " – ".join([*(".".join(side) for side in sides), *([last] if last else [])])
+    text = f"{kind} {link.components}: {ends}"
+    return {text: Line2D([], [], color=_LINKED, linewidth=2.4)}
 
 
 def _draw_mesh(axes: Axes, mesh: Mesh, fill: str) -> None:
