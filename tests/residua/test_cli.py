@@ -345,6 +345,22 @@ def test_the_bar_stays_on_one_line_and_counts_failures() -> None:
 
 
 @pytest.mark.parametrize("screen", [Terminal(), io.StringIO()])
+def test_the_time_left_is_told_at_the_pace_so_far(
+    screen: io.StringIO, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, clock = fake_study(), iter((0.0, 0.0, 3600.0, 5400.0, 7290.0))
+    monkeypatch.setattr("residua.progress.time.monotonic", lambda: next(clock))
+    monkeypatch.setattr("residua.progress._REDRAW", -1.0)
+    first = next(study.cases())
+    bar = Progress(study, screen)
+    bar(StudyEvent(kind="path", progress=0.0, path="a"))
+    bar(StudyEvent(kind="run", progress=0.5, path="a", run=first.id, status="ok"))
+    assert screen.getvalue().rstrip("\x1b[K\n").endswith("left")
+    left = screen.getvalue().split()[-2:]
+    assert left[0] in ("1:00:00", "1:30:00")
+
+
+@pytest.mark.parametrize("screen", [Terminal(), io.StringIO()])
 def test_runs_that_were_there_are_told(screen: io.StringIO) -> None:
     study = fake_study()
     bar = Progress(study, screen)

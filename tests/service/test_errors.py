@@ -355,15 +355,18 @@ def test_the_description_names_every_resource_and_its_problems(app: FastAPI) -> 
         "/studies/{study_id}/table.json",
         "/studies/{study_id}/table.parquet",
         "/studies/{study_id}/numbers",
+        "/studies/{study_id}/plot.png",
         "/runs",
         "/runs/{run_id}",
         "/runs/{run_id}.nc",
         "/runs/{run_id}.vtu",
         "/runs/{run_id}/map.png",
+        "/runs/{run_id}/line.png",
         "/runs/{run_id}/fields",
         "/runs/{run_id}/values",
         "/scenes",
         "/scenes/{name}",
+        "/scenes/{name}/draw.png",
         "/health",
     } == set(description["paths"])
     for operations in description["paths"].values():
