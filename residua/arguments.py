@@ -38,9 +38,67 @@ def parser() -> argparse.ArgumentParser:
 
     one = add("show", commands.show)
     one.add_argument("path", type=_path, metavar="DIR|RUN")
+    _study(one)
+
+    one = add("export", commands.export)
+    one.add_argument("path", type=_path, metavar="RUN|DIR")
+    _study(one)
+    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
+    one.add_argument("--vtu", type=_path, required=True, metavar="FOLDER", help="where they go")
+
+    one = add("serve", commands.serve)
+    one.add_argument("--host", help="default: 127.0.0.1; with another one callers need API keys")
+    one.add_argument("--port", type=_integer(0, 65535), help="default: 8000")
+    one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
+    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
+
+    one = add("view", commands.view)
+    one.add_argument("path", type=_path, metavar="DIR|DATASET")
+    _study(one)
+    one.add_argument(
+        "--port", type=_integer(0, 65535), default=0, help="default: any port that is free"
+    )
+    one.add_argument("--no-browser", action="store_true", help="print the address alone")
+
+    one = add("report", commands.report)
+    one.add_argument("path", type=_place, metavar="DIR|DATASET")
+    _study(one)
+    one.add_argument("--out", "-o", type=_path, default=Path("report.html"), metavar="HTML")
+
+    for more in (_add_pictures, _add_cluster, _add_numbers, _add_access, _add_remote):
+        more(add)
+    return whole
+
+
+class _Parser(argparse.ArgumentParser):
+    """Tells a mistake in one line, as the commands do."""
+
+    def error(self, message: str) -> NoReturn:
+        sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
+
+
+def _study(one: argparse.ArgumentParser) -> None:
+    one.add_argument(
+        "--study", metavar="NAME|ID|latest", help="of the studies in a folder, as DIR/NAME says too"
+    )
+
+
+def _add_pictures(add: Callable[..., argparse.ArgumentParser]) -> None:
+    one = add("draw", commands.draw)
+    one.add_argument(
+        "what", metavar="SCENE|STUDY.toml",
+        help="name of a scene, its file, or a study, whose first run is drawn",
+    )  # fmt: skip
+    one.add_argument(
+        "--set", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
+        help="parameters, in place of those of the study or the defaults",
+    )  # fmt: skip
+    one.add_argument("--zoom", type=float, metavar="MM", help="only within this distance of 0, 0")
+    _add_window(one)
 
     one = add("plot", commands.plot)
     one.add_argument("path", type=_place, metavar="RUN|DIR")
+    _study(one)
     one.add_argument(
         "--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
         help="of the sweep, or of the field's own dimensions, such as pass=2",
@@ -53,45 +111,28 @@ def parser() -> argparse.ArgumentParser:
         "bodies was computed",
     )  # fmt: skip
     one.add_argument(
-        "--window", type=float, nargs=4, metavar=("X0", "X1", "Y0", "Y1"),
-        help="only this part of a map [mm]",
+        "--over",
+        metavar="AXIS",
+        help="draw lines for each value of this axis, or dimension of the field",
+    )
+    one.add_argument(
+        "--against", metavar="NAME",
+        help="draw lines over increments over this variable, such as a motion: a loop",
     )  # fmt: skip
-    one.add_argument("--over", metavar="AXIS", help="draw lines for each value of this axis")
+    one.add_argument(
+        "--deformed", type=float, metavar="FACTOR",
+        help='draw the bodies of a map deformed, of a study with keep = "fields"',
+    )  # fmt: skip
+    _add_window(one)
+
+
+def _add_window(one: argparse.ArgumentParser) -> None:
+    one.add_argument(
+        "--window", type=float, nargs=4, metavar=("X0", "X1", "Y0", "Y1"),
+        help="only this part [mm]",
+    )  # fmt: skip
     one.add_argument("--resolution", type=float, metavar="DPI", help="dots per inch, 50 to 600")
     one.add_argument("--out", type=_path, required=True, metavar="PNG")
-
-    one = add("export", commands.export)
-    one.add_argument("path", type=_path, metavar="RUN|DIR")
-    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
-    one.add_argument("--vtu", type=_path, required=True, metavar="FOLDER", help="where they go")
-
-    one = add("serve", commands.serve)
-    one.add_argument("--host", help="default: 127.0.0.1; with another one callers need API keys")
-    one.add_argument("--port", type=_integer(0, 65535), help="default: 8000")
-    one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
-    one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
-
-    one = add("view", commands.view)
-    one.add_argument("path", type=_path, metavar="DIR|DATASET")
-    one.add_argument(
-        "--port", type=_integer(0, 65535), default=0, help="default: any port that is free"
-    )
-    one.add_argument("--no-browser", action="store_true", help="print the address alone")
-
-    one = add("report", commands.report)
-    one.add_argument("path", type=_place, metavar="DIR|DATASET")
-    one.add_argument("--out", "-o", type=_path, default=Path("report.html"), metavar="HTML")
-
-    for more in (_add_cluster, _add_numbers, _add_access, _add_remote):
-        more(add)
-    return whole
-
-
-class _Parser(argparse.ArgumentParser):
-    """Tells a mistake in one line, as the commands do."""
-
-    def error(self, message: str) -> NoReturn:
-        sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
 
 
 def _add_run(one: argparse.ArgumentParser) -> None:
@@ -149,18 +190,30 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
     one.add_argument("--field", help="the number of the runs that is drawn")
     one.add_argument("--out", type=_path, metavar="PNG", help="draw what differs")
 
+    one = add("table", commands.table)
+    one.add_argument("path", type=_place, metavar="DIR")
+    _study(one)
+    kind = one.add_mutually_exclusive_group()
+    kind.add_argument("--csv", action="store_true", help="with commas between; this is the default")
+    kind.add_argument("--json", action="store_true", help="columns with units, rows as objects")
+    one.add_argument("--columns", nargs="+", metavar="NAME", help="default: all")
+    _add_where(one)
+    one.add_argument(
+        "--sort", default="", metavar="NAME", help="by a column; --sort=-NAME: largest first"
+    )
+    one.add_argument("--out", type=_path, metavar="FILE", help="default: print it")
+
     one = add("best", commands.best)
     one.add_argument("path", type=_place, metavar="DIR")
+    _study(one)
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
-    one.add_argument(
-        "--where", nargs="+", action="extend", default=[], metavar="CONDITION",
-        help='such as "friction<0.3" or "hardening=none"; runs must meet all',
-    )  # fmt: skip
+    _add_where(one)
     one.add_argument("--lowest", action="store_true", help="the lowest numbers first")
     one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
 
     one = add("predict", commands.predict)
     one.add_argument("path", type=_path, metavar="DIR")
+    _study(one)
     one.add_argument("at", nargs="+", metavar="NAME=VALUE", help="each parameter that varies")
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
     one.add_argument("--by", choices=["cells", "gaussian"], help="default: cells, if it has any")
@@ -171,6 +224,7 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
 
     one = add("sensitivity", commands.sensitivity)
     one.add_argument("path", type=_path, metavar="DIR")
+    _study(one)
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
     one.add_argument(
@@ -178,6 +232,13 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
         help="chaos (default); delta, pawn or rbd_fast, with the library SALib",
     )  # fmt: skip
     one.add_argument("--out", type=_path, metavar="PNG", help="draw indices, tornado and runs")
+
+
+def _add_where(one: argparse.ArgumentParser) -> None:
+    one.add_argument(
+        "--where", nargs="+", action="extend", default=[], metavar="CONDITION",
+        help='such as "friction<0.3" or "hardening=none"; runs must meet all',
+    )  # fmt: skip
 
 
 def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from residua.neighbours import wrong_package
 from residua.status import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
@@ -36,6 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     try:
         load_own_parts()
+        if study := getattr(options, "study", None) if hasattr(options, "path") else None:
+            options.path = Path(options.path) / study
         return options.command(options)
     except (ModelError, StudyError) as error:
         return complain(error, BAD_INPUT)

@@ -136,6 +136,19 @@ def scenes(options: argparse.Namespace) -> int:
     return OK
 
 
+def draw(options: argparse.Namespace) -> int:
+    """Draw a scene before anything is computed: meshes, boundaries, supports, loads, contacts."""
+    from studies.views.described import described_scene
+    from studies.views.plots.picture import resolved
+    from studies.views.plots.setup import setup_figure
+
+    scene, values = described_scene(options.what, _selection(options.set, "--set"))
+    sheet = setup_figure(scene, values, options.zoom, options.window)
+    _save(resolved(sheet, options.resolution), options.out)
+    print(f"wrote {options.out}")
+    return OK
+
+
 def show(options: argparse.Namespace) -> int:
     """Print the results of a run, a study or all studies of a directory."""
     from studies.views.reading import begun_studies, find_datasets, open_netcdf, present_datasets
@@ -157,14 +170,19 @@ def show(options: argparse.Namespace) -> int:
 
 def plot(options: argparse.Namespace) -> int:
     """Draw a field of one run, or one value per run over the sweep."""
+    from studies.views.kept import drawn_from
     from studies.views.plots.picture import picture
     from studies.views.reading import open_study
 
     selection = _selection(options.select)
-    with open_study(options.path) as dataset:
+    with (
+        open_study(options.path) as dataset,
+        drawn_from(options.path, dataset, options.field, selection) as (found, left),
+    ):
         drawn = picture(
-            dataset, options.field, options.component, options.zoom, selection,
-            window=options.window, over=options.over,
+            found, options.field, options.component, options.zoom, left,
+            window=options.window, over=options.over, against=options.against,
+            deformed=options.deformed,
             resolution=options.resolution,
         )  # fmt: skip
         _save(drawn, options.out)
@@ -182,6 +200,29 @@ def best(options: argparse.Namespace) -> int:
             dataset, options.of, options.where, lowest=options.lowest, count=options.count
         )
         print(best_table(dataset, options.of, runs))
+    return OK
+
+
+def table(options: argparse.Namespace) -> int:
+    """Write the numbers of the runs of a study as CSV or JSON."""
+    from studies.views.numbers import table_of
+    from studies.views.reading import open_study
+    from studies.views.written import FORMS
+
+    with open_study(options.path) as dataset:
+        found = table_of(dataset)
+    at = found.chosen(options.sort)
+    for condition in options.where:
+        at = at[found.meeting(condition)[at]]
+    columns = [found.column(name) for name in dict.fromkeys(options.columns or found.columns)]
+    pieces = FORMS["json" if options.json else "csv"].write(columns, at)
+    if options.out is None:
+        for piece in pieces:
+            sys.stdout.write(piece.decode())
+        return OK
+    with _written("--out", options.out) as part, part.open("wb") as file:
+        file.writelines(pieces)
+    print(f"wrote {options.out}")
     return OK
 
 

@@ -63,8 +63,8 @@ class Progress:
             if not self._bar:
                 reason = f": {event.message}" if event.status != OK else ""
                 place = event.place or self._names[event.run]
-                line = f"{100 * event.progress:3.0f} %  {event.status}  {place}"
-                print(line + reason, file=self._stream, flush=True)
+                line = f"{100 * event.progress:3.0f} %  {event.status}  {place}{reason}"
+                print(f"{line}{self._remaining(event.progress)}", file=self._stream, flush=True)
         now = time.monotonic()
         self._progress = event.progress
         if self._bar and now - self._drawn > _REDRAW:
@@ -93,7 +93,10 @@ class Progress:
         if gained <= 0.02 or progress >= 1.0:
             return ""
         seconds = (time.monotonic() - self._started) * (1.0 - progress) / gained
-        return f"  {int(seconds // 60)}:{int(seconds % 60):02d} left"
+        minutes, rest = divmod(int(seconds), 60)
+        hours, minutes = divmod(minutes, 60)
+        clock = f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+        return f"  {clock} left"
 
 
 def _place(study: Study, case: Case) -> str:

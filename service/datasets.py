@@ -43,6 +43,9 @@ WAITING = 8
 """Number of studies whose data sets may wait to be made."""
 
 
+AGAIN = "the data set was lost or damaged, and is made again from the runs: ask later"
+
+
 @dataclass(slots=True)
 class _Offered:
     """A data set: of which state of the catalogue, where it is, and until when it stays."""
@@ -107,6 +110,8 @@ class Datasets:
         try:
             return await asyncio.to_thread(self.ended, job)
         except NotFound:
+            if job.stood == StudyState.SUCCESSFUL and not job.state.final:
+                raise Busy(AGAIN) from None
             return await self._partial(job)
 
     async def tiles(self, job: Job) -> Tiles:

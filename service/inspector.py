@@ -1,4 +1,4 @@
-"""Check scene files before they are stored; nothing in them is executed.
+"""Check scene files before they are stored, and draw them; nothing in them is executed.
 
 A scene is read in a process without a network, which writes in one folder; a caller has a budget of
 the time of these processes.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import json
 import logging
+import time
 from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,11 +17,15 @@ from typing import Any
 
 from service.alone import CRASHED, FAILED, Answer, alone
 from service.guarded import Budget, Guarded, beyond
-from service.schemas import KeptScene
-from studies import StudyError
+from service.maps import png
+from service.schemas import KeptScene, SketchQuery
+from solver.errors import ModelError
+from studies import Store, StudyError
+from studies.definition.parameters import read_values
 from studies.errors import SceneError
 from studies.scenes.description import Description, file_names
 from studies.scenes.meshfile import FORMATS, TABLE, MeshFile
+from studies.scenes.registry import scene_named
 from studies.scenes.scene import FileScene, read_scene
 from studies.scenes.table import FILE_NAME
 from studies.scratch import scratch
@@ -95,6 +100,32 @@ class Inspector:
         given = {name: MeshFile(name, data, arrays[name]) for name, data in meshes.items()}
         return KeptScene(**found["scene"]), Description(_FILE, found["content"], given)
 
+    async def draw(self, directory: Path, name: str, query: SketchQuery, caller: str) -> bytes:
+        """Return the picture of a scene of a store before loading, as PNG.
+
+        Its meshes may be those of a stranger, and its parameters are the caller's: it is drawn in
+        a process with limits, and takes the caller's budget.
+
+        Raises
+        ------
+        StudyError
+            if a parameter or the part is refused
+        Busy
+            if too many others wait, the budget is used, or the process was killed
+        """
+        self.budget.left(caller)
+        async with self.process.turn(caller):
+            spent = left = self.budget.left(caller)  # all of it if there is no answer
+            begun = time.monotonic()
+            try:
+                found, spent = await self.process.call(drawn, directory, name, query, name=name)
+            except StudyError:
+                spent = min(left, time.monotonic() - begun)
+                raise
+            finally:
+                self.budget.charge(caller, spent)
+        return found
+
     def _read(self, answer: Answer) -> dict[str, Any]:
         if answer.open != self.told:
             self.told = answer.open
@@ -124,6 +155,20 @@ def inspected(files: Mapping[str, bytes], seconds: float) -> Answer:
         for name, data in files.items():
             (folder / name).write_bytes(data)
         return alone(_told, folder, folder=folder, seconds=seconds)
+
+
+def drawn(directory: Path, name: str, query: SketchQuery) -> tuple[bytes, float]:
+    """Return the picture of a scene of a store as PNG, and the processor time it took [s]."""
+    from studies.views.plots.setup import setup_figure  # matplotlib takes a second to import
+
+    begun = time.process_time()
+    scene = Store(directory).scene(name) or scene_named(name)
+    values = read_values(scene, query.selection)
+    try:
+        figure = setup_figure(scene, values, query.zoom, query.window)
+    except ModelError as error:
+        raise StudyError(error.field, error.value, error.allowed) from None
+    return png(figure, query.resolution), time.process_time() - begun
 
 
 def _told(folder: Path) -> str:

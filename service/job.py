@@ -96,19 +96,20 @@ def wanted(
     tag: str | None = None,
     scene: str | None = None,
     text: str | None = None,
+    name: str | None = None,
 ) -> tuple[str, list[str]]:
     """Return the SQL condition for jobs, and its values.
 
     Parameters
     ----------
-    state, scene : state and scene of the job
+    state, scene, name : state, scene and name of the job
     tag : one of the tags of its study
     text : a part of its name or note, in capitals or not
     """
     tagged = "json_valid(study) AND ? IN (SELECT value FROM json_each(study, '$.tags'))"
     noted = "CASE WHEN json_valid(study) THEN json_extract(study, '$.note') END"
     said = f"instr(lower(name || ' ' || COALESCE({noted}, '')), lower(?))"
-    conditions = {"state = ?": state, tagged: tag, "scene = ?": scene, said: text}
+    conditions = {"state = ?": state, "name = ?": name, "scene = ?": scene, tagged: tag, said: text}
     clauses = [clause for clause, value in conditions.items() if value is not None]
     values = [str(value) for value in conditions.values() if value is not None]
     return (f"WHERE {' AND '.join(clauses)}" if clauses else ""), values

@@ -1,4 +1,4 @@
-"""Pictures of runs as PNG, drawn one at a time."""
+"""Pictures of runs and studies as PNG, drawn one at a time."""
 
 from __future__ import annotations
 
@@ -6,23 +6,40 @@ import asyncio
 import hashlib
 import io
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from anyio import CapacityLimiter
 from anyio.to_thread import run_sync
+from fastapi.concurrency import run_in_threadpool
+from starlette.datastructures import Headers
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.staticfiles import NotModifiedResponse
 
 import solver
 from service.errors import Busy
-from service.schemas import MapQuery
+from service.files import TAGS, UNCHANGED
+from service.schemas import LineQuery, MapQuery, PlotQuery
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 WAITING = 200
 """Number of readings and pictures that may wait for their turn."""
 
+PNG = "image/png"
+PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {PNG: {}}}, **UNCHANGED}
+"""What a route of a picture answers."""
+
 Read = TypeVar("Read")
+Drawn = TypeVar("Drawn")
+Draw = Callable[[], Awaitable[bytes]]
+"""Draws a picture."""
 
 
 class Pictures:
@@ -45,7 +62,7 @@ class Pictures:
         self.kept: OrderedDict[str, bytes] = OrderedDict()
         self.underway: dict[str, asyncio.Task[bytes]] = {}
 
-    async def get(self, tag: str, path: Path, query: MapQuery) -> bytes:
+    async def get(self, tag: str, draw: Draw) -> bytes:
         """Return the picture with this tag; it is drawn unless it is kept or being drawn.
 
         Raises
@@ -53,7 +70,7 @@ class Pictures:
         Busy
             If too many others wait.
         StudyError
-            If the run has no such field, or the field no such component.
+            If there is nothing to draw, as `draw` tells.
         """
         if tag in self.kept:
             self.kept.move_to_end(tag)
@@ -61,7 +78,7 @@ class Pictures:
         if tag not in self.underway:
             if len(self.underway) > self.queue:
                 raise Busy(f"{self.queue} pictures wait to be drawn already")
-            self.underway[tag] = asyncio.create_task(self._draw(tag, path, query))
+            self.underway[tag] = asyncio.ensure_future(self._kept(tag, draw))
         return await asyncio.shield(self.underway[tag])
 
     async def alone(self, read: Callable[..., Read], *arguments: Any) -> Read:
@@ -80,9 +97,9 @@ class Pictures:
         finally:
             self.present -= 1
 
-    async def _draw(self, tag: str, path: Path, query: MapQuery) -> bytes:
+    async def _kept(self, tag: str, draw: Draw) -> bytes:
         try:
-            picture = await self.alone(draw, path, query)
+            picture = await draw()
         finally:
             del self.underway[tag]
         self.kept[tag] = picture
@@ -91,27 +108,73 @@ class Pictures:
             self.size -= len(self.kept.popitem(last=False)[1])
         return picture
 
+    async def answer(self, request: Request, what: object, draw: Draw) -> Response:
+        """Return the answer with the picture of ``what``, unless the caller has it.
 
-def tag(path: Path, query: MapQuery) -> str:
-    """Return an entity tag that changes with the run's file, the query and the version."""
-    content = f"{path.name} {solver.__version__} {digest(path)} {query!r}"
-    return f'"{hashlib.sha256(content.encode()).hexdigest()[:32]}"'
+        Parameters
+        ----------
+        what : all that the picture depends on, but the version
+        """
+        content = f"{solver.__version__} {what!r}".encode("utf-8", "surrogatepass")
+        tag = f'"{hashlib.sha256(content).hexdigest()[:32]}"'
+        headers = Headers({"etag": tag, "cache-control": "no-cache"})
+        if TAGS.is_not_modified(headers, request.headers):
+            return NotModifiedResponse(headers)
+        return Response(await self.get(tag, draw), media_type=PNG, headers=dict(headers))
+
+    async def of_file(
+        self, request: Request, path: Path, query: Drawn, draw: Callable[[Path, Drawn], bytes]
+    ) -> Response:
+        """Return the answer with a picture of the file of a run or a study, drawn `alone`."""
+        what = path.name, await run_in_threadpool(digest, path), query
+        return await self.answer(request, what, partial(self.alone, draw, path, query))
 
 
-def draw(path: Path, query: MapQuery) -> bytes:
-    """Return a field of the run in ``path`` as PNG.
+def draw_map(path: Path, query: MapQuery) -> bytes:
+    """Return a map of the run in ``path`` as PNG.
 
     Raises
     ------
     StudyError
-        If the run has no such field, or the field no such component.
+        If the run has no such field, or the field no such component or stage.
     """
     from studies import open_netcdf
     from studies.views.plots.maps import map_figure  # matplotlib takes a second to import
 
-    picture = io.BytesIO()
     verify(path)
     with open_netcdf(path) as run:
-        figure = map_figure(run, **query.model_dump(exclude={"resolution"}))
-        figure.savefig(picture, format="png", dpi=query.resolution)
-    return picture.getvalue()
+        return png(map_figure(run, **query.model_dump(exclude={"resolution"})), query.resolution)
+
+
+def draw_lines(path: Path, query: LineQuery) -> bytes:
+    """Return lines of the run in ``path`` as PNG; raise `StudyError` as `picture` does."""
+    from studies import open_netcdf
+    from studies.views.plots.fields import check_field, line_fields
+    from studies.views.plots.picture import picture
+
+    verify(path)
+    with open_netcdf(path) as run:
+        check_field(query.field, line_fields(run))
+        asked = query.model_dump(include={"field", "component", "zoom"})
+        return png(picture(run, selection=query.selection, **asked), query.resolution)
+
+
+def draw_study(path: Path, query: PlotQuery) -> bytes:
+    """Return a field of the study in ``path`` as PNG; raise `StudyError` as `picture` does."""
+    from studies import open_netcdf
+    from studies.views.kept import drawn_from
+    from studies.views.plots.picture import picture
+
+    with (
+        open_netcdf(path) as dataset,
+        drawn_from(path, dataset, query.field, query.selection) as (found, left),
+    ):
+        asked = query.model_dump(include={"field", "component", "zoom", "window", "over"})
+        return png(picture(found, selection=left, **asked), query.resolution)
+
+
+def png(figure: Figure, resolution: int) -> bytes:
+    """Return a figure as PNG."""
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=resolution)
+    return drawn.getvalue()

@@ -30,6 +30,7 @@ class StudyFilter(Window):
     status: StudyState | None = None
     tag: str | None = Field(default=None, description="one of the tags of the study")
     scene: str | None = Field(default=None, description="name of its scene, or id of a posted one")
+    name: str | None = Field(default=None, description="its name; several may have it")
     text: str | None = Field(default=None, description="a part of its name or its note")
 
 
@@ -73,15 +74,38 @@ class Prediction(BaseModel):
     )
 
 
-class Conditions(BaseModel):
-    """The runs of a study that are requested, by any column of its table."""
+class Selecting(BaseModel):
+    """A query of which all entries but those named select a part of the results."""
 
     model_config = ConfigDict(extra="allow")
 
     @property
-    def conditions(self) -> dict[str, str]:
-        """The conditions by column."""
+    def selection(self) -> dict[str, str]:
+        """The values selected, by dimension or parameter."""
         return {name: str(value) for name, value in (self.model_extra or {}).items() if value != ""}
+
+
+Millimetres = Annotated[float, Field(allow_inf_nan=False)]
+Resolution = Annotated[int, Field(ge=50, le=600, description="dots per inch")]
+Zoom = Annotated[
+    float | None,
+    Field(
+        gt=0,
+        allow_inf_nan=False,
+        description="only what lies within this distance of the contact's centre, or of its edge "
+        "where half of the bodies was computed [mm]",
+    ),
+]
+Part = Annotated[
+    list[Millimetres] | None,
+    Field(
+        min_length=4,
+        max_length=4,
+        description="only x0 <= x <= x1, y0 <= y <= y1 [mm]: "
+        "`window=x0&window=x1&window=y0&window=y1`",
+    ),
+]
+Component = Annotated[str | None, Field(description="of a tensor; the first by default")]
 
 
 class AuditFigure(BaseModel):
@@ -95,14 +119,14 @@ class AuditFigure(BaseModel):
     at: dict[str, Any] = Field(description="where the run is in the sweep")
 
 
-class TableFilter(Conditions):
+class TableFilter(Selecting):
     """The part of the table of a study that is requested."""
 
     sort: str = Field(default="", description="a column; with a minus, the largest first")
     columns: str = Field(default="", description="names with commas between; all by default")
 
 
-class NumbersFilter(Conditions):
+class NumbersFilter(Selecting):
     """The columns of the table of a study that are requested."""
 
     name: list[str] = Field(min_length=1, max_length=100, description="names of columns")
@@ -118,21 +142,47 @@ class MapQuery(BaseModel):
         description="variable on the map grid; `residual_stress` by default, or `map_stress` where "
         "the bodies are not released",
     )
-    component: str | None = Field(default=None, description="of a stress; the first by default")
+    component: Component = None
     stage: str | None = Field(default=None, description="of several stages; the last by default")
-    zoom: float | None = Field(
-        default=None,
-        gt=0,
-        allow_inf_nan=False,
-        description="only what lies within this distance of the contact's centre, or of its edge "
-        "where half of the bodies was computed [mm]",
-    )
-    window: list[Annotated[float, Field(allow_inf_nan=False)]] | None = Field(
-        default=None, min_length=4, max_length=4,
-        description="only x0 <= x <= x1, y0 <= y <= y1 [mm]: "
-        "`window=x0&window=x1&window=y0&window=y1`",
+    zoom: Zoom = None
+    window: Part = None
+    deformed: float = Field(
+        default=0.0, allow_inf_nan=False,
+        description="factor of the displacements, of a run that keeps its fields",
     )  # fmt: skip
-    resolution: int = Field(default=150, ge=50, le=600, description="dots per inch")
+    resolution: Resolution = 150
+
+
+class LineQuery(Selecting):
+    """Which lines of a run are drawn."""
+
+    field: str = Field(description="variable along a line, a contact, a depth or the increments")
+    component: Component = None
+    zoom: Zoom = None
+    resolution: Resolution = 150
+
+
+class PlotQuery(Selecting):
+    """Which field of a study is drawn."""
+
+    field: str | None = Field(
+        default=None, description="a number of the runs, a map or lines; a map by default"
+    )
+    component: Component = None
+    over: str | None = Field(default=None, description="axis of which each value has lines")
+    zoom: Zoom = None
+    window: Part = None
+    resolution: Resolution = 150
+
+
+class SketchQuery(Selecting):
+    """Which part of a scene is drawn, for which values of its parameters."""
+
+    zoom: Annotated[float | None, Field(gt=0, allow_inf_nan=False)] = Field(
+        default=None, description="only what lies within this distance of the origin [mm]"
+    )
+    window: Part = None
+    resolution: Resolution = 150
 
 
 class StudySummary(BaseModel):

@@ -44,13 +44,14 @@ from service.pages.run import audited, numbers_shown, parameters_shown
 from service.routes.health import health
 from service.routes.scenes import post_scene
 from service.schemas import ContentId, StudyFilter, Window
-from service.table import MESSAGE, RUN, STATUS, Tables, scene_of_study, varied
+from service.table import Tables, scene_of_study
 from solver.errors import ModelError
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
 from studies.scenes.registry import known_names, known_scenes
 from studies.views.scene_picture import sentence
+from studies.views.table import MESSAGE, RUN, STATUS, varied
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
 home = APIRouter(include_in_schema=False)

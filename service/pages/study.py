@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from service.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, varied
 from studies.definition.vocabulary import OK
 from studies.views.figures import FIGURES, group_of
+from studies.views.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, varied
 
 ROWS = 25
 """Number of runs on a page of the table."""

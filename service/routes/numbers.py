@@ -23,14 +23,17 @@ from service.errors import CONTENT, REFUSED
 from service.files import TAGS, UNCHANGED
 from service.octets import MEDIA_TYPE, octets
 from service.schemas import AuditFigure, ContentId, NumbersFilter, TableFilter
-from service.table import OUTCOMES, RUN, STATUS, RunTable, varied
-from service.written import FORMS, MISSING
+from service.table import OUTCOMES
 from studies import StudyError
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
 from studies.views.audited import Worst, worst
+from studies.views.table import RUN, STATUS, RunTable, varied
+from studies.views.written import FORMS
 
 router = APIRouter()
+
+MISSING = "table.parquet needs pyarrow on the service: pip install residua-contact[parquet]"
 
 OCTETS: dict[int | str, dict[str, Any]] = {
     200: {"content": {MEDIA_TYPE: {}}, "description": "A line of JSON, then the numbers"},
@@ -81,7 +84,7 @@ def table_of_columns(
 
 def _table(ending: str, found: RunTable, which: TableFilter) -> Response:
     """Return the part of a table that is asked for, in the form of an ending."""
-    at = found.chosen(which.sort, which.conditions)
+    at = found.chosen(which.sort, which.selection)
     names = dict.fromkeys(which.columns.split(",") if which.columns else found.columns)
     form, columns = FORMS[ending], [found.column(name) for name in names]
     named = {"content-disposition": f'attachment; filename="table.{ending}"'}
@@ -99,7 +102,7 @@ def numbers(
     column is a query, as of the table; `at` has the positions of the runs that meet them.
     """
     found = tables.get(study_id)
-    at = found.chosen("", which.conditions)
+    at = found.chosen("", which.selection)
     arrays, words = {"at": at}, {}
     for each in dict.fromkeys(which.name):
         column = found.column(each, "name")

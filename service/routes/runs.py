@@ -7,17 +7,15 @@ from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
-from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 from starlette.convertors import StringConvertor, register_url_convertor
-from starlette.datastructures import Headers
-from starlette.staticfiles import NotModifiedResponse
 
 from service import maps
 from service.dependencies import TheKeeper, ThePictures, TheRun, TheStore
 from service.errors import REFUSED
-from service.files import NETCDF, TAGS, UNCHANGED, netcdf
-from service.schemas import MapQuery, Run, RunFilter, RunPage
+from service.files import NETCDF, netcdf
+from service.maps import PICTURE
+from service.schemas import LineQuery, MapQuery, Run, RunFilter, RunPage
 from service.search import conditions
 from solver.results.export import vtu_of
 from studies import StudyError
@@ -89,10 +87,7 @@ def delete_run(run: TheRun, keeper: TheKeeper) -> None:
     keeper.delete_run(run["id"])
 
 
-@router.get(
-    "/{run_id}/map.png",
-    responses={200: {"content": {"image/png": {}}}, **UNCHANGED, **REFUSED},
-)
+@router.get("/{run_id}/map.png", responses={**PICTURE, **REFUSED})
 async def draw_map(
     run: TheRun,
     query: Annotated[MapQuery, Query()],
@@ -101,9 +96,19 @@ async def draw_map(
     request: Request,
 ) -> Response:
     """Draw a field of a run around the contact."""
-    path = store.run_path(run["id"])
-    tag = await run_in_threadpool(maps.tag, path, query)
-    headers = Headers({"etag": tag, "cache-control": "no-cache"})
-    if TAGS.is_not_modified(headers, request.headers):
-        return NotModifiedResponse(headers)
-    return Response(await pictures.get(tag, path, query), media_type="image/png", headers=headers)
+    return await pictures.of_file(request, store.run_path(run["id"]), query, maps.draw_map)
+
+
+@router.get("/{run_id}/line.png", responses={**PICTURE, **REFUSED})
+async def draw_lines(
+    run: TheRun,
+    query: Annotated[LineQuery, Query()],
+    store: TheStore,
+    pictures: ThePictures,
+    request: Request,
+) -> Response:
+    """Draw a field of a run along lines, contacts, depths or increments.
+
+    Beside the queries named below, every dimension of the field is one: `?stage=loaded&pass=2`.
+    """
+    return await pictures.of_file(request, store.run_path(run["id"]), query, maps.draw_lines)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 from http import HTTPStatus
 from typing import Annotated, Any
 
 from fastapi import APIRouter, File, Query, Request, Response, UploadFile
 
-from service.dependencies import TheInspector, TheKeeper, TheName, TheStore
+from service.dependencies import TheInspector, TheKeeper, TheName, ThePictures, TheStore
 from service.errors import REFUSED, NotFound
-from service.schemas import ContentId, KeptScene, SceneSummary, Window
-from studies import StudyError, scene_schema
+from service.maps import PICTURE
+from service.schemas import ContentId, KeptScene, SceneSummary, SketchQuery, Window
+from solver.scenes import Scene
+from studies import Store, StudyError, scene_schema
 from studies.scenes.registry import known_names, known_scenes, scene_named
 from studies.scenes.scene import FileScene
 
@@ -79,12 +82,39 @@ def get_scene(name: str, store: TheStore) -> dict[str, Any]:
 
     `name` is that of a scene, or the id of a posted one.
     """
+    found = _scene(name, store)
+    posted = name != found.name
+    entry = {"id": name, "name": found.name, "summary": found.summary} if posted else {}
+    return scene_schema(found) | entry
+
+
+def _scene(name: str, store: Store) -> Scene:
+    """Return a scene, a posted one without its meshes; raise `NotFound` if there is none."""
     if kept := store.scene(name, whole=False):
-        entry = {"id": name, "name": kept.name, "summary": kept.summary}
-        return scene_schema(kept) | entry
+        return kept
     if name not in known_names():
         raise NotFound(f"no scene has this name; there are {', '.join(known_names())}")
-    return scene_schema(scene_named(name))
+    return scene_named(name)
+
+
+@router.get("/{name}/draw.png", responses={**PICTURE, **REFUSED})
+async def draw_scene(
+    name: str,
+    query: Annotated[SketchQuery, Query()],
+    store: TheStore,
+    pictures: ThePictures,
+    inspector: TheInspector,
+    caller: TheName,
+    request: Request,
+) -> Response:
+    """Draw a scene before anything is computed: meshes, boundaries, supports, loads, contacts.
+
+    Beside the queries named below, every parameter of the scene is one: `?friction=0.3`. `name` is
+    that of a scene, or the id of a posted one.
+    """
+    await asyncio.to_thread(_scene, name, store)
+    draw = partial(inspector.draw, store.directory, name, query, caller)
+    return await pictures.answer(request, (name, query), draw)
 
 
 @router.delete("/{name}", status_code=HTTPStatus.NO_CONTENT)

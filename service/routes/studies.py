@@ -10,13 +10,14 @@ from http import HTTPStatus
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse, PlainTextResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import WithJsonSchema
 from starlette.datastructures import Headers
 from starlette.staticfiles import NotModifiedResponse
 
-from service import overview
+from service import maps, overview
 from service.datasets import Datasets
 from service.dependencies import (
     TheDatasets,
@@ -35,9 +36,11 @@ from service.files import NETCDF, TAGS, UNCHANGED, netcdf
 from service.history import log_of
 from service.job import Job
 from service.jobs import Jobs
+from service.maps import PICTURE
 from service.octets import MEDIA_TYPE
 from service.schemas import (
     ContentId,
+    PlotQuery,
     Prediction,
     PredictQuery,
     StudyDetail,
@@ -117,7 +120,7 @@ def list_studies(which: Annotated[StudyFilter, Query()], jobs: TheJobs) -> Study
     """List studies, the latest first."""
     page, total = jobs.page(
         limit=which.limit, offset=which.offset, state=which.status, tag=which.tag,
-        scene=which.scene, text=which.text,
+        scene=which.scene, text=which.text, name=which.name,
     )  # fmt: skip
     return StudyPage(total=total, items=[overview.summary(job) for job in page])
 
@@ -238,6 +241,23 @@ def _indices(job: Job, datasets: Datasets, of: str) -> dict[str, Any]:
             allowed = f"at most {MOST_FITTED} are fitted here: fetch the data set, and fit it there"
             raise StudyError("runs", size, allowed)
         return told(sensitivity(runs, of))
+
+
+@router.get("/{study_id}/plot.png", responses={**PICTURE, **REFUSED})
+async def draw_study(
+    job: TheJob,
+    query: Annotated[PlotQuery, Query()],
+    datasets: TheDatasets,
+    pictures: ThePictures,
+    request: Request,
+) -> Response:
+    """Draw a number of the runs over what is swept, or a map or lines of one run.
+
+    Beside the queries named below, every axis of the sweep and dimension of the field is one:
+    `?field=contact_pressure&over=friction&load_ratio=0.5&stage=loaded`.
+    """
+    found = await run_in_threadpool(datasets.ended, job)
+    return await pictures.of_file(request, found, query, maps.draw_study)
 
 
 @router.get("/{study_id}/fit", responses=REFUSED)

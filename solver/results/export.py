@@ -78,13 +78,14 @@ def to_meshio(fields: MeshFields, stage: str) -> meshio.Mesh:
     """Return a stage as one mesh of meshio with all bodies.
 
     The cell field ``body`` is the number of the body. Displacement has three components for
-    ParaView's *Warp By Vector*; stress is in the fields ``stress_xx`` and so on. Units: N, mm, MPa.
+    ParaView's *Warp By Vector*; stress is in the fields ``stress_xx`` and
+    so on, and so is plastic strain. Units: N, mm, MPa.
     """
     import meshio  # imported here: only export needs it
 
     values = dict(fields.stages[stage])
     moved, stress = values.pop("displacement"), values.pop("stress")
-    names = components(len(stress))
+    plastic, names = values.pop("plastic_tensor"), components(len(stress))
     every = list(fields.bodies.values())
     return meshio.Mesh(
         _in_space(fields.X),
@@ -92,6 +93,7 @@ def to_meshio(fields: MeshFields, stage: str) -> meshio.Mesh:
         point_data={
             "displacement": _in_space(moved),
             **{f"stress_{c}": each for c, each in zip(names, stress, strict=True)},
+            **{f"plastic_strain_{c}": each for c, each in zip(names, plastic, strict=True)},
             **values,
         },
         cell_data={"body": [np.full(len(cells), k) for k, (_, cells) in enumerate(every)]},

@@ -93,12 +93,14 @@ class BodyValues(NamedTuple):
     mises : (n,) von Mises stress, recovered from its values at the integration points: computed
         from the recovered stress it would exceed the strength [MPa]
     plastic_strain : (n,) equivalent plastic strain, recovered
+    plastic_tensor : (n_components, n) plastic strain, recovered, components as of stress
     """
 
     displacement: Array
     stress: Array
     mises: Array
     plastic_strain: Array
+    plastic_tensor: Array
 
 
 _POSITIVE = ("mises", "plastic_strain")
@@ -129,6 +131,7 @@ class SystemFields:
             stress=to_tensor(self.recovered(body, response.stress)),
             mises=mises,
             plastic_strain=not_below_zero(self.recovered(body, response.state.accumulated)),
+            plastic_tensor=to_tensor(self.recovered(body, response.state.plastic_strain)),
         )
 
     def at_points(self, at: Solved, body: str) -> tuple[Array, Array, Array]:

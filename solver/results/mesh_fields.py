@@ -44,7 +44,8 @@ class MeshFields:
     bodies : for each body its element and the nodes (n_cells, k) of its cells: corners, mid-sides,
         middle; in two dimensions counterclockwise; of a hexahedron as VTK orders them
     stages : for each stage ``displacement`` (n_axes, n_nodes), ``stress`` (n_components, n_nodes)
-        with components xx, yy, zz, xy (, yz, zx), ``mises`` and ``plastic_strain`` (n_nodes,)
+        and ``plastic_tensor`` with components xx, yy, zz, xy (, yz, zx), ``mises`` and
+        ``plastic_strain`` (n_nodes,)
     """
 
     X: Array

@@ -68,13 +68,14 @@ def zone_fields(body: PrismBody, found: Pass[PrismState], loaded: str, left: str
         both = each[..., main, :], each[..., between, :][..., corners]
         return np.concatenate([own.reshape(*own.shape[:-2], -1) for own in both], axis=-1)
 
-    def stage(elastic: Array, accumulated: Array, u: Array) -> Mapping[str, Array]:
+    def stage(elastic: Array, plastic: Array, accumulated: Array, u: Array) -> Mapping[str, Array]:
         stress = np.einsum("ab,pcb->apc", found.law.stiffness(6), elastic)
         return {
             "displacement": u,
             "stress": to_tensor(at_nodes(stress)),
             "mises": not_below_zero(at_nodes(von_mises(stress))),
             "plastic_strain": not_below_zero(at_nodes(accumulated)),
+            "plastic_tensor": to_tensor(at_nodes(np.moveaxis(plastic, -1, 0))),
         }
 
     x = track.before * (modes.length / modes.stations) + modes.x
@@ -91,9 +92,10 @@ def zone_fields(body: PrismBody, found: Pass[PrismState], loaded: str, left: str
         return np.repeat(values[:, None], window, axis=1)
 
     under = before.strain[:, None] + found.strain - found.plastic_strain
-    behind = along(after.strain - after.plastic_strain)
+    behind, remains = along(after.strain - after.plastic_strain), along(after.plastic_strain)
+    nothing = np.full_like(still, np.nan)
     stages = {
-        loaded: stage(under, found.accumulated, np.full_like(still, np.nan)),
-        left: stage(behind, along(after.accumulated), still),
+        loaded: stage(under, found.plastic_strain, found.accumulated, nothing),
+        left: stage(behind, remains, along(after.accumulated), still),
     }
     return MeshFields(X=X, bodies={name: (_ELEMENT, np.vstack(layers))}, stages=stages)

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from solver.errors import ModelError
+from solver.results.invariants import component, known_components
 from solver.results.quantities import Quantity
-from solver.tensors import AXES, components
+from solver.tensors import AXES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,7 +27,8 @@ Span = tuple[float, float]
 Take = Literal["maximum", "minimum", "integral", "extent"]
 _UNITS = {"stress": "MPa", "mises": "MPa", "plastic_strain": "1", "displacement": "mm",
           "pressure": "MPa", "shear": "MPa", "gap": "mm", "slip": "mm"}  # fmt: skip
-_COMPONENTS = {name: k for names in (components(6), AXES) for k, name in enumerate(names)}
+_TENSORS = {"stress": "stress", "plastic_strain": "plastic_tensor"}
+"""Tensors by the names of requests, and of `BodyValues`."""
 EXTREME = ("maximum", "minimum")
 FORCES = ("pressure", "shear")
 """Fields of a contact whose integral is a force: over the area, not along the surface."""
@@ -36,9 +38,10 @@ OF_CONTACT = (*FORCES, "gap", "slip")
 
 def of_body(axes: int) -> tuple[str, ...]:
     """Return the fields of a body with this many axes of which a number can be requested."""
-    stress = (f"stress.{name}" for name in components(2 * axes))
+    names = known_components(2 * axes)
     moved = (f"displacement.{name}" for name in AXES[:axes])
-    return (*stress, "mises", "plastic_strain", *moved)
+    tensors = (f"{tensor}.{name}" for tensor in _TENSORS for name in names)
+    return (*tensors, "mises", "plastic_strain", *moved)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,15 +169,20 @@ class RequestedNumber:
         body = str(self.body)
         X = fields.system.full(body).X if self.line is None else lines[self.line].X
         self._check(of_body(len(X)))
+        field = _TENSORS[kind] if part and kind in _TENSORS else kind
         if self.line is not None:
-            (values,) = fields.at_places(lines[self.line], [at])
-            found = getattr(values, kind)
-        elif kind in ("mises", "plastic_strain"):  # recovered nodal values may violate the law
+            (there,) = fields.at_places(lines[self.line], [at])
+            found = getattr(there, field)
+        elif field in ("mises", "plastic_strain"):  # recovered nodal values may violate the law
             X, mises, strain = fields.at_points(at, body)
             found = mises if kind == "mises" else strain
         else:
-            found = getattr(fields.at_nodes(at, body), kind)
-        values = found[_COMPONENTS[part]] if part else found
+            found = getattr(fields.at_nodes(at, body), field)
+        if part:
+            of_axis = kind == "displacement"
+            values = found[AXES.index(part)] if of_axis else component(found, part)
+        else:
+            values = found
         inside = np.ones(X.shape[1], dtype=bool)
         for k, span in enumerate((self.x, self.y, self.z)):
             if span is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,12 +24,15 @@ from solver.scenes.passes import (
     PASS_SURFACE_ADVANCE,
 )
 from solver.scenes.rolling import CREEPAGE, LONGITUDINAL_FORCE
+from solver.scenes.scene import Sketch
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
+    from solver.materials.law import Law
+    from solver.prism.section import Section
     from solver.results.run import FinishedRun, Values
     from solver.scenes.prism_passes import PassTrace
 
@@ -105,6 +109,12 @@ _AVERAGED = 100
 """Largest number of passes in a mean over the last ones, which are at most half of all."""
 _YIELDED = 1e-6
 """Plastic strain above which a point counts as yielded."""
+
+
+def sketched(name: str, section: Section, law: Law, curves: Mapping[str, Array]) -> Sketch:
+    """Return the section of a prism of a law, and curves (2, n) of what rolls on it, in z and y."""
+    body = replace(section.plane.body, name=name, material=law)
+    return Sketch((body,), springs={body.name: [*section.springs]}, curves=curves)
 
 
 def patch(run: FinishedRun) -> Values:

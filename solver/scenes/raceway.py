@@ -24,10 +24,10 @@ from solver.results.quantities import declare
 from solver.results.record import Status
 from solver.results.view import ACROSS_TRACK, View
 from solver.scenes.prism_effort import effort_of
-from solver.scenes.prism_outputs import cycles, patch, section
+from solver.scenes.prism_outputs import cycles, patch, section, sketched
 from solver.scenes.raceway_parameters import RacewayParameters
 from solver.scenes.rolling import AXLE_HEIGHT
-from solver.scenes.scene import Method, Scene
+from solver.scenes.scene import Method, Scene, Sketch
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,6 +76,18 @@ def view(parameters: RacewayParameters) -> View:
     )
 
 
+def sketch(parameters: RacewayParameters) -> Sketch:
+    """Return the section of the raceway, and the ball or roller at first touch."""
+    from solver.scenes.raceway_track import geometry, section_of
+
+    own, radius = geometry(parameters), parameters.across
+    wide = own.block if own.groove is None else min(own.block, own.groove[1])
+    z = min(0.95 * radius, wide) * np.linspace(-1.0, 1.0, 201)
+    height = radius - np.sqrt(radius**2 - z**2)
+    rolls = {"ball or roller": np.stack([z, height])}
+    return sketched("raceway", section_of(own), parameters.material(), rolls)
+
+
 def elastic(run: FinishedRun) -> Values:
     """Return the elastic Hertz contact, and the height of the ball or roller over first touch."""
     p: Any = run.parameters
@@ -112,6 +124,7 @@ RACEWAY = Scene(
     branch="passes",
     method=method,
     view=view,
+    sketch=sketch,
     outputs=(maps, profiles, residual_extremes, extremes, patch, section, cycles, elastic),
     costs=(cost,),
     effort=effort,

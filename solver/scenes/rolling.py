@@ -33,7 +33,7 @@ from solver.results.quantities import declare
 from solver.results.record import Status
 from solver.scenes.passes import Trace, passes, shakedown_of
 from solver.scenes.rolling_effort import effort
-from solver.scenes.rolling_model import model
+from solver.scenes.rolling_model import model, sketch
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_view import view
 from solver.scenes.scene import Method, Scene, by_increments
@@ -232,6 +232,7 @@ ROLLING = Scene(
     branch="passes",
     method=method,
     model=model,
+    sketch=sketch,
     program=program,
     view=view,
     outputs=(

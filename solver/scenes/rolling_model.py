@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.materials.material import Material
 from solver.mesh import grid, mapped, merged, within
+from solver.mesh.endless import track_lines
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.model.motion import Axle, TravellingPressure
 from solver.scenes.rolling_grids import half_space_nodes, wheel_nodes
+from solver.scenes.scene import Sketch
 
 if TYPE_CHECKING:
     from skfem import Mesh
@@ -97,6 +100,28 @@ def _wheel(parameters: RollingParameters) -> Body:
         turned=-turned,
     )
     return wheel_body(axle, parameters.reach, parameters.element_size, parameters.wheel_material)
+
+
+def sketch(parameters: RollingParameters) -> Sketch | None:
+    """Return the bodies of steady passes, the load at x = 0; None of passes by increments."""
+    from solver.steady.track import CONTACT, half_space_body, standing_pressure
+
+    p = parameters
+    if not p.endless:
+        return None
+    lines, a = track_lines(p.mesh_width, p.element_size, p.growth), p.mesh_width
+    body = half_space_body(*lines, CONTACT * a, p.material().elasticity)
+    half_space = replace(body, material=p.material())
+    if p.load == "hertz":
+        pressure = standing_pressure(p.peak_pressure, p.friction * p.traction, p.half_width)
+        return Sketch((replace(half_space, travelling=pressure),))
+    still = Amplitude.constant(0.0)
+    axle = Axle(
+        centre=(0.0, p.radius), radius=p.radius, force=Amplitude.constant(p.force), moment=still,
+        position=still,
+    )  # fmt: skip
+    wheel = wheel_body(axle, p.widest.reach, p.element_size, p.wheel_material)
+    return Sketch((wheel, half_space), ((("half_space", "contact"), ("wheel", "rim")),))
 
 
 def model(parameters: RollingParameters) -> Model:

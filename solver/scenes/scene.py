@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Seq
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import tee
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 from solver.errors import LimitLoad
 from solver.loading.control import Control
@@ -24,6 +24,10 @@ from solver.results.view import View
 from solver.scenes.effort import Effort
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from solver.model.body import Body
     from solver.results.audit.report import Audit
     from solver.results.named_places import NamedPlaces
     from solver.results.samples import Samples
@@ -40,6 +44,23 @@ def _no_increments(parameters: Any) -> NoReturn:
     """Raise: neither model nor program of increments is known."""
     del parameters
     raise NotImplementedError("this scene is computed by its own method alone, not by increments")
+
+
+class Sketch(NamedTuple):
+    """The bodies of a scene before loading, in the plane of its map, where it has no model.
+
+    Attributes
+    ----------
+    bodies : bodies with the meshes on which the scene is computed
+    pairs : sides (body, boundary) that may touch
+    springs : boundaries on springs, by body
+    curves : (2, n) more surfaces by name [mm]
+    """
+
+    bodies: tuple[Body, ...]
+    pairs: tuple[tuple[tuple[str, str], ...], ...] = ()
+    springs: Mapping[str, Sequence[str]] = {}
+    curves: Mapping[str, NDArray[np.float64]] = {}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +80,7 @@ class Scene:
         whose ``method`` needs no increments has neither model nor program
     program : (parameters) -> loading history; a stage ``unloaded`` ends every lap
     view : (parameters) -> positions of results
+    sketch : (parameters) -> its bodies, where its model is not what is computed, else None
     places : (parameters) -> named places and numbers requested at them
     outputs : functions that compute quantities of a complete run
     costs : functions that compute quantities of every run, also of one that failed
@@ -90,6 +112,7 @@ class Scene:
     view: Callable[[Any], View]
     outputs: tuple[Output, ...]
     costs: tuple[Output, ...]
+    sketch: Callable[[Any], Sketch | None] | None = None
     places: Callable[[Any], NamedPlaces] | None = None
     method: Callable[[Any], Method] | None = None
     trace: Callable[[Samples, Mapping[str, Any]], Any] | None = None

@@ -23,9 +23,9 @@ from solver.results.quantities import declare
 from solver.results.record import Status
 from solver.results.view import ACROSS_TRACK, View
 from solver.scenes.prism_effort import effort_of
-from solver.scenes.prism_outputs import cycles, patch, section
+from solver.scenes.prism_outputs import cycles, patch, section, sketched
 from solver.scenes.rolling import AXLE_HEIGHT
-from solver.scenes.scene import Method, Scene
+from solver.scenes.scene import Method, Scene, Sketch
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
 
 if TYPE_CHECKING:
@@ -95,6 +95,17 @@ def view(parameters: WheelRailParameters) -> View:
     )
 
 
+def sketch(parameters: WheelRailParameters) -> Sketch:
+    """Return the section of the rail, and the wheel of the last pass at first touch."""
+    from solver.scenes.wheel_rail_track import geometry, meshed
+
+    z = np.linspace(-_HALF_HEAD, _HALF_HEAD, 20 * round(_HALF_HEAD) + 1)
+    height = _at_first_touch(parameters.each_pass()[-1], z)
+    there = np.isfinite(height)
+    own, wheel = meshed(parameters, geometry(parameters)), np.stack([z[there], height[there]])
+    return sketched("rail", own, parameters.material(), {"wheel": wheel})
+
+
 def traffic(run: FinishedRun) -> Values:
     """Return the figures of every pass, with its load, position and traction."""
     each = run.parameters.each_pass()
@@ -119,17 +130,24 @@ def wheel(run: FinishedRun) -> Values:
     The height is that of the axle over the one at which the undeformed bodies touch; the moment is
     that about the vertical through the running circle.
     """
-    from solver.scenes.wheel_rail_contact import expected_contact, wheel_of
+    from solver.scenes.wheel_rail_contact import expected_contact
 
     contact = cast("PatchContact", run.outcome.points[run.view.loaded].touching)
-    p, z = run.parameters.each_pass()[-1], run.view.z
-    own, gap = wheel_of(p), expected_contact(p).gap
+    p = run.parameters.each_pass()[-1]
     return {
-        AXLE_HEIGHT: contact.height + gap,
+        AXLE_HEIGHT: contact.height + expected_contact(p).gap,
         AXLE_LATERAL_CREEPAGE: contact.lateral_creepage,
         SPIN_MOMENT: contact.spin_moment + p.lateral_position * float(contact.force[0]),
-        WHEEL_SURFACE: own.surface(own.lowest(z), z) - gap,
+        WHEEL_SURFACE: _at_first_touch(p, run.view.z),
     }
+
+
+def _at_first_touch(p: WheelRailParameters, z: Array) -> Array:
+    """Return the height of the undeformed wheel where it first touches, inf where it is not."""
+    from solver.scenes.wheel_rail_contact import expected_contact, wheel_of
+
+    own = wheel_of(p)
+    return own.surface(own.lowest(z), z) - expected_contact(p).gap
 
 
 def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
@@ -150,6 +168,7 @@ WHEEL_RAIL = Scene(
     branch="passes",
     method=method,
     view=view,
+    sketch=sketch,
     outputs=(maps, profiles, residual_extremes, extremes, patch, section, traffic, wheel),
     costs=(cost,),
     effort=effort,

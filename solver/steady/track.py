@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_CONTACT = 2.0
+CONTACT = 2.0
 """Ratio of half the length of the surface that may come into contact to the half-width."""
 
 
@@ -79,8 +79,8 @@ class Track:
             raise ModelError("element_size", h, allowed)
         self.half_width = a
         self._lines = track_lines(a, h, growth, reach)
-        self._contact = _CONTACT * reach * a
-        self.part = Discretisation(_body(*self._lines, self._contact, elasticity))
+        self._contact = CONTACT * reach * a
+        self.part = Discretisation(half_space_body(*self._lines, self._contact, elasticity))
         self._window = h * ahead, h * behind, window_depth(a, reach)
         self.rows = FlowRows(self.part, self.operator, *self._window, interleaved=interleaved)
 
@@ -88,7 +88,7 @@ class Track:
     def mirrored(self) -> Discretisation:
         """The half-plane seen along -x."""
         x, y = self._lines
-        return Discretisation(_body(-x[::-1], y, self._contact, self.elasticity))
+        return Discretisation(half_space_body(-x[::-1], y, self._contact, self.elasticity))
 
     @cached_property
     def mirror(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -193,7 +193,8 @@ def standing_pressure(half_width: float, peak: float, shear_ratio: float) -> Tra
     )
 
 
-def _body(x: Array, y: Array, contact: float, elasticity: Elasticity) -> Body:
+def half_space_body(x: Array, y: Array, contact: float, elasticity: Elasticity) -> Body:
+    """Return the half-plane with grid lines x, y, which may touch within ``contact`` of x = 0."""
     return Body(
         name="half_space",
         mesh=within(grid(x, y), "contact", ["top"], x=(-contact, contact)),

@@ -10,6 +10,7 @@ import dataclasses
 import json
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from types import UnionType
@@ -20,7 +21,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from solver.parameters import is_number
 from solver.scenes import Scene
-from studies.errors import StudyError
+from studies.errors import StudyError, one_of
 from studies.scenes.registry import scene_named
 
 _RELATIONS = {
@@ -74,6 +75,21 @@ class Parameter:
         if isinstance(typed, float) and not math.isfinite(typed):
             raise self.refusal(field, value)
         return self._type.dump_python(typed, mode="json")
+
+    def read(self, text: str, field: str) -> Any:
+        """Return the normalised value that a text stands for: a word, or else JSON.
+
+        Raises
+        ------
+        StudyError
+            naming `field`, when it stands for none
+        """
+        with suppress(StudyError):
+            return self.normalise(text, field)
+        try:
+            return self.normalise(json.loads(text), field)
+        except (ValueError, RecursionError):
+            raise self.refusal(field, text) from None
 
     def typed(self, value: Any) -> Any:
         """Return a normalised value in the type of the parameter object; None if left out."""
@@ -142,6 +158,21 @@ def build(scene: Scene, values: Mapping[str, Any]) -> Any:
     """
     known = parameters_of(scene)
     return scene.parameters(**{name: known[name].typed(value) for name, value in values.items()})
+
+
+def read_values(scene: Scene, texts: Mapping[str, str]) -> dict[str, Any]:
+    """Return normalised values of parameters that are given as texts.
+
+    Raises
+    ------
+    StudyError
+        if there is no such parameter, or it cannot have such a value
+    """
+    known = parameters_of(scene)
+    for name, text in texts.items():
+        if name not in known:
+            raise StudyError(name, text, one_of(name, known))
+    return {name: known[name].read(text, name) for name, text in texts.items()}
 
 
 def completed(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:

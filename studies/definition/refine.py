@@ -24,6 +24,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.definition.cells import KINK, Cell, Point, weights
@@ -325,17 +327,22 @@ class Refinement(Chooser):
         Cells that miss more than is allowed are to be divided after all.
         """
         known = {each: number for each in self.asked if (number := self.number(each))}
+        keys = list(known)
+        branches = np.array([each.branch for each in keys])
+        at = np.array([each.point for each in keys], dtype=float).reshape(-1, len(self.refine.axes))
         settled, self.settled = self.settled, []
         for cell, state, left in settled:
             axes: set[int] = set()
             misses = [left]
             own = {at: known[Wanted(cell.branch, at)] for at in points_of(cell)} if left else {}
-            for (branch, at), number in known.items() if left else ():
-                if at in own or not cell.holds(branch, at):
+            inside = (branches == cell.branch) & (at >= cell.low).all(1) & (at <= cell.high).all(1)
+            for each in (keys[k] for k in np.flatnonzero(inside)) if left else ():
+                if each.point in own:
                     continue
-                misses.append(_off(cell, own, at, number))
+                misses.append(_off(cell, own, each.point, known[each]))
                 if self._ratio(misses[-1]) > 1.0:
-                    axes |= {k for k, x in enumerate(at) if x not in (cell.low[k], cell.high[k])}
+                    ends = zip(cell.low, each.point, cell.high, strict=True)
+                    axes |= {k for k, (low, x, high) in enumerate(ends) if low < x < high}
             most = tuple(map(max, zip(*misses, strict=True)))
             can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
             if can and state == SETTLED:
@@ -363,7 +370,7 @@ class Refinement(Chooser):
             for cell, axes, _, left in sorted(own, key=lambda each: each.order):
                 parts = cell.parts(axes)
                 new = {Wanted(part.branch, at) for part in parts for at in points_of(part)}
-                full = full or len(self.asked.keys() | new) > self.refine.most
+                full = full or len(self.asked) + len(new - self.asked.keys()) > self.refine.most
                 if full:
                     self.settled.append(RefinedCell(cell, MOST, left))
                     continue

@@ -13,7 +13,7 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.loading.program import Program, walked
 from solver.parameters import Accuracy, by_accuracy, check, described
-from solver.results.cycles import over_cycles
+from solver.results.cycles import LEAST, over_cycles
 from solver.results.figures import cost
 from solver.results.named_places import NamedPlaces, at_named_places
 from solver.results.outputs import outputs
@@ -160,7 +160,12 @@ def _effort(description: Description, parameters: Any, values: Sequence[Any]) ->
     if in_one_increment(scene):
         return effort_of(description, scene, [1] * (len(values) if branch else 1))
     if not branch:
-        return effort_of(description, scene, [_program(description, parameters).count])
+        most, files = _program(description, parameters).count, description.meshes
+        if scene.repeat is None or scene.repeat.until is None:
+            return effort_of(description, scene, [most])
+        fewest = scene.repeat.model_copy(update={"times": LEAST})
+        least = program_of(scene.model_copy(update={"repeat": fewest}), files).count
+        return replace(effort_of(description, scene, [least]), most_increments=most)
     runs = [replace(parameters, **{branch: value}) for value in sorted(values)]
     return effort_of(description, scene, [walked([_program(description, r) for r in runs])])
 

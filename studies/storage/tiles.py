@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 
-from studies.storage.frame import NO_COORDINATE
 from studies.storage.readback import internal, plain
 from studies.storage.seal import State, state_of
 
@@ -158,6 +157,8 @@ def _attributes(attributes: Mapping[str, Any]) -> Document:
 def _chunk(path: Path, name: str, array: Document, at: tuple[int, ...]) -> bytes | None:
     """Return a packed chunk; None if there is none, or nothing was written in it."""
     import h5py
+
+    from studies.storage.frame import NO_COORDINATE
 
     shape, sizes = array["shape"], array["chunk_grid"]["configuration"]["chunk_shape"]
     begin = [number * size for number, size in zip(at, sizes, strict=True)]

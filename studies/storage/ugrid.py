@@ -88,6 +88,11 @@ def owns(name: str, dims: Iterable[Hashable]) -> bool:
     return name == _MESH or not {_TIME, _NODE, _FACE, _CELL}.isdisjoint(dims)
 
 
+def keeps(run: xr.Dataset) -> bool:
+    """Whether the data set of a run has the fields at the nodes."""
+    return run.attrs.get(KEEP) == FIELDS and _MESH in run.variables
+
+
 def read(run: xr.Dataset) -> MeshFields:
     """Return the fields at the nodes from the data set of a run.
 
@@ -96,7 +101,7 @@ def read(run: xr.Dataset) -> MeshFields:
     StudyError
         if it has none
     """
-    if run.attrs.get(KEEP) != FIELDS or _MESH not in run.variables:
+    if not keeps(run):
         allowed = 'keeps no fields: its study must say keep = "fields", and the run must succeed'
         raise StudyError("run", run.attrs.get("id", ""), allowed)
     cells, of = (_nodes(run[name]) for name in ("mesh_cell_nodes", "mesh_cell_body"))
@@ -113,6 +118,7 @@ def read(run: xr.Dataset) -> MeshFields:
             "stress": np.stack([_at(run, f"stress_{c}", k) for c in parts]),
             "mises": _at(run, "mises", k),
             "plastic_strain": _at(run, "plastic_strain", k),
+            "plastic_tensor": np.stack([_at(run, f"plastic_strain_{c}", k) for c in parts]),
         }
         for k in range(run.sizes[_TIME])
     ]
@@ -128,9 +134,11 @@ def _parts(fields: MeshFields) -> dict[str, np.ndarray]:
         for name in next(iter(fields.stages.values()))
     }
     moved, stress = stacked.pop("displacement"), stacked.pop("stress")
+    plastic, names = stacked.pop("plastic_tensor"), components(stress.shape[1])
     return {
         **{f"displacement_{a}": moved[:, k] for k, a in enumerate(AXES[: moved.shape[1]])},
-        **{f"stress_{c}": stress[:, k] for k, c in enumerate(components(stress.shape[1]))},
+        **{f"stress_{c}": stress[:, k] for k, c in enumerate(names)},
+        **{f"plastic_strain_{c}": plastic[:, k] for k, c in enumerate(names)},
         **stacked,
     }
 
@@ -138,7 +146,7 @@ def _parts(fields: MeshFields) -> dict[str, np.ndarray]:
 def _unit(name: str) -> str:
     if name.startswith("displacement"):
         return "mm"
-    return "1" if name == "plastic_strain" else "MPa"
+    return "1" if name.startswith("plastic_strain") else "MPa"
 
 
 def _whole(values: np.ndarray) -> np.ndarray:

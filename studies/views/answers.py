@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -108,7 +106,5 @@ def answer(
 def _json(value: Any, parameter: Parameter) -> Any:
     """Return a value of a coordinate as that of its parameter, of which a data set has the JSON."""
     if isinstance(value, str):
-        with suppress(StudyError):
-            return parameter.normalise(value, parameter.name)
-        value = json.loads(value)
+        return parameter.read(value, parameter.name)
     return None if isinstance(value, float) and math.isnan(value) else value

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import operator
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,14 +11,10 @@ import xarray as xr
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError, one_of
 from studies.views.columns import in_blocks, stacked, value_text
+from studies.views.numbers import table_of
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import sweep_fields
-
-_COMPARED: Mapping[str, Callable[[Any, Any], Any]] = {
-    "<=": operator.le, ">=": operator.ge, "!=": operator.ne, "<": operator.lt, ">": operator.gt,
-    "=": operator.eq,
-}  # fmt: skip
-_CONDITION = re.compile(r"\s*(?P<name>\w+)\s*(?P<sign><=|>=|!=|<|>|=)\s*(?P<value>.*?)\s*")
+from studies.views.table import STATUS
 
 
 def best_runs(
@@ -52,14 +46,14 @@ def best_runs(
     known = sweep_fields(dataset)
     if of not in known or of == "status":
         raise StudyError("of", of, one_of(of, [name for name in known if name != "status"]))
-    left = (dataset["status"] == OK) & dataset[of].notnull()
+    table = table_of(dataset)
+    left = (table.columns[STATUS].values == OK) & ~np.isnan(table.columns[of].values)
     for text in where:
-        left = left & _meets(dataset, text)
-    left = left.transpose(*dataset["status"].dims)
+        left &= table.meeting(text)
     if not left.any():
         conditions = ", ".join(where) or "any"
         raise StudyError("where", conditions, "no run that succeeded meets this")
-    places = np.argwhere(left.to_numpy())
+    places = np.argwhere(left.reshape(dataset["status"].shape))
     numbers = dataset[of].to_numpy()[tuple(places.T)]
     order = np.argsort(numbers if lowest else -numbers, kind="stable")[:count]
     axes = sweep_axes(dataset)
@@ -85,25 +79,3 @@ def best_table(dataset: xr.Dataset, of: str, runs: Sequence[Mapping[str, Any]]) 
     second = ["" if unit in {"", "1"} else f"[{unit}]" for unit in units]
     headings = [name.replace("_", " ") for name in runs[0]]
     return in_blocks([*stacked(headings), second, *lines], 1, right=len(headings) - 1)
-
-
-def _meets(dataset: xr.Dataset, text: str) -> xr.DataArray:
-    """Return where the runs of a study meet a condition."""
-    match = _CONDITION.fullmatch(text)
-    known = [*sweep_coordinates(dataset), *sweep_fields(dataset)]
-    if match is None:
-        raise StudyError("where", text, "must be NAME<VALUE, with <, <=, >, >=, = or !=")
-    if match["name"] not in known:
-        raise StudyError("where", text, one_of(match["name"], known))
-    values, compared = dataset[match["name"]], _COMPARED[match["sign"]]
-    codes = {name: code for code, name in flags(values).items()}
-    if match["name"] != "status" and match["value"] in codes:
-        return xr.DataArray(compared(values, codes[match["value"]]))
-    if values.dtype.kind not in "fiu":
-        if match["sign"] not in {"=", "!="}:
-            raise StudyError("where", text, f"{match['name']} has words: compare them by = or !=")
-        return xr.DataArray(compared(values, match["value"]))
-    try:
-        return xr.DataArray(compared(values, float(match["value"])))
-    except ValueError:
-        raise StudyError("where", text, f"{match['value']!r} must be a number") from None

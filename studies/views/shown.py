@@ -10,9 +10,10 @@ import xarray as xr
 
 from solver.tensors import AXES
 from studies.errors import StudyError
+from studies.views.plots.captions import DISTANCE
 from studies.views.plots.fields import (
-    DISTANCE,
     check_field,
+    component_names,
     component_of,
     depth_shown,
     line_axis,
@@ -138,7 +139,9 @@ def _lines(run: xr.Dataset, field: str, component: str | None) -> Shown:
 def _described(run: xr.Dataset, name: str) -> dict[str, Any]:
     """Return name, meaning and unit of a variable, and its components and stages."""
     values = run[name]
-    own = {each: _labels(run, each)["labels"] for each in ("component", "stage")}
+    own = {"stage": _labels(run, "stage")["labels"]}
+    if "component" in values.dims:
+        own["component"] = component_names(values)
     return {
         "name": name,
         "words": str(values.attrs.get("long_name", name.replace("_", " "))),

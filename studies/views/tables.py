@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from studies.views.picking import flags, sweep_axes, sweep_coordinates
 
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*[A-Za-z_])")
 """A number in a message, not the digits of a name."""
+_AUDIT = "audit_"
 _AWAY = "audit_plastic_strain"
 _MARK = "*"
 FOOTNOTE = (
@@ -28,6 +29,8 @@ FOOTNOTE = (
     "mesh and need not\n  converge as the mesh is refined\n"
 )
 
+_ROUNDED = 1e-9
+"""Ratio of a number to the largest of its unit in a table; below it, it is printed as 0."""
 NAMED = 4
 """Largest number of runs that are named for a message; further ones are counted."""
 
@@ -77,7 +80,8 @@ def run_cells(dataset: xr.Dataset) -> RunCells:
     units: list[str] = [_unit(dataset[name]) for name in places]
     units += ["", *(_unit(each) for _, each, _ in figures)]
     values = {name: dataset[name].to_numpy() for name in (*places, "status")}
-    cells = [_cells(each, spoiled) for _, each, spoiled in figures]
+    levels = _levels(each for _, each, _ in figures)
+    cells = [_cells(_clean(each, levels), spoiled) for _, each, spoiled in figures]
     rows: list[list[str]] = []
     for at in np.ndindex(values["status"].shape):
         place = dict(zip(sweep_axes(dataset), at, strict=True))
@@ -85,6 +89,23 @@ def run_cells(dataset: xr.Dataset) -> RunCells:
         rows.append([*where, str(values["status"][at]), *(str(each[at]) for each in cells)])
     marked = any(bool(spoiled.any()) for *_, spoiled in figures)
     return RunCells(headings, units, rows, keys, len(places) + 1, marked)
+
+
+def _levels(variables: Iterable[xr.DataArray]) -> dict[str, float]:
+    """Return the largest magnitude of numbers by their unit."""
+    levels: dict[str, float] = {}
+    for each in variables:
+        if each.dtype.kind == "f":
+            size = float(np.nanmax(np.abs(each.to_numpy()), initial=0.0))
+            levels[_unit(each)] = max(levels.get(_unit(each), 0.0), size)
+    return levels
+
+
+def _clean(values: xr.DataArray, levels: Mapping[str, float]) -> xr.DataArray:
+    """Return numbers with zero for what is rounding beside others of their unit."""
+    if values.dtype.kind != "f" or not (unit := _unit(values)):
+        return values
+    return values.where(~(abs(values) < _ROUNDED * levels.get(unit, 0.0)), 0.0)
 
 
 def _cells(values: xr.DataArray, spoiled: xr.DataArray) -> np.ndarray:
@@ -134,7 +155,7 @@ def _own(dataset: xr.Dataset) -> list[str]:
     numbers = {str(n): v for n, v in dataset.data_vars.items() if v.dtype.kind in "fiub"}
     names = [name for name, each in numbers.items() if each.dims == rank]
     known = QUANTITIES.keys() | LABEL_ATTRIBUTES.keys()
-    own = [name for name in names if name not in known and not name.startswith("audit_")]
+    own = [name for name in names if name not in known and not name.startswith(_AUDIT)]
     ends = {f"_{axis}" for axis in AXES}
     return [name for name in own if name[-2:] not in ends or name[:-2] not in own]
 
@@ -190,13 +211,17 @@ def run_details(dataset: xr.Dataset) -> str:
     if message := str(dataset["message"].item()):
         lines.append(["message", message])
     rank = dataset["status"].ndim
-    lines += [
-        [str(name), f"{_figure(each)} {_bracketed(_unit(each))}".rstrip()]
+    shown = {
+        str(name): each
         for name, each in dataset.data_vars.items()
         if each.ndim == rank
         and name not in {"status", "message"}
         and not owns(str(name), each.dims)
-    ]
+    }
+    levels = _levels(each for name, each in shown.items() if not name.startswith(_AUDIT))
+    for name, each in shown.items():
+        value = each if name.startswith(_AUDIT) else _clean(each, levels)
+        lines.append([name, f"{_figure(value)} {_bracketed(_unit(each))}".rstrip()])
     return aligned(lines)
 
 

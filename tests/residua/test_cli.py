@@ -272,6 +272,10 @@ def test_show_takes_a_run_a_study_or_a_directory(
         assert main(["show", str(path)]) == 0
         assert capsys.readouterr().out.count(" ok ") == study.size
     assert main(["show", str(store.directory / "nowhere")]) == 2
+    for name in (study.name, study.id[:6], "latest"):
+        assert main(["show", str(store.directory), "--study", name]) == 0
+        assert capsys.readouterr().out.count(" ok ") == study.size
+    assert main(["show", str(store.directory), "--study", "nowhere"]) == 2
 
 
 @pytest.mark.processes
@@ -338,6 +342,22 @@ def test_the_bar_stays_on_one_line_and_counts_failures() -> None:
     drawn = screen.getvalue()
     assert drawn.count("\n") == 1
     assert "100 %  4 of 4 runs, 1 failed" in drawn.split("\r")[-1]
+
+
+@pytest.mark.parametrize("screen", [Terminal(), io.StringIO()])
+def test_the_time_left_is_told_at_the_pace_so_far(
+    screen: io.StringIO, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, clock = fake_study(), iter((0.0, 0.0, 3600.0, 5400.0, 7290.0))
+    monkeypatch.setattr("residua.progress.time.monotonic", lambda: next(clock))
+    monkeypatch.setattr("residua.progress._REDRAW", -1.0)
+    first = next(study.cases())
+    bar = Progress(study, screen)
+    bar(StudyEvent(kind="path", progress=0.0, path="a"))
+    bar(StudyEvent(kind="run", progress=0.5, path="a", run=first.id, status="ok"))
+    assert screen.getvalue().rstrip("\x1b[K\n").endswith("left")
+    left = screen.getvalue().split()[-2:]
+    assert left[0] in ("1:00:00", "1:30:00")
 
 
 @pytest.mark.parametrize("screen", [Terminal(), io.StringIO()])

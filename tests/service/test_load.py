@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -24,14 +25,13 @@ import psutil
 import pytest
 from fastapi import FastAPI
 
-from service import maps, probe
+from service import probe
 from service.app import create_app
 from service.connections import limited
 from service.errors import Busy, NoRoom, status_of
 from service.examiner import examined
 from service.jobs import Jobs
 from service.maps import Pictures
-from service.schemas import MapQuery
 from service.settings import Settings
 from studies import Store, StoreFull, Study, StudyError
 from studies.errors import Unusable
@@ -222,24 +222,24 @@ class Drawer:
 
     def __init__(self, size: int) -> None:
         self.size = size
-        self.drawn: list[float | None] = []
+        self.drawn: list[int] = []
         self.go = threading.Event()
 
-    def __call__(self, path: Path, query: MapQuery) -> bytes:
+    def __call__(self, zoom: int) -> bytes:
         self.go.wait(10.0)
-        self.drawn.append(query.zoom)
+        self.drawn.append(zoom)
         return bytes(self.size)
 
 
-def test_a_picture_is_drawn_once_for_all_who_ask(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_picture_is_drawn_once_for_all_who_ask() -> None:
     drawer = Drawer(size=10)
-    monkeypatch.setattr(maps, "draw", drawer)
 
     async def ask() -> None:
         pictures = Pictures(queue=2, memory=25)
 
         def get(zoom: int) -> asyncio.Task[bytes]:
-            return asyncio.create_task(pictures.get(str(zoom), Path(), MapQuery(zoom=zoom)))
+            draw = partial(pictures.alone, drawer, zoom)
+            return asyncio.create_task(pictures.get(str(zoom), draw))
 
         tasks = [get(zoom) for zoom in (1, 2, 3, 1, 2, 3)]
         await asyncio.sleep(0.01)

@@ -217,8 +217,9 @@ def test_a_study_computed_without_the_service_is_found_when_it_starts(tmp_path: 
         assert total == 2
         states = {job.id: job.state for job in jobs}
         assert states == {known.id: StudyState.ACCEPTED, ended.id: StudyState.SUCCESSFUL}
-    (job,), _ = open_queue(path, store, None).page(limit=9, offset=0, tag="own")
-    assert job.name == "by-hand"
+    for which in ({"tag": "own"}, {"name": "by-hand"}):
+        (job,), _ = open_queue(path, store, None).page(limit=9, offset=0, **which)
+        assert job.name == "by-hand"
 
 
 def test_in_a_queue_made_anew_what_is_computed_is_running(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from typing import Any
 
+import httpx
 import matplotlib.image
 import numpy as np
 import pytest
@@ -18,8 +19,9 @@ def runs(service: Server) -> list[dict[str, Any]]:
     """The runs of a study: two loads, the friction of 0.3 unlike any other test's."""
     study = fake_study("catalogued", hardening="isotropic")
     study["sweep"]["friction"] = [0.125, 0.875]
-    found: list[dict[str, Any]] = service.finished(service.post(study))["runs"]
-    return found
+    done = service.finished(service.post(study))
+    found: list[dict[str, Any]] = done["runs"]
+    return [each | {"study": done["id"]} for each in found]
 
 
 @pytest.mark.parametrize(
@@ -103,6 +105,29 @@ def test_a_map_that_cannot_be_drawn_is_refused_by_field(
     (error,) = answer.json()["errors"]
     assert error["field"] == field and str(error["value"]) == str(query[field])
     assert allowed in error["allowed"]
+
+
+def picture_of(answer: httpx.Response) -> np.ndarray:
+    assert answer.status_code == 200, answer.text
+    assert answer.headers["content-type"] == "image/png"
+    return matplotlib.image.imread(io.BytesIO(answer.content), format="png")
+
+
+def test_a_number_of_the_runs_is_drawn_over_the_sweep(
+    service: Server, runs: list[dict[str, Any]]
+) -> None:
+    sweep, asked = f"/studies/{runs[0]['study']}/plot.png", {"resolution": 60}
+    own = {"friction": runs[0]["at"]["friction"]}
+    number = {"field": "max_plastic_strain"}
+    whole, part, usual = (
+        picture_of(service.client.get(sweep, params=asked | more))
+        for more in (number, number | own, own)
+    )
+    assert not np.array_equal(whole, part)
+    assert usual.shape != part.shape
+    for wrong, name in (({"field": "nonsense"}, "field"), (number | {"fricton": 1}, "fricton")):
+        answer = service.client.get(sweep, params=wrong)
+        assert answer.status_code == 422 and name in answer.text
 
 
 def test_a_map_has_the_window_and_the_resolution_that_are_asked_for(

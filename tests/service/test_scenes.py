@@ -133,6 +133,28 @@ def test_a_study_names_a_posted_scene_by_its_name_if_no_other_has_it(service: Se
     assert one in mistake["allowed"] and other in mistake["allowed"]
 
 
+def test_a_scene_is_drawn_before_anything_is_computed(service: Server, pin: str) -> None:
+    sizes = {}
+    for asked in ({}, {"clearance": 0.1}, {"window": [0, 20, -20, 0]}):
+        answer = service.client.get(f"/scenes/{pin}/draw.png", params={"resolution": 50} | asked)
+        assert answer.status_code == 200, answer.text
+        sizes[str(asked)] = answer.content
+    assert all(each.startswith(b"\x89PNG") for each in sizes.values())
+    assert len(set(sizes.values())) == 3
+    for asked, field, allowed in (
+        ({"clarence": 1}, "clarence", "did you mean clearance"),
+        ({"clearance": 9}, "clearance", "at most 0.2"),
+        ({"clearance": "wide"}, "clearance", "must be a finite number"),
+        ({"window": [5, 4, 0, 1]}, "window", "must be x0 x1 y0 y1"),
+        ({"zoom": -1}, "zoom", "greater than 0"),
+    ):
+        answer = service.client.get(f"/scenes/{pin}/draw.png", params=asked)
+        assert answer.status_code == 422, asked
+        (mistake,) = answer.json()["errors"]
+        assert mistake["field"] == field and allowed in mistake["allowed"]
+    assert service.client.get(f"/scenes/{'0' * 32}/draw.png").status_code == 404
+
+
 def test_a_posted_scene_is_listed_and_described(service: Server, pin: str) -> None:
     listed = {each["id"]: each for each in service.client.get("/scenes").json()}
     assert listed[pin]["name"] == "pin"
@@ -160,8 +182,17 @@ def test_a_study_of_a_posted_scene_has_the_ids_and_numbers_of_the_file(
         np.testing.assert_array_equal(ours[name], theirs[name], err_msg=str(name))
     found = service.client.get("/runs", params={"scene": "pin", "clearance": 0.02}).json()
     assert [run["id"] for run in found["items"]] == [done["runs"][1]["id"]]
-    picture = service.client.get(f"/runs/{done['runs'][0]['id']}/map.png")
+    run = f"/runs/{done['runs'][0]['id']}"
+    picture = service.client.get(f"{run}/map.png")
     assert picture.status_code == 200, picture.text
+    asked = {"field": "line_stress", "component": "yy", "line": "below", "resolution": 60}
+    answer = service.client.get(f"{run}/line.png", params=asked)
+    assert answer.content.startswith(b"\x89PNG"), answer.text
+    tag = {"if-none-match": answer.headers["etag"]}
+    assert service.client.get(f"{run}/line.png", params=asked, headers=tag).status_code == 304
+    for wrong in ({"field": "residual_stress"}, asked | {"lyne": "below"}, asked | {"line": "no"}):
+        assert service.client.get(f"{run}/line.png", params=wrong).status_code == 422
+
     page = service.client.get(f"/ui/runs/{done['runs'][0]['id']}").text
     assert "yield stress of the plate" in page
 
@@ -203,7 +234,8 @@ def test_all_mistakes_are_in_the_answer(service: Server) -> None:
     assert answer.status_code == 422
     told = {each["field"]: each["allowed"] for each in answer.json()["errors"]}
     assert "did you mean friction?" in told["contacts[0].frictoin"]
-    assert told["loads[0].value"].startswith("must be a number or an expression of x and y; ")
+    allowed = "must be a number, a table or an expression of x and y; "
+    assert told["loads[0].value"].startswith(allowed)
     assert "has no effect" in told["parameters.mu"]
 
 
@@ -219,7 +251,7 @@ def test_bodies_are_built_before_a_scene_is_kept(service: Server) -> None:
     ("scene", "meshes", "field", "words"),
     [
         (b"name = ", {}, "scene", "valid TOML"),
-        (b"\xff\xfe", {}, "scene", "valid TOML"),
+        (b"\xff\xfe", {}, "scene", "saved as UTF-8"),
         (PIN, {}, "bodies.plate.mesh", "no such file"),
         (PIN, {"pin_msh": b"$MeshFormat"}, "bodies.plate.mesh", "cannot be read"),
         (PIN, {"pin_msh": MESH, "other_msh": MESH}, "meshes", "that the scene names: pin.msh"),

@@ -23,10 +23,10 @@ from service.maps import Pictures
 from service.pages.form import as_toml, study_of
 from service.pages.run import audited
 from service.settings import Settings
-from service.table import RunTable, _column
-from service.written import FORMS
 from studies import Store, open_netcdf, open_study
 from studies.definition.identity import content_id
+from studies.views.table import RunTable, column_of
+from studies.views.written import FORMS
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE
 
@@ -125,7 +125,10 @@ def test_a_service_without_pyarrow_says_so(seen: Seen, monkeypatch: pytest.Monke
 @pytest.mark.parametrize("begun", ["=", "+", "-", "@", "\t", "\r"])
 def test_a_spreadsheet_takes_no_text_for_a_formula(begun: str) -> None:
     labels = np.array([f"{begun}1+1", "a=b"], dtype=object)
-    columns = [_column("case", labels, "sweep"), _column("x", np.array([-1.5, math.nan]), "result")]
+    columns = [
+        column_of("case", labels, "sweep"),
+        column_of("x", np.array([-1.5, math.nan]), "result"),
+    ]
     text = b"".join(FORMS["csv"].write(columns, np.arange(2))).decode()
     rows = list(csv.reader(io.StringIO(text, newline="")))
     shown = begun.replace("\r", " ")
@@ -138,14 +141,14 @@ def test_a_spreadsheet_takes_no_text_for_a_formula(begun: str) -> None:
 def test_a_table_is_written_in_pieces(form: str) -> None:
     if form == "parquet":
         pytest.importorskip("pyarrow", reason="the extra `parquet` is not installed")
-    columns = [_column(f"c{k}", np.linspace(0.0, k, 60_000), "result") for k in range(3)]
+    columns = [column_of(f"c{k}", np.linspace(0.0, k, 60_000), "result") for k in range(3)]
     sizes = [len(piece) for piece in FORMS[form].write(columns, np.arange(60_000))]
     assert max(sizes) < 0.5 * sum(sizes)
 
 
 @pytest.mark.parametrize(("condition", "kept"), [("1e-12..", 2), ("..1e-12", 1), ("1e-12", 0)])
 def test_a_range_of_small_numbers_has_small_ends(condition: str, kept: int) -> None:
-    column = _column("audit_small", np.array([2e-13, 3e-12, 4e-11, math.nan]), "audit")
+    column = column_of("audit_small", np.array([2e-13, 3e-12, 4e-11, math.nan]), "audit")
     table = RunTable(axes={}, columns={"run": column, "audit_small": column})
     assert len(table.chosen(where={"audit_small": condition})) == kept
 
@@ -175,7 +178,7 @@ def test_runs_that_a_study_chooses_have_their_own_places(
 
 
 def test_numbers_that_stand_for_words_are_filtered_by_words() -> None:
-    column = _column("mode", np.array([0.0, 1.0, math.nan]), "result")
+    column = column_of("mode", np.array([0.0, 1.0, math.nan]), "result")
     column = dataclasses.replace(column, flags={0: "rolls", 1: "slides"})
     table = RunTable(axes={}, columns={"run": column, "mode": column})
     assert table.chosen(where={"mode": "slides, nothing"}).tolist() == [1]

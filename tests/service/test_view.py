@@ -41,7 +41,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Store]:
     store = Store(tmp_path_factory.mktemp("folder") / "out")
     study = fake_study("whole", sweep=AXES)
     compute_here(study, store)
-    store.save_study(fake_study("begun", sweep=AXES | {"load_ratio": [0.3, 0.5, 0.9, 1.0]}))
+    store.save_study(fake_study("begun", sweep=AXES | {"load_ratio": [0.3, 0.9, 1.0]}))
     return study, store
 
 
@@ -92,11 +92,11 @@ def test_a_study_that_is_computed_elsewhere_is_followed(
     folder: tuple[Study, Store], tmp_path: Path
 ) -> None:
     study, store = folder
-    begun = fake_study("begun", sweep=AXES | {"load_ratio": [0.3, 0.5, 0.9, 1.0]})
+    begun = fake_study("begun", sweep=AXES | {"load_ratio": [0.3, 0.9, 1.0]})
     seen = ViewedFolder(store.directory, tmp_path)
     seen.look()
     job = seen.jobs.get(begun.id)
-    assert (job.state, job.progress) == (StudyState.RUNNING, 50.0)
+    assert (job.state, job.progress) == (StudyState.RUNNING, pytest.approx(200 / 3))
     for run in study.run_ids():
         os.utime(store.run_path(run), (0, 0))
     seen.look()
@@ -105,7 +105,7 @@ def test_a_study_that_is_computed_elsewhere_is_followed(
     seen.look()
     job = seen.jobs.get(begun.id)
     assert (job.state, job.progress) == (StudyState.SUCCESSFUL, 100.0)
-    assert len(seen.store.catalogue.rows(seen.jobs.runs(begun.id))) == 8
+    assert len(seen.store.catalogue.rows(seen.jobs.runs(begun.id))) == 6
 
 
 def test_a_data_set_alone_has_the_pages_of_its_runs(

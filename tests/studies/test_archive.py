@@ -13,7 +13,6 @@ from residua.cli import main
 from studies import Store, Study, open_study, summary
 from studies.views.archive import archive
 from studies.views.columns import value_text
-from tests.studies.conftest import compute_here, fake_study
 
 
 @pytest.fixture(scope="module")
@@ -49,15 +48,9 @@ def test_it_has_the_numbers_of_the_data_set(dataset: xr.Dataset) -> None:
     assert "<h2>How it was computed</h2>" in text and dataset.attrs["solver_source"] in text
 
 
-def test_failed_runs_are_told_and_texts_are_texts(tmp_path: Path) -> None:
-    store = Store(tmp_path)
-    sweep = {"load_ratio": [0.3, 0.9]}
-    study = Study.from_dict(
-        {"name": "told", "scene": "fake", "note": "a < b & c", "tags": ["rail"], "sweep": sweep}
-    )
-    compute_here(study, store)
-    with open_study(store.dataset_path(study.id)) as whole:
-        found = whole.load()
+def test_failed_runs_are_told_and_texts_are_texts(dataset: xr.Dataset) -> None:
+    found = dataset.isel(friction=[0]).copy()
+    found.attrs |= {"note": "a < b & c", "tags": "rail"}
     for name in ("status", "message"):
         found[name] = found[name].astype(object)
     found["status"][{"load_ratio": 1}] = "limit_load"
@@ -71,9 +64,6 @@ def test_failed_runs_are_told_and_texts_are_texts(tmp_path: Path) -> None:
     assert len(view.failed) == 2 and "load_ratio = 0.9: the punch <sinks>" in str(view)
 
 
-def test_a_study_of_one_run_and_of_many_columns(tmp_path: Path) -> None:
-    store, study = Store(tmp_path), fake_study("one", sweep={"load_ratio": [0.9]})
-    compute_here(study, store)
-    with open_study(store.dataset_path(study.id)) as one:
-        text = archive(one)
+def test_a_study_of_one_run_has_no_axes(dataset: xr.Dataset) -> None:
+    text = archive(dataset.isel(load_ratio=[0], friction=[0]))
     assert "What varies" not in text and "What is fixed" in text and "1 run" in text

@@ -17,6 +17,7 @@ from solver.mesh import grid
 from studies import Store, Study, StudyError, run_study
 from studies.scenes.scene import read_scene
 from studies.storage import ugrid
+from studies.views.kept import drawn_from
 from studies.views.reading import open_netcdf
 
 pytestmark = [pytest.mark.processes, pytest.mark.solves, pytest.mark.usefixtures("one_worker")]
@@ -29,8 +30,8 @@ CONTENT: dict[str, Any] = {
 
 @pytest.fixture(scope="module")
 def pressed() -> Solution:
-    """Two blocks with different elements, pressed together."""
-    steel = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
+    """Two blocks with different elements, pressed together until the upper one yields."""
+    steel = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=175.0)
     x = np.linspace(0.0, 2.0, 3)
     upper = Body(name="upper", mesh=grid(x, x, "tri"), material=steel, element="tri6",
                  supports={"left": "x"}, pressure={"top": 200.0})  # fmt: skip
@@ -90,6 +91,19 @@ def test_faces_cover_the_bodies_once(kept: tuple[Study, Store]) -> None:
             each = run[name]
             assert (each.attrs["mesh"], each.attrs["location"]) == ("mesh", "node")
             assert each.dims == ("time", "mesh_node")
+
+
+def test_plastic_strain_keeps_the_volume_and_makes_the_equivalent_one(pressed: Solution) -> None:
+    at = pressed.mesh_fields().stages["unloaded"]
+    xx, yy, zz, xy = at["plastic_tensor"]
+    most = at["plastic_strain"].max()
+    assert most > 1e-6
+    np.testing.assert_allclose(xx + yy + zz, 0.0, atol=1e-9 * most)
+    equivalent = np.sqrt(2.0 / 3.0 * (xx**2 + yy**2 + zz**2 + 2.0 * xy**2))
+    assert (equivalent <= (1.0 + 1e-9) * most).all()
+    k = at["plastic_strain"].argmax()
+    assert yy[k] < 0.0 < xx[k]  # pressed flat
+    assert equivalent[k] == pytest.approx(most, rel=0.05)
 
 
 def test_the_fields_are_those_of_the_solution(pressed: Solution) -> None:
@@ -174,3 +188,23 @@ def test_labels_make_another_study_of_the_same_runs() -> None:
     assert "note" not in plain.to_dict()
     again = Study.from_dict(told.to_dict(), scene=PIN)
     assert (again.id, again.note, again.tags) == (told.id, told.note, told.tags)
+
+
+def test_the_maps_of_a_study_are_drawn_on_the_mesh_of_the_run_and_numbers_over_all_runs(
+    kept: tuple[Study, Store], tmp_path: Path
+) -> None:
+    study, store = kept
+    where = store.study_directory(study.id)
+    with open_netcdf(store.dataset_path(study.id)) as dataset:
+        chosen = {"load_ratio": "0.2"}
+        with drawn_from(where, dataset, "map_mises", {**chosen, "stage": "loaded"}) as found:
+            run, left = found
+            assert left == {"stage": "loaded"}
+            assert run.attrs["id"] == next(iter(study.run_ids()))
+        for field in ("tension", "line_mises"):
+            with drawn_from(where, dataset, field, chosen) as (whole, left):
+                assert whole is dataset and left == chosen
+    out = tmp_path / "map.png"
+    select = ["--select", "load_ratio=0.5", "stage=loaded", "--deformed", "50"]
+    assert main(["plot", str(where), "--field", "map_stress", *select, "--out", str(out)]) == 0
+    assert out.read_bytes().startswith(b"\x89PNG")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from studies.views.tables import messages
+from studies.views.tables import messages, runs_table
 
 
 def told(texts: list[str], statuses: list[str]) -> str:
@@ -34,3 +34,16 @@ def test_outcomes_are_kinds_of_their_own() -> None:
     told_of = told([text, text.replace("-1e-3", "0.5")], ["ok", "limit_load"])
     assert f"\nwarning: {text}\n" in told_of
     assert "\nlimit_load: between x = 0.5 and 2 of body 'pin2'\n" in told_of
+
+
+def test_rounding_beside_numbers_of_its_unit_is_zero() -> None:
+    """Not small numbers alone."""
+
+    def study(**numbers: list[float]) -> str:
+        own = {name: ("a", values, {"units": "mm"}) for name, values in numbers.items()}
+        status = ("a", np.array(["ok", "ok"], dtype=object))
+        return runs_table(xr.Dataset({"status": status, **own}, {"a": [1, 2]}))
+
+    assert "4.6e-11" not in study(moved=[350.0, 4.6e-11])
+    assert "4.6e-11" not in study(moved=[350.0, 350.0], other=[4.6e-11, 2.0])
+    assert "4.6e-11" in study(moved=[4.6e-11, 1e-11])

@@ -10,6 +10,7 @@ from typing import Any
 import xarray as xr
 
 from solver.errors import ModelError
+from solver.tensors import AXES
 from studies.definition.parameters import defaults, parameters_of, plain
 from studies.scenes.registry import scene_of
 from studies.storage.frame import FRACTION
@@ -36,8 +37,45 @@ def named(name: str, value: Any, unit: str = "") -> str:
 
 
 def label(variable: xr.DataArray) -> str:
-    """Return the meaning of a variable with its unit, for an axis."""
-    return _measured(variable.attrs.get("long_name", str(variable.name)), variable)
+    """Return the meaning of a variable with its symbol and unit, for an axis."""
+    name = variable.attrs.get("long_name", str(variable.name))
+    return _measured(f"{name} {symbol(variable)}".rstrip(), variable)
+
+
+_SYMBOLS = {
+    "principal_1": "{0}_{{1}}", "principal_2": "{0}_{{2}}", "principal_3": "{0}_{{3}}",
+    "tresca": "{0}_{{1}} - {0}_{{3}}", "hydrostatic": r"{0}_{{\mathrm{{m}}}}",
+}  # fmt: skip
+"""Invariants of a tensor as mathtext, with its letter."""
+
+
+def symbol(values: xr.DataArray) -> str:
+    """Return the symbol of a component of a stress or strain; empty for other variables."""
+    if "component" not in values.coords or values["component"].ndim:
+        return ""
+    name = str(values["component"].item())
+    words_of = f"{values.name} {values.attrs.get('long_name', '')}"
+    letter = r"\varepsilon" if "strain" in words_of else r"\sigma"
+    return f"${_SYMBOLS.get(name, f'{{0}}_{{{{{name}}}}}').format(letter)}$"
+
+
+DISTANCE = "distance"
+"""The coordinate of lines and contacts that `placed` adds."""
+_LENGTHS = {
+    "s": "distance from the middle $s$",
+    "depth": "depth below the surface",
+    "fraction": "fraction of the length",
+}
+"""Labels of axes, by the name of the variable; those of coordinates are their names."""
+
+
+def axis_label(coordinate: xr.DataArray) -> str:
+    """Return the label of a horizontal axis with its unit: short, with the symbol."""
+    name = str(coordinate.name)
+    usual = f"${name}$" if name in AXES else coordinate.attrs.get("long_name", words(name))
+    if name == DISTANCE:
+        usual = f"{usual.replace('distance s ', 'distance ')} $s$"
+    return _measured(_LENGTHS.get(name, usual), coordinate)
 
 
 def short_label(variable: xr.DataArray) -> str:
@@ -92,6 +130,14 @@ def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:
         return defaults(scene, {**given, **swept})
     except ModelError:  # the parameters are consistent only with the swept values
         return {name: parameter.default for name, parameter in known.items()}
+
+
+def short_number(value: float, digits: int = 4) -> str:
+    """Return a few digits of a number, without a power of ten up to a million."""
+    text = f"{value:.{digits}g}"
+    if "e" in text and 1e-4 <= abs(value) < 1e6:
+        text = f"{float(text):.0f}"
+    return text.replace("-", "\N{MINUS SIGN}")
 
 
 def wrapped(text: str, width: float, points: int) -> str:

@@ -16,7 +16,7 @@ from studies.views.grids import parameters_over
 from studies.views.picking import sweep_axes
 from studies.views.plots.captions import capitalised, named, setting, short_label, words, wrapped
 from studies.views.plots.curves import label_values
-from studies.views.plots.legends import MOST_LINES, colours_of, is_number
+from studies.views.plots.legends import MOST_LINES, add_head, colours_of, is_number
 from studies.views.plots.runs import Kind, absent, known_values, style_of
 
 _PANEL, _ABREAST = (3.2, 2.9), 3
@@ -82,9 +82,8 @@ def cloud_figure(dataset: xr.Dataset, field: str, points: str) -> Figure:
         handles.sort(key=lambda each: each.get_marker() != "o")
         sheet.legend(handles=handles, loc="outside right upper", frameon=False)
     single = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] == 1]
-    below = wrapped(setting(dataset.squeeze(single)), size[0], 9)
-    name = capitalised(dataset[field].attrs.get("long_name", words(field)))
-    sheet.suptitle(f"{name}\n{below}", fontsize=9)
+    below = wrapped(setting(dataset.squeeze(single)), size[0] - 0.4, 8)
+    add_head(sheet, capitalised(dataset[field].attrs.get("long_name", words(field))), below)
     return sheet
 
 

@@ -8,9 +8,12 @@ from collections.abc import Hashable, Sequence
 import numpy as np
 import xarray as xr
 
-from solver.tensors import AXES
+from solver.results.invariants import INVARIANTS
+from solver.results.invariants import component as derived
+from solver.tensors import AXES, components
 from studies.definition.vocabulary import SYMMETRIC
 from studies.errors import StudyError, one_of
+from studies.views.plots.captions import DISTANCE
 
 Window = Sequence[float]
 """Part of a map: horizontal range, vertical range [mm]."""
@@ -18,7 +21,6 @@ Window = Sequence[float]
 _RESIDUAL, _STRESS = "residual_stress", "map_stress"
 ALONG = ("s", "depth", "increment", "fraction")
 """Dimensions along which lines are drawn."""
-DISTANCE = "distance"
 _DECAYED = 0.02
 """Depth is shown as far as values exceed this share of the peak."""
 DRAWN = (*AXES, *ALONG)
@@ -105,7 +107,7 @@ def check_field(field: str, known: list[str]) -> None:
 
 
 def component_of(values: xr.DataArray, component: str | None) -> xr.DataArray:
-    """Return one component of a tensor, by default the first; a scalar field unchanged.
+    """Return one component or invariant of a tensor, by default the first; a scalar unchanged.
 
     Raises `StudyError` for an unknown component, or a component of a scalar.
     """
@@ -113,10 +115,33 @@ def component_of(values: xr.DataArray, component: str | None) -> xr.DataArray:
         if component is not None:
             raise StudyError("component", component, f"{values.name} is a scalar: leave it out")
         return values
-    known = [str(name) for name in values["component"].to_numpy()]
+    known = component_names(values)
     if component is not None and component not in known:
-        raise StudyError("component", component, f"must be one of {', '.join(known)}")
-    return values.sel(component=component or known[0])
+        raise StudyError("component", component, one_of(component, known))
+    component = component or known[0]
+    if component not in INVARIANTS:
+        return values.sel(component=component)
+    whole = values.transpose("component", ...)
+    tensor = whole.to_numpy()
+    # a tensor in two dimensions beside others in three has no shear out of the plane
+    tensor = np.where(np.isnan(tensor) & np.isfinite(tensor[0]), 0.0, tensor)
+    return (
+        whole.isel(component=0)
+        .copy(data=derived(tensor, component))
+        .assign_coords(component=component)
+    )
+
+
+def component_name(values: xr.DataArray) -> str:
+    """Return the name of the component that `component_of` has chosen; empty for a scalar."""
+    there = "component" in values.coords and not values["component"].ndim
+    return str(values["component"].item()) if there else ""
+
+
+def component_names(values: xr.DataArray) -> list[str]:
+    """Return the components that a tensor has, and the invariants that it then has too."""
+    own = [str(name) for name in values["component"].to_numpy()]
+    return [*own, *INVARIANTS] if tuple(own) in (components(4), components(6)) else own
 
 
 def is_half(run: xr.Dataset) -> bool:

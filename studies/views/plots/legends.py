@@ -11,6 +11,8 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from studies.views.plots.captions import capitalised, short_label
 
@@ -68,3 +70,17 @@ def add_legend(axes: Axes, headings: Sequence[str], *, styles: bool = False) -> 
     if styles:
         for line in legend.get_lines():
             line.set_color("0.3")
+
+
+def add_head(sheet: Figure, name: str, below: str) -> None:
+    """Write the title at the top left of a figure of several panels, and the setting below it."""
+    engine = sheet.get_layout_engine()
+    assert isinstance(engine, ConstrainedLayoutEngine)
+    width, height = sheet.get_size_inches()
+    head = 0.36 + 0.16 * (below.count("\n") + 1)
+    height += head
+    sheet.set_size_inches(width, height)
+    engine.set(rect=(0.0, 0.0, 1.0, 1.0 - head / height))
+    left = 0.1 / width
+    sheet.text(left, 1.0 - 0.08 / height, name, va="top", fontsize=11, weight="bold")
+    sheet.text(left, 1.0 - 0.31 / height, below, va="top", fontsize=8, color="0.3")

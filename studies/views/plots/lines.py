@@ -8,14 +8,15 @@ from itertools import cycle
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solver.tensors import AXES
-from studies.errors import StudyError
-from studies.views.picking import one_run
-from studies.views.plots.captions import label, value_text, words, wrapped
+from studies.errors import StudyError, one_of
+from studies.views.picking import one_run, sweep_axes
+from studies.views.plots.captions import DISTANCE, axis_label, label, value_text, words, wrapped
 from studies.views.plots.fields import (
-    DISTANCE,
+    Window,
     check_field,
     component_of,
     depth_shown,
@@ -34,12 +35,20 @@ from studies.views.plots.legends import (
     has_bar,
     is_number,
 )
+from studies.views.plots.mapped import STAGE
 from studies.views.plots.maps import entitle
 
 _EACH = len(STYLES)
 """Largest number of values drawn of a dimension of the field."""
 _SIZE = (8.0, 4.6)
 _LENGTHS = ("s", "depth", *AXES)
+INCREMENT, TIME, AGAINST = "increment", "increment_time", "against"
+"""Dimension of courses, the variable of their time, and the coordinate of what they lie over."""
+_RELEASED = ("residual_stress", "plastic_strain", "residual_profile", "surface_residual")
+"""Variables that only a run has whose bodies are released at the end."""
+_NOTHING, _SHORT, _BESIDE = 1e-3, 0.5, 0.25
+"""Share of the peak below which a line is zero; largest share of a line outside of which it may be
+left out; margin beside what is left, over its length."""
 
 
 def line_figure(
@@ -48,12 +57,15 @@ def line_figure(
     component: str | None = None,
     zoom: float | None = None,
     over: str | None = None,
+    window: Window | None = None,
+    against: str | None = None,
 ) -> Figure:
     """Return `field` over a length or increments, with a line for each value of other dimensions.
 
     These are passes, stations, stages, bodies and contacts. If there are more passes than lines can
     be distinguished, the first, the last and some between are drawn; then of several stations only
-    the middle one.
+    the middle one, and of several stages the last one under load. Ends of stages are marked on
+    lines over increments.
 
     Parameters
     ----------
@@ -63,35 +75,20 @@ def line_figure(
     zoom : show only this length on either side of the contact's centre (of its edge, if half of the
         bodies was computed) or below the surface [mm]; by default depth ends where values have
         decayed
-    over : axis of the sweep that ``run`` still has; each of its values has lines
+    over : axis of the sweep that ``run`` still has, each of its values has lines; or a dimension of
+        the field, of which alone all values are drawn
+    window : show only this part: horizontal and vertical range
+    against : another variable over the same increments, which is horizontal: a loop of force over
+        displacement
 
     Raises
     ------
     StudyError
         if there is no such field or component, no value, or too many lines
     """
-    run = run if over else one_run(run)
-    check_field(field, line_fields(run))
-    values = placed(component_of(run[field], component), run)
+    values, run, at, sizes = _drawn(run, field, component, zoom, over, window, against)
     along = line_axis(values)
-    assert along is not None
-    if zoom is not None and along not in _LENGTHS:
-        raise StudyError("zoom", zoom, f"{field} lies over {words(along)}, no length: leave it out")
-    for name in values.dims:
-        values = values.dropna(name, how="all")
-    if not values.size:
-        raise StudyError("field", field, "has no value in the run selected")
-    sizes = values.sizes
-    values = _distinguishable(values, [name for name in values.dims if name != along], over)
     others = [name for name in values.dims if name != along]
-    at = DISTANCE if DISTANCE in values.coords else along
-    if zoom is not None:
-        middle = 0.0 if along == "depth" else focus(run, zoom)
-        values = values.where(abs(values[along] - middle) <= zoom, drop=True)
-        if values.sizes[along] < 2:
-            raise too_close(zoom)
-    elif along == "depth":
-        values = values.isel(depth=slice(depth_shown(values, others)))
     sheet = Figure(figsize=_SIZE, dpi=150, layout="constrained")
     axes = sheet.add_subplot()
     entitle(axes, run, values, _SIZE[0] - 0.8)
@@ -114,12 +111,16 @@ def line_figure(
                     label=name,
                     linewidth=1.0 if barred else 1.6,
                 )
+                _mark_stages(axes, run, line, at)
     axes.axhline(0.0, color="0.35", linewidth=0.8, zorder=0)
     axes.grid(color="0.92")
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.margins(x=0.0)
-    axes.set(xlabel=label(values[at]), ylabel=wrapped(label(values), _SIZE[1] - 1.2, 10))
+    axes.margins(x=0.03 if against else 0.0)
+    below = run[against] if against else values[at]
+    axes.set(xlabel=axis_label(below), ylabel=wrapped(label(values), _SIZE[1] - 1.2, 10))
+    if window is not None:
+        _show_part(axes, window)
     if barred:
         add_bar(axes, several[0])
     if named:
@@ -127,8 +128,130 @@ def line_figure(
     return sheet
 
 
+def _show_part(axes: Axes, window: Window) -> None:
+    x0, x1, y0, y1 = window
+    if not (x0 < x1 and y0 < y1):
+        allowed = "must be X0 X1 Y0 Y1 with X0 < X1 and Y0 < Y1"
+        raise StudyError("window", list(window), allowed)
+    axes.set(xlim=(x0, x1), ylim=(y0, y1))
+
+
+def _drawn(
+    run: xr.Dataset,
+    field: str,
+    component: str | None,
+    zoom: float | None,
+    over: str | None,
+    window: Window | None,
+    against: str | None,
+) -> tuple[xr.DataArray, xr.Dataset, str, Mapping[Hashable, int]]:
+    """Return the values of the lines, their runs, what is horizontal, and all sizes of the field.
+
+    The arguments are those of `line_figure`.
+    """
+    own = over if over in run[field].dims and over not in sweep_axes(run) else None
+    swept = over if own is None else None
+    run = run if swept else one_run(run)
+    check_field(field, line_fields(run))
+    values = placed(component_of(run[field], component), run)
+    along = line_axis(values)
+    assert along is not None
+    if zoom is not None and (along not in _LENGTHS or against):
+        at = against or words(along)
+        raise StudyError("zoom", zoom, f"{field} lies over {at}, no length: leave it out")
+    if against is not None:
+        values = values.assign_coords({AGAINST: _other(run, values, against)})
+    for name in values.dims:
+        values = values.dropna(name, how="all")
+    if not values.size:
+        raise StudyError("field", field, "has no value in the run selected")
+    sizes = values.sizes
+    if own is not None:
+        for name in values.dims:
+            if name not in (along, own):
+                values = values.isel({name: [_usual(values[name], run)]})
+    values = _distinguishable(values, [name for name in values.dims if name != along], swept, run)
+    others = [name for name in values.dims if name != along]
+    at = DISTANCE if DISTANCE in values.coords else along
+    at = at if against is None else AGAINST
+    if zoom is not None:
+        middle = 0.0 if along == "depth" else focus(run, zoom)
+        values = values.where(abs(values[along] - middle) <= zoom, drop=True)
+        if values.sizes[along] < 2:
+            raise too_close(zoom)
+    elif along == "depth":
+        values = values.isel(depth=slice(depth_shown(values, others)))
+    elif window is None and along in (*_LENGTHS, "fraction"):
+        values = _happening(values, along, others)
+    return values, run, at, sizes
+
+
+def _other(run: xr.Dataset, values: xr.DataArray, name: str) -> xr.DataArray:
+    """Return the variable that is horizontal, over dimensions that the field has."""
+    known = [
+        str(each)
+        for each, other in run.data_vars.items()
+        if INCREMENT in other.dims and other.dtype.kind == "f"
+    ]
+    if INCREMENT not in values.dims:
+        allowed = f"must be left out: {values.name} does not lie over increments"
+        raise StudyError("against", name, allowed)
+    if name not in known:
+        raise StudyError("against", name, one_of(name, known))
+    other = run[name]
+    if not other.notnull().any():
+        raise StudyError("against", name, "has no value in the run selected")
+    for each in [each for each in other.dims if each not in values.dims]:
+        ways = np.ptp(other.fillna(0.0).transpose(each, ...).to_numpy(), axis=-1)
+        most = int(ways.reshape(other.sizes[each], -1).max(axis=1).argmax())
+        other = other.isel({each: most}, drop=True)  # of several parts that which moves most
+    return other.drop_vars([each for each in other.coords if each not in other.dims])
+
+
+def _happening(values: xr.DataArray, along: Hashable, others: Sequence[Hashable]) -> xr.DataArray:
+    """Return the part of lines outside of which they are zero, with a margin, if it is short."""
+    largest = abs(values).max(others).to_numpy()
+    there = np.flatnonzero(largest > _NOTHING * np.nanmax(largest))
+    if not there.size or there[-1] - there[0] > _SHORT * len(largest):
+        return values
+    margin = max(round(_BESIDE * (there[-1] - there[0])), 1)
+    return values.isel({along: slice(max(there[0] - margin, 0), there[-1] + margin + 1)})
+
+
+def _mark_stages(axes: Axes, run: xr.Dataset, line: xr.DataArray, at: Hashable) -> None:
+    """Mark where stages end on a line over increments; stage k ends at time k."""
+    if INCREMENT not in line.dims or TIME not in run or STAGE not in run.coords:
+        return
+    time = run[TIME].sel({INCREMENT: line[INCREMENT]}).to_numpy()
+    ends = [k for k in range(1, round(float(np.nanmax(time))) + 1) if np.isclose(time, k).any()]
+    names = [str(each) for each in np.atleast_1d(run[STAGE].to_numpy())]
+    if len(names) != len(ends) or len(ends) > MOST_LINES:
+        return
+    for name, end in zip(names, ends, strict=True):
+        k = int(np.flatnonzero(np.isclose(time, end))[-1])
+        axes.plot(line[at][k], line[k], "o", color="k", markersize=3.0, label="_end")
+        x, y = float(line[at][k]), float(line[k])
+        right = x > float(line[at].min()) + 0.9 * np.ptp(line[at].to_numpy())
+        axes.annotate(
+            name, (x, y), xytext=(-3.0 if right else 3.0, 3.0), fontsize=7, color="0.3",
+            textcoords="offset points", ha="right" if right else "left",
+        )  # fmt: skip
+
+
+def _usual(dimension: xr.DataArray, run: xr.Dataset) -> int:
+    """Return the position of the one value of a dimension that is drawn.
+
+    It is the middle one; of stages the last under load: a run that is released ends without load.
+    """
+    count = dimension.size
+    if dimension.name != STAGE:
+        return count // 2
+    released = any(name in run for name in _RELEASED)
+    return max(count - 2, 0) if released else count - 1
+
+
 def _distinguishable(
-    values: xr.DataArray, others: Sequence[Hashable], over: str | None
+    values: xr.DataArray, others: Sequence[Hashable], over: str | None, run: xr.Dataset
 ) -> xr.DataArray:
     """Return as many lines as can be distinguished; dimensions with one value are dropped.
 
@@ -148,7 +271,7 @@ def _distinguishable(
     counted, most = (own, len(STYLES)) if barred else (others, MOST_LINES)
     for name in reversed(own):
         if math.prod(values.sizes[each] for each in counted) > most:
-            values = values.isel({name: [values.sizes[name] // 2]})
+            values = values.isel({name: [_usual(values[name], run)]})
     return values.squeeze([name for name in others if values.sizes[name] == 1])
 
 

@@ -11,10 +11,13 @@ import numpy as np
 import xarray as xr
 
 from solver.model.friction import PatchStatus
+from solver.results.invariants import INVARIANTS
 from studies.errors import StudyError, one_of
+from studies.views.plots.captions import short_number
 from studies.views.plots.fields import (
     Window,
     check_field,
+    component_name,
     component_of,
     empty_window,
     focus,
@@ -29,7 +32,8 @@ STATUS = "patch_status"
 """The variable that a run with its contact in a patch has."""
 _MARGIN = 0.2
 """Width of the frame around the contact, over its longer side."""
-_STAGE = "stage"
+STAGE = "stage"
+"""The dimension of stages."""
 _PERCENT, _WORTHWHILE = 99.8, 1.5
 """Colours end at this percentile of the map if the largest value is this many times larger: near a
 sharp corner stress is unbounded."""
@@ -40,7 +44,7 @@ _NOTHING = 1e-3
 """Stress up to which it is rounding [MPa]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Mapped:
     """The values of a map.
 
@@ -89,18 +93,22 @@ def mapped(
         values = within_patch(values, run)
     if window is not None:
         values = _inside(values, window, empty_window(window, across, up))
-    signed = "component" in values.coords or bool(values.min() < -_SIGNED * values.max())
-    return Mapped(values, signed, *_limit(values, signed))
+    signed = component_name(values) not in ("", "tresca")
+    signed = signed or bool(values.min() < -_SIGNED * values.max())
+    known = np.isfinite(values.to_numpy())
+    there, area = values.to_numpy()[known], _areas(values)[known]
+    high, note = limit(there, area, signed, str(values.attrs.get("units", "1")))
+    return Mapped(values=values, signed=signed, high=high, note=note)
 
 
 def _at_stage(values: xr.DataArray, stage: str | None) -> xr.DataArray:
     """Return the values at a stage; all of them if none is named."""
     if stage is None:
         return values
-    known = [str(each) for each in values[_STAGE].to_numpy()] if _STAGE in values.dims else []
+    known = [str(each) for each in values[STAGE].to_numpy()] if STAGE in values.dims else []
     if stage not in known:
-        raise StudyError(_STAGE, stage, one_of(stage, known) if known else "has one stage only")
-    return values.sel({_STAGE: stage})
+        raise StudyError(STAGE, stage, one_of(stage, known) if known else "has one stage only")
+    return values.sel({STAGE: stage})
 
 
 def is_patch(values: xr.DataArray, run: xr.Dataset) -> bool:
@@ -136,8 +144,8 @@ def whole(values: xr.DataArray) -> xr.DataArray:
     if (start := 2.0 * x[0] - x[1]) > 0.0:  # one step from the map towards the line
         before = values.isel({across: [0]}).assign_coords({across: [start]}) * np.nan
         values = xr.concat([before, values], across)
-    component = str(values["component"].item()) if "component" in values.coords else ""
-    sign = -1.0 if component.count(across) == 1 else 1.0
+    component = component_name(values)
+    sign = -1.0 if component not in INVARIANTS and component.count(across) == 1 else 1.0
     other = sign * values.isel({across: slice(None, 0 if x[0] < 1e-6 * x[-1] else None, -1)})
     both = xr.concat([other.assign_coords({across: -other[across]}), values], across)
     return both.assign_attrs(values.attrs)
@@ -154,25 +162,28 @@ def _inside(values: xr.DataArray, window: Window, nothing: StudyError) -> xr.Dat
     return part
 
 
-def _limit(values: xr.DataArray, signed: bool) -> tuple[float, str]:
-    """Return the largest value of the colours, and a note on values beyond it."""
-    known = np.isfinite(values.to_numpy())
-    there, area = values.to_numpy()[known], _areas(values)[known]
+def limit(there: np.ndarray, area: np.ndarray, signed: bool, unit: str) -> tuple[float, str]:
+    """Return the largest value of the colours, and a note on values beyond it.
+
+    Parameters
+    ----------
+    there : (n,) finite values
+    area : (n,) of each of them
+    """
     size = np.abs(there) if signed else there
     if not size.size or not size.max() > 0.0:
         return 1.0, ""
-    if values.attrs.get("units") == "MPa" and size.max() < _NOTHING:
+    if unit == "MPa" and size.max() < _NOTHING:
         return 1.0, f"No value is larger than {_NOTHING:g} MPa."
     high = _percentile(size[size > 0.0], area[size > 0.0])
     if size.max() <= _WORTHWHILE * high:
         return float(size.max()), ""
-    unit = values.attrs.get("units", "1")
-    note = (
-        f"Colours end at {'±' if signed else ''}{high:.3g}{'' if unit == '1' else f' {unit}'}: "
-        f"{area[size > high].sum() / area.sum():.1%} of the map lies beyond. "
-        f"Values go from {there.min():.3g} to {there.max():.3g}."
+    least, most = (short_number(float(each)) for each in (there.min(), there.max()))
+    beyond = f"{area[size > high].sum() / area.sum():.1%} of the map lies beyond"
+    return high, (
+        f"Colours end at {'±' if signed else ''}{short_number(high, 3)}"
+        f"{'' if unit == '1' else f' {unit}'}: {beyond}. Values go from {least} to {most}."
     )
-    return high, note.replace("-", "\N{MINUS SIGN}")
 
 
 def _areas(values: xr.DataArray) -> np.ndarray:

@@ -2,23 +2,39 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.markers import CARETDOWN
+from matplotlib.tri import Triangulation
 
+from solver.results.invariants import PRINCIPAL, principal_of
+from solver.tensors import AXES
+from studies.errors import StudyError
 from studies.views.picking import one_run
-from studies.views.plots.captions import capitalised, label, setting, wrapped
-from studies.views.plots.fields import Window, map_axes
-from studies.views.plots.mapped import is_patch, mapped
+from studies.views.plots.captions import capitalised, label, setting, symbol, wrapped
+from studies.views.plots.fields import Window, component_name, is_half, map_axes, usual_field
+from studies.views.plots.mapped import Mapped, is_patch, mapped
+from studies.views.plots.meshed import MappedMesh, mesh_maps, on_mesh
 from studies.views.plots.over import BELOW, draw_patch, draw_wheel
 
+Box = tuple[float, float, float, float]
+"""Left, right, bottom, top [mm]."""
 SIGNED = "RdBu_r"
 SEQUENTIAL = "YlOrRd"
 _OUTSIDE = "0.86"
 _AREA, _LONGEST = 26.0, 8.0
 """Area of a map and its longest side [in]."""
+_BARS = 24
+"""Number of bars of directions along the longer side of a map."""
+_LITTLE = 0.01
+"""Share of the end of the colours below which a direction means nothing."""
 _TEXT = 3.2
 """Least length of the lines around a map [in]."""
 
@@ -30,54 +46,184 @@ def map_figure(
     zoom: float | None = None,
     window: Window | None = None,
     stage: str | None = None,
+    deformed: float = 0.0,
 ) -> Figure:
     """Return a map of `field` over the bodies, with both halves if one half was computed.
+
+    It is drawn on the mesh if the run keeps its fields, else on the map grid. A principal value has
+    its directions.
 
     Parameters
     ----------
     run : data set of one run
-    field : variable over two coordinates, such as ``y`` and ``x``, the last of them horizontal; by
-        default the residual stress, or the stress if the bodies are not unloaded
-    component : component of a stress tensor; by default the first
+    field : variable over two coordinates, such as ``y`` and ``x``, the last of them horizontal, or
+        one of `mesh_maps`; by default the residual stress, or the stress if the bodies are not
+        unloaded
+    component : component or invariant of a tensor; by default the first component
     zoom : show only the part within this distance of the contact's centre, or of its edge if half
         of the bodies was computed [mm]
     window : show only this part: horizontal and vertical range, such as (x0, x1, y0, y1) [mm]
     stage : of several stages; by default the last
+    deformed : factor of the displacements by which the bodies are drawn deformed
 
     Raises
     ------
     StudyError
-        if the data set has no such field, component or stage, or the part has no points
+        if the data set has no such field, component or stage, the part has no points, or a deformed
+        body is asked for where no mesh is kept
     """
     run = one_run(run)
-    drawn = mapped(run, field, component, zoom, window, stage)
-    values, signed, high = drawn.values, drawn.signed, drawn.high
+    field = field or usual_field(run)
+    if field in mesh_maps(run):
+        return _on_mesh(run, on_mesh(run, field, component, zoom, window, stage, deformed))
+    if deformed:
+        raise StudyError("deformed", deformed, 'needs the mesh: a study with keep = "fields"')
+    return _on_grid(run, mapped(run, field, component, zoom, window, stage))
+
+
+def _on_grid(run: xr.Dataset, drawn: Mapped) -> Figure:
+    """Return the figure of a map on a grid."""
+    values = drawn.values
     across, up = map_axes(values)
-    edge = float(run["contact_half_width"]) if "contact_half_width" in run else 0.0
     patch = is_patch(values, run)
-    width, height = _size(values)
+    x, y = values[across], values[up]
+    sheet, axes = _sheet(run, values, *(float(np.ptp(each.to_numpy())) for each in (x, y)))
+    mesh = axes.pcolormesh(x, y, values, shading="nearest", rasterized=True, **_colours(drawn))
+    box = (*axes.get_xlim(), *axes.get_ylim())
+    _mark_edges(axes, run, box)
+    axes.set(xlim=box[:2], ylim=box[2:], xlabel=_symbol(run[across]), ylabel=_symbol(run[up]))
+    if patch:
+        draw_patch(axes, run, str(values.name), box)
+    draw_wheel(axes, values, run)  # above the section
+    axes.set_xlim(*box[:2])
+    _draw_directions(axes, run, drawn, box)
+    return _finished(sheet, axes, mesh, drawn, axes.get_legend() if patch else None)
+
+
+def _on_mesh(run: xr.Dataset, drawn: MappedMesh) -> Figure:
+    """Return the figure of a map on a mesh, with the outlines of the bodies and the contact."""
+    x0, x1, y0, y1 = drawn.box
+    sheet, axes = _sheet(run, drawn.values, x1 - x0, y1 - y0)
+    cells = Triangulation(drawn.X[0], drawn.X[1], drawn.triangles)
+    mesh = axes.tripcolor(
+        cells, drawn.values.to_numpy(), shading="gouraud", rasterized=True, **_colours(drawn)
+    )
+    outline = drawn.X[:, drawn.edges].transpose(1, 2, 0)
+    axes.add_collection(LineCollection(list(outline), colors="0.15", linewidths=0.6))
+    if not drawn.deformed:
+        _draw_contact(axes, run)
+        _mark_edges(axes, run, drawn.box)
+    _draw_directions(axes, run, drawn, drawn.box)
+    axes.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="$x$ [mm]", ylabel="$y$ [mm]")
+    return _finished(sheet, axes, mesh, drawn, None)
+
+
+def _sheet(run: xr.Dataset, values: xr.DataArray, across: float, up: float) -> tuple[Figure, Axes]:
+    """Return a figure and its axes, with the title, for a map of this width and height [mm]."""
+    scale = min(np.sqrt(_AREA / (across * up)), _LONGEST / max(across, up))
+    width, height = scale * across, scale * up
     sheet = Figure(figsize=(width, height), dpi=150)
     axes = sheet.add_axes((0.0, 0.0, 1.0, 1.0), facecolor=_OUTSIDE)
     entitle(axes, run, values, max(width, _TEXT))
-    mesh = axes.pcolormesh(
-        values[across], values[up], values, shading="nearest", rasterized=True,
-        cmap=SIGNED if signed else SEQUENTIAL, vmin=-high if signed else 0.0, vmax=high,
-    )  # fmt: skip
-    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    return sheet, axes
+
+
+def _colours(drawn: Mapped) -> dict[str, Any]:
+    signed, high = drawn.signed, drawn.high
+    colours = SIGNED if signed else SEQUENTIAL
+    return {"cmap": colours, "vmin": -high if signed else 0.0, "vmax": high}
+
+
+def _mark_edges(axes: Axes, run: xr.Dataset, box: Box) -> None:
+    """Mark the edges of the contact above the surface: a line would hide the stress there."""
+    left, right, bottom, top = box
+    edge = float(run["contact_half_width"]) if "contact_half_width" in run else 0.0
     seen = edge > 0.0 and bottom <= 0.0 <= top
     ends = [end for end in (-edge, edge) if seen and left <= end <= right]
-    if ends:  # marks above the surface: a line would hide the stress at the surface
+    if ends:
         axes.plot(
             ends, [0.0] * len(ends), linestyle="none", marker=CARETDOWN, color="k",
             label="edge of contact under load",
         )  # fmt: skip
         axes.legend(loc="upper right", framealpha=0.9, edgecolor="none", fontsize=8)
-    axes.set(xlim=(left, right), ylim=(bottom, top))
-    if patch:
-        draw_patch(axes, run, str(values.name), (left, right, bottom, top))
-    draw_wheel(axes, values, run)
-    axes.set_xlim(left, right)
-    axes.set(xlabel=_symbol(run[across]), ylabel=_symbol(run[up]))
+
+
+def _draw_contact(axes: Axes, run: xr.Dataset) -> None:
+    """Draw where bodies touch under load."""
+    names = ("contact_x", "contact_y", "contact_pressure")
+    if not all(name in run for name in names) or "fraction" not in run["contact_pressure"].dims:
+        return
+    x, y, pressure = (run[name] for name in names)
+    pressing = pressure.max([name for name in ("stage",) if name in pressure.dims]) > 0.0
+    label: str | None = "contact under load"
+    for k in range(run.sizes["contact"]):
+        for sign in (-1.0, 1.0) if is_half(run) else (1.0,):
+            line = [each.isel(contact=k).where(pressing.isel(contact=k)) for each in (x, y)]
+            if line[0].notnull().any():
+                axes.plot(sign * line[0], line[1], color="#111", linewidth=2.0, label=label)
+                label = None
+    if label is None:
+        axes.legend(loc="upper right", framealpha=0.9, edgecolor="none", fontsize=8)
+
+
+def _draw_directions(axes: Axes, run: xr.Dataset, drawn: Mapped, box: Box) -> None:
+    """Draw the directions of a principal value as bars, as long as they are in the plane."""
+    name = component_name(drawn.values)
+    if name not in PRINCIPAL:
+        return
+    places, tensor, plane = _tensor_of(run, drawn)
+    left, right, bottom, top = box
+    apart = max(right - left, top - bottom) / _BARS
+    seen = (places[0] > left) & (places[0] < right) & (places[1] > bottom) & (places[1] < top)
+    known = np.flatnonzero(seen & np.isfinite(tensor).all(axis=0))
+    values, directions = principal_of(tensor[:, known])
+    large = np.abs(values[PRINCIPAL.index(name)]) > _LITTLE * drawn.high
+    known, directions = known[large], directions[..., large]
+    squares = np.floor((places[:, known] - [[left], [bottom]]) / apart)
+    away = np.abs((places[:, known] - [[left], [bottom]]) / apart - squares - 0.5).max(axis=0)
+    order = np.argsort(away, kind="stable")  # in each square the place nearest to its middle
+    _, first = np.unique(squares[:, order], axis=1, return_index=True)
+    chosen = known[order[first]]
+    way = directions[plane, PRINCIPAL.index(name)][:, order[first]]
+    axes.quiver(
+        *places[:, chosen], *(0.7 * apart * way), angles="xy", scale_units="xy", scale=1.0,
+        pivot="middle", headwidth=0.0, headlength=0.0, headaxislength=0.0, units="dots", width=1.6,
+        color="k",
+    )  # fmt: skip
+
+
+def _tensor_of(run: xr.Dataset, drawn: Mapped) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """Return places (2, n), a tensor (n_components, n) there, and the rows of the plane."""
+    if isinstance(drawn, MappedMesh):
+        assert drawn.tensor is not None
+        return drawn.X, drawn.tensor, [0, 1]
+    values = drawn.values
+    across, up = map_axes(values)
+    parts = [
+        mapped(run, str(values.name), str(name), stage=_stage_of(values)).values
+        for name in run["component"].to_numpy()
+    ]
+    places = np.meshgrid(parts[0][across], parts[0][up])
+    tensor = np.stack([each.transpose(up, across).to_numpy().ravel() for each in parts])
+    rows = [AXES.index(across), AXES.index(up)]
+    return np.stack([each.ravel() for each in places]), tensor, rows
+
+
+def _stage_of(values: xr.DataArray) -> str | None:
+    return str(values["stage"].item()) if "stage" in values.coords else None
+
+
+def _finished(
+    sheet: Figure, axes: Axes, mesh: ScalarMappable, drawn: Mapped, above: Artist | None
+) -> Figure:
+    """Return a figure with its colour bar and note, as large as all that is drawn.
+
+    Parameters
+    ----------
+    above : what the note stands below; by default the axes
+    """
+    values, signed, high = drawn.values, drawn.signed, drawn.high
+    width, height = sheet.get_size_inches()
     axes.set_aspect("equal")
     beside = axes.inset_axes((1.0 + 0.12 / width, 0.0, 0.16 / width, 1.0))
     over, under = bool((values > high).any()), signed and bool((values < -high).any())
@@ -87,7 +233,6 @@ def map_figure(
     if "flag_meanings" in values.attrs:
         bar.set_ticks(values.attrs["flag_values"], labels=values.attrs["flag_meanings"].split())
     bar.outline.set_visible(False)
-    above = axes.get_legend() if patch else None
     axes.annotate(
         wrapped(drawn.note, max(width, _TEXT), 8), (0.0, 0.0), xycoords=above or "axes fraction",
         xytext=(0.0, -4.0 if above else BELOW), textcoords="offset points", va="top", fontsize=8,
@@ -95,13 +240,6 @@ def map_figure(
     )  # fmt: skip
     _fit(sheet, axes)
     return sheet
-
-
-def _size(values: xr.DataArray) -> tuple[float, float]:
-    """Return width and height of the axes of a map [in]."""
-    width, height = (float(np.ptp(values[name].to_numpy())) for name in map_axes(values))
-    scale = min(np.sqrt(_AREA / (width * height)), _LONGEST / max(width, height))
-    return scale * width, scale * height
 
 
 def _fit(sheet: Figure, axes: Axes) -> None:
@@ -118,22 +256,17 @@ def _fit(sheet: Figure, axes: Axes) -> None:
 def entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> None:
     """Set the title, and below it what distinguishes the run, in lines of `width` inches."""
     quantity = values.attrs.get("long_name", str(values.name))
-    component = str(values["component"].item()) if "component" in values.coords else ""
     shown = values.drop_vars("component", errors="ignore").to_dataset(name="values")
     below = axes.set_title(
         wrapped(setting(shown.assign_attrs(run.attrs)), width, 8),
         loc="left", fontsize=8, color="0.3", pad=5.0,
     )  # fmt: skip
-    title = axes.annotate(
-        capitalised(quantity) + (" σ" if component else ""), (0.0, 1.0), xycoords=below,
-        xytext=(0.0, 5.0), textcoords="offset points", weight="bold", fontsize=11,
-    )  # fmt: skip
     axes.annotate(
-        component, (1.0, 0.0), xycoords=title,
-        xytext=(0.5, 0.0), textcoords="offset points", weight="bold", fontsize=8,
+        f"{capitalised(quantity)} {symbol(values)}".rstrip(), (0.0, 1.0), xycoords=below,
+        xytext=(0.0, 5.0), textcoords="offset points", weight="bold", fontsize=11,
     )  # fmt: skip
 
 
 def _symbol(coordinate: xr.DataArray) -> str:
     """Return the name of a map's axis, with its unit."""
-    return f"{coordinate.name} [{coordinate.attrs.get('units', '1')}]"
+    return f"${coordinate.name}$ [{coordinate.attrs.get('units', '1')}]"

@@ -21,7 +21,9 @@ from studies.views.plots.fields import (
     usual_field,
 )
 from studies.views.plots.lines import line_figure
+from studies.views.plots.mapped import STAGE
 from studies.views.plots.maps import map_figure
+from studies.views.plots.meshed import mesh_maps
 from studies.views.plots.sweep import sweep_figure
 
 _COARSEST, _FINEST = 50, 600
@@ -37,6 +39,8 @@ def picture(
     *,
     window: Window | None = None,
     over: str | None = None,
+    against: str | None = None,
+    deformed: float | None = None,
     resolution: float | None = None,
 ) -> Figure:
     """Return a figure of `field`, by default of residual stress (of stress, if none is kept).
@@ -51,8 +55,10 @@ def picture(
         surface [mm]
     selection : value for each selected axis of the sweep, parameter set by a linked axis, or
         dimension of the field, such as ``pass``
-    window : for a map: show only this part
-    over : for lines: axis of the sweep; each of its values has a line
+    window : show only this part
+    over : for lines: axis of the sweep, or dimension of the field; each of its values has a line
+    against : for lines over increments: the variable over which they are drawn
+    deformed : for a map of a run that keeps its fields: factor of the displacements
     resolution : dots per inch; by default that of the figure
 
     Raises
@@ -63,24 +69,44 @@ def picture(
     maps, lines, singles = map_fields(dataset), line_fields(dataset), sweep_fields(dataset)
     labelled = labelled_fields(dataset)
     field = field or usual_field(dataset)
-    given = {"component": component, "zoom": zoom, "window": window, "over": over}
+    given = {
+        "component": component, "zoom": zoom, "window": window, "over": over, "against": against,
+        "deformed": deformed,
+    }  # fmt: skip
+    alone = {"over": over, "against": against}
     if field in singles:
         _refuse(given, f"{field} has one value a run: leave it out")
         figure = sweep_figure(select(dataset, selection or {}), field)
     elif field in labelled:
         _refuse(given | {"component": None}, f"{field} has one value a run: leave it out")
         figure = sweep_figure(_labelled(dataset, field, component, selection or {}), field)
+    elif field in mesh_maps(dataset):
+        _refuse(alone, f"{field} is a map of one run: leave it out")
+        swept, chosen = sweep_coordinates(dataset), dict(selection or {})
+        _known(chosen, [*swept, STAGE])
+        stage = chosen.pop(STAGE, None)
+        run = one_run(dataset, chosen)
+        staged = None if stage is None else str(stage)
+        figure = map_figure(run, field, component, zoom, window, staged, deformed or 0.0)
     else:
         one_run(dataset)  # without a successful run there are no fields: report the reason
         check_field(field, [*maps, *lines, *singles, *labelled])
         if field in maps:
-            _refuse({"over": over}, f"{field} is a map of one run: leave it out")
+            _refuse(
+                {"over": over, "against": against}, f"{field} is a map of one run: leave it out"
+            )
             part = _part(dataset, field, selection or {})
-            figure = map_figure(part, field, component, zoom, window)
+            figure = map_figure(part, field, component, zoom, window, deformed=deformed or 0.0)
         else:
-            _refuse({"window": window}, f"{field} is no map: leave it out")
-            part = _part(dataset, field, selection or {}, over)
-            figure = line_figure(part, field, component, zoom, over)
+            _refuse({"deformed": deformed}, f"{field} is no map: leave it out")
+            axis = None if over in _own(dataset, field) else over
+            part = _part(dataset, field, selection or {}, axis)
+            figure = line_figure(part, field, component, zoom, over, window, against)
+    return resolved(figure, resolution)
+
+
+def resolved(figure: Figure, resolution: float | None) -> Figure:
+    """Return a figure with its resolution [dpi], by default its own, or raise `StudyError`."""
     if resolution is not None:
         if not _COARSEST <= resolution <= _FINEST:
             allowed = f"must be {_COARSEST} to {_FINEST} dots per inch"
@@ -123,6 +149,12 @@ def _known(selection: Mapping[str, object], names: list[str]) -> None:
             raise StudyError(name, value, one_of(name, names))
 
 
+def _own(dataset: xr.Dataset, field: str) -> list[str]:
+    """Return the dimensions of a field of which values can be selected, beside the sweep."""
+    drawn = {*sweep_coordinates(dataset).values(), *DRAWN, "component"}
+    return [str(name) for name in dataset[field].dims if name not in drawn]
+
+
 def _part(
     dataset: xr.Dataset, field: str, selection: Mapping[str, str | float], over: str | None = None
 ) -> xr.Dataset:
@@ -130,9 +162,7 @@ def _part(
 
     The selection is also applied to the field's own dimensions.
     """
-    swept = sweep_coordinates(dataset)
-    drawn = {*swept.values(), *DRAWN, "component"}
-    own = [str(name) for name in dataset[field].dims if name not in drawn]
+    swept, own = sweep_coordinates(dataset), _own(dataset, field)
     _known(selection, [*swept, *own])
     chosen = {name: selection[name] for name in swept if name in selection}
     run = one_run(dataset, chosen) if over is None else runs_over(dataset, over, chosen, field)

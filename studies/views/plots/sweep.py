@@ -15,10 +15,11 @@ from matplotlib.ticker import MaxNLocator
 
 from studies.errors import StudyError
 from studies.views.grids import parameters_over, point_axes, to_grid
-from studies.views.picking import sweep_axes
+from studies.views.picking import flags, sweep_axes
 from studies.views.plots.captions import capitalised, named, setting, short_label, words, wrapped
 from studies.views.plots.cloud import cloud_figure
 from studies.views.plots.curves import curve_figure
+from studies.views.plots.legends import MOST_LINES, add_head
 from studies.views.plots.limits import draw_shakedown_limits
 from studies.views.plots.runs import (
     POINTS,
@@ -38,6 +39,8 @@ OVERLAYS: Mapping[tuple[str, str, str], Callable[[Axes, xr.Dataset, bool], Seque
 """Theory drawn over a field, by field, vertical and horizontal quantity. The function gets the
 axes, the runs of the panel and whether it is the last of its row; it returns the lines."""
 
+_FEW = 3
+"""Numbers of values of both quantities up to which curves are drawn."""
 _PANEL = (3.4, 3.1)
 """Width and height of a panel [in]."""
 _DENSE, _CONTOURS = 6, 12
@@ -49,7 +52,8 @@ _LEGEND = 3.2
 def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     """Return `field` over two swept numbers, in a panel for each combination of the other axes.
 
-    Over one number, or only over labels, it is drawn as curves: see `curve_figure`. Points that are
+    Over one number, only over labels, or over two numbers of up to three values, it is drawn as
+    curves: see `curve_figure`. Points that are
     a grid are drawn as one; over points of more than two parameters see `cloud_figure`.
 
     The number of an axis is the axis itself, or a parameter of a linked axis that distinguishes all
@@ -75,7 +79,8 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
             return sweep_figure(gridded, field)
         if not plane_of(dataset, axis):
             return cloud_figure(dataset, field, axis)
-    if len(standing(dataset)[0]) < 2:
+    numbers, _ = standing(dataset)
+    if len(numbers) < 2 or (not flags(dataset[field]) and _few(dataset)):
         return curve_figure(dataset, field)
     up, across, *others = _arrangement(dataset, field)
     columns = others[-1].size if others else 1
@@ -112,10 +117,19 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     for axes in grid[:, 0]:
         axes.set_ylabel(capitalised(short_label(up)))
     single = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] == 1]
-    below = wrapped(setting(dataset.squeeze(single)), size[0], 10)
-    name = capitalised(dataset[field].attrs.get("long_name", words(field)))
-    sheet.suptitle(f"{name}\n{below}", fontsize=10)
+    below = wrapped(setting(dataset.squeeze(single)), size[0] - 0.4, 8)
+    add_head(sheet, capitalised(dataset[field].attrs.get("long_name", words(field))), below)
     return sheet
+
+
+def _few(dataset: xr.Dataset) -> bool:
+    """Whether two numbers have so few values that curves tell more than marks in a plane."""
+    numbers, labels = standing(dataset)
+    first, second = numbers[:2]
+    curves = math.prod(each.size for each in (*numbers[1:], *labels))
+    return (
+        first.dims != second.dims and max(first.size, second.size) <= _FEW and curves <= MOST_LINES
+    )
 
 
 def _gridded(dataset: xr.Dataset, points: str) -> xr.Dataset | None:

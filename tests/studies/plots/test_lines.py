@@ -63,7 +63,7 @@ def test_a_field_over_one_axis_is_a_line_along_it() -> None:
     sheet = picture(run, "running_surface_residual", component="zz")
     (line,) = lines_of(sheet)
     np.testing.assert_allclose(np.transpose(line.get_xydata()), [z, np.cos(z)])
-    assert sheet.axes[0].get_xlabel().startswith("z")
+    assert sheet.axes[0].get_xlabel() == "$z$ [mm]"
     near = picture(run, "running_surface_residual", zoom=10.0)
     assert near.axes[0].get_xlim() == (-10.0, 10.0)
 

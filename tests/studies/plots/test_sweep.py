@@ -21,6 +21,7 @@ from studies.storage.dataset import attributes_of
 from studies.views.plots.fields import sweep_fields
 from studies.views.plots.sweep import sweep_figure
 from tests.studies.conftest import compute_here, fake_study
+from tests.studies.plots.test_curves import swept as curves_over
 
 ROOT = Path(__file__).parents[3]
 RATIOS, FRICTIONS = np.array([1.8, 1.2, 2.4]), np.array([0.0, 0.2, 0.5, 0.3])
@@ -149,7 +150,7 @@ def test_limits_are_those_of_theory_and_drawn_for_full_slip_only() -> None:
 def test_an_axis_whose_numbers_repeat_is_told_by_its_labels(store: Store) -> None:
     case = {"A": {"passes": 2}, "B": {"passes": 2, "state": "plane_strain"}}
     study = fake_study(
-        sweep={"case": case, "half_width": [20.0, 50.0], "friction": [0.0, 0.4, 0.2]}
+        sweep={"case": case, "half_width": [20.0, 50.0], "friction": [0.0, 0.4, 0.2, 0.6]}
     )
     compute_here(study, store)
     with open_study(store.directory) as together:
@@ -159,7 +160,7 @@ def test_an_axis_whose_numbers_repeat_is_told_by_its_labels(store: Store) -> Non
         (cloud,) = panels[0].collections
         # friction is of the usual numbers, so it goes up
         assert {tuple(at) for at in cloud.get_offsets()} == {
-            (width, friction) for width in (20.0, 50.0) for friction in (0.0, 0.2, 0.4)
+            (width, friction) for width in (20.0, 50.0) for friction in (0.0, 0.2, 0.4, 0.6)
         }
         curves = sweep_figure(together.isel(half_width=[0]), "increments").axes[0]
         assert curves.get_xlabel() == "Friction"
@@ -198,8 +199,10 @@ def test_nothing_is_cut_and_the_legend_lies_beside_panels_of_a_good_size(
     assert inked.x1 <= sheet.get_figwidth()
     assert inked.y1 <= sheet.get_figheight()
     (legend,) = sheet.legends
-    box, title = legend.get_window_extent(), sheet._suptitle.get_window_extent()
-    assert not box.overlaps(title)
+    box, heads = legend.get_window_extent(), [text.get_window_extent() for text in sheet.texts]
+    assert len(heads) == 2
+    for head in heads:
+        assert not any(head.overlaps(each) for each in (box, *(a.bbox for a in sheet.axes)))
     panels = sheet.axes[: len(hardening)]
     for axes in panels:
         assert not axes.get_tightbbox().overlaps(box)
@@ -275,3 +278,23 @@ def test_the_map_of_point_contact_asks_for_ellipses_of_one_pressure_on_three_mes
         assert all(run.traction == (run.friction > 0.0) for run in each)
         loads = {sqrt(3) * run.load_ratio for run in each if run.friction == 0.0}
         assert min(loads) < limits[ratio] < max(loads)
+
+
+def test_few_values_are_labelled_lines_and_many_are_a_plane() -> None:
+    """Two or three values of each number: marks in a plane would tell nothing."""
+    for loads in (2, 3, 5):
+        number = swept_numbers(loads, 3)
+        sheet = sweep_figure(number, "creepage")
+        axes = sheet.axes[0]
+        assert bool(axes.lines) == (loads <= 3)
+        if loads <= 3:
+            assert axes.get_xlabel() == "Load ratio"
+            assert [t.get_text() for t in axes.get_legend().get_texts()] == ["0", "0.1", "0.2"]
+            np.testing.assert_array_equal(axes.lines[1].get_ydata(), number["creepage"][:, 1, 0])
+
+
+def swept_numbers(loads: int, frictions: int) -> xr.Dataset:
+    runs = curves_over(list(1.0 + np.arange(loads)), list(0.1 * np.arange(frictions)), ["none"])
+    size = np.arange(1.0, loads * frictions + 1.0).reshape(loads, frictions, 1)
+    runs["creepage"] = (("load_ratio", "friction", "hardening"), size)
+    return runs

@@ -211,6 +211,11 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "repeat.stages",
         "must hold a stage that loads the bodies",
     ),
+    "number with a unit": (
+        put("materials", "steel", "youngs_modulus", "195 GPa"),
+        "materials.steel.youngs_modulus",
+        "must be a number without a unit: in N, mm, MPa",
+    ),
     "unknown region that is removed": (
         put("stages", 0, "remove", ["upper.skin"]),
         "stages[0].remove",

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from service.table import Column
+from studies.views.table import Column
 
 PIECE = 1000
 """Number of runs in a piece of text."""
@@ -21,8 +21,6 @@ GROUP = 20_000
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """With these a text begins that a spreadsheet takes for a formula, and carries out."""
-
-MISSING = "table.parquet needs pyarrow on the service: pip install residua-contact[parquet]"
 
 Columns = Sequence[Column]
 Write = Callable[[Columns, np.ndarray], Iterator[bytes]]

@@ -1,0 +1,206 @@
+"""The values of a map on the mesh of a run that keeps its fields: smooth, with exact outlines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from solver.results.invariants import INVARIANTS
+from solver.results.mesh_fields import NO_NODE, MeshFields
+from solver.results.quantities import QUANTITIES
+from solver.tensors import AXES, components
+from studies.errors import StudyError, one_of
+from studies.storage.ugrid import keeps, read
+from studies.views.plots.fields import (
+    Window,
+    component_name,
+    component_of,
+    empty_window,
+    focus,
+    is_half,
+    too_close,
+)
+from studies.views.plots.mapped import STAGE, Mapped, limit
+
+Array = np.ndarray
+
+_AT_THE_END = {"residual_stress": "stress", "plastic_strain": "plastic_strain"}
+"""Variables after release, and the fields at the nodes."""
+_STAGED = {"map_stress": "stress", "map_mises": "mises", "map_plastic_strain": "plastic_strain"}
+"""Variables at each stage."""
+_MOVED = "map_displacement"
+MESH_MAPS = (*_AT_THE_END, *_STAGED, _MOVED)
+"""Variables that are drawn on a mesh where it is kept."""
+_NODE = "node"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MappedMesh(Mapped):
+    """The values of a map at nodes.
+
+    Attributes
+    ----------
+    X : (2, n) positions of the nodes, deformed if that was asked for [mm]
+    triangles : (n_triangles, 3) nodes
+    edges : (n_edges, 2) nodes of the edges of the bodies
+    tensor : (n_components, n), if the values are a component of one
+    box : what is shown: left, right, bottom, top [mm]
+    deformed : factor of the displacements
+    """
+
+    X: Array
+    triangles: Array
+    edges: Array
+    tensor: Array | None
+    box: tuple[float, float, float, float]
+    deformed: float
+
+
+def mesh_maps(run: xr.Dataset) -> list[str]:
+    """Return the variables that are drawn on the mesh; none of a run without one in its plane."""
+    if not keeps(run) or f"mesh_node_{AXES[2]}" in run:
+        return []
+    return [*MESH_MAPS]
+
+
+def on_mesh(
+    run: xr.Dataset,
+    field: str,
+    component: str | None = None,
+    zoom: float | None = None,
+    window: Window | None = None,
+    stage: str | None = None,
+    deformed: float = 0.0,
+) -> MappedMesh:
+    """Return the values of a map at the nodes, with both halves if one half was computed.
+
+    The arguments are those of `map_figure`; ``field`` is one of `mesh_maps`.
+
+    Raises
+    ------
+    StudyError
+        if there is no such component or stage, or the part contains no nodes
+    """
+    fields = read(run)
+    at = _stage_of(fields, field, stage)
+    values, tensor = _values(run, fields.stages[at], field, component)
+    if field not in _AT_THE_END:
+        values = values.assign_coords({STAGE: at})
+    X = fields.X + deformed * fields.stages[at]["displacement"]
+    numbers, name = values.to_numpy(), component_name(values)
+    faces, bodies = fields.faces
+    triangles, edges = _triangles(faces), _edges(faces, bodies)
+    if is_half(run) and (fields.X[0] >= -1e-9 * np.ptp(fields.X[0])).all():
+        count, odd = X.shape[1], name not in INVARIANTS and name.count("x") == 1
+        X = np.hstack([X, X * [[-1.0], [1.0]]])
+        numbers = np.concatenate([numbers, -numbers if odd else numbers])
+        triangles = np.vstack([triangles, count + triangles])
+        kept = edges[(np.abs(fields.X[0][edges]) > 1e-9 * np.ptp(fields.X[0])).any(axis=1)]
+        edges = np.vstack([kept, count + kept])
+        if tensor is not None:
+            tensor = np.hstack([tensor, tensor * [[1.0], [1.0], [1.0], [-1.0]]])
+    box = _box(run, X, zoom, window)
+    low, high = X[:, triangles].min(axis=2), X[:, triangles].max(axis=2)
+    shown = (low[0] < box[1]) & (high[0] > box[0]) & (low[1] < box[3]) & (high[1] > box[2])
+    if not shown.any() or not box[0] < box[1]:
+        raise too_close(zoom) if window is None and zoom else empty_window(box, *AXES[:2])
+    inside = np.unique(triangles[shown])
+    area = np.zeros(X.shape[1])
+    np.add.at(area, triangles[shown], _areas(X, triangles[shown])[:, None] / 3.0)
+    signed = field == _MOVED or (bool(name) and name != "tresca")
+    unit = str(values.attrs.get("units", "1"))
+    most, note = limit(numbers[inside], area[inside], signed, unit)
+    if deformed:
+        note = f"Displacements are drawn {deformed:g} times as large. {note}".rstrip()
+    return MappedMesh(
+        values=xr.DataArray(numbers, dims=_NODE, name=field, attrs=values.attrs).assign_coords(
+            {name: each for name, each in values.coords.items() if not each.ndim}
+        ),
+        signed=signed, high=most, note=note, X=X, triangles=triangles[shown], edges=edges,
+        tensor=tensor, box=box, deformed=deformed,
+    )  # fmt: skip
+
+
+def _stage_of(fields: MeshFields, field: str, stage: str | None) -> str:
+    known = list(fields.stages)
+    if stage is None:
+        return known[-1]
+    if field in _AT_THE_END or stage not in known:
+        allowed = "has one stage only" if field in _AT_THE_END else one_of(stage, known)
+        raise StudyError(STAGE, stage, allowed)
+    return stage
+
+
+def _values(
+    run: xr.Dataset, at: Mapping[str, Array], field: str, component: str | None
+) -> tuple[xr.DataArray, Array | None]:
+    """Return the values at the nodes, with their meaning, and the tensor they are taken from."""
+    scalars = {name: each for name, each in run.coords.items() if not each.ndim}
+    if field == _MOVED:
+        known = AXES[: len(at["displacement"])]
+        component = component or known[-1]
+        if component not in known:
+            raise StudyError("component", component, one_of(component, known))
+        words = {"long_name": f"displacement along {component}", "units": "mm"}
+        values = at["displacement"][known.index(component)]
+        return xr.DataArray(values, scalars, _NODE, field, words), None
+    name = (_AT_THE_END | _STAGED)[field]
+    tensor = name == "plastic_strain" and component is not None
+    nodal = at["plastic_tensor" if tensor else name]
+    words = QUANTITIES[field].attributes
+    if tensor:
+        words = words | {"long_name": words["long_name"].removeprefix("equivalent ")}
+    if nodal.ndim == 1:
+        return component_of(xr.DataArray(nodal, scalars, _NODE, field, words), component), None
+    names = list(components(len(nodal)))
+    whole = xr.DataArray(nodal, scalars | {"component": names}, ("component", _NODE), field, words)
+    return component_of(whole, component), nodal
+
+
+def _triangles(faces: Array) -> Array:
+    """Return triangles (n, 3) of faces (n_faces, 4), of which triangles lack the last node."""
+    four = faces[:, 3] != NO_NODE
+    return np.vstack([faces[:, :3], faces[four][:, [0, 2, 3]]])
+
+
+def _edges(faces: Array, bodies: Array) -> Array:
+    """Return the edges (n, 2) that only one face of a body has."""
+    del bodies  # bodies share no nodes
+    last = np.where(faces[:, 3:] == NO_NODE, faces[:, :1], faces[:, 3:])
+    ring = np.hstack([faces[:, :3], last])
+    pairs = np.stack([ring, np.roll(ring, -1, axis=1)], axis=2).reshape(-1, 2)
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    _, first, count = np.unique(
+        np.sort(pairs, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    return np.asarray(pairs[first[count == 1]])
+
+
+def _areas(X: Array, triangles: Array) -> Array:
+    a, b, c = (X[:, triangles[:, k]] for k in range(3))
+    u, v = b - a, c - a
+    return np.asarray(np.abs(u[0] * v[1] - u[1] * v[0]) / 2.0)
+
+
+def _box(
+    run: xr.Dataset, X: Array, zoom: float | None, window: Window | None
+) -> tuple[float, float, float, float]:
+    """Return what is shown: by default where the run has its map, else all bodies."""
+    if window is not None:
+        x0, x1, y0, y1 = window
+        if not (x0 < x1 and y0 < y1):
+            raise empty_window(window, *AXES[:2])
+        return x0, x1, y0, y1
+    if zoom is not None:
+        middle = focus(run, zoom)
+        return middle - zoom, middle + zoom, -zoom, zoom
+    low, high = X.min(axis=1), X.max(axis=1)
+    if all(name in run.coords and run[name].size > 1 for name in AXES[:2]):
+        x, y = (run[name].to_numpy() for name in AXES[:2])
+        left = -float(x.max()) if is_half(run) else float(x.min())
+        low = np.maximum(low, [left, float(y.min())])
+        high = np.minimum(high, [float(x.max()), float(y.max())])
+    return float(low[0]), float(high[0]), float(low[1]), float(high[1])

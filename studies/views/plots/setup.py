@@ -1,0 +1,397 @@
+"""What a scene looks like before anything is computed: meshes, boundaries, supports, loads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from matplotlib.ticker import MaxNLocator
+
+from solver.model.rigid import RigidBody
+from solver.results.named_places import NamedPlaces
+from solver.results.view import View
+from solver.scenes.scene import Scene, Sketch
+from solver.tensors import AXES
+from studies.definition.parameters import build, defaults, parameters_of
+from studies.errors import StudyError
+from studies.views.plots.acting import acting, draw_acting, draw_supports, outward
+from studies.views.plots.captions import capitalised, named, short_number, words, wrapped
+from studies.views.plots.fields import Window, empty_window
+
+if TYPE_CHECKING:
+    from skfem import Mesh
+
+    from solver.model.body import Body
+    from solver.model.link import Link
+    from solver.model.model import Model
+
+    Array = np.ndarray
+    Box = tuple[float, float, float, float]
+
+_PANEL, _LEGEND = (4.4, 5.4), 3.3
+"""Largest width and height of a panel; width of the legend [in]."""
+_FILLS = ("#dfe8f3", "#f6ead7", "#e2efdd", "#f1dfe9", "#e8e8e8")
+_PAIRS = ("#d62728", "#1f77b4", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2")
+_RESULTS = "#7b3fa0"
+_LINKED = "#0f766e"
+_MARGIN, _WORTHWHILE = 0.1, 0.35
+"""Frame around what is drawn, over its larger side; largest ratio of the sides of the close-up to
+those of the whole for a second panel."""
+_NAMED = 0.4
+"""Least length of a line that has its name beside it [in]."""
+_AROUND = 25.0
+"""Half the width of a close-up without a map, over the shortest side of an element."""
+
+
+@dataclass(slots=True, kw_only=True)
+class _Subject:
+    """What is drawn.
+
+    Attributes
+    ----------
+    own : bodies, pairs, springs and curves
+    rigid : rigid bodies
+    links : boundaries that are tied, kept rigid, or held by springs
+    axes : names of the horizontal and vertical coordinate
+    middle : what x = 0 is, if it is drawn as a line of symmetry
+    """
+
+    own: Sketch
+    rigid: Sequence[RigidBody] = ()
+    links: Sequence[Link] = ()
+    axes: tuple[str, str]
+    middle: str = ""
+
+
+def setup_figure(
+    scene: Scene,
+    values: Mapping[str, Any] | None = None,
+    zoom: float | None = None,
+    window: Window | None = None,
+) -> Figure:
+    """Return a figure of a scene before loading; nothing is computed.
+
+    It has meshes, named boundaries, supports, loads as arrows, contact pairs in colours, and where
+    results are taken; and a second panel with the surroundings of the contact if they are small.
+
+    Parameters
+    ----------
+    values : normalised values of parameters; the others have their defaults
+    zoom : show only the part within this distance of the origin [mm]
+    window : show only this part: horizontal and vertical range [mm]
+
+    Raises
+    ------
+    StudyError
+        if the scene has nothing to draw, or the part contains nothing
+    ModelError
+        if a parameter is refused
+    """
+    given = dict(values or {})
+    parameters = build(scene, given)
+    view = scene.view(parameters)
+    places = scene.places(parameters) if scene.places else None
+    shown = _shown(scene, parameters, view)
+    whole = _around(_extent(shown))
+    boxes = [whole]
+    if zoom is not None:
+        boxes = [(-zoom, zoom, -zoom, zoom)]
+        _check_part("zoom", zoom, boxes[0], whole, shown)
+    elif window is not None:
+        x0, x1, y0, y1 = window
+        boxes = [(x0, x1, y0, y1)]
+        _check_part("window", window, boxes[0], whole, shown)
+    elif (close := _close(shown, view)) and _side(close) < _WORTHWHILE * _side(whole):
+        boxes.append(close)
+    shapes = [_fitted(box) for box in boxes]
+    height = max(own[1] for own in shapes)
+    size = sum(own[0] + 0.7 for own in shapes) + _LEGEND, height + 1.3
+    sheet = Figure(figsize=size, dpi=150, layout="compressed")
+    panels = sheet.subplots(1, len(boxes), squeeze=False, width_ratios=[s[0] for s in shapes])[0]
+    handles: dict[str, Any] = {}
+    for axes, box, shape in zip(panels, boxes, shapes, strict=True):
+        axes.set(xlim=box[:2], ylim=box[2:], aspect="equal", anchor="NW")
+        handles |= _draw(axes, shown, view, places, (box[1] - box[0]) / shape[0])
+        axes.set(xlabel=f"${shown.axes[0]}$ [mm]", ylabel=f"${shown.axes[1]}$ [mm]")
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.xaxis.set_major_locator(MaxNLocator(max(int(1.3 * shape[0]), 2)))
+    if len(boxes) > 1:
+        x0, x1, y0, y1 = boxes[1]
+        frame = Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, edgecolor="k", linewidth=0.9)
+        panels[0].add_patch(frame)
+        panels[1].set_title("the frame on the left", loc="left", fontsize=8, color="0.3")
+    sheet.legend(
+        handles=list(handles.values()), labels=list(handles), loc="outside right upper",
+        frameon=False, fontsize=8, labelspacing=0.55,
+    )  # fmt: skip
+    lines = [scene.summary, _own(scene, given)]
+    below = "\n".join(wrapped(line, max(shapes[0][0], 3.0), 8) for line in lines if line)
+    panels[0].set_title(below, loc="left", fontsize=8, color="0.3")
+    sheet.suptitle(capitalised(words(scene.name)), x=0.01, ha="left", fontsize=11, weight="bold")
+    return sheet
+
+
+def _own(scene: Scene, given: Mapping[str, Any]) -> str:
+    """Return the parameters that are not the defaults, in words."""
+    known, usual = parameters_of(scene), defaults(scene, given)
+    return ", ".join(
+        named(name, value, known[name].unit)
+        for name, value in given.items()
+        if value not in (None, usual[name]) and isinstance(value, str | int | float)
+    )
+
+
+def _shown(scene: Scene, parameters: Any, view: View) -> _Subject:
+    if scene.sketch is not None and (sketch := scene.sketch(parameters)) is not None:
+        return _Subject(own=sketch, axes=view.map_axes)
+    try:
+        model: Model = scene.model(parameters)
+    except NotImplementedError:
+        raise StudyError("scene", scene.name, "has no model to draw") from None
+    turned = model.bodies[0].kinematics == "axisymmetric"
+    middle = "axis of rotation" if turned else "line of symmetry" if view.symmetric else ""
+    pairs = tuple((pair.slave, pair.master) for pair in model.contacts)
+    own = Sketch(model.bodies, pairs)
+    return _Subject(
+        own=own, rigid=model.rigid, links=model.links, axes=view.map_axes, middle=middle
+    )
+
+
+# -- what is seen ----------------------------------------------------------------------------------
+
+
+def _extent(shown: _Subject) -> Box:
+    """Return the box around all bodies; of rigid bodies and curves only what is near."""
+    p = np.hstack([body.mesh.p for body in shown.own.bodies])
+    low, high = p.min(axis=1), p.max(axis=1)
+    near = 0.35 * float(np.max(high - low))
+    others = [s.points for body in shown.rigid for s in body.surfaces.values()]
+    for each in (*others, *shown.own.curves.values()):
+        low = np.minimum(low, np.maximum(np.asarray(each).min(axis=1), low - near))
+        high = np.maximum(high, np.minimum(np.asarray(each).max(axis=1), high + near))
+    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def _side(box: Box) -> float:
+    return max(box[1] - box[0], box[3] - box[2])
+
+
+def _around(box: Box) -> Box:
+    more = _MARGIN * _side(box)
+    return box[0] - more, box[1] + more, box[2] - more, box[3] + more
+
+
+def _close(shown: _Subject, view: View) -> Box | None:
+    """Return a box around the map, or else around the smallest elements."""
+    across, up = view.map_grid
+    if across.size and up.size:
+        low, high = (float(across.min()), float(up.min())), (float(across.max()), float(up.max()))
+        return _around((low[0], high[0], low[1], high[1]))
+    if not shown.own.pairs:
+        return None
+    sides = [(_shortest(body.mesh), body) for body in shown.own.bodies]
+    (side, (x, y)), _ = min(sides, key=lambda each: each[0][0])
+    reach = _AROUND * side
+    return x - reach, x + reach, y - reach, y + reach
+
+
+def _shortest(mesh: Mesh) -> tuple[float, tuple[float, float]]:
+    """Return length and middle of the shortest edge [mm]."""
+    ends = mesh.p[:, mesh.facets]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=0)
+    k = int(length.argmin())
+    x, y = ends[:, :, k].mean(axis=1)
+    return float(length[k]), (float(x), float(y))
+
+
+def _check_part(name: str, value: Any, box: Box, whole: Box, shown: _Subject) -> None:
+    ordered = all(map(math.isfinite, box)) and box[0] < box[1] and box[2] < box[3]
+    inside = box[0] < whole[1] and box[1] > whole[0] and box[2] < whole[3] and box[3] > whole[2]
+    if not (ordered and inside):
+        if name == "window":
+            raise empty_window(value, *shown.axes)
+        raise StudyError(name, value, "must be a length [mm] within which there is a body")
+
+
+def _fitted(box: Box) -> tuple[float, float]:
+    """Return width and height of the axes of a box [in]."""
+    width, height = box[1] - box[0], box[3] - box[2]
+    scale = min(_PANEL[0] / width, _PANEL[1] / height)
+    return max(scale * width, 1.6), max(scale * height, 1.2)
+
+
+# -- drawing ---------------------------------------------------------------------------------------
+
+
+def _draw(
+    axes: Axes, shown: _Subject, view: View, places: NamedPlaces | None, inch: float
+) -> dict[str, Any]:
+    """Draw all in a panel, in which an inch is so many mm; return the entries of the legend."""
+    handles: dict[str, Any] = {}
+    colours = {
+        side: _PAIRS[k % len(_PAIRS)] for k, pair in enumerate(shown.own.pairs) for side in pair
+    }
+    for number, body in enumerate(shown.own.bodies):
+        fill = _FILLS[number % len(_FILLS)]
+        _draw_mesh(axes, body.mesh, fill)
+        handles[_told(body)] = Patch(facecolor=fill, edgecolor="0.55", linewidth=0.5)
+    for rigid in shown.rigid:
+        for name, surface in rigid.surfaces.items():
+            colour = colours.get((rigid.name, name), "k")
+            axes.plot(*surface.points, color=colour, linewidth=2.0, solid_capstyle="butt")
+            points = np.asarray(surface.points)
+            _label(
+                axes,
+                np.stack([points[:, :-1], points[:, 1:]], axis=2),
+                f"{rigid.name}.{name}",
+                inch,
+            )
+        handles[f"{rigid.name}: rigid"] = Line2D([], [], color="k", linewidth=2.0)
+    for name, curve in shown.own.curves.items():
+        axes.plot(*curve, color="0.25", linewidth=1.6)
+        handles[name] = Line2D([], [], color="0.25", linewidth=1.6)
+    for slave, master in shown.own.pairs:
+        text = f"contact {'.'.join(slave)} – {'.'.join(master)}"
+        handles[text] = Line2D([], [], color=colours[slave], linewidth=2.4)
+    for body in shown.own.bodies:
+        for name in body.mesh.boundaries or {}:
+            lines = _polylines(body.mesh, body.mesh.boundaries[name])
+            own = colours.get((body.name, name))
+            axes.add_collection(
+                LineCollection(
+                    list(lines.transpose(2, 1, 0)),
+                    colors=own or "0.25",
+                    linewidths=2.4 if own else 1.1,
+                )
+            )
+            _label(axes, outward(body.mesh, body.mesh.boundaries[name])[0], name, inch)
+        handles |= draw_supports(axes, body, inch, shown.own.springs.get(body.name, ()))
+    for link in shown.links:
+        handles |= _draw_link(axes, shown.own.bodies, link)
+    for each in acting(shown.own.bodies, shown.rigid):
+        handles |= draw_acting(axes, each, inch)
+    if shown.middle:
+        axes.axvline(0.0, color="0.3", linewidth=0.8, linestyle=(0, (8, 2, 1, 2)))
+        handles[f"{shown.middle}: ${shown.axes[0]} = 0$"] = Line2D(
+            [], [], color="0.3", linewidth=0.8, linestyle=(0, (8, 2, 1, 2))
+        )
+    return handles | _draw_results(axes, view, places)
+
+
+def _draw_link(axes: Axes, bodies: Sequence[Body], link: Link) -> dict[str, Any]:
+    """Draw the boundaries of a link; return its entry of the legend."""
+    known = {body.name: body for body in bodies}
+    sides = [side for side in (link.slave, link.master) if side is not None]
+    for name, boundary in sides:
+        if name in known:
+            lines = _polylines(known[name].mesh, known[name].facets(boundary))
+            pieces = list(lines.transpose(2, 1, 0))
+            axes.add_collection(LineCollection(pieces, colors=_LINKED, linewidths=2.4))
+    kind = "springs" if math.isfinite(link.stiffness) else "link"
+    last = link.rigid or ("ground" if link.grounded else "")
+    ends = " – ".join([*(".".join(side) for side in sides), *([last] if last else [])])
+    text = f"{kind} {link.components}: {ends}"
+    return {text: Line2D([], [], color=_LINKED, linewidth=2.4)}
+
+
+def _draw_mesh(axes: Axes, mesh: Mesh, fill: str) -> None:
+    """Draw the elements; fine ones are seen as a tint."""
+    cells = list(_outlines(mesh))
+    axes.add_collection(
+        PolyCollection(
+            cells, facecolors=fill, edgecolors="0.5", linewidths=0.2, rasterized=True, zorder=0.5,
+        )
+    )  # fmt: skip
+
+
+def _outlines(mesh: Mesh) -> Iterator[Array]:
+    """Yield the outline of each element (n, 2), through the middles of curved sides."""
+    corners = mesh.t.shape[0]
+    nodes = mesh.dofs.element_dofs
+    order = list(range(corners))
+    if nodes.shape[0] >= 2 * corners:
+        order = [k for pair in zip(order, range(corners, 2 * corners), strict=True) for k in pair]
+    yield from mesh.doflocs[:, nodes[order]].transpose(2, 1, 0)
+
+
+def _polylines(mesh: Mesh, facets: Array) -> Array:
+    """Return points (2, n, n_facets) along facets."""
+    ends = mesh.facets[:, facets]
+    if (middles := mesh.dofs.facet_dofs) is not None and len(middles):
+        ends = np.stack([ends[0], middles[0, facets], ends[1]])
+    return np.asarray(mesh.doflocs[:, ends])
+
+
+def _label(axes: Axes, ends: Array, name: str, inch: float) -> None:
+    """Write the name of a line, given by the ends of its pieces (2, n, 2), inside its body.
+
+    It stands at the middle of the part of the line that is seen, unless that is too short: names
+    would stand on one another.
+    """
+    middle, along = ends.mean(axis=2), ends[:, :, 1] - ends[:, :, 0]
+    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    seen = (x0 < middle[0]) & (middle[0] < x1) & (y0 < middle[1]) & (middle[1] < y1)
+    if np.linalg.norm(along[:, seen], axis=0).sum() < _NAMED * inch:
+        return
+    here, length = middle[:, seen], np.linalg.norm(along[:, seen], axis=0)
+    centre = (here * length).sum(axis=1) / length.sum()
+    k = int(np.linalg.norm(here - centre[:, None], axis=0).argmin())
+    left = np.array([-along[1, seen][k], along[0, seen][k]]) / length[k]
+    axes.annotate(
+        name, here[:, k], xytext=9.0 * left, textcoords="offset points", fontsize=6.5, color="0.15",
+        ha="center" if abs(left[0]) < 0.5 else "left" if left[0] > 0 else "right", va="center",
+        annotation_clip=True,
+        bbox={"boxstyle": "round,pad=0.15", "facecolor": "w", "edgecolor": "none", "alpha": 0.7},
+    )  # fmt: skip
+
+
+def _told(body: Body) -> str:
+    """Return size, elements and kind of a body."""
+    mesh = body.mesh
+    sides = np.linalg.norm(np.diff(mesh.p[:, mesh.facets], axis=1)[:, 0], axis=0)
+    law = "elastic" if body.material.elastic else "elastic-plastic"
+    width, height, least, most = map(short_number, (*body.box, sides.min(), sides.max()))
+    count = f"{mesh.t.shape[1]} elements {body.element}"
+    return f"{body.name}: {law}, {width} × {height} mm\n{count}, sides {least} to {most} mm"
+
+
+def _draw_results(axes: Axes, view: View, places: NamedPlaces | None) -> dict[str, Any]:
+    """Draw where results are taken."""
+    handles: dict[str, Any] = {}
+    across, up = view.map_grid
+    if across.size and up.size:
+        (x0, x1), (y0, y1) = ((float(each.min()), float(each.max())) for each in (across, up))
+        frame = Rectangle(
+            (x0, y0),
+            x1 - x0,
+            y1 - y0,
+            fill=False,
+            edgecolor=_RESULTS,
+            linewidth=1.0,
+            linestyle="--",
+        )
+        axes.add_patch(frame)
+        size = f"{short_number(x1 - x0)} × {short_number(y1 - y0)} mm"
+        handles[f"map: {size}"] = Line2D([], [], color=_RESULTS, linewidth=1.0, linestyle="--")
+    if view.station.size and view.depth.size:
+        rows = [AXES.index(name) for name in view.map_axes]
+        for at in view.station:
+            profile = view.axis.place(np.full(view.depth.size, at), view.depth)[rows]
+            axes.plot(*profile, color=_RESULTS, linewidth=1.0, linestyle=":")
+        text = f"profiles, {short_number(view.depth.max())} mm deep"
+        handles[text] = Line2D([], [], color=_RESULTS, linewidth=1.0, linestyle=":")
+    for name, line in (places.lines if places else {}).items():
+        axes.plot(*line.X[:2], color=_RESULTS, linewidth=1.3)
+        handles[f"line {name}"] = Line2D([], [], color=_RESULTS, linewidth=1.3)
+    for name, point in (places.points if places else {}).items():
+        axes.plot(*point.X[:2], color=_RESULTS, marker="P", linestyle="none")
+        handles[f"point {name}"] = Line2D([], [], color=_RESULTS, marker="P", linestyle="none")
+    return handles

@@ -1,0 +1,216 @@
+"""The numbers of a study's runs as columns: sorted, filtered, written.
+
+A service makes the table from its catalogue, while the study runs; `studies.views.numbers` makes
+that of a data set.
+"""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from solver.results.quantities import QUANTITIES
+from solver.scenes import Scene
+from studies.errors import StudyError, one_of
+from studies.storage.dataset import attributes_of
+
+_COMPARED: Mapping[str, Callable[[Any, Any], Any]] = {
+    "<=": operator.le, ">=": operator.ge, "!=": operator.ne, "<": operator.lt, ">": operator.gt,
+    "=": operator.eq,
+}  # fmt: skip
+_CONDITION = re.compile(r"\s*(?P<name>\w+)\s*(?P<sign><=|>=|!=|<|>|=)\s*(?P<value>.*?)\s*")
+
+SAME = 1e-9
+"""Relative difference below which a number is the one that a query names."""
+
+MOST_VALUES = 100
+"""Largest number of numbers that a query names of a column."""
+
+RANGE = re.compile(r"(?P<low>[^.]*(?:\.\d[^.]*)?)\.\.(?P<high>.*)", re.DOTALL)
+
+NUMBERS = ("result", "effort", "audit")
+"""Groups of columns with the numbers of runs, the main ones first."""
+
+STATUS, RUN, MESSAGE = "status", "run", "message"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """One column of a table.
+
+    Attributes
+    ----------
+    name, words, unit : name, meaning and unit
+    group : ``sweep``, ``run``, or one of `NUMBERS`
+    flags : meanings of its numbers, if they stand for words
+    values : numbers, NaN where there is none, or texts, for each run
+    """
+
+    name: str
+    words: str
+    unit: str
+    group: str
+    flags: Mapping[int, str]
+    values: np.ndarray
+
+    @property
+    def number(self) -> bool:
+        """Whether it has numbers."""
+        return self.values.dtype.kind == "f"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunTable:
+    """The runs of a study in the order of its cases.
+
+    Attributes
+    ----------
+    axes : name of each axis of the sweep, with its values or labels; the last runs fastest
+    columns : all columns by name: the sweep, status, numbers, audit, id, message
+    """
+
+    axes: Mapping[str, Sequence[Any]]
+    columns: Mapping[str, Column]
+
+    @property
+    def size(self) -> int:
+        """Number of runs."""
+        return len(next(iter(self.columns.values())).values)
+
+    @property
+    def numbers(self) -> list[Column]:
+        """The columns of results that are numbers."""
+        every = self.columns.values()
+        return [each for each in every if each.number and each.group in NUMBERS]
+
+    def column(self, name: str, field: str = "columns") -> Column:
+        """Return a column; raise `StudyError` if there is none of this name."""
+        if name not in self.columns:
+            raise StudyError(field, name, one_of(name, self.columns))
+        return self.columns[name]
+
+    def chosen(self, sort: str = "", where: Mapping[str, str] | None = None) -> np.ndarray:
+        """Return the positions of the runs that meet all conditions, in order.
+
+        Parameters
+        ----------
+        sort : name of a column; with a minus before it, the largest first. Runs without a value
+            come last
+        where : a condition by column: a value, several with commas between, or a range ``0.1..0.4``
+
+        Raises
+        ------
+        StudyError
+            if there is no such column, or it has numbers and the condition none
+        """
+        keep = np.ones(self.size, dtype=bool)
+        for name, condition in (where or {}).items():
+            keep &= _meets(self.column(name, name), condition)
+        found = np.flatnonzero(keep)
+        if not sort:
+            return found
+        column = self.column(sort.removeprefix("-"), "sort")
+        values = column.values[found]
+        if not column.number:
+            _, values = np.unique(values.astype(str), return_inverse=True)
+            values = values.astype(float)
+        return found[np.argsort(-values if sort.startswith("-") else values, kind="stable")]
+
+    def meeting(self, condition: str) -> np.ndarray:
+        """Return which runs meet a condition such as ``"friction<0.3"`` or ``"hardening=none"``.
+
+        Raises
+        ------
+        StudyError
+            if it is no condition, there is no such column, or the two cannot be compared
+        """
+        match = _CONDITION.fullmatch(condition)
+        if match is None:
+            allowed = "must be NAME<VALUE, with <, <=, >, >=, = or !="
+            raise StudyError("where", condition, allowed)
+        if match["name"] not in self.columns:
+            raise StudyError("where", condition, one_of(match["name"], self.columns))
+        column, compared = self.columns[match["name"]], _COMPARED[match["sign"]]
+        codes = {name: code for code, name in column.flags.items()}
+        if match["value"] in codes:
+            return np.asarray(compared(column.values, codes[match["value"]]))
+        if not column.number:
+            if match["sign"] not in {"=", "!="}:
+                allowed = f"{match['name']} has words: compare them by = or !="
+                raise StudyError("where", condition, allowed)
+            return np.asarray(compared(column.values.astype(str), match["value"]))
+        try:
+            return np.asarray(compared(column.values, float(match["value"])))
+        except ValueError:
+            raise StudyError("where", condition, f"{match['value']!r} must be a number") from None
+
+
+def varied(table: RunTable) -> list[Column]:
+    """Return the columns of the sweep that are not the same in all runs."""
+    sweep = [each for each in table.columns.values() if each.group == "sweep"]
+    several = [each for each in sweep if len(set(each.values.tolist())) > 1]
+    return several or sweep
+
+
+def column_of(
+    name: str,
+    values: np.ndarray,
+    group: str,
+    scene: Scene | None = None,
+    words: Mapping[str, Any] | None = None,
+) -> Column:
+    """Return a column of a variable, with its meaning and unit as a data set has them.
+
+    Parameters
+    ----------
+    scene : declares quantities of its own
+    words : attributes, in place of those of the variable
+    """
+    attributes = attributes_of(name, scene) if words is None else words
+    unit = str(attributes.get("units", ""))
+    quantity = QUANTITIES.get(name)
+    meanings = quantity.flags if quantity else None
+    return Column(
+        name=name,
+        words=str(attributes.get("long_name", name.replace("_", " "))),
+        unit="" if unit == "1" else unit,
+        group=group,
+        flags={flag.value: flag.name.lower() for flag in meanings} if meanings else {},
+        values=values,
+    )
+
+
+def _meets(column: Column, condition: str) -> np.ndarray:
+    """Return which runs meet a condition."""
+    if not column.number or column.flags:
+        wanted = {each.strip() for each in condition.split(",")}
+        said = column.values.tolist()
+        if column.flags:
+            said = [column.flags.get(each) for each in said]
+        return np.array([each in wanted for each in said], dtype=bool)
+    values = column.values
+    if match := RANGE.fullmatch(condition):
+        low, high = (match[end].strip() for end in ("low", "high"))
+        least, most = (_number(column, end, condition) if end else None for end in (low, high))
+        above = least is None or values >= least - SAME * abs(least)
+        below = most is None or values <= most + SAME * abs(most)
+        return ~np.isnan(values) & above & below
+    named = condition.split(",")
+    if len(named) > MOST_VALUES:
+        allowed = f"must be at most {MOST_VALUES} numbers, or a range such as 0.1..0.4"
+        raise StudyError(column.name, f"{len(named)} numbers", allowed)
+    numbers = [_number(column, each, condition) for each in named]
+    return np.any([np.isclose(values, each, rtol=SAME, atol=0.0) for each in numbers], axis=0)
+
+
+def _number(column: Column, text: str, condition: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        allowed = "must be a number, several with commas between, or a range such as 0.1..0.4"
+        raise StudyError(column.name, condition, allowed) from None

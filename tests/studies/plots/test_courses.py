@@ -1,0 +1,130 @@
+"""Lines over increments and stages: ends of stages, loops, and the part in which they lie."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+
+from studies import StudyError
+from studies.views.plots.picture import picture
+from tests.studies.plots.test_curves import swept
+from tests.studies.plots.test_lines import legend_of, lines_of
+from tests.studies.plots.test_many import COUNTS, check_inside
+
+SWEEP = ("load_ratio", "friction", "hardening")
+
+
+def course(stages: int, parts: int = 1) -> xr.Dataset:
+    """A run with a force and a motion over increments, four in each stage."""
+    run = swept([0.5], [0.1], ["none"])
+    time = np.arange(4 * stages + 1) / 4.0
+    names = [f"stage_{number}" for number in range(stages)]
+    part = [f"part_{number}" for number in range(parts)]
+    run = run.assign_coords(increment=np.arange(len(time)), stage=names, part=part)
+    force, motion = np.sin(time), 0.1 * np.sin(time - 0.3)
+    share = np.arange(1.0, parts + 1.0)[:, None] / parts
+    run["increment_time"] = ((*SWEEP, "increment"), time[None, None, None])
+    run["force"] = ((*SWEEP, "increment"), force[None, None, None], {"units": "N"})
+    moved = (share * motion)[None, None, None]
+    run["motion"] = ((*SWEEP, "part", "increment"), moved, {"units": "mm", "long_name": "motion"})
+    return run
+
+
+def ends_of(sheet: Figure) -> list[str]:
+    return [text.get_text() for text in sheet.axes[0].texts if text.get_text().startswith("stage_")]
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_ends_of_stages_are_marked_unless_they_are_too_many(count: int) -> None:
+    sheet = picture(course(count), "force")
+    assert ends_of(sheet) == ([f"stage_{k}" for k in range(count)] if count <= 12 else [])
+    marks = [line for line in lines_of(sheet) if line.get_marker() == "o"]
+    for number, mark in enumerate(marks, start=1):
+        assert mark.get_xdata()[0] == 4 * number
+        assert mark.get_ydata()[0] == np.sin(number)
+    check_inside(sheet)
+
+
+@pytest.mark.parametrize("parts", COUNTS)
+def test_a_force_over_a_displacement_is_a_loop(parts: int) -> None:
+    run = course(5, parts)
+    sheet = picture(run, "force", against="motion")
+    (loop,) = (line for line in lines_of(sheet) if line.get_marker() != "o")
+    np.testing.assert_allclose(loop.get_ydata(), run["force"].squeeze())
+    np.testing.assert_allclose(loop.get_xdata(), run["motion"].squeeze(SWEEP)[-1])
+    assert sheet.axes[0].get_xlabel() == "motion [mm]"
+    assert ends_of(sheet)[-1] == "stage_4"
+    check_inside(sheet)
+
+
+def touching(stages: int, pairs: int = 1, *, released: bool) -> xr.Dataset:
+    """A run with the pressure of pairs along contacts 20 mm long, of which 2 mm touch."""
+    run = swept([0.5], [0.1], ["none"])
+    s = np.linspace(-10.0, 10.0, 201)
+    size = np.arange(1.0, stages + 1.0)
+    if released:
+        size[-1] = 0.0
+    pressure = np.sqrt(np.maximum(1.0 - s**2, 0.0)) * size[:, None]
+    run = run.drop_dims("s").assign_coords(
+        s=("s", s, {"units": "mm"}),
+        stage=[f"stage_{k}" for k in range(stages)],
+        contact=[f"pair_{k}" for k in range(pairs)],
+    )
+    both = np.repeat(pressure[None], pairs, axis=0)
+    dims = (*SWEEP, "contact", "stage", "s")
+    run["contact_pressure"] = (dims, both[None, None, None], {"units": "MPa"})
+    return run.assign(plastic_strain=0.0) if released else run
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_the_axis_ends_where_nothing_happens(count: int) -> None:
+    sheet = picture(touching(count, released=False), "contact_pressure")
+    low, high = sheet.axes[0].get_xlim()
+    assert -2.0 < low < -1.0 < 1.0 < high < 2.0
+    assert sheet.axes[0].get_xlabel() == "distance from the middle $s$ [mm]"
+    wide = picture(touching(count, released=False), "contact_pressure", zoom=8.0)
+    assert wide.axes[0].get_xlim() == pytest.approx((-8.0, 8.0))
+    part = picture(
+        touching(count, released=False), "contact_pressure", window=(-0.5, 0.5, 0.0, 2.0)
+    )
+    assert (part.axes[0].get_xlim(), part.axes[0].get_ylim()) == ((-0.5, 0.5), (0.0, 2.0))
+    check_inside(part)
+
+
+def test_without_a_stage_the_last_one_under_load_is_drawn_and_named() -> None:
+    for released, last in ((True, 4), (False, 5)):
+        run = touching(6, pairs=5, released=released)
+        sheet = picture(run, "contact_pressure")
+        assert len(lines_of(sheet)) == 5
+        assert float(np.max(lines_of(sheet)[0].get_ydata())) == last + 1.0
+        assert f"stage\N{NO-BREAK SPACE}stage_{last}".replace("_", "\N{NO-BREAK SPACE}") in (
+            sheet.axes[0].get_title(loc="left")
+        )
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_lines_over_a_dimension_of_the_field_have_one_value_of_others(count: int) -> None:
+    stages = picture(touching(count, pairs=3, released=False), "contact_pressure", over="stage")
+    shown = min(count, 6)
+    assert len(lines_of(stages)) == shown
+    assert "pair" in stages.axes[0].get_title(loc="left")
+    pairs = picture(touching(3, pairs=count, released=False), "contact_pressure", over="contact")
+    assert len(lines_of(pairs)) == min(count, 6)
+    if count > 1:
+        assert legend_of(pairs)[0] == "pair 0"
+
+
+def test_what_cannot_be_drawn_is_refused() -> None:
+    run = course(3)
+    for given, told in (
+        ({"against": "moton"}, "against = 'moton': .* did you mean motion"),
+        ({"zoom": 1.0}, "zoom = 1.0"),
+        ({"window": (1.0, 0.0, 0.0, 1.0)}, "window = "),
+        ({"over": "stages"}, "over = 'stages'"),
+    ):
+        with pytest.raises(StudyError, match=told):
+            picture(run, "force", **given)
+    with pytest.raises(StudyError, match="does not lie over increments"):
+        picture(touching(2, released=False), "contact_pressure", against="force")

@@ -1,0 +1,175 @@
+"""What a picture of a scene before its computation shows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
+
+from residua.cli import main
+from solver.mesh import grid
+from studies import StudyError
+from studies.scenes.registry import beside, scene_named
+from studies.views.plots.acting import outward
+from studies.views.plots.setup import setup_figure
+from tests.studies.plots.test_many import check_inside
+
+SCENE = """
+name = "block"
+summary = "a block under a rigid ball"
+kinematics = "plane_strain"
+symmetric = true
+[parameters.p]
+default = 20.0
+unit = "MPa"
+description = "pressure"
+[materials.steel]
+youngs_modulus = 2e5
+poisson_ratio = 0.3
+yield_stress = 300
+[bodies.block]
+material = "steel"
+supports = { left = "x", bottom = "xy" }
+[bodies.block.shape]
+kind = "rectangle"
+x = [0.0, 4.0]
+y = [0.0, 2.0]
+size = 0.5
+[rigid.ball]
+y = { moved = -0.1 }
+[rigid.ball.surfaces.face]
+kind = "arc"
+centre = [0, 12]
+radius = 10
+angles = [-90, -80]
+edges = 4
+[[contacts]]
+name = "face"
+slave = "block.top"
+master = "ball.face"
+gap = 0.0
+[[loads]]
+body = "block"
+kind = "pressure"
+boundary = "right"
+value = "$p"
+[[loads]]
+body = "block"
+kind = "temperature"
+rise = 50.0
+expansion = 1e-5
+[loading]
+factor = 1.0
+step = 0.1
+[results.lines.below]
+body = "block"
+start = [0.0, 2.0]
+end = [0.0, 0.0]
+[results.points.corner]
+body = "block"
+at = [4.0, 0.0]
+"""
+
+
+def legend_of(sheet: Figure) -> list[str]:
+    (legend,) = sheet.legends
+    return [text.get_text() for text in legend.get_texts()]
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "block.toml"
+    path.write_text(SCENE)
+    return path
+
+
+def test_it_shows_what_acts_where_and_in_which_direction(file: Path) -> None:
+    scene = scene_named("block.toml", beside(file.parent))
+    sheet = setup_figure(scene, {"p": 30.0}, window=(-1.0, 5.0, -1.0, 4.0))
+    (axes,) = sheet.axes
+    assert {"left", "right", "top", "bottom", "ball.face"} == {t.get_text() for t in axes.texts}
+    pressure, motion = (
+        np.stack([each.U, each.V]) for each in axes.collections if isinstance(each, Quiver)
+    )
+    np.testing.assert_allclose(pressure / np.abs(pressure).max(), [[-1.0] * 4, [0.0] * 4])
+    np.testing.assert_allclose(motion, [[0.0], [-1.0]])
+    known = legend_of(sheet)
+    told = (
+        "pressure block.right: 30",
+        "temperature block: rise 50",
+        "contact block.top – ball.face",
+        "ball: moved y \N{MINUS SIGN}0.1",
+        "held: x, y",
+        "line below",
+        "point corner",
+    )
+    assert [name for name in told if not any(each.startswith(name) for each in known)] == []
+    assert known[0].startswith("block: elastic-plastic, 4 × 2 mm\n32 elements quad8")
+    assert "p 30 MPa" in axes.get_title(loc="left")
+    red = [each for each in axes.collections if isinstance(each, LineCollection)
+           and to_hex(each.get_color()[0]) == "#d62728"]  # fmt: skip
+    assert [np.ptp(np.concatenate(each.get_segments()), axis=0).tolist() for each in red] == [
+        [4, 0]
+    ]
+    check_inside(sheet)
+
+
+def test_outward_normals_point_away_from_a_body() -> None:
+    mesh = grid(np.linspace(0.0, 1.0, 3), np.linspace(0.0, 2.0, 4))
+    for name, way in (("left", [-1, 0]), ("right", [1, 0]), ("top", [0, 1]), ("bottom", [0, -1])):
+        ends, normal = outward(mesh, mesh.boundaries[name])
+        length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=0)
+        np.testing.assert_allclose(normal, np.outer(way, length), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "bodies"),
+    [
+        ("punch", {"accuracy": "draft"}, {"punch", "half_plane"}),
+        ("rolling", {"accuracy": "draft"}, {"wheel", "half_space"}),
+        ("rolling", {"accuracy": "draft", "load": "hertz", "track": 20.0}, {"half_space"}),
+        ("raceway", {"accuracy": "draft"}, {"raceway"}),
+    ],
+)
+def test_scenes_of_the_package_are_drawn_whole_and_near(
+    name: str, values: dict[str, object], bodies: set[str]
+) -> None:
+    sheet = setup_figure(scene_named(name), values)
+    whole, near = sheet.axes
+    assert near.get_xlim()[1] < whole.get_xlim()[1]
+    assert bodies <= {text.partition(":")[0] for text in legend_of(sheet)}
+
+
+def test_the_command_draws_a_scene_or_the_first_run_of_a_study(
+    file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study, picture = tmp_path / "study.toml", tmp_path / "block.png"
+    study.write_text('name = "s"\nscene = "block.toml"\n[sweep]\np = [7.5, 8]\n')
+    for what in (file, study):
+        assert main(["draw", str(what), "--set", "p=5", "--out", str(picture)]) == 0
+        assert picture.read_bytes().startswith(b"\x89PNG")
+    mistakes = {
+        "friction": ["--set", "friction=1"],
+        "p = 'soft'": ["--set", "p=soft"],
+        "window": ["--window", "8", "9", "0", "1"],
+        "zoom": ["--zoom", "0"],
+        "resolution": ["--resolution", "9"],
+    }
+    for name, given in mistakes.items():
+        assert main(["draw", str(file), *given, "--out", str(picture)]) == 2
+        assert name in capsys.readouterr().err
+
+
+def test_a_scene_without_a_model_is_refused() -> None:
+    def model(parameters: object) -> NoReturn:
+        raise NotImplementedError
+
+    with pytest.raises(StudyError, match="no model to draw"):
+        setup_figure(replace(scene_named("punch"), model=model))
