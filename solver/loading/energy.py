@@ -38,19 +38,25 @@ def worked(system: System, before: Converged, now: Converged) -> Energy:
         "external": so_far.external + work,
         "plastic": so_far.plastic + _plastic_work(parts, before, now),
         "friction": so_far.friction + now.contact_work[0],
-        "contact": so_far.contact + now.contact_work[1] + _released(before, now),
+        "contact": so_far.contact + now.contact_work[1] + _released(system, before, now),
         "supplied": so_far.supplied + max(work, 0.0),
     }
     scale = max(so_far.scale, system.least(now.state.time)[1], *map(abs, terms.values()))
     return Energy(stored=so_far.stored, scale=scale, **terms)
 
 
-def _released(before: Converged, now: Converged) -> float:
-    """Return the work on contact forces that vanish because the bodies are separated [N mm]."""
+def _released(system: System, before: Converged, now: Converged) -> float:
+    """Return the work on contact forces that vanish because the bodies are separated [N mm].
+
+    Those of links stay.
+    """
     if not now.separated:
         return 0.0
+    work, links = 0.0, before.state.links
     moves = zip(before.state.u, now.state.u, before.contact_forces, strict=True)
-    return -sum(float(force @ (u1 - u0)) / 2 for u0, u1, force in moves)
+    for k, (u0, u1, force) in enumerate(moves):
+        work -= float((force - system.links.on_part(k, links, len(force))) @ (u1 - u0)) / 2
+    return work
 
 
 def _heat(parts: Sequence[Part], before: Converged, now: Converged) -> float:

@@ -245,6 +245,24 @@ def test_a_block_settles_on_its_springs() -> None:
     assert springs == pytest.approx(4.0 * 100.0**2 / 2 * (1 / 400.0 + 1 / 2000.0), rel=1e-9)
 
 
+def test_springs_keep_their_energy_when_bodies_are_separated() -> None:
+    """What the tool presses springs back; the energy of its contact is given off."""
+    body = block("block", np.linspace(0, 4, 3), np.linspace(0, 2, 3), supports={"left": "x"})
+    tool = RigidBody(name="tool", surfaces={"face": line((-0.5, 2.0), (4.5, 2.0))},
+                     y=Moved(value=-0.01))  # fmt: skip
+    model = Model(
+        bodies=(body,),
+        rigid=(tool,),
+        contacts=(ContactPair(slave=("block", "top"), master=("tool", "face")),),
+        links=(Link(slave=("block", "bottom"), components="y", stiffness=1000.0),),
+    )
+    stages = (Stage(name="on", target=1.0), Stage(name="off", target=0.9, apart=True))
+    found = solve(model, stages=stages)
+    for stage in ("on", "off"):
+        assert found.audit(stage).figures["audit_energy"] < 1e-9
+    assert found.stages["off"].energy.contact > 0.1 * found.stages["on"].energy.external
+
+
 def test_a_boundary_kept_plane_takes_the_mean_of_its_load() -> None:
     body = block("block", np.linspace(0, 10, 6), np.linspace(0, 5, 4),
                  supports={"bottom": "y", "left": "x"},
