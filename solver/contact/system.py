@@ -138,7 +138,7 @@ class System:
             kinds = (pairing.normal, pairing.tangent)[: 2 if interface.rough else 1]
             for kind, gaps in zip(kinds, (len(pairing.area), 0), strict=False):
                 rows.append(self.rigid_rows(interface, kind, u, gaps))
-        rows.append(self._linked_motions())
+        rows.append(self.linked_motions())
         A = np.vstack([np.zeros((0, ends[-1])), *rows])
         loose = null_space(A, rcond=1e-9) if len(A) else np.eye(ends[-1])
         for part, size, end in zip(self.parts, sizes, ends, strict=True):
@@ -149,7 +149,7 @@ class System:
                     f"body {part.body.name!r} can move freely: support it, or hold it by contact",
                 )
 
-    def _linked_motions(self) -> Array:
+    def linked_motions(self) -> Array:
         """Return how the rigid motions of all parts violate the conditions of links (c, n)."""
         each = zip(self.parts, self.links.rows, strict=True)
         return np.hstack([

@@ -30,6 +30,7 @@ from solver import (
     Traction,
     solve,
 )
+from solver.contact.parting import parted
 from solver.mesh import grid, within
 from solver.model.rigid import line
 from studies.scenes.scene import read_scene
@@ -191,6 +192,22 @@ def test_two_tied_bodies_touch_another_as_one_body_does() -> None:
     assert normal.sum() == pytest.approx(500.0)
     assert one.audit().passed
     assert two.audit().passed
+
+
+def test_tied_bodies_that_overlap_another_are_moved_apart_from_it_together() -> None:
+    ground = block("ground", np.linspace(-6, 6, 7), np.linspace(-6, 0, 4),
+                   supports={"bottom": "xy"})  # fmt: skip
+    x = np.linspace(-2, 2, 5)
+    lower = block("lower", x, np.linspace(0, 1, 3) - 0.01)
+    upper = block("upper", x, np.linspace(1, 2, 3) - 0.01)
+    pair = ContactPair(slave=("lower", "bottom"), master=("ground", "top"), friction=0.3)
+    tie = Link(slave=("upper", "bottom"), master=("lower", "top"))
+    system = System(Model(bodies=(lower, upper, ground), contacts=(pair,), links=(tie,)))
+    state = parted(system, system.initial())
+    assert not system.overlaps(state)
+    for name in ("lower", "upper"):
+        assert np.allclose(system.displacement(name, state).reshape(-1, 2), [0.0, 0.01])
+    assert np.allclose(system.links.off(state.u, state.links), 0.0)
 
 
 def test_tied_bodies_stay_where_they_are_when_contact_leaves_them() -> None:
