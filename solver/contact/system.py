@@ -146,7 +146,7 @@ class System:
                 raise ModelError(
                     "supports",
                     getattr(part.body, "supports", {}),
-                    f"body {part.body.name!r} can move freely: support it, or hold it by contact",
+                    f"body {part.body.name!r} can move freely: hold it by supports, contact or links",
                 )
 
     def linked_motions(self) -> Array:
