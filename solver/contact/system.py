@@ -143,11 +143,9 @@ class System:
         loose = null_space(A, rcond=1e-9) if len(A) else np.eye(ends[-1])
         for part, size, end in zip(self.parts, sizes, ends, strict=True):
             if size and np.abs(loose[end - size : end]).max(initial=0.0) > 1e-6:
-                raise ModelError(
-                    "supports",
-                    getattr(part.body, "supports", {}),
-                    f"body {part.body.name!r} can move freely: hold it by supports, contact or links",
-                )
+                held = getattr(part.body, "supports", {})
+                allowed = "can move freely: hold it by supports, links or contact"
+                raise ModelError("supports", held, f"body {part.body.name!r} {allowed}")
 
     def linked_motions(self) -> Array:
         """Return how the rigid motions of all parts violate the conditions of links (c, n)."""
