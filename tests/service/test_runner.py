@@ -33,7 +33,10 @@ AWAY = {"kind": "wait", "content": {"reason": "the store is busy"}}
 
 def outcome(counts: dict[str, int], stage: str = "", asked: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return the last message of a child."""
-    return {"kind": "outcome", "content": {"counts": counts, "stage": stage, "asked": asked}}
+    return {
+        "kind": "outcome",
+        "content": {"counts": counts, "stage": stage, "asked": asked, "counted": "runs"},
+    }
 
 
 ALL_FAILED = outcome({"error": 2})
