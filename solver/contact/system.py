@@ -381,7 +381,7 @@ class System:
     def response(self, name: str, converged: Converged) -> Response:
         """Return stress and internal variables at the points of a whole body.
 
-        Stress and accumulated plastic strain are NaN in elements that are removed.
+        Stress and plastic strain are NaN in elements that are removed.
         """
         number = self.part(name)
         if not self.parts[number].meshed:
@@ -391,11 +391,12 @@ class System:
         found, gone = converged.responses[number], self.full(name).gone(converged.state.time)
         if gone is None or not gone.any():
             return found
-        accumulated = np.where(gone, np.nan, found.state.accumulated)
-        return found._replace(
-            stress=np.where(gone, np.nan, found.stress),
-            state=replace(found.state, accumulated=accumulated),
-        )
+        unknown = {
+            name: np.where(gone, np.nan, getattr(found.state, name))
+            for name in ("accumulated", "plastic_strain")
+        }
+        stress = np.where(gone, np.nan, found.stress)
+        return found._replace(stress=stress, state=replace(found.state, **unknown))
 
     def initial(self) -> State:
         """Return the unloaded, undeformed state."""
