@@ -8,10 +8,13 @@ import pytest
 from solver import (
     Amplitude,
     Body,
+    ContactPair,
     Material,
     Model,
     ModelError,
+    Moved,
     Pressure,
+    RigidBody,
     Solution,
     Stage,
     Traction,
@@ -19,6 +22,7 @@ from solver import (
 )
 from solver.mesh import grid, marked, within
 from solver.model.loads import InitialStress, Load, Removal
+from solver.model.rigid import line
 from studies.scenes.scene import read_scene
 from tests.architecture.sources import ROOT
 
@@ -108,6 +112,21 @@ def test_a_piece_that_is_cut_off_under_load_fails_the_audit() -> None:
     assert found.audit("rest").passed
     (told,) = found.audit("cut").violations
     assert told.startswith("removed elements of bar bear")
+
+
+def test_the_error_of_contact_pressure_counts_where_nothing_is_removed() -> None:
+    mesh = marked(grid(np.linspace(0.0, 4.0, 9), np.linspace(0.0, 1.0, 5)), "end", x=(3.0, 4.0))
+    block = Body(name="block", mesh=mesh, material=STEEL, supports={"bottom": "xy"},
+                 loads=(Removal(region="end", amplitude=AWAY),))  # fmt: skip
+    tool = RigidBody(name="tool", surfaces={"face": line((0.5, 1.0), (2.5, 1.0))},
+                     y=Moved(value=-0.01, amplitude=Amplitude([0, 1], [0, 1])))  # fmt: skip
+    pair = ContactPair(slave=("block", "top"), master=("tool", "face"))
+    found = solve(Model(bodies=(block,), rigid=(tool,), contacts=(pair,)), stages=(REST, CUT))
+    before, after = (found.audit(stage) for stage in ("rest", "cut"))
+    assert after.passed
+    error = before.figures["audit_error_contact"]
+    assert error > 0
+    assert after.figures["audit_error_contact"] == pytest.approx(error, rel=0.5)
 
 
 def test_a_reamed_hole_loses_the_stress_that_lames_closed_form_says() -> None:

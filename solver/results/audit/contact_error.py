@@ -112,4 +112,6 @@ def _integrals(chain: Surface, pressure: Array, stress: Array) -> tuple[float, f
     xx, yy, _, xy = stress[:, chain.edges] @ shape.T
     across = nx**2 * xx + ny**2 * yy + 2 * nx * ny * xy
     area = _WEIGHT * length * chain.depth(at @ shape.T) * (pressure != 0).any(axis=1, keepdims=True)
-    return float((area * np.abs(pressure + across)).sum()), float((area * pressure).sum())
+    area = np.where(np.isnan(across), 0.0, area)  # beside removed elements
+    off = np.abs(pressure + np.nan_to_num(across))
+    return float((area * off).sum()), float((area * pressure).sum())
