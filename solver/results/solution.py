@@ -304,7 +304,7 @@ def _check_ends(model: Model, times: Sequence[float]) -> None:
     of += [(f"axle of {body.name}", float) for body in model.bodies if body.axle]
     for name, value in of:
         ends = [value(time) for time in times]
-        if np.ptp(ends) > ROUNDING * np.abs(ends).max():
+        if np.ptp(ends) > ROUNDING * max(1.0, *np.abs(ends)):  # a sine ends at rounding
             allowed = f"must be the same at the ends of all cycles: {name}"
             raise ModelError("until", [float(f"{end:.6g}") for end in ends], allowed)
 
