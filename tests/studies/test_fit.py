@@ -465,7 +465,7 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
     with pytest.raises(StudyError, match=r"fit\.measured = None: is missing"):
         Study.from_toml(file)
     for text, allowed in (
-        ("contact_half_width [m]\n1\n2\n", "must be in mm"),
+        ("contact_half_width [N]\n1\n2\n", "in mm; N is a force"),
         ("contact_half_width\nx\n2\n", "must be a number in every row"),
         ("s, contact_pressure, peak_contact_pressure\n1, 2, 3\n", "the columns PLACE and VALUE"),
     ):
