@@ -212,9 +212,19 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "must hold a stage that loads the bodies",
     ),
     "number with a unit": (
-        put("materials", "steel", "youngs_modulus", "195 GPa"),
+        put("materials", "steel", "youngs_modulus", "195 GN"),
         "materials.steel.youngs_modulus",
+        "must be a number in MPa; GN is a force",
+    ),
+    "unit of an entry without one": (
+        put("loads", 0, "amplitude", {"pressed": "2 in"}),
+        "loads[0].amplitude.pressed",
         "must be a number without a unit: in N, mm, MPa",
+    ),
+    "unit of a default": (
+        put("parameters", "wide", "default", "4 s"),
+        "parameters.wide.default",
+        "must be a number in mm; s is a time",
     ),
     "unknown region that is removed": (
         put("stages", 0, "remove", ["upper.skin"]),
