@@ -108,7 +108,7 @@ def test_points_and_samples_have_units_in_cells_headings_and_ranges() -> None:
 
 def test_a_wrong_unit_of_a_study_is_one_error_with_what_is_allowed() -> None:
     with pytest.raises(StudyError) as caught:
-        fake_study(friction="3 mm")
+        fake_study(sweep={"half_width": [10.0]}, friction="3 mm")
     assert str(caught.value).startswith("parameters.friction = '3 mm': must be a number >= 0")
     assert str(caught.value).endswith("; mm is a length")
 
