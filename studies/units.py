@@ -22,7 +22,8 @@ _POWER = r"(?:\^?-?[1-9])?"
 _WORD = rf"[A-Za-zµ°%]+{_POWER}"
 _QUANTITY = re.compile(
     r"\s*(?P<number>[-+]?(?:[0-9]+\.?[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]{1,3})?+)"
-    rf"(?P<unit>\s*/\s*{_WORD}|\s+1\s*/\s*{_WORD}|\s*{_WORD})(?P<more>(?:\s*[*/ ]\s*{_WORD})*)\s*"
+    rf"(?P<unit>\s*+(?:/\s*+|(?<=\s)1\s*+/\s*+)?{_WORD})"
+    rf"(?P<more>(?:(?:\s*+[*/]\s*+|\s++){_WORD})*)\s*"
 )
 """A number with a unit; its number is as long as it can be: ``60e1`` has no unit."""
 _PLAIN = str.maketrans({"²": "^2", "³": "^3", "·": "*", "μ": "µ"})
@@ -136,9 +137,9 @@ def _roots(text: str) -> tuple[Fraction | None, Any]:
     known = _registry()
     try:
         unit = known.parse_units(written)
-    except pint.UndefinedUnitError:
+        factor, roots = known.get_root_units(unit)
+    except (pint.PintError, ValueError):  # ValueError for the word nan
         raise UnitError(f"{text} is no known unit") from None
-    factor, roots = known.get_root_units(unit)
     try:
         multiple = known.convert(Fraction(0), unit, roots) == 0
     except TypeError:  # a logarithm

@@ -108,8 +108,9 @@ class Parameter:
         StudyError
             naming `field`, when it stands for none
         """
+        value = self.in_own_unit(text, field)
         with suppress(StudyError):
-            return self.normalise(text, field)
+            return self.normalise(value, field)
         try:
             return self.normalise(json.loads(text), field)
         except (ValueError, RecursionError):

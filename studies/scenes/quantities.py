@@ -7,10 +7,11 @@ numbers only.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import UnionType
 from typing import Annotated, Any, TypeAlias, Union, get_args, get_origin
 
+from solver.parameters import is_number
 from studies.errors import StudyError
 from studies.scenes.mending import Where
 from studies.scenes.refusals import dotted
@@ -20,7 +21,7 @@ from studies.units import UnitError, converted, is_quantity, number_in
 
 Visit: TypeAlias = Callable[[Where, str, str], Any]
 """Place, text and unit of an entry -> its new value."""
-Options: TypeAlias = Iterable[tuple[Any, str | None]]
+Options: TypeAlias = Sequence[tuple[Any, str | None]]
 """Types that a value may have, each with the unit of its numbers."""
 
 
@@ -54,6 +55,8 @@ def _converted(where: Where, text: str, unit: str) -> Any:
 
 def _visited(where: Where, value: Any, options: Options, visit: Visit) -> Any:
     """Return a part of the file with what `visit` returns in place of numbers with a unit."""
+    if not options:  # not known here
+        return value
     if isinstance(value, str):
         unit = next((unit for _, unit in options if unit is not None), None)
         return visit(where, value, unit) if unit is not None and is_quantity(value) else value
@@ -62,7 +65,7 @@ def _visited(where: Where, value: Any, options: Options, visit: Visit) -> Any:
             key: _visited((*where, str(key)), each, _entry(options, value, key), visit)
             for key, each in value.items()
         }
-    if isinstance(value, list | tuple):
+    if isinstance(value, list | tuple) and not all(map(is_number, value)):
         return [
             _visited((*where, k), each, _item(options, k), visit) for k, each in enumerate(value)
         ]

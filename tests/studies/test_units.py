@@ -58,6 +58,8 @@ def test_a_number_is_as_if_typed_in_the_other_unit(text: str, unit: str, number:
         ("3 dB", "1", "dB has a zero of its own"),
         ("3 furlongs^9", "mm", "is something else"),
         ("3 lines", "mm", "lines is no known unit"),
+        ("3 nan", "mm", "nan is no known unit"),
+        ("3 1/neper", "mm", "1/neper is no known unit"),
         ("3 mm", "rows", "its own unit cannot be converted: rows is no known unit"),
         ("1e999 km", "mm", "is not finite"),
     ],
@@ -109,7 +111,9 @@ def test_points_and_samples_have_units_in_cells_headings_and_ranges() -> None:
 def test_a_wrong_unit_of_a_study_is_one_error_with_what_is_allowed() -> None:
     with pytest.raises(StudyError) as caught:
         fake_study(sweep={"half_width": [10.0]}, friction="3 mm")
-    assert str(caught.value).startswith("parameters.friction = '3 mm': must be a number >= 0")
+    assert str(caught.value).startswith(
+        "parameters.friction = '3 mm': must be a finite number >= 0"
+    )
     assert str(caught.value).endswith("; mm is a length")
 
 
@@ -118,8 +122,10 @@ def test_words_stay_words_and_the_command_takes_units() -> None:
     found = read_values(scene, {"rail_profile": "60e1", "yaw": "0.1 deg", "load": "80 kN"})
     assert found == {"rail_profile": "60e1", "yaw": math.radians(0.1), "load": 80000.0}
     assert {type(each) for each in found.values()} == {str, float}
-    track = parameters_of(scene)["track_length"]
-    assert (track.normalise("endless", ""), track.normalise("2 m", "")) == ("endless", 2000.0)
+    span = parameters_of(scene)["span"]
+    assert (span.read("endless", ""), span.read("2 m", "")) == ("endless", 2000.0)
+    with pytest.raises(StudyError, match="must be .*endless.*; N is a force"):
+        span.read("2 N", "")
 
 
 @pytest.mark.parametrize(
