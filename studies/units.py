@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 from fractions import Fraction
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 UNITLESS = ("", "1", "-")
@@ -102,7 +102,7 @@ def _registry() -> Any:
     return pint.UnitRegistry(non_int_type=Fraction)
 
 
-@cache
+@lru_cache(maxsize=256)
 def _factor(given: str, wanted: str) -> Fraction | str:
     """Return the number that multiplies one in a given unit, or why there is none."""
     try:
@@ -147,7 +147,7 @@ def _roots(text: str) -> tuple[Fraction | None, Any]:
     return Fraction(factor) if multiple else None, roots
 
 
-@cache
+@lru_cache(maxsize=256)
 def _kind(roots: Any) -> str:
     """Return what has a unit: ``a length``."""
     for name, usual in _KINDS.items():
