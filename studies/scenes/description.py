@@ -194,8 +194,8 @@ class Description:
             if not wrong:
                 return Readable(tables, wrong, {})
         except ValidationError as error:
-            wrong |= {at: each for at, each in wrong_units(tree).items() if at not in wrong}
-            wrong |= mistakes_of(error, SceneFile, wrong)
+            told = mistakes_of(error, SceneFile, wrong)
+            wrong |= told | {at: each for at, each in wrong_units(tree).items() if at in told}
         rest, own = mended(tree, wrong)
         try:
             return Readable(SceneFile.model_validate_json(_json(rest), strict=True), wrong, own)
