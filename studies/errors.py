@@ -9,6 +9,8 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Any
 
+from studies.units import is_quantity
+
 MOST_MISTAKES, MOST_NAMES, COMPARED = 20, 10, 500
 """Number of mistakes and of names that a message lists, and of names compared with a wrong one."""
 
@@ -181,10 +183,6 @@ def without_folders(text: str) -> str:
     return _PATH.sub(lambda path: PurePath(path[0]).name, text)
 
 
-_WITH_UNIT = re.compile(
-    r"\s*[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?\s*[a-zµ°%][\w/*^ .²³-]*", re.IGNORECASE
-)
-"""A number with a unit, such as ``195 GPa``."""
 _WORDS = {
     "missing": "must be given",
     "float_type": "must be a number",
@@ -217,6 +215,6 @@ _WORDS = {
 def worded(error: Mapping[str, Any]) -> str:
     """Return what is allowed for the input of a pydantic error."""
     words = _WORDS.get(error["type"])
-    if error["type"] in ("float_type", "int_type") and _WITH_UNIT.fullmatch(str(error["input"])):
+    if error["type"] in ("float_type", "int_type") and is_quantity(error["input"]):
         return f"{words} without a unit: in N, mm, MPa, t, s, K, degrees"
     return words.format(**error.get("ctx", {})) if words else str(error["msg"])

@@ -22,12 +22,15 @@ from numpy.typing import NDArray
 from solver.errors import ModelError
 from solver.model.amplitude import Amplitude
 from solver.model.kinematics import Kinematics
+from solver.parameters import Coordinate
 from solver.parts import Parts
 
 Array = NDArray[np.float64]
 Field = Callable[[Array], Array]
 Value = float | Field
 """A number, or a function of position: (positions (2, n) [mm]) -> (n,), such as a `Tabulated`."""
+StressValue = Annotated[Value, Unit("MPa")]
+PerKelvin = Annotated[float, Unit("1/K")]
 
 _ALWAYS = Amplitude.constant(1.0)
 _VECTOR, _TENSOR = ("x", "y"), ("xx", "yy", "zz", "xy")
@@ -132,7 +135,7 @@ class BoundaryLoad(Load):
 class Pressure(BoundaryLoad):
     """A pressure on a boundary, positive when it pushes: ``value`` [MPa]."""
 
-    value: Value
+    value: StressValue
 
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a pressure that is not finite."""
@@ -150,8 +153,8 @@ class Pressure(BoundaryLoad):
 class Traction(BoundaryLoad):
     """A force per area on a boundary, in fixed directions: ``x`` and ``y`` [MPa]."""
 
-    x: Value = 0.0
-    y: Value = 0.0
+    x: StressValue = 0.0
+    y: StressValue = 0.0
 
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a component that is not finite."""
@@ -169,8 +172,8 @@ class Traction(BoundaryLoad):
 class BodyForce(Load):
     """A force per volume in fixed directions: ``x`` and ``y`` [N/mm3]."""
 
-    x: Value = 0.0
-    y: Value = 0.0
+    x: Annotated[Value, Unit("N/mm3")] = 0.0
+    y: Annotated[Value, Unit("N/mm3")] = 0.0
 
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a component that is not finite."""
@@ -198,8 +201,8 @@ class Gravity(Load):
     """
 
     density: Density
-    x: float = 0.0
-    y: float = -9806.65
+    x: Annotated[float, Unit("mm/s2")] = 0.0
+    y: Annotated[float, Unit("mm/s2")] = -9806.65
 
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a number that is not allowed, or weight across the axis."""
@@ -232,7 +235,7 @@ class Centrifugal(Load):
     density: Density
     speed: Annotated[float, Interval(ge=0.0), Unit("rad/s")]
     axis: Axis = "y"
-    centre: tuple[float, float] = (0.0, 0.0)
+    centre: tuple[Coordinate, Coordinate] = (0.0, 0.0)
 
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a number that is not allowed, or another axis than its own."""
@@ -263,8 +266,8 @@ class Centrifugal(Load):
 class Displacement(BoundaryLoad):
     """A prescribed displacement of a boundary: ``x`` and ``y`` [mm]; None leaves it free."""
 
-    x: float | None = None
-    y: float | None = None
+    x: Coordinate | None = None
+    y: Coordinate | None = None
     outside: ClassVar[bool] = False
 
     @property
@@ -295,10 +298,10 @@ class Temperature(Load):
         [1/K]. Every slope of the tension curve decreases with Young's modulus
     """
 
-    rise: Value
-    expansion: float
-    modulus_drop: float = 0.0
-    yield_drop: float = 0.0
+    rise: Annotated[Value, Unit("K")]
+    expansion: PerKelvin
+    modulus_drop: PerKelvin = 0.0
+    yield_drop: PerKelvin = 0.0
 
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a number that is not finite."""
@@ -372,10 +375,10 @@ class InitialStress(Load):
     stress : in place of them, a function (positions (2, n) [mm]) -> xx, yy, zz, xy (4, n) [MPa]
     """
 
-    xx: Value = 0.0
-    yy: Value = 0.0
-    zz: Value = 0.0
-    xy: Value = 0.0
+    xx: StressValue = 0.0
+    yy: StressValue = 0.0
+    zz: StressValue = 0.0
+    xy: StressValue = 0.0
     stress: Field | None = None
     amplitude: Amplitude | None = _ALWAYS
     varies: ClassVar[bool] = False

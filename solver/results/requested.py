@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from solver.errors import ModelError
+from solver.parameters import Coordinate
 from solver.results.invariants import component, known_components
 from solver.results.quantities import Quantity
 from solver.tensors import AXES
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-Span = tuple[float, float]
+Span = tuple[Coordinate, Coordinate]
 Take = Literal["maximum", "minimum", "integral", "extent"]
 _UNITS = {"stress": "MPa", "mises": "MPa", "plastic_strain": "1", "displacement": "mm",
           "pressure": "MPa", "shear": "MPa", "gap": "mm", "slip": "mm"}  # fmt: skip

@@ -22,6 +22,7 @@ from solver.scenes import Scene
 from studies.definition.line import Read, picked
 from studies.definition.spaced import is_finite
 from studies.errors import StudyError, check_entries, nearest, one_of
+from studies.units import UnitError, number_in, under
 
 Numbers = NDArray[np.float64]
 
@@ -210,23 +211,23 @@ def _columns(field: str, rows: Any, scene: Scene) -> dict[str, Any]:
     if not tables or not rows:
         raise StudyError(f"{field}.rows", rows, "must be a list of tables: the rows of a file")
     headings = list(dict.fromkeys(key for row in rows for key in row))
-    names, known = [], scene.known_quantities
-    for heading in headings:
-        match = _HEADING.fullmatch(heading)
-        name, unit = (match["name"], match["unit"]) if match else (heading, None)
-        if name != SIGMA and name in known and unit is not None:
-            own = known[name].units
-            if unit.strip() != own and not {unit.strip(), own} <= {"", "1", "-"}:
-                raise StudyError(field, heading, f"{name} must be in {own}")
-        names.append(name)
+    matches = [_HEADING.fullmatch(heading) for heading in headings]
+    names = [m["name"] if m else h for m, h in zip(matches, headings, strict=True)]
     lines = [name for name in names if name != SIGMA]
     if not 1 <= len(lines) <= 2:
         allowed = "must have the columns PLACE and VALUE, named as variables of the runs, and sigma"
         raise StudyError(field, ", ".join(headings), allowed)
-    columns = {
-        name: [_number(field, heading, row.get(heading)) for row in rows]
-        for name, heading in zip(names, headings, strict=True)
-    }
+    columns, known = {}, scene.known_quantities
+    for name, heading, match in zip(names, headings, matches, strict=True):
+        columns[name] = [_number(field, heading, row.get(heading)) for row in rows]
+        quantity = known.get(lines[-1] if name == SIGMA else name)
+        if quantity and match and match["unit"] is not None:
+            unit = match["unit"].strip()
+            try:
+                columns[name] = [under(unit, each, quantity.units) for each in columns[name]]
+            except UnitError as error:
+                allowed = f"must be {number_in(quantity.units)}; {error}"
+                raise StudyError(field, heading, allowed) from None
     found: dict[str, Any] = {"of": lines[-1], "values": columns[lines[-1]]}
     if len(lines) == 2:
         found |= {"over": lines[0], "places": columns[lines[0]]}

@@ -23,6 +23,7 @@ from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.errors import StudyError, one_of
 from studies.scenes.registry import scene_named
+from studies.units import UnitError, converted, is_quantity
 
 _RELATIONS = {
     "exclusiveMinimum": ">",
@@ -61,11 +62,14 @@ class Parameter:
     def normalise(self, value: Any, field: str) -> Any:
         """Return `value` as a JSON value of this parameter's type.
 
+        A text such as ``195 GPa`` is the number in the unit of the parameter.
+
         Raises
         ------
         StudyError
-            naming `field`, when the value has the wrong type or is not finite
+            naming `field`, when the value has the wrong type, another dimension, or is not finite
         """
+        value = self.in_own_unit(value, field)
         if value is None and self.default is None:  # left out, as a stored study has it
             return None
         try:
@@ -76,6 +80,26 @@ class Parameter:
             raise self.refusal(field, value)
         return self._type.dump_python(typed, mode="json")
 
+    def in_own_unit(self, value: Any, field: str) -> Any:
+        """Return the number of a text such as ``195 GPa`` in the unit of this parameter.
+
+        Other values stay, and so do words of a parameter that takes no numbers.
+
+        Raises
+        ------
+        StudyError
+            naming `field`, when the unit has another dimension
+        """
+        options = self.schema.get("anyOf", [self.schema])
+        if not is_quantity(value) or {"number", "integer"}.isdisjoint(
+            each.get("type") for each in options
+        ):
+            return value
+        try:
+            return converted(value, self.unit)
+        except UnitError as error:
+            raise StudyError(field, value, f"must be {self.allowed}; {error}") from None
+
     def read(self, text: str, field: str) -> Any:
         """Return the normalised value that a text stands for: a word, or else JSON.
 
@@ -84,8 +108,9 @@ class Parameter:
         StudyError
             naming `field`, when it stands for none
         """
+        value = self.in_own_unit(text, field)
         with suppress(StudyError):
-            return self.normalise(text, field)
+            return self.normalise(value, field)
         try:
             return self.normalise(json.loads(text), field)
         except (ValueError, RecursionError):

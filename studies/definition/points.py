@@ -16,8 +16,10 @@ from solver.parameters import is_number
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
 from studies.definition.sampling import METHOD, METHODS, sampled
+from studies.definition.spaced import is_finite
 from studies.errors import StudyError, nearest
 from studies.toml import CASE
+from studies.units import UnitError, number_in, under
 
 POINT = "point"
 """Name of the axis of the entries ``points`` and ``sample``."""
@@ -29,7 +31,6 @@ Points = list[dict[str, Any]]
 ENTRIES = ("points", "sample")
 """Entries of a study that say what its axis `POINT` is."""
 _HEADING = re.compile(r"(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]*)\]")
-_UNITLESS = ("", "1", "-")
 _NUMBER = re.compile(
     r"[+-]?(?:[0-9]+(?P<part>\.[0-9]*)?|(?P<dot>\.[0-9]+))(?P<power>[eE][+-]?[0-9]+)?"
 )
@@ -114,7 +115,7 @@ def checked_points(name: str, content: Any, known: Mapping[str, Parameter]) -> P
     """Return the points of an axis, normalised: all with the same parameters, in their order.
 
     A parameter that one point sets and another leaves out has the scene's default there. The key of
-    a value may tell its unit, as in ``"radius [mm]"``, which must be that of the parameter. A table
+    numbers may tell their unit, as in ``"radius [mm]"``: they are converted. A table
     may have a `CASE`, if all have one.
 
     Raises
@@ -132,7 +133,7 @@ def checked_points(name: str, content: Any, known: Mapping[str, Parameter]) -> P
         raise StudyError(field, content, "must be a list of points, each a table of parameters")
     if len(content) > MOST_POINTS:
         raise StudyError(field, f"{len(content)} points", f"must be at most {MOST_POINTS}")
-    headings: dict[Any, str] = {}
+    headings: dict[Any, tuple[str, str]] = {}
     given = [_point(f"{field}[{k}]", each, known, headings) for k, each in enumerate(content)]
     own = [key for key in known if key != CASE and any(key in point for point in given)]
     if not own:
@@ -156,28 +157,38 @@ def checked_points(name: str, content: Any, known: Mapping[str, Parameter]) -> P
 
 
 def _point(
-    field: str, content: Any, known: Mapping[str, Parameter], headings: dict[Any, str]
+    field: str,
+    content: Any,
+    known: Mapping[str, Parameter],
+    headings: dict[Any, tuple[str, str]],
 ) -> dict[str, Any]:
     """Return the parameters that a point sets, normalised, and its case."""
     if not isinstance(content, Mapping):
         raise StudyError(field, content, "must be a table of parameters")
     point: dict[str, Any] = {}
     for key, value in content.items():
-        name = headings.get(key) or headings.setdefault(key, _parameter(field, key, known))
+        if key not in headings:
+            headings[key] = _heading(field, key, known)
+        name, unit = headings[key]
         if name in point:
             raise StudyError(f"{field}.{key}", value, f"{name} is given twice")
         own = f"{field}.{name}"
-        point[name] = _case(own, value) if name == CASE else _value(own, value, known[name])
+        point[name] = _case(own, value) if name == CASE else _value(own, value, known[name], unit)
     return point
 
 
-def _value(field: str, value: Any, parameter: Parameter) -> Any:
+def _value(field: str, value: Any, parameter: Parameter, unit: str) -> Any:
     """Return the value of a parameter, normalised; a cell of a file is a text.
+
+    A number is one in `unit`.
 
     A text is a number or a truth value if it is written so and the parameter takes it. Other texts
     are words: ``60e1`` is one of ``rail_profile``, and no number.
     """
-    if isinstance(value, str) and (plain := _plain(value)) is not None:
+    plain = _plain(value) if isinstance(value, str) else value
+    if unit != parameter.unit and is_finite(plain):
+        return parameter.normalise(under(unit, plain, parameter.unit), field)
+    if isinstance(value, str) and plain is not None:
         with suppress(StudyError):
             return parameter.normalise(plain, field)
     return parameter.normalise(value, field)
@@ -193,20 +204,23 @@ def _plain(text: str) -> float | bool | None:
     return int(text) if whole else float(text)
 
 
-def _parameter(field: str, key: Any, known: Mapping[str, Parameter]) -> str:
-    """Return the parameter of a key such as ``"radius [mm]"``, if the unit is its own."""
+def _heading(field: str, key: Any, known: Mapping[str, Parameter]) -> tuple[str, str]:
+    """Return the parameter of a key such as ``"radius [mm]"``, and the unit of its numbers."""
     heading = _HEADING.fullmatch(key) if isinstance(key, str) else None
     name = heading["name"] if heading else key
     if name == CASE and not heading:
-        return CASE
+        return CASE, ""
     if name not in known:
         allowed = f"the scene has no such parameter; it has {', '.join(known)}"
         raise StudyError(f"{field}.{name}", key, allowed + nearest(name, known))
-    unit, own = heading["unit"].strip() if heading else "", known[name].unit
-    if heading and unit != own and not (unit in _UNITLESS and own in _UNITLESS):
-        allowed = f"{name} has no unit" if own in _UNITLESS else f"{name} must be in {own}"
-        raise StudyError(f"{field}.{name}", key, allowed)
-    return str(name)
+    own = known[name].unit
+    unit = heading["unit"].strip() if heading else own
+    try:
+        under(unit, 1.0, own)
+    except UnitError as error:
+        allowed = f"must be {number_in(own)}; {error}"
+        raise StudyError(f"{field}.{name}", key, allowed) from None
+    return name, unit
 
 
 def _case(field: str, value: Any) -> str:

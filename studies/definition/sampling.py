@@ -106,6 +106,8 @@ def sampled(
 def _range(field: str, content: Any, parameter: Parameter) -> _Range:
     """Return the range of a parameter."""
     listed = isinstance(content, list | tuple)
+    if listed:
+        content = [parameter.in_own_unit(value, f"{field}[{k}]") for k, value in enumerate(content)]
     if listed and content and not any(map(is_number, content)):
         values = [parameter.normalise(value, f"{field}[{k}]") for k, value in enumerate(content)]
         for k, value in enumerate(values):

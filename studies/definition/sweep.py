@@ -89,7 +89,11 @@ def checked_axes(content: Any, known: Mapping[str, Parameter]) -> Axes:
     given: dict[Any, Any] = {}
     for name, axis in content.items():
         if name in known and isinstance(axis, Mapping):
-            given[name] = spaced(name, axis)
+            ends = {
+                key: known[name].in_own_unit(value, f"sweep.{name}.{key}")
+                for key, value in axis.items()
+            }
+            given[name] = spaced(name, ends)
         elif name not in known and describes_points(name, axis):
             _check_name(name, axis)
             given[name] = checked_points(name, axis, known)

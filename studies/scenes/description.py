@@ -17,6 +17,7 @@ from studies.errors import SceneError, StudyError
 from studies.scenes.arithmetic import ExpressionError, evaluated, is_expression, names
 from studies.scenes.mending import Where, mended
 from studies.scenes.meshfile import MeshFile
+from studies.scenes.quantities import in_own_units, wrong_units
 from studies.scenes.refusals import dotted, mistakes_of
 from studies.scenes.table import FILE_NAME
 from studies.scenes.tables import ACCURACY, OPEN, ParameterTable, SceneFile
@@ -75,7 +76,7 @@ class Description:
     Attributes
     ----------
     file : name of the file, for messages
-    content : its tables, as read from TOML or JSON
+    content : its tables, as read from TOML or JSON; a number with a unit is in that of its entry
     meshes : meshes and tables of values by the names that bodies and loads give; None if they are
         not at hand, so that no model can be built
     shipped : whether it is a scene of the package, which studies call by its name
@@ -85,6 +86,9 @@ class Description:
     content: Mapping[str, Any]
     meshes: Mapping[str, MeshFile] | None
     shipped: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "content", in_own_units(self.content))
 
     @classmethod
     def read(cls, path: Path | str, *, shipped: bool = False) -> Self:
@@ -190,7 +194,8 @@ class Description:
             if not wrong:
                 return Readable(tables, wrong, {})
         except ValidationError as error:
-            wrong |= mistakes_of(error, SceneFile, wrong)
+            told = mistakes_of(error, SceneFile, wrong)
+            wrong |= told | {at: each for at, each in wrong_units(tree).items() if at in told}
         rest, own = mended(tree, wrong)
         try:
             return Readable(SceneFile.model_validate_json(_json(rest), strict=True), wrong, own)
@@ -220,7 +225,13 @@ class Description:
             from_it = {k: v for k, v in usual.items() if k in defaults and defaults[k] is None}
             defaults |= {ACCURACY: "standard"} | from_it
         known = {name: each if _is_value(each) else None for name, each in defaults.items()}
+        known |= {str(where[1]): None for where in self._wrong_parameters}
         return known | {name: field.default for name, (_, field) in self.opened.items()}
+
+    @cached_property
+    def _wrong_parameters(self) -> dict[Where, StudyError]:
+        """The mistakes of declared numbers whose unit is not that of the parameter, by place."""
+        return wrong_units({"parameters": self.content.get("parameters")})
 
     def _levels(self, mistakes: Mistakes) -> Any:
         """Return the table of accuracies; its texts are expressions without parameters."""
@@ -243,7 +254,7 @@ class Description:
 
     def _evaluated(self, values: Mapping[str, Any]) -> tuple[dict[str, Any], Mistakes]:
         """Return the tables with values in place of expressions, and the mistakes."""
-        mistakes: Mistakes = {}
+        mistakes: Mistakes = {**self._wrong_parameters}
         known = dict(values)
         for name, text in self._derived.items():
             where = ("derived", name)

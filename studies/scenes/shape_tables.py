@@ -14,8 +14,8 @@ from pydantic import Field
 from solver.errors import ModelError
 from solver.mesh import Near, ball, disc, fillet, grid, half_plane, pad, rectangle, refined, ring
 from solver.mesh.shapes import ball_lines, ball_sides, few
-from solver.parameters import Length
-from studies.scenes.table import Count, Place, SceneTable, Span
+from solver.parameters import Coordinate, Length
+from studies.scenes.table import Angles, Count, Place, SceneTable, Span
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,7 +34,7 @@ class NearTable(SceneTable):
 
     at: Place
     size: Length
-    radius: Annotated[float, Interval(ge=0.0, le=1e6)] = 0.0
+    radius: Annotated[Coordinate, Interval(ge=0.0, le=1e6)] = 0.0
 
 
 class _MeshedTable(SceneTable):
@@ -79,7 +79,7 @@ class RingTable(_MeshedTable):
     kind: Literal["ring", "sector"]
     centre: Place = (0.0, 0.0)
     radii: tuple[Length, Length]
-    angles: Span = (0.0, 360.0)
+    angles: Angles = (0.0, 360.0)
 
 
 class FilletTable(_MeshedTable):
@@ -136,7 +136,7 @@ class _MarkTable(SceneTable):
 class LineMarkTable(_MarkTable):
     """A position on an axis through which a grid line goes."""
 
-    at: float
+    at: Coordinate
 
 
 class PointMarkTable(_MarkTable):
@@ -271,5 +271,5 @@ class ArcTable(SceneTable):
     kind: Literal["arc"]
     centre: Place
     radius: Length
-    angles: Span
+    angles: Angles
     edges: Count = 60

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any
 
-from annotated_types import Interval
+from annotated_types import Interval, Unit
 from pydantic import AfterValidator, BaseModel, ConfigDict, StringConstraints
 from pydantic_core import PydanticCustomError
 
+from solver.parameters import Coordinate
 from studies.scenes.arithmetic import ExpressionError, Field
 
 Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,59}$")]
@@ -38,6 +40,17 @@ class SceneTable(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
+    @classmethod
+    def unit_of(cls, name: str, given: Mapping[str, Any]) -> str | None:
+        """Return the unit of an entry, None if it has none: ``given`` are those of the table."""
+        del given
+        return unit_in(cls.model_fields[name].metadata)
+
+
+def unit_in(marks: Iterable[Any], usual: str | None = None) -> str | None:
+    """Return the unit among the marks of a type."""
+    return next((mark.unit for mark in marks if isinstance(mark, Unit)), usual)
+
 
 class TabulatedTable(SceneTable):
     """A function of position: a column of a CSV file beside the scene, times a factor.
@@ -50,8 +63,10 @@ class TabulatedTable(SceneTable):
     times: float = 1.0
 
 
-Place = tuple[float, float]
-Span = tuple[float, float]
+Angle = Annotated[float, Unit("deg")]
+Place = tuple[Coordinate, Coordinate]
+Span = tuple[Coordinate, Coordinate]
+Angles = tuple[Angle, Angle]
 Count = Annotated[int, Interval(ge=1, le=10_000)]
 Side = Annotated[str, StringConstraints(pattern=r"^[^.]+\.[^.]+$")]
 """A boundary of a body: ``body.boundary``."""

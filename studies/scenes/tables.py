@@ -20,7 +20,7 @@ from typing import (
 )
 
 import numpy as np
-from annotated_types import Interval
+from annotated_types import Interval, Unit
 from numpy.typing import NDArray
 from pydantic import Field, StringConstraints, create_model
 
@@ -28,13 +28,15 @@ from solver.errors import ModelError
 from solver.mesh.lines import closer
 from solver.model.link import Components
 from solver.model.loads import LOADS, Load
-from solver.parameters import Accuracy, Length, Stress
+from solver.parameters import Accuracy, Coordinate, Length, Stress
 from solver.parts import Declared, declared
 from solver.results.outputs import outputs
 from solver.results.requested import OF_CONTACT, RequestedNumber, of_body
 from solver.scenes.material_parameters import ContactParameters, MaterialParameters
 from studies.scenes.shape_tables import ArcTable, GradedTable, LineTable, Shape
 from studies.scenes.table import (
+    Angle,
+    Angles,
     Count,
     FieldText,
     FileName,
@@ -143,10 +145,17 @@ class MotionTable(SceneTable):
     From the end of the stage ``locked`` on, a free motion stays as it is then.
     """
 
-    moved: float | None = None
-    pushed: float | None = None
+    moved: Coordinate | None = None
+    pushed: Annotated[float, Unit("N")] | None = None
     amplitude: Amplitude | None = None
     locked: Label | None = None
+
+
+class RotationTable(MotionTable):
+    """A rotation of a rigid body: by an angle (``moved``), or free under a moment (``pushed``)."""
+
+    moved: Angle | None = None
+    pushed: Annotated[float, Unit("N mm")] | None = None
 
 
 class RigidTable(SceneTable):
@@ -158,7 +167,7 @@ class RigidTable(SceneTable):
     centre: Place = (0.0, 0.0)
     x: MotionTable = MotionTable()
     y: MotionTable = MotionTable()
-    rotation: MotionTable = MotionTable()
+    rotation: RotationTable = RotationTable()
 
 
 # -- loads and contact ---------------------------------------------------------------------------
@@ -199,6 +208,10 @@ def _in_file(hint: Any) -> Any:
 
     A number that may be a function of position is an expression or a table of values there.
     """
+    if get_origin(hint) is Annotated:
+        inner, *marks = get_args(hint)
+        kept = _in_file(inner)
+        return None if kept is None else Annotated[(kept, *marks)]
     if get_origin(hint) not in (Union, UnionType):
         return None if get_origin(hint) is Callable else hint
     kept = tuple(each for each in get_args(hint) if get_origin(each) is not Callable)
@@ -227,8 +240,8 @@ class PairTable(OpenTable):
     slave: Side
     master: Side
     sliding: Literal["auto", "small", "finite"] = "auto"
-    gap: float = 0.0
-    interference: float = 0.0
+    gap: Coordinate = 0.0
+    interference: Coordinate = 0.0
     amplitude: Amplitude | None = None
     active: Annotated[tuple[Label, ...], Field(min_length=1)] | None = None
     friction_law: str
@@ -254,7 +267,7 @@ class LinkTable(SceneTable):
     master: Side | None = None
     rigid: str | None = None
     components: Components = "xy"
-    stiffness: Annotated[float, Interval(gt=0.0)] | None = None
+    stiffness: Annotated[float, Interval(gt=0.0), Unit("N/mm3")] | None = None
     distributed: bool = False
 
     @property
@@ -319,12 +332,12 @@ class SpacedTable(SceneTable):
     those between its two positions are kept.
     """
 
-    start: float
-    stop: float
+    start: Coordinate
+    stop: Coordinate
     num: Annotated[int, Interval(ge=2, le=2000)]
-    near: float | None = None
+    near: Coordinate | None = None
     size: Length | None = None
-    away: float | None = None
+    away: Coordinate | None = None
     within: Span | None = None
 
     def positions(self) -> NDArray[np.float64]:
@@ -345,7 +358,7 @@ class SpacedTable(SceneTable):
         return closer(self.start, self.stop, self.num, self.near, self.size)
 
 
-Spaced = SpacedTable | Annotated[tuple[float | SpacedTable, ...], Field(min_length=1)]
+Spaced = SpacedTable | Annotated[tuple[Coordinate | SpacedTable, ...], Field(min_length=1)]
 """Positions along an axis: one table, or several tables and single positions in turn."""
 
 
@@ -371,7 +384,7 @@ class LineResultTable(SceneTable):
     end: Place | None = None
     centre: Place | None = None
     radius: Length | None = None
-    angles: Span | None = None
+    angles: Angles | None = None
 
 
 class PointResultTable(SceneTable):
@@ -386,14 +399,14 @@ class ProfileTable(SceneTable):
 
     body: str
     depth: Spaced
-    stations: Annotated[tuple[float, ...], Field(min_length=1, max_length=1000)] = (0.0,)
+    stations: Annotated[tuple[Coordinate, ...], Field(min_length=1, max_length=1000)] = (0.0,)
 
 
 class AxisTable(SceneTable):
     """The line along the contact surfaces; see `solver.results.view.Axis`."""
 
     origin: Place = (0.0, 0.0)
-    along: Place = (1.0, 0.0)
+    along: tuple[float, float] = (1.0, 0.0)
 
 
 class PlacesTable(SceneTable):
@@ -480,6 +493,13 @@ class ParameterTable(SceneTable):
     choices: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     unit: Annotated[str, StringConstraints(max_length=40)] = "1"
     description: Annotated[str, StringConstraints(max_length=400)] = ""
+
+    @classmethod
+    def unit_of(cls, name: str, given: Mapping[str, Any]) -> str | None:
+        """Return the unit of the default, if it is no word, and of the range."""
+        unit = given.get("unit", "1")
+        own = name == "range" or (name == "default" and "choices" not in given)
+        return unit if own and isinstance(unit, str) else None
 
 
 class AccuracyTable(SceneTable):

@@ -18,8 +18,8 @@ LAYERS = {
         "materials", "model", "fem", "contact", "loading", "steady", "prism", "results", "scenes",
     ),
     "studies": (
-        "errors", "toml", "appearing", "scratch", "scenes", "definition", "storage", "execution",
-        "views", "client",
+        "units", "errors", "toml", "appearing", "scratch", "scenes", "definition", "storage",
+        "execution", "views", "client",
     ),
     "residua": (
         "neighbours", "status", "cost", "progress", "keys", "slurm", "commands",

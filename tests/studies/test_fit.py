@@ -457,6 +457,8 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
     assert one.fit["measured"] == [
         {"of": "contact_half_width", "values": [50.5, 51.0], "sigma": [0.5, 0.5]}
     ]
+    (tmp_path / "b.csv").write_text("contact_half_width [cm]; sigma [um]\n5,05; 500\n5.1; 500\n")
+    assert Study.from_toml(file, [tmp_path / "b.csv"]).fit == one.fit
     (tmp_path / "p.csv").write_text(PRESSURE)
     two = Study.from_toml(file, [tmp_path / "b.csv", tmp_path / "p.csv@stage=loaded"])
     assert [line.get("at") for line in two.fit["measured"]] == [None, {"stage": "loaded"}]
@@ -465,7 +467,7 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
     with pytest.raises(StudyError, match=r"fit\.measured = None: is missing"):
         Study.from_toml(file)
     for text, allowed in (
-        ("contact_half_width [m]\n1\n2\n", "must be in mm"),
+        ("contact_half_width [N]\n1\n2\n", "in mm; N is a force"),
         ("contact_half_width\nx\n2\n", "must be a number in every row"),
         ("s, contact_pressure, peak_contact_pressure\n1, 2, 3\n", "the columns PLACE and VALUE"),
     ):

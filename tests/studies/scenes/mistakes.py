@@ -212,9 +212,32 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "must hold a stage that loads the bodies",
     ),
     "number with a unit": (
-        put("materials", "steel", "youngs_modulus", "195 GPa"),
+        put("materials", "steel", "youngs_modulus", "195 GN"),
         "materials.steel.youngs_modulus",
+        "must be a number in MPa; GN is a force",
+    ),
+    "unit of an entry without one": (
+        put("loads", 0, "amplitude", {"pressed": "2 in"}),
+        "loads[0].amplitude.pressed",
         "must be a number without a unit: in N, mm, MPa",
+    ),
+    "unit beside a field that looks like one": (
+        lambda content: (
+            content["loads"][0].update(value="2/x"),
+            content["bodies"]["upper"]["shape"].update(size="2 N"),
+        ),
+        "bodies.upper.shape.size",
+        "must be a number in mm; N is a force",
+    ),
+    "unit of a load": (
+        put("loads", 0, "value", "2 m"),
+        "loads[0].value",
+        "must be a number in MPa; m is a length",
+    ),
+    "unit of a default": (
+        put("parameters", "wide", "default", "4 s"),
+        "parameters.wide.default",
+        "must be a number in mm; s is a time",
     ),
     "unknown region that is removed": (
         put("stages", 0, "remove", ["upper.skin"]),

@@ -1,0 +1,111 @@
+"""Numbers with a unit in the tables of a scene file: ``"195 GPa"``.
+
+The type of an entry declares its unit (`annotated_types.Unit`); an entry without one takes plain
+numbers only.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import UnionType
+from typing import Annotated, Any, TypeAlias, Union, get_args, get_origin
+
+from solver.parameters import is_number
+from studies.errors import StudyError
+from studies.scenes.mending import Where
+from studies.scenes.refusals import dotted
+from studies.scenes.table import SceneTable, unit_in
+from studies.scenes.tables import SceneFile
+from studies.units import UnitError, converted, is_quantity, number_in
+
+Visit: TypeAlias = Callable[[Where, str, str], Any]
+"""Place, text and unit of an entry -> its new value."""
+Options: TypeAlias = Sequence[tuple[Any, str | None]]
+"""Types that a value may have, each with the unit of its numbers."""
+
+
+def in_own_units(content: Mapping[str, Any]) -> Any:
+    """Return a scene file with numbers in place of those with a unit, if it can be converted."""
+    return _visited((), content, [(SceneFile, None)], _converted)
+
+
+def wrong_units(content: Mapping[str, Any]) -> dict[Where, StudyError]:
+    """Return the mistakes of numbers whose unit is not one of their entry, by place."""
+    found: dict[Where, StudyError] = {}
+
+    def check(where: Where, text: str, unit: str) -> None:
+        try:
+            converted(text, unit)
+        except UnitError as error:
+            allowed = f"must be {number_in(unit)}; {error}"
+            found[where] = StudyError(dotted(where), text, allowed)
+
+    _visited((), content, [(SceneFile, None)], check)
+    return found
+
+
+def _converted(where: Where, text: str, unit: str) -> Any:
+    del where
+    try:
+        return converted(text, unit)
+    except UnitError:
+        return text
+
+
+def _visited(where: Where, value: Any, options: Options, visit: Visit) -> Any:
+    """Return a part of the file with what `visit` returns in place of numbers with a unit."""
+    if not options:  # not known here
+        return value
+    if isinstance(value, str):
+        unit = next((unit for _, unit in options if unit is not None), None)
+        return visit(where, value, unit) if unit is not None and is_quantity(value) else value
+    if isinstance(value, Mapping):
+        return {
+            key: _visited((*where, str(key)), each, _entry(options, value, key), visit)
+            for key, each in value.items()
+        }
+    if isinstance(value, list | tuple) and not all(map(is_number, value)):
+        return [
+            _visited((*where, k), each, _item(options, k), visit) for k, each in enumerate(value)
+        ]
+    return value
+
+
+def _entry(options: Options, table: Mapping[str, Any], key: str) -> Options:
+    """Return what an entry of a table may be."""
+    found: list[tuple[Any, str | None]] = []
+    for option, _ in options:
+        origin: Any = get_origin(option)
+        if origin is dict:
+            found += _options(get_args(option)[1], None)
+        elif inspect.isclass(option) and issubclass(option, SceneTable):
+            fields = option.model_fields
+            kinds = get_args(fields["kind"].annotation) if "kind" in fields else ()
+            if key in fields and (not kinds or table.get("kind") in kinds):
+                found += _options(fields[key].annotation, option.unit_of(key, table))
+    return found
+
+
+def _item(options: Options, k: int) -> Options:
+    """Return what an item of a list may be."""
+    found: list[tuple[Any, str | None]] = []
+    for option, unit in options:
+        origin: Any = get_origin(option)
+        if origin is tuple:
+            first, *rest = get_args(option)
+            each = first if rest == [...] else [first, *rest][min(k, len(rest))]
+            found += _options(each, unit)
+    return found
+
+
+def _options(hint: Any, unit: str | None) -> Iterator[tuple[Any, str | None]]:
+    """Yield the types that a value may have, each with the unit of its numbers."""
+    if get_origin(hint) is Annotated:
+        inner, *marks = get_args(hint)
+        yield from _options(inner, unit_in(marks, unit))
+    elif get_origin(hint) in (Union, UnionType):
+        for each in get_args(hint):
+            yield from _options(each, unit)
+    else:
+        yield hint, unit
