@@ -35,6 +35,7 @@ from service.errors import Conflict, NoRoom, NotFound
 from service.examiner import Examined
 from service.job import Job, StudyState
 from service.jobs import Jobs
+from service.maps import PNG
 from service.pages import form
 from service.pages import study as chosen
 from service.pages.assets import asset
@@ -45,12 +46,10 @@ from service.routes.health import health
 from service.routes.scenes import post_scene
 from service.schemas import ContentId, StudyFilter, Window
 from service.table import Tables, scene_of_study
-from solver.errors import ModelError
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
 from studies.scenes.registry import known_names, known_scenes
-from studies.views.scene_picture import sentence
 from studies.views.table import MESSAGE, RUN, STATUS, varied
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
@@ -263,21 +262,17 @@ def _given(fields: Iterable[tuple[str, object]]) -> dict[str, list[str]]:
     return given
 
 
-@router.get("/scene.svg")
+@router.get("/scene.png")
 async def draw_scene(request: Request, store: TheStore, examiner: TheExaminer) -> Response:
-    """Draw the scene that the fields of the form describe, or say why it cannot be drawn."""
+    """Draw the scene of the first run that the fields of the form describe."""
     given = _given(request.query_params.multi_items())
     name = given.get("scene", [""])[0]
     scene = await run_in_threadpool(known_scene, store, name)
     content, wrong = await run_in_threadpool(form.study_of, name, scene, given)
-    try:
-        if wrong:
-            name, allowed = next(iter(wrong.items()))
-            raise StudyError(name, given.get(f"p.{name}"), allowed)
-        picture = await examiner.picture(content)
-    except (StudyError, ModelError):
-        picture = sentence("There is no such scene: a field has a mistake.")
-    return Response(picture, media_type="image/svg+xml", headers={"cache-control": "no-cache"})
+    for field, allowed in wrong.items():
+        raise StudyError(field, given.get(f"p.{field}"), allowed)
+    picture = await examiner.picture(content)
+    return Response(picture, media_type=PNG, headers={"cache-control": "no-cache"})
 
 
 @router.post("/scenes")
