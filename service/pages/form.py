@@ -179,9 +179,10 @@ def as_curl(study: Mapping[str, Any], address: str) -> str:
     return f"curl -i {address} -H 'content-type: application/json' -d {said}\n"
 
 
-def as_python(study: Mapping[str, Any], address: str) -> str:
-    """Return a program that posts a study."""
+def as_python(study: Mapping[str, Any], service: str) -> str:
+    """Return a program that has a service at an address compute a study, and opens its data set."""
+    content = pprint.pformat(dict(study), width=88, sort_dicts=False)
     return (
-        f"import httpx\n\nstudy = {pprint.pformat(dict(study), width=88, sort_dicts=False)}\n"
-        f"answer = httpx.post({address!r}, json=study)\nprint(answer.json())\n"
+        f"from studies import Client\n\nstudy = {content}\nwith Client({service!r}) as service:\n"
+        "    dataset = service.submit(study).wait().open()\nprint(dataset)\n"
     )

@@ -335,7 +335,7 @@ def _copies(request: Request, content: dict[str, Any]) -> dict[str, str]:
     return {
         "toml": form.as_toml(content),
         "curl": form.as_curl(content, address),
-        "python": form.as_python(content, address),
+        "python": form.as_python(content, address.removesuffix("/studies")),
     }
 
 
