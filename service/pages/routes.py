@@ -8,7 +8,7 @@ import json
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from http import HTTPStatus
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, File, Form, Query, Request, Response, UploadFile
@@ -16,8 +16,10 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse, RedirectResponse
 
 from service import overview
+from service.datasets import Datasets
 from service.dependencies import (
     TheCaller,
+    TheDatasets,
     TheDetails,
     TheExaminer,
     TheInspector,
@@ -25,13 +27,14 @@ from service.dependencies import (
     TheKeeper,
     TheKeys,
     TheName,
+    ThePictures,
     TheProbe,
     TheRun,
     TheRunner,
     TheStore,
     TheTables,
 )
-from service.errors import Conflict, NoRoom, NotFound
+from service.errors import Busy, Conflict, NoRoom, NotFound
 from service.examiner import Examined
 from service.job import Job, StudyState
 from service.jobs import Jobs
@@ -51,6 +54,9 @@ from studies import Store, StudyError
 from studies.definition.identity import is_id
 from studies.scenes.registry import known_names, known_scenes
 from studies.views.table import MESSAGE, RUN, STATUS, varied
+
+if TYPE_CHECKING:
+    from studies.views.found import Found
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
 home = APIRouter(include_in_schema=False)
@@ -123,14 +129,34 @@ def _said(jobs: Jobs, job: Job) -> Mapping[str, Any]:
 
 @router.get("/studies/{study_id}")
 async def study_page(
-    study_id: ContentId, request: Request, details: TheDetails, tables: TheTables
+    study_id: ContentId,
+    request: Request,
+    details: TheDetails,
+    tables: TheTables,
+    datasets: TheDatasets,
+    pictures: ThePictures,
 ) -> Response:
-    """Show a study: numbers over its sweep, one of its runs, a part of its table."""
+    """Show a study: what it found, numbers over its sweep, one of its runs, a part of its table."""
     study = json.loads(await details.get(study_id, Window(limit=1)))
-    return await run_in_threadpool(_study, request, study, tables)
+    found = None
+    if overview.chooses(study):
+        with suppress(Busy, NotFound):  # it is there at the end
+            found = await pictures.alone(_found, tables.jobs.get(study_id), datasets)
+    return await run_in_threadpool(_study, request, study, tables, found)
 
 
-def _study(request: Request, study: Mapping[str, Any], tables: Tables) -> Response:
+def _found(job: Job, datasets: Datasets) -> Found | None:
+    """Return what a study that chooses its runs has found."""
+    from studies import open_netcdf  # xarray takes half a second to import
+    from studies.views.found import found_of
+
+    with open_netcdf(datasets.ended(job)) as dataset:
+        return found_of(dataset)
+
+
+def _study(
+    request: Request, study: Mapping[str, Any], tables: Tables, found: Found | None
+) -> Response:
     table = tables.get(study["id"])
     scene = scene_of_study(tables.store, study["scene"])
     query = dict(request.query_params)
@@ -167,8 +193,12 @@ def _study(request: Request, study: Mapping[str, Any], tables: Tables) -> Respon
         turn=turn,
         csv=f"?{csv}" if csv else "",
         live=study["status"] in POLLED,
+        found=found,
+        chooses=overview.chooses(study),
         data={
             "id": study["id"],
+            "sought": study["goal"].get("parameter", ""),
+            "found": found.marks if found else [],
             "live": study["status"] in POLLED,
             "number": number,
             "run": run["id"] if run else None,
