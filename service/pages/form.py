@@ -155,11 +155,14 @@ def _one(given: Mapping[str, Sequence[str]], name: str) -> str:
     return given.get(name, [""])[0].strip()
 
 
-def beside(error: StudyError, scene: Scene) -> tuple[str, str]:
-    """Return the parameter that an error is about, or its field, and what is allowed."""
-    match = OF.match(error.field)
-    name = match["name"] if match else ""
-    return (name if name in parameters_of(scene) else error.field), error.allowed
+def beside(error: StudyError, scene: Scene) -> dict[str, str]:
+    """Return what is allowed by the parameter that a mistake is about, or by its field."""
+    wrong: dict[str, str] = {}
+    for each in error.each:
+        match = OF.match(each.field)
+        name = match["name"] if match else ""
+        wrong.setdefault(name if name in parameters_of(scene) else each.field, each.allowed)
+    return wrong
 
 
 def as_toml(study: Mapping[str, Any]) -> str:

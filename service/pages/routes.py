@@ -338,8 +338,7 @@ async def make(
             await run_in_threadpool(keeper.check_room, examined)
             found = examined
         except StudyError as error:
-            name, allowed = form.beside(error, scene)
-            wrong[name] = allowed
+            wrong = form.beside(error, scene)
         except NoRoom as error:
             wrong[""] = str(error)
     if "submit" in given and found is not None:
