@@ -46,6 +46,7 @@ from service.pages.compare import MOST, compared
 from service.pages.rendering import COOKIE, ROOT, PageRoute, number_text, page
 from service.pages.run import audited, numbers_shown, parameters_shown
 from service.routes.health import health
+from service.routes.numbers import outlined
 from service.routes.scenes import post_scene
 from service.schemas import ContentId, StudyFilter, Window
 from service.table import Tables, scene_of_study
@@ -163,7 +164,8 @@ def _study(
     numbers = [each.name for each in chosen.usual(table)]
     number = query.get("number", "")
     if number not in numbers:
-        number = next(iter(numbers), "")
+        asked = study["goal"].get("of", "")
+        number = asked if asked in numbers else next(iter(numbers), "")
     at = chosen.chosen_run(table, query.get("run", ""), number)
 
     def turn(**other: Any) -> str:
@@ -197,7 +199,8 @@ def _study(
         chooses=overview.chooses(study),
         data={
             "id": study["id"],
-            "sought": study["goal"].get("parameter", ""),
+            "sought": study["goal"].get("parameter")
+            or next(iter(study["fit"].get("ranges", {})), ""),
             "found": found.marks if found else [],
             "live": study["status"] in POLLED,
             "number": number,
@@ -217,8 +220,17 @@ def _cell(column: Any, at: int) -> str:
 
 
 @router.get("/runs/{run_id}")
-def run_page(run: TheRun, request: Request, store: TheStore) -> Response:
+async def run_page(
+    run: TheRun, request: Request, store: TheStore, pictures: ThePictures
+) -> Response:
     """Show a run: its maps and lines, its numbers, its audit."""
+    drawn = await pictures.alone(outlined, store.run_path(run["id"]))
+    return await run_in_threadpool(_run, request, run, store, drawn)
+
+
+def _run(
+    request: Request, run: Mapping[str, Any], store: Store, drawn: Mapping[str, Any]
+) -> Response:
     scene = _scene_of_run(store, run["scene"])
     return page(
         request,
@@ -227,7 +239,8 @@ def run_page(run: TheRun, request: Request, store: TheStore) -> Response:
         parameters=parameters_shown(run, scene),
         audit=audited(run, scene),
         numbers=numbers_shown(run, scene),
-        data={"run": run["id"]},
+        drawn=drawn,
+        data={"run": run["id"], "fields": drawn},
     )
 
 
@@ -294,14 +307,22 @@ def _given(fields: Iterable[tuple[str, object]]) -> dict[str, list[str]]:
 
 @router.get("/scene.png")
 async def draw_scene(request: Request, store: TheStore, examiner: TheExaminer) -> Response:
-    """Draw the scene of the first run that the fields of the form describe."""
+    """Draw the scene of the first run that the fields describe; of a scene without a model nothing.
+
+    A page asks for what may not be there, which no browser takes for an error.
+    """
     given = _given(request.query_params.multi_items())
     name = given.get("scene", [""])[0]
     scene = await run_in_threadpool(known_scene, store, name)
     content, wrong = await run_in_threadpool(form.study_of, name, scene, given)
     for field, allowed in wrong.items():
         raise StudyError(field, given.get(f"p.{field}"), allowed)
-    picture = await examiner.picture(content)
+    try:
+        picture = await examiner.picture(content)
+    except StudyError as error:
+        if error.field != "scene":
+            raise
+        return Response(status_code=HTTPStatus.NO_CONTENT)
     return Response(picture, media_type=PNG, headers={"cache-control": "no-cache"})
 
 

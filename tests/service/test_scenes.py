@@ -84,6 +84,8 @@ def test_the_form_of_a_study_has_a_picture_of_its_scene(service: Server, pin: st
     assert answer.content == first.content, "that of the first run"
     wrong = service.client.get("/ui/scene.png", params=asked | {"p.clearance": "-1"})
     assert (wrong.status_code, "clearance" in wrong.text) == (422, True)
+    without = service.client.get("/ui/scene.png", params={"scene": "fake"})
+    assert (without.status_code, without.content) == (204, b"")
 
 
 def test_the_first_words_of_a_scene_stay_and_the_answer_says_so(service: Server, pin: str) -> None:

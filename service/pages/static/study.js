@@ -23,7 +23,7 @@ function watch() {
     const begun = study.at === null && now.at !== null;
     if (begun && !document.querySelector("[data-picture]")) return document.location.reload();
     forget();
-    Object.assign(study, { numbers: now.numbers, places: now.places, size: now.size, found: now.found }, final ? { live: false } : {}, begun ? { at: now.at } : {});
+    Object.assign(study, { numbers: now.numbers, places: now.places, size: now.size, found: now.found, number: now.number }, final ? { live: false } : {}, begun ? { at: now.at } : {});
     tell(begun ? "chosen" : "runs");
   });
 }

@@ -45,7 +45,8 @@ function markedPlaces() {
   const of = (name) => study.places.find((place) => place.name === name);
   const sorted = [...study.places].reverse().sort((a, b) => b.number - a.number); // the load comes last
   const x = of(state.get("x")) ?? sorted.findLast(({ name, number: a }) => study.sought && name !== study.sought && a) ?? sorted[0];
-  const number = (state.get("y") ?? (axes.length ? "" : "value")) === "value"; // a search goes along one place
+  const along = !axes.length && (!study.sought || study.places.length < 2); // a search goes along one place
+  const number = (state.get("y") ?? (along ? "value" : "")) === "value";
   const y = number ? undefined : of(state.get("y")) ?? (x.name === study.sought ? undefined : of(study.sought)) ?? sorted.find((place) => place !== x && place.number);
   return { x, y: y === x ? undefined : y };
 }

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -93,9 +93,8 @@ def record(parameters: FakeParameters) -> Record:
 class Canned(Scene):
     """A scene whose records come from a function, not from a model."""
 
-    model: Any = None
     program: Any = None
-    view: Any = None
+    view: Any = lambda parameters: SimpleNamespace(map_axes=("x", "y"), symmetric=False)
     outputs: tuple[Any, ...] = ()
     costs: tuple[Any, ...] = ()
     records: Any = None
