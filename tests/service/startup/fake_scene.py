@@ -89,12 +89,17 @@ def record(parameters: FakeParameters) -> Record:
     )
 
 
+def seen(parameters: FakeParameters) -> Any:
+    """Return what a picture asks of the view of a scene that has no model."""
+    return SimpleNamespace(map_axes=("x", "y"), symmetric=False)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Canned(Scene):
     """A scene whose records come from a function, not from a model."""
 
     program: Any = None
-    view: Any = lambda parameters: SimpleNamespace(map_axes=("x", "y"), symmetric=False)
+    view: Any = seen
     outputs: tuple[Any, ...] = ()
     costs: tuple[Any, ...] = ()
     records: Any = None
