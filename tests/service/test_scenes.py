@@ -229,7 +229,9 @@ def test_all_mistakes_are_in_the_answer(service: Server) -> None:
     assert answer.status_code == 422
     told = {each["field"]: each["allowed"] for each in answer.json()["errors"]}
     assert "did you mean friction?" in told["contacts[0].frictoin"]
-    assert told["loads[0].value"].startswith("must be a number or an expression of x and y; ")
+    assert told["loads[0].value"].startswith(
+        "must be a number, a table or an expression of x and y; "
+    )
     assert "has no effect" in told["parameters.mu"]
 
 
