@@ -201,9 +201,10 @@ def on_scene_error(request: Request, exc: SceneError) -> Problem:
 
 
 def on_field_error(request: Request, exc: StudyError) -> Problem:
-    """Answer an error that names its field."""
-    error = mistake(exc.field, exc.value, exc.allowed)
-    return problem(request, status_of(exc), f"{error['field']}: {exc.allowed}", [error])
+    """Answer an error that names its field, or several."""
+    errors = [mistake(each.field, each.value, each.allowed) for each in exc.each]
+    texts = (f"{error['field']}: {error['allowed']}" for error in errors)
+    return problem(request, status_of(exc), "; ".join(texts), errors)
 
 
 def on_validation_error(request: Request, exc: RequestValidationError) -> Problem:

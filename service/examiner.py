@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from service.guarded import Guarded
+from service.maps import draw_scene
+from service.schemas import SketchQuery
 from service.settings import Settings
 from solver.scenes import Scene
 from studies import Bounds, Estimate, Store, Study, StudyError, estimate
@@ -68,8 +70,8 @@ class Examiner:
         async with self.process.turn():
             return await self.process.call(examined, *what, name=name, advice=": sweep less")
 
-    async def picture(self, content: Mapping[str, Any]) -> str:
-        """Return the scene of the first run of a study, with its mesh, as SVG.
+    async def picture(self, content: Mapping[str, Any]) -> bytes:
+        """Return the scene of the first run of a study before loading, as PNG.
 
         Raises
         ------
@@ -83,14 +85,12 @@ class Examiner:
             return await self.process.call(pictured, dict(content), self.directory, name=name)
 
 
-def pictured(content: dict[str, Any], directory: Path) -> str:
-    """Return the scene of the first run of a study; called in a separate process."""
-    from studies.views.scene_picture import scene_svg
-
+def pictured(content: dict[str, Any], directory: Path) -> bytes:
+    """Return the scene of the first run of a study as PNG; called in a separate process."""
     store = Store(directory)
     study = Study.known(content, partial(_posted, store), store.definition)
     first = next(iter(study.cases()))
-    return scene_svg(first.scene, first.parameters)
+    return draw_scene(first.scene, first.values, SketchQuery())
 
 
 def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:

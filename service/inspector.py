@@ -17,9 +17,8 @@ from typing import Any
 
 from service.alone import CRASHED, FAILED, Answer, alone
 from service.guarded import Budget, Guarded, beyond
-from service.maps import png
+from service.maps import draw_scene
 from service.schemas import KeptScene, SketchQuery
-from solver.errors import ModelError
 from studies import Store, StudyError
 from studies.definition.parameters import read_values
 from studies.errors import SceneError
@@ -159,16 +158,10 @@ def inspected(files: Mapping[str, bytes], seconds: float) -> Answer:
 
 def drawn(directory: Path, name: str, query: SketchQuery) -> tuple[bytes, float]:
     """Return the picture of a scene of a store as PNG, and the processor time it took [s]."""
-    from studies.views.plots.setup import setup_figure  # matplotlib takes a second to import
-
     begun = time.process_time()
     scene = Store(directory).scene(name) or scene_named(name)
     values = read_values(scene, query.selection)
-    try:
-        figure = setup_figure(scene, values, query.zoom, query.window)
-    except ModelError as error:
-        raise StudyError(error.field, error.value, error.allowed) from None
-    return png(figure, query.resolution), time.process_time() - begun
+    return draw_scene(scene, values, query), time.process_time() - begun
 
 
 def _told(folder: Path) -> str:

@@ -6,7 +6,7 @@ import asyncio
 import hashlib
 import io
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -22,7 +22,10 @@ from starlette.staticfiles import NotModifiedResponse
 import solver
 from service.errors import Busy
 from service.files import TAGS, UNCHANGED
-from service.schemas import LineQuery, MapQuery, PlotQuery
+from service.schemas import LineQuery, MapQuery, PlotQuery, SketchQuery
+from solver.errors import ModelError
+from solver.scenes import Scene
+from studies import StudyError
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
 
@@ -171,6 +174,23 @@ def draw_study(path: Path, query: PlotQuery) -> bytes:
     ):
         asked = query.model_dump(include={"field", "component", "zoom", "window", "over"})
         return png(picture(found, selection=left, **asked), query.resolution)
+
+
+def draw_scene(scene: Scene, values: Mapping[str, Any], query: SketchQuery) -> bytes:
+    """Return a scene before loading as PNG, for these values of its parameters.
+
+    Raises
+    ------
+    StudyError
+        If a parameter or the part is refused, or the scene has nothing to draw.
+    """
+    from studies.views.plots.setup import setup_figure
+
+    try:
+        figure = setup_figure(scene, values, query.zoom, query.window)
+    except ModelError as error:
+        raise StudyError(error.field, error.value, error.allowed) from None
+    return png(figure, query.resolution)
 
 
 def png(figure: Figure, resolution: int) -> bytes:

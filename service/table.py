@@ -81,7 +81,8 @@ class Tables:
                     if name not in numbers:
                         numbers[name] = np.full(len(runs), math.nan)
                     numbers[name][at] = math.nan if number is None else number
-                for name, value in searched_at(study, row["parameters"]).items() if asks else ():
+                place = _asked(study, axes, row["parameters"]) if asks else {}
+                for name, value in place.items():
                     asked.setdefault(name, [None] * len(runs))[at] = value
         if asks:
             axes = {}
@@ -104,6 +105,24 @@ def scene_of_study(store: Store, name: str) -> Scene | None:
     if scene := store.scene(name, whole=False):
         return scene
     return scene_named(name) if name in known_names() else None
+
+
+def _asked(
+    study: Mapping[str, Any], axes: Mapping[str, Sequence[Any]], parameters: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return where a study has asked for a run, with what labels and points set.
+
+    The number of a point is no place: what the point sets is.
+    """
+    found = searched_at(study, parameters)
+    linked = linked_values(dict(study["sweep"]))
+    own = {
+        name: values[list(axes[axis]).index(found[axis])]
+        for name, (axis, values) in linked.items()
+        if axis in found
+    }
+    numbered = {axis for axis, _ in linked.values() if [*axes[axis]] == [*range(len(axes[axis]))]}
+    return own | {name: value for name, value in found.items() if name not in numbered}
 
 
 def _sweep(

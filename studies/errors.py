@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import reprlib
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -31,18 +31,37 @@ class StudyError(ValueError):
     field : dotted name of the offending input (``"sweep.friction[2]"``)
     value : what was given
     allowed : what would have been accepted, in words
+    others : further mistakes of the same input, each in a line of its own of the text
     """
 
-    def __init__(self, field: str, value: object, allowed: str) -> None:
+    others: tuple[StudyError, ...] = ()
+
+    def __init__(
+        self, field: str, value: object, allowed: str, others: Sequence[StudyError] = ()
+    ) -> None:
         field = field.encode("utf-8", "backslashreplace").decode()  # JSON may hold lone surrogates
         field, allowed = cut(field, LONGEST_FIELD), cut(allowed, LONGEST_TEXT)
-        super().__init__(f"{field} = {reprlib.repr(value)}: {allowed}")
-        self.field = field
-        self.value = value
-        self.allowed = allowed
+        self.field, self.value, self.allowed = field, value, allowed
+        self.others = tuple(others)
+        own = f"{field} = {reprlib.repr(value)}: {allowed}"
+        super().__init__("\n".join([own, *map(str, self.others)]))
 
-    def __reduce__(self) -> tuple[type[StudyError], tuple[str, object, str]]:
-        return type(self), (self.field, self.value, self.allowed)
+    def __reduce__(
+        self,
+    ) -> tuple[type[StudyError], tuple[str, object, str, tuple[StudyError, ...]]]:
+        return type(self), (self.field, self.value, self.allowed, self.others)
+
+    @property
+    def each(self) -> list[StudyError]:
+        """The mistakes, this one first."""
+        return [self, *self.others]
+
+    def renamed(self, rename: Callable[[str], str]) -> StudyError:
+        """Return the same mistakes of other fields."""
+        first, *others = (
+            StudyError(rename(each.field), each.value, each.allowed) for each in self.each
+        )
+        return StudyError(first.field, first.value, first.allowed, others)
 
 
 class SceneError(StudyError):

@@ -155,11 +155,14 @@ def _one(given: Mapping[str, Sequence[str]], name: str) -> str:
     return given.get(name, [""])[0].strip()
 
 
-def beside(error: StudyError, scene: Scene) -> tuple[str, str]:
-    """Return the parameter that an error is about, or its field, and what is allowed."""
-    match = OF.match(error.field)
-    name = match["name"] if match else ""
-    return (name if name in parameters_of(scene) else error.field), error.allowed
+def beside(error: StudyError, scene: Scene) -> dict[str, str]:
+    """Return what is allowed by the parameter that a mistake is about, or by its field."""
+    wrong: dict[str, str] = {}
+    for each in error.each:
+        match = OF.match(each.field)
+        name = match["name"] if match else ""
+        wrong.setdefault(name if name in parameters_of(scene) else each.field, each.allowed)
+    return wrong
 
 
 def as_toml(study: Mapping[str, Any]) -> str:
@@ -179,9 +182,10 @@ def as_curl(study: Mapping[str, Any], address: str) -> str:
     return f"curl -i {address} -H 'content-type: application/json' -d {said}\n"
 
 
-def as_python(study: Mapping[str, Any], address: str) -> str:
-    """Return a program that posts a study."""
+def as_python(study: Mapping[str, Any], service: str) -> str:
+    """Return a program that has a service at an address compute a study, and opens its data set."""
+    content = pprint.pformat(dict(study), width=88, sort_dicts=False)
     return (
-        f"import httpx\n\nstudy = {pprint.pformat(dict(study), width=88, sort_dicts=False)}\n"
-        f"answer = httpx.post({address!r}, json=study)\nprint(answer.json())\n"
+        f"from studies import Client\n\nstudy = {content}\nwith Client({service!r}) as service:\n"
+        "    dataset = service.submit(study).wait().open()\nprint(dataset)\n"
     )

@@ -8,7 +8,7 @@ import json
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from http import HTTPStatus
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, File, Form, Query, Request, Response, UploadFile
@@ -16,8 +16,10 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse, RedirectResponse
 
 from service import overview
+from service.datasets import Datasets
 from service.dependencies import (
     TheCaller,
+    TheDatasets,
     TheDetails,
     TheExaminer,
     TheInspector,
@@ -25,16 +27,18 @@ from service.dependencies import (
     TheKeeper,
     TheKeys,
     TheName,
+    ThePictures,
     TheProbe,
     TheRun,
     TheRunner,
     TheStore,
     TheTables,
 )
-from service.errors import Conflict, NoRoom, NotFound
+from service.errors import Busy, Conflict, NoRoom, NotFound
 from service.examiner import Examined
 from service.job import Job, StudyState
 from service.jobs import Jobs
+from service.maps import PNG
 from service.pages import form
 from service.pages import study as chosen
 from service.pages.assets import asset
@@ -42,16 +46,18 @@ from service.pages.compare import MOST, compared
 from service.pages.rendering import COOKIE, ROOT, PageRoute, number_text, page
 from service.pages.run import audited, numbers_shown, parameters_shown
 from service.routes.health import health
+from service.routes.numbers import outlined
 from service.routes.scenes import post_scene
 from service.schemas import ContentId, StudyFilter, Window
 from service.table import Tables, scene_of_study
-from solver.errors import ModelError
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
 from studies.scenes.registry import known_names, known_scenes
-from studies.views.scene_picture import sentence
 from studies.views.table import MESSAGE, RUN, STATUS, varied
+
+if TYPE_CHECKING:
+    from studies.views.found import Found
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
 home = APIRouter(include_in_schema=False)
@@ -124,21 +130,42 @@ def _said(jobs: Jobs, job: Job) -> Mapping[str, Any]:
 
 @router.get("/studies/{study_id}")
 async def study_page(
-    study_id: ContentId, request: Request, details: TheDetails, tables: TheTables
+    study_id: ContentId,
+    request: Request,
+    details: TheDetails,
+    tables: TheTables,
+    datasets: TheDatasets,
+    pictures: ThePictures,
 ) -> Response:
-    """Show a study: numbers over its sweep, one of its runs, a part of its table."""
+    """Show a study: what it found, numbers over its sweep, one of its runs, a part of its table."""
     study = json.loads(await details.get(study_id, Window(limit=1)))
-    return await run_in_threadpool(_study, request, study, tables)
+    found = None
+    if overview.chooses(study):
+        with suppress(Busy, NotFound):  # it is there at the end
+            found = await pictures.alone(_found, tables.jobs.get(study_id), datasets)
+    return await run_in_threadpool(_study, request, study, tables, found)
 
 
-def _study(request: Request, study: Mapping[str, Any], tables: Tables) -> Response:
+def _found(job: Job, datasets: Datasets) -> Found | None:
+    """Return what a study that chooses its runs has found."""
+    from studies import open_netcdf  # xarray takes half a second to import
+    from studies.views.found import found_of
+
+    with open_netcdf(datasets.ended(job)) as dataset:
+        return found_of(dataset)
+
+
+def _study(
+    request: Request, study: Mapping[str, Any], tables: Tables, found: Found | None
+) -> Response:
     table = tables.get(study["id"])
     scene = scene_of_study(tables.store, study["scene"])
     query = dict(request.query_params)
     numbers = [each.name for each in chosen.usual(table)]
     number = query.get("number", "")
     if number not in numbers:
-        number = next(iter(numbers), "")
+        asked = study["goal"].get("of", "")
+        number = asked if asked in numbers else next(iter(numbers), "")
     at = chosen.chosen_run(table, query.get("run", ""), number)
 
     def turn(**other: Any) -> str:
@@ -168,8 +195,13 @@ def _study(request: Request, study: Mapping[str, Any], tables: Tables) -> Respon
         turn=turn,
         csv=f"?{csv}" if csv else "",
         live=study["status"] in POLLED,
+        found=found,
+        chooses=overview.chooses(study),
         data={
             "id": study["id"],
+            "sought": study["goal"].get("parameter")
+            or next(iter(study["fit"].get("ranges", {})), ""),
+            "found": found.marks if found else [],
             "live": study["status"] in POLLED,
             "number": number,
             "run": run["id"] if run else None,
@@ -188,8 +220,17 @@ def _cell(column: Any, at: int) -> str:
 
 
 @router.get("/runs/{run_id}")
-def run_page(run: TheRun, request: Request, store: TheStore) -> Response:
+async def run_page(
+    run: TheRun, request: Request, store: TheStore, pictures: ThePictures
+) -> Response:
     """Show a run: its maps and lines, its numbers, its audit."""
+    drawn = await pictures.alone(outlined, store.run_path(run["id"]))
+    return await run_in_threadpool(_run, request, run, store, drawn)
+
+
+def _run(
+    request: Request, run: Mapping[str, Any], store: Store, drawn: Mapping[str, Any]
+) -> Response:
     scene = _scene_of_run(store, run["scene"])
     return page(
         request,
@@ -198,7 +239,8 @@ def run_page(run: TheRun, request: Request, store: TheStore) -> Response:
         parameters=parameters_shown(run, scene),
         audit=audited(run, scene),
         numbers=numbers_shown(run, scene),
-        data={"run": run["id"]},
+        drawn=drawn,
+        data={"run": run["id"], "fields": drawn},
     )
 
 
@@ -263,21 +305,25 @@ def _given(fields: Iterable[tuple[str, object]]) -> dict[str, list[str]]:
     return given
 
 
-@router.get("/scene.svg")
+@router.get("/scene.png")
 async def draw_scene(request: Request, store: TheStore, examiner: TheExaminer) -> Response:
-    """Draw the scene that the fields of the form describe, or say why it cannot be drawn."""
+    """Draw the scene of the first run that the fields describe; of a scene without a model nothing.
+
+    A page asks for what may not be there, which no browser takes for an error.
+    """
     given = _given(request.query_params.multi_items())
     name = given.get("scene", [""])[0]
     scene = await run_in_threadpool(known_scene, store, name)
     content, wrong = await run_in_threadpool(form.study_of, name, scene, given)
+    for field, allowed in wrong.items():
+        raise StudyError(field, given.get(f"p.{field}"), allowed)
     try:
-        if wrong:
-            name, allowed = next(iter(wrong.items()))
-            raise StudyError(name, given.get(f"p.{name}"), allowed)
         picture = await examiner.picture(content)
-    except (StudyError, ModelError):
-        picture = sentence("There is no such scene: a field has a mistake.")
-    return Response(picture, media_type="image/svg+xml", headers={"cache-control": "no-cache"})
+    except StudyError as error:
+        if error.field != "scene":
+            raise
+        return Response(status_code=HTTPStatus.NO_CONTENT)
+    return Response(picture, media_type=PNG, headers={"cache-control": "no-cache"})
 
 
 @router.post("/scenes")
@@ -313,8 +359,7 @@ async def make(
             await run_in_threadpool(keeper.check_room, examined)
             found = examined
         except StudyError as error:
-            name, allowed = form.beside(error, scene)
-            wrong[name] = allowed
+            wrong = form.beside(error, scene)
         except NoRoom as error:
             wrong[""] = str(error)
     if "submit" in given and found is not None:
@@ -340,7 +385,7 @@ def _copies(request: Request, content: dict[str, Any]) -> dict[str, str]:
     return {
         "toml": form.as_toml(content),
         "curl": form.as_curl(content, address),
-        "python": form.as_python(content, address),
+        "python": form.as_python(content, address.removesuffix("/studies")),
     }
 
 

@@ -15,7 +15,7 @@ from studies.definition.cases import Case, LoadingPath
 from studies.definition.identity import Namer, Places, written
 from studies.definition.parameters import parameters_of
 from studies.definition.sweep import Axes, Position, positions
-from studies.errors import StudyError
+from studies.errors import MOST_MISTAKES, StudyError
 
 
 class _Setting(NamedTuple):
@@ -85,18 +85,29 @@ class Expansion:
         Raises
         ------
         StudyError
-            if the scene refuses a combination of parameters, or one that is given has no effect
+            if the scene refuses combinations of parameters: of each field the first one; else if
+            some that are given have no effect
         """
         given = self._given()
         idle = dict.fromkeys(given, "")
+        refused: dict[str, StudyError] = {}
         for index in self._indices():
             try:
                 parameters = self._parameters(index)
             except ModelError as error:
-                raise self.located(error, index) from error
+                if error.field not in refused:
+                    refused[error.field] = self.located(error, index)
+                if len(refused) == MOST_MISTAKES:
+                    break
+                continue
             idle = {name: needs for name in idle if (needs := unmet(parameters, name))}
-        for name, needs in idle.items():
-            raise StudyError(*given[name], f"changes nothing in any run of this study: {needs}")
+        mistakes = list(refused.values()) or [
+            StudyError(*given[name], f"changes nothing in any run of this study: {needs}")
+            for name, needs in idle.items()
+        ]
+        if mistakes:
+            first, *others = mistakes[:MOST_MISTAKES]
+            raise StudyError(first.field, first.value, first.allowed, others)
 
     def _given(self) -> dict[str, tuple[str, Any]]:
         """Return the field and the value of each parameter that is given.

@@ -192,16 +192,14 @@ class Study(BaseModel):
         Raises
         ------
         StudyError
-            for the first combination that the scene refuses
+            for combinations that the scene refuses, or parameters that change nothing
         """
         if isinstance(self.asks, Fit):
             try:
                 Expansion(self.problem, self.parameters | self.asks.first, self.sweep).check()
             except StudyError as error:
-                entry, _, name = error.field.partition(".")
-                free = entry == "parameters" and name in self.asks.free
-                field = f"fit.first.{name}" if free else error.field
-                raise StudyError(field, error.value, error.allowed) from None
+                own = {f"parameters.{name}": f"fit.first.{name}" for name in self.asks.free}
+                raise error.renamed(lambda field: own.get(field, field)) from None
             return self
         if not isinstance(self.asks, Goal):
             self.expansion.check()
@@ -210,8 +208,8 @@ class Study(BaseModel):
         try:
             Expansion(self.problem, self.parameters, self.sweep | ends).check()
         except StudyError as error:
-            field = error.field.replace(f"sweep.{self.asks.parameter}", "goal.between")
-            raise StudyError(field, error.value, error.allowed) from None
+            own_axis = f"sweep.{self.asks.parameter}"
+            raise error.renamed(lambda field: field.replace(own_axis, "goal.between")) from None
         return self
 
     @model_validator(mode="before")

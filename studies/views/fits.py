@@ -15,6 +15,9 @@ from studies.storage.store import Store
 from studies.views.columns import aligned, or_none, value_text
 from studies.views.reading import open_study
 
+_ENDS = {"value": "", "sigma": "_sigma", "lowest": "_low", "highest": "_high"}
+"""What is known of a parameter, and how the names of its variables end."""
+
 
 def fit(study: Study | Mapping[str, Any], store: Store, **options: Any) -> xr.Dataset:
     """Return the parameters with which runs come closest to measured lines, and how sure they are.
@@ -39,9 +42,8 @@ def fit(study: Study | Mapping[str, Any], store: Store, **options: Any) -> xr.Da
 def told(found: xr.Dataset) -> dict[str, Any]:
     """Return what was found as JSON has it, without the lines over which it was fitted."""
     names = [str(name) for name in found["parameter"].to_numpy()]
-    ends = {"value": "", "sigma": "_sigma", "lowest": "_low", "highest": "_high"}
     parameters: dict[str, dict[str, Any]] = {
-        name: {key: or_none(found[f"{name}{end}"].item()) for key, end in ends.items()}
+        name: {key: or_none(found[f"{name}{end}"].item()) for key, end in _ENDS.items()}
         for name in names
     }
     for name, row in zip(names, found["correlation"].to_numpy().tolist(), strict=True):
@@ -51,21 +53,28 @@ def told(found: xr.Dataset) -> dict[str, Any]:
     return {key: or_none(found[key].item()) for key in about} | {"parameters": parameters}
 
 
+def fit_rows(dataset: xr.Dataset) -> list[list[str]]:
+    """Return the headings, and a line for each parameter that was fitted."""
+    rows = [["parameter", "value", "sigma", "lowest", "highest", "unit"]]
+    for name in map(str, dataset["parameter"].to_numpy()):
+        numbers = [value_text(dataset[f"{name}{end}"].item()) for end in _ENDS.values()]
+        rows.append([name, *numbers, dataset[name].attrs.get("units", "")])
+    return rows
+
+
+def measures(dataset: xr.Dataset) -> str:
+    """Return how well the fit tells its parameters, and what it took."""
+    names = ("condition", "misfit", "runs")
+    return ", ".join(f"{name} {value_text(dataset[name].item())}" for name in names)
+
+
 def fit_table(dataset: xr.Dataset) -> str:
     """Return what was found: a line for each parameter, and how they go together."""
     names = [str(name) for name in dataset["parameter"].to_numpy()]
-    lines = [["parameter", "value", "sigma", "lowest", "highest", "unit"]]
-    for name in names:
-        ends = ("", "_sigma", "_low", "_high")
-        numbers = [value_text(dataset[f"{name}{end}"].item()) for end in ends]
-        lines.append([name, *numbers, dataset[name].attrs.get("units", "")])
-    text = aligned(lines, 1)
+    text = aligned(fit_rows(dataset), 1)
     if len(names) > 1:
         table = dataset["correlation"].to_numpy()
         rows = [["correlation", *names]]
         rows += [[name, *(f"{x:.3f}" for x in row)] for name, row in zip(names, table, strict=True)]
         text += f"\n\n{aligned(rows, 1)}"
-    told = [
-        f"{name} {value_text(dataset[name].item())}" for name in ("condition", "misfit", "runs")
-    ]
-    return f"{text}\n\n{', '.join(told)}"
+    return f"{text}\n\n{measures(dataset)}"

@@ -280,6 +280,8 @@ def test_a_study_of_points_is_watched_to_its_end_and_its_runs_are_marks(
         assert {*zip(x, y, strict=True)} == {(0.2, 0.1), (0.4, 0.05)}
         assert (reason, u, v) == ("no equilibrium", [0.3], [0.2])
         assert "load ratio 0.3" in said[0] and "friction 0.2" in said[0]
+    for run, cards in zip(runs(service, study_id), (True, True, False), strict=True):
+        assert ("data-picture" in service.client.get(f"/ui/runs/{run}").text) == cards
 
 
 def test_a_study_is_made_by_the_form(context: Any, service: Server) -> None:

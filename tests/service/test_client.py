@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import runpy
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 import pytest
 import xarray as xr
 
+from service.pages.form import as_python
 from studies import Client, Study, open_study, summary
 from studies.client import Refused, RemoteStudy, _Screen
 from studies.scenes.scene import read_scene
@@ -47,6 +49,14 @@ def test_a_study_is_submitted_watched_and_opened(
     assert rows == [{"load_ratio": at, "status": "ok"} for at in (0.5, 0.25)]
     content = fake_study("by-client")
     assert client.submit(Study.from_dict(content, scene=FAKE)).id == done.id
+
+
+def test_the_program_of_the_form_opens_the_data_set(
+    client: Client, done: RemoteStudy, tmp_path: Path
+) -> None:
+    (tmp_path / "copied.py").write_text(as_python(fake_study("by-client"), client.url))
+    found = runpy.run_path(str(tmp_path / "copied.py"))
+    assert found["dataset"].attrs["id"] == done.id
 
 
 def test_a_study_is_cancelled_and_what_it_has_is_read(client: Client) -> None:

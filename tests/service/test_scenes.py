@@ -76,21 +76,16 @@ def test_a_browser_posts_a_scene_and_gets_the_form_of_its_studies(
     assert service.client.get(f"/ui/new?scene={pin}").status_code == 200
 
 
-def test_the_form_of_a_study_has_a_picture_of_the_meshes(service: Server, pin: str) -> None:
-    def picture(**query: str) -> str:
-        answer = service.client.get("/ui/scene.svg", params=query)
-        assert answer.headers["content-type"] == "image/svg+xml"
-        return answer.text
-
-    scene = read_scene(SCENES / "pin.toml")
-    bodies = scene.model(scene.parameters()).bodies
-    elements = sum(body.mesh.t.shape[1] for body in bodies)
-    drawn = picture(scene=pin)
-    assert f"<title>Mesh of {elements} elements: " in drawn
-    assert 0 < drawn.count("Z") <= elements, "those that the maps show"
-    assert drawn.count('class="contact"') == 2
-    assert "a field has a mistake" in picture(scene=pin, **{"p.clearance": "-1"})
-    assert "method of their own" in picture(scene="raceway").replace("</text>", " ")
+def test_the_form_of_a_study_has_a_picture_of_its_scene(service: Server, pin: str) -> None:
+    asked = {"scene": pin, "p.clearance": "0.1, 0.15"}
+    answer = service.client.get("/ui/scene.png", params=asked)
+    assert answer.headers["content-type"] == "image/png", answer.text
+    first = service.client.get(f"/scenes/{pin}/draw.png", params={"clearance": 0.1})
+    assert answer.content == first.content, "that of the first run"
+    wrong = service.client.get("/ui/scene.png", params=asked | {"p.clearance": "-1"})
+    assert (wrong.status_code, "clearance" in wrong.text) == (422, True)
+    without = service.client.get("/ui/scene.png", params={"scene": "fake"})
+    assert (without.status_code, without.content) == (204, b"")
 
 
 def test_the_first_words_of_a_scene_stay_and_the_answer_says_so(service: Server, pin: str) -> None:

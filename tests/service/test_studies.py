@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -344,6 +345,14 @@ def test_a_goal_is_estimated_searched_and_answered(service: Server) -> None:
     } == at
     shown = service.client.get(f"/ui/studies/{study_id}")
     assert shown.text.count("data-choose=") == min(len(at), 25)
+    low, high = (found[f"load_ratio_{end}"].to_numpy().ravel() for end in ("low", "high"))
+    marks = json.loads(re.search(r'"found": (\[.*?\]\}\])', shown.text)[1])
+    assert [each["test"][0] for each in marks] == ["A", "B"]
+    assert [each["load_ratio"] for each in marks] == [
+        [*each] for each in zip(found.load_ratio.to_numpy().ravel(), low, high, strict=True)
+    ]
+    cells = re.findall(r"<td[^>]*>(.*?)</td>", shown.text.partition("What was found")[2])
+    assert cells[:2] == ["A", "0"] and {"0.6", f"{low[0]:.4g}", f"{high[0]:.4g}"} <= {*cells[:9]}
 
 
 def test_a_goal_that_is_not_reached_fails_with_the_reason(service: Server) -> None:
@@ -351,6 +360,9 @@ def test_a_goal_that_is_not_reached_fails_with_the_reason(service: Server) -> No
     detail = service.finished(service.post(fake_study("far") | {"goal": goal, "sweep": {}}))
     assert (detail["status"], detail["message"]) == ("failed", "1 of 1 searches: 1 missing")
     assert detail["stage"] == "1 of 1 searches ended"
+    page = service.client.get(f"/ui/studies/{detail['id']}").text
+    assert "<td>at load ratio = 1 the goal is not reached: max plastic strain = 1</td>" in page
+    assert '"found": []' in page
 
 
 def test_a_refinement_is_estimated_watched_and_predicted(service: Server) -> None:
@@ -370,6 +382,9 @@ def test_a_refinement_is_estimated_watched_and_predicted(service: Server) -> Non
     url = f"/studies/{study_id}/predict"
     told = service.client.get(url, params={"of": "max_plastic_strain", **at}).json()
     assert (told["by"], told["value"]) == ("cells", pytest.approx(0.31))
+    page = service.client.get(f"/ui/studies/{study_id}").text
+    assert "2 cells: 2 settled." in page and "2 % of its range" in page
+    assert '<td>max plastic strain</td><td class="right">0</td>' in page
 
 
 def test_a_fit_is_searched_and_its_answer_told(service: Server, done: dict[str, Any]) -> None:
@@ -386,6 +401,11 @@ def test_a_fit_is_searched_and_its_answer_told(service: Server, done: dict[str, 
     assert (told["status"], told["runs"]) == ("ok", len(detail["runs"]))
     assert found["value"] == pytest.approx(0.6)
     assert found["sigma"] == pytest.approx(0.01 / 2**0.5, rel=1e-3)
+    page = service.client.get(f"/ui/studies/{study_id}").text
+    assert (
+        f'<td>load ratio</td><td class="right">0.6</td><td class="right">{found["sigma"]:.4g}'
+        in page
+    )
     refused = service.client.get(f"/studies/{done['id']}/fit")
     assert refused.json()["errors"][0]["field"] == "fit"
     file = service.client.post("/studies", json=study | {"fit": fit | {"measured": ["a.csv"]}})

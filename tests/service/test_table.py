@@ -342,6 +342,14 @@ def test_a_form_tells_that_there_is_no_room(seen: Seen, monkeypatch: pytest.Monk
         assert answer.status_code == 422 and "free on the disk" in answer.text
 
 
+def test_a_form_tells_all_that_the_scene_refuses_beside_its_fields(seen: Seen) -> None:
+    idle = ("saturation", "isotropic_fraction")
+    fields = {"scene": "punch", "name": "idle", **{f"p.{name}": "0.3" for name in idle}}
+    answer = seen.client.post("/ui/new", data=fields, headers={"accept": "application/json"})
+    wrong = answer.json()["wrong"]
+    assert {*wrong} == {*idle} and all("changes nothing" in each for each in wrong.values())
+
+
 def test_studies_are_found_by_scene_and_text(seen: Seen) -> None:
     assert seen.client.get("/studies", params={"scene": "fake", "text": "FAK"}).json()["total"] == 1
     assert seen.client.get("/studies", params={"scene": "punch"}).json()["total"] == 0

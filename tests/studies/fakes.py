@@ -163,7 +163,6 @@ def record(run: FakeParameters) -> Record:
 class Canned(Scene):
     """A scene whose records come from a function, not from a model."""
 
-    model: Any = None
     program: Any = None
     view: Any = None
     outputs: tuple[Any, ...] = ()

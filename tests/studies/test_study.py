@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import pickle
 import subprocess
 import sys
 import time
@@ -406,6 +407,21 @@ def test_a_swept_parameter_that_changes_nothing_is_refused(
         content["parameters"]["saturation"] = 100.0
     with pytest.raises(StudyError, match=f"sweep.{name} = .*changes nothing in any run"):
         Study.from_dict(content)
+
+
+def test_all_known_mistakes_of_a_study_are_told_in_other_processes_too() -> None:
+    idle = {"saturation": 20.0, "isotropic_fraction": 0.3, "hardening_ratio": 0.05}
+    sweep = {"load_ratio": [0.5, 20.0], "friction": [0.1, 0.95, 0.97]}
+    refused = {"name": "no", "scene": "fake", "parameters": {"state": "plane_strain"}}
+    for content, fields in (
+        ({"name": "idle", "scene": "punch", "parameters": idle}, [f"parameters.{n}" for n in idle]),
+        (refused | {"sweep": sweep}, ["sweep.friction[1]", "sweep.load_ratio[1]"]),
+    ):
+        with pytest.raises(StudyError) as told:
+            Study.from_dict(content)
+        sent = pickle.loads(pickle.dumps(told.value))
+        assert [each.field for each in sent.each] == fields
+        assert [line.split(" = ")[0] for line in str(sent).splitlines()] == fields
 
 
 def test_a_swept_parameter_that_changes_some_runs_is_taken() -> None:

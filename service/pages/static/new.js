@@ -7,7 +7,14 @@ const REST = 450;
 const copies = form.querySelectorAll(".code pre");
 let asked = null;
 
-const picture = form.querySelector("[data-scene-picture]");
+const figure = form.querySelector("[data-scene-picture]");
+const picture = element("img", { alt: figure.dataset.words });
+const sheet = element("a", { target: "_blank", hidden: true, title: "open it alone" }, picture);
+const OF = {
+  now: "The first run before loading; a click enlarges it.", before: "The first run of the last study without a mistake.",
+  wait: "The picture comes with the first study without a mistake.", none: "Of this scene there is no picture.",
+};
+let drawn = "";
 
 document.querySelector("[data-scene]").addEventListener("change", (event) => event.target.form.submit());
 for (const each of document.querySelectorAll("[data-check], [data-take]")) each.hidden = true;
@@ -43,12 +50,26 @@ function costs(estimate) {
   place.replaceChildren(...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, String(value))]));
 }
 
-// The picture depends on the parameters alone.
-function drawn() {
+// The picture depends on the parameters alone; one with a mistake is not asked for.
+function draw() {
   const fields = [...new FormData(form)].filter(([name, value]) => name === "scene" || (name.startsWith("p.") && value));
-  const address = `${picture.src.split("?")[0]}?${new URLSearchParams(fields)}`;
-  if (picture.dataset.shown !== address) picture.src = picture.dataset.shown = address;
+  const address = `${figure.dataset.address}?${new URLSearchParams(fields)}`;
+  if (drawn !== address) {
+    picture.src = sheet.href = drawn = address;
+    figure.classList.add("busy");
+  } else if (!sheet.hidden) said("now");
 }
+
+function said(which) {
+  figure.classList.remove("busy");
+  figure.classList.toggle("before", which === "before");
+  sheet.hidden = ["wait", "none"].includes(which);
+  figure.querySelector("figcaption").textContent = OF[which];
+}
+
+figure.prepend(sheet);
+picture.addEventListener("load", () => said("now"));
+picture.addEventListener("error", () => said("none"));
 
 async function check() {
   asked?.abort();
@@ -65,7 +86,8 @@ async function check() {
     const found = await answer.json();
     told(found.wrong);
     costs(found.estimate);
-    if (found.estimate) drawn();
+    if (found.estimate) draw();
+    else said(sheet.hidden ? "wait" : "before");
     [found.toml, found.curl, found.python].forEach((each, k) => (copies[k].textContent = each));
   } catch (error) {
     if (error.name !== "AbortError") throw error;

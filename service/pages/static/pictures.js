@@ -28,13 +28,13 @@ export class Pictures {
     this.asked = {};
   }
 
-  async show(run) {
+  async show(run, fields = null) {
     this.stop.abort();
     this.stop = new AbortController();
     this.run = run;
     const { signal } = this.stop;
     try {
-      this.fields = await json(`${root}/runs/${run}/fields`, signal);
+      this.fields = fields ?? (await json(`${root}/runs/${run}/fields`, signal));
     } catch (error) {
       if (!signal.aborted) this.#each((part, chart) => fail(chart, error.message));
       return;

@@ -3,5 +3,5 @@
 import { data } from "./page.js";
 import { Pictures } from "./pictures.js";
 
-const { run } = data();
-new Pictures(run).show(run);
+const { run, fields } = data();
+new Pictures(run).show(run, fields);

@@ -48,7 +48,7 @@ export async function met() {
   return new Set(arrays.at.values);
 }
 
-export const number = () => study.numbers.find(({ name }) => name === state.get("number")) ?? study.numbers[0];
+export const number = () => [state.get("number"), study.number].map((each) => study.numbers.find(({ name }) => name === each)).find(Boolean) ?? study.numbers[0];
 export const column = (name) => columns.get(name) ?? before.get(name);
 export const statusOf = (run) => texts[STATUS][column(STATUS)[run]];
 export const value = (run, { name }) => (statusOf(run) === "ok" ? column(name)[run] : NaN);

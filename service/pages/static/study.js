@@ -17,13 +17,13 @@ function watch() {
     if (final) source.close();
     else if (Date.now() - last < REST) return;
     last = Date.now();
-    const fresh = await renew(document.location, ["status", "progress", "table"]);
+    const fresh = await renew(document.location, ["status", "progress", "found", "table"]);
     if (!fresh) return;
     const now = data(fresh);
     const begun = study.at === null && now.at !== null;
     if (begun && !document.querySelector("[data-picture]")) return document.location.reload();
     forget();
-    Object.assign(study, { numbers: now.numbers, places: now.places, size: now.size }, final ? { live: false } : {}, begun ? { at: now.at } : {});
+    Object.assign(study, { numbers: now.numbers, places: now.places, size: now.size, found: now.found, number: now.number }, final ? { live: false } : {}, begun ? { at: now.at } : {});
     tell(begun ? "chosen" : "runs");
   });
 }

@@ -40,13 +40,14 @@ function shownAxes() {
   return { x, y };
 }
 
-// Both places of the marks; without a second one the number itself is drawn up.
+// Both places of the marks, what a search seeks up; without a second one the number itself is drawn up.
 function markedPlaces() {
   const of = (name) => study.places.find((place) => place.name === name);
   const sorted = [...study.places].reverse().sort((a, b) => b.number - a.number); // the load comes last
-  const x = of(state.get("x")) ?? sorted[0];
-  const number = (state.get("y") ?? (axes.length ? "" : "value")) === "value"; // a search goes along one place
-  const y = number ? undefined : of(state.get("y")) ?? sorted.find((place) => place !== x && place.number);
+  const x = of(state.get("x")) ?? sorted.findLast(({ name, number: a }) => study.sought && name !== study.sought && a) ?? sorted[0];
+  const along = !axes.length && (!study.sought || study.places.length < 2); // a search goes along one place
+  const number = (state.get("y") ?? (along ? "value" : "")) === "value";
+  const y = number ? undefined : of(state.get("y")) ?? (x.name === study.sought ? undefined : of(study.sought)) ?? sorted.find((place) => place !== x && place.number);
   return { x, y: y === x ? undefined : y };
 }
 
@@ -187,10 +188,46 @@ function marks(what, shown) {
   const shading = y ? { color: there.map((run) => value(run, what)), cmin: shade.low, cmax: shade.high, colorscale: shade.colours, colorbar: shade.bar } : { color: colour("accent") };
   const where = y ? shown.spotOf : (run) => [shown.spotOf(run)[0], Number.isFinite(lowest) ? lowest : 0];
   return {
-    traces: [dots(what, there, shown, { size, line: { width: 1, color: colour("card") }, ...shading }), ...holes(shown.runs, what, where), ...ring(shown, size + 8, "circle-open")],
+    traces: [dots(what, there, shown, { size, line: { width: 1, color: colour("card") }, ...shading }), ...holes(shown.runs, what, where), ...ring(shown, size + 8, "circle-open"), ...(y ? answers(x, y) : [])],
     layout: {
       xaxis: axisLayout(x), yaxis: y ? axisLayout(y) : { title: { text: named(what.words, what.unit) } }, showlegend: true, margin: { r: y ? 84 : 16, t: 26 },
+      ...(y ? {} : limits(x)),
     },
+  };
+}
+
+const certain = ({ name }, [value, low, high]) => `${words(name)} ${text(value)}${low === null ? "" : ` (${text(low)} – ${high === null ? "" : text(high)})`}`;
+
+// What the study found, as marks with what is known of it; a curve where each place has one answer.
+function answers(...places) {
+  const there = study.found.filter((each) => places.every(({ name }) => name in each));
+  if (!there.length) return [];
+  const of = (place, k) => there.map((each) => each[place.name][k]);
+  const axis = places.find((place) => place.number && of(place, 1).every((low) => low === null));
+  const curve = axis && new Set(of(axis, 0)).size === there.length && there.length > 1;
+  if (curve) there.sort((a, b) => a[axis.name][0] - b[axis.name][0]);
+  const part = (place, side) => {
+    const at = of(place, 0).map((each) => (place.number ? each : plain(words(each))));
+    const ends = place.number ? [2, 1].map((k) => of(place, k).map((end, i) => (end === null ? 0 : Math.abs(end - at[i])))) : [];
+    return { [side]: at, [`error_${side}`]: { visible: ends.flat().some(Boolean), type: "data", array: ends[0], arrayminus: ends[1], color: colour("k2"), thickness: 1.6, width: 5 } };
+  };
+  return [{
+    ...part(places[0], "x"), ...part(places[1], "y"), type: "scatter", mode: curve ? "lines+markers" : "markers", name: "found", showlegend: true,
+    text: there.map((each) => `<b>found</b><br>${places.map((place) => plain(certain(place, each[place.name]))).join("<br>")}`), hovertemplate: "%{text}<extra></extra>",
+    line: { color: colour("k2"), width: 2 }, marker: { symbol: "diamond", size: 10, color: colour("k2"), line: { width: 1, color: colour("card") } },
+  }];
+}
+
+// The same where the number is drawn up: a line across it, and a band.
+function limits(x) {
+  const there = study.found.map((each) => each[x.name]).filter((each) => each && each[1] !== null);
+  const own = { yref: "paper", y0: 0, y1: 1, layer: "below" };
+  return {
+    shapes: there.flatMap(([value, low, high]) => [
+      { ...own, type: "line", x0: value, x1: value, line: { color: colour("k2"), width: 1.6 } },
+      ...(high === null ? [] : [{ ...own, type: "rect", x0: low, x1: high, fillcolor: colour("k2"), opacity: 0.18, line: { width: 0 } }]),
+    ]),
+    annotations: there.map(([value]) => ({ x: value, y: 1, yref: "paper", yanchor: "bottom", showarrow: false, text: `found ${text(value)}`, font: { color: colour("k2") } })),
   };
 }
 

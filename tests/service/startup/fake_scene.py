@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -89,13 +89,17 @@ def record(parameters: FakeParameters) -> Record:
     )
 
 
+def seen(parameters: FakeParameters) -> Any:
+    """Return what a picture asks of the view of a scene that has no model."""
+    return SimpleNamespace(map_axes=("x", "y"), symmetric=False)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Canned(Scene):
     """A scene whose records come from a function, not from a model."""
 
-    model: Any = None
     program: Any = None
-    view: Any = None
+    view: Any = seen
     outputs: tuple[Any, ...] = ()
     costs: tuple[Any, ...] = ()
     records: Any = None
