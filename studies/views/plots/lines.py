@@ -149,10 +149,10 @@ def _drawn(
 
     The arguments are those of `line_figure`.
     """
+    check_field(field, line_fields(run))
     own = over if over in run[field].dims and over not in sweep_axes(run) else None
     swept = over if own is None else None
     run = run if swept else one_run(run)
-    check_field(field, line_fields(run))
     values = placed(component_of(run[field], component), run)
     along = line_axis(values)
     assert along is not None

@@ -71,6 +71,11 @@ def test_both_halves_are_mirrored_with_the_sign_of_shear() -> None:
         np.testing.assert_allclose(drawn.values[half:], sign * drawn.values[:half])
         assert drawn.box == pytest.approx((-1.9, 1.9, -0.9, 0.9))
         assert drawn.signed == (name != "tresca")
+    run = kept(symmetric=True)
+    run["mesh_displacement_x"] = run["mesh_displacement_x"] + 0.3
+    for axis, sign in (("x", -1.0), ("y", 1.0)):
+        moved = on_mesh(run, "map_displacement", axis).values
+        np.testing.assert_allclose(moved[half:], sign * moved[:half])
     on_line = np.abs(drawn.X[0][drawn.edges]).max(axis=1) < 1e-12
     assert not on_line.any()  # the line of symmetry is no outline
 
