@@ -152,6 +152,9 @@ def _values(
     tensor = name == "plastic_strain" and component is not None
     nodal = at["plastic_tensor" if tensor else name]
     words = QUANTITIES[field].attributes
+    if tensor and not np.isfinite(nodal).any():
+        allowed = "is not kept in the file of this run: leave it out"
+        raise StudyError("component", component, allowed)
     if tensor:
         words = words | {"long_name": words["long_name"].removeprefix("equivalent ")}
     if nodal.ndim == 1:

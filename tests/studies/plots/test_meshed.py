@@ -128,6 +128,14 @@ def test_what_is_not_there_is_refused(given: dict[str, Any], told: str) -> None:
         map_figure(kept(), "map_stress", **given)
 
 
+def test_a_run_of_an_earlier_version_lacks_the_components_of_plastic_strain() -> None:
+    run = kept()
+    run = run.drop_vars([name for name in run if str(name).startswith("mesh_plastic_strain_")])
+    assert on_mesh(run, "plastic_strain").values.notnull().all()
+    with pytest.raises(StudyError, match="component = 'xx': is not kept in the file"):
+        on_mesh(run, "plastic_strain", "xx")
+
+
 def test_maps_on_a_grid_have_invariants_too() -> None:
     x, y = np.linspace(0.5, 4.5, 5), np.linspace(-3.5, -0.5, 4)
     run = grid_map(x, y, "xx").drop_vars(["quantity", "component"])
