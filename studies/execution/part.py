@@ -215,11 +215,14 @@ class _Unit:
     def held(self, claims: Claims) -> Iterator[Claim | None]:
         """Claim it; None if another process may be at it.
 
-        What a program asks for along a path is claimed as a whole too: a process that begins later,
-        and takes the runs that are there, would ask for the rest under another name.
+        A search is claimed as a whole too: a process that begins later, and takes the runs that are
+        there, would ask for the rest of a path under another name. A refinement and a fit are not:
+        several processes may compute what they ask for along one path.
         """
+        asked = self.asked
+        whole = f"{asked.whole}-whole" if asked and (asked.limit or asked.place) else ""
         with ExitStack() as own:
-            if self.asked and not own.enter_context(claims.held(f"{self.asked.whole}-whole")):
+            if whole and not own.enter_context(claims.held(whole)):
                 yield None
             else:
                 yield own.enter_context(claims.held(self.path.id))
