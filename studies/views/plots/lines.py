@@ -76,7 +76,7 @@ def line_figure(
         bodies was computed) or below the surface [mm]; by default depth ends where values have
         decayed
     over : axis of the sweep that ``run`` still has, each of its values has lines; or a dimension of
-        the field, of which alone all values are drawn
+        the field, of which alone several values are drawn
     window : show only this part: horizontal and vertical range
     against : another variable over the same increments, which is horizontal: a loop of force over
         displacement
