@@ -106,7 +106,7 @@ def _at_place(text: str, field: str) -> dict[str, Any]:
         if not (dim and sign and value):
             raise StudyError(field, text, "must be FILE, or FILE@NAME=VALUE,NAME=VALUE")
         try:
-            at[dim] = float(value)
+            at[dim] = value if dim == CASE else float(value)
         except ValueError:
             at[dim] = value
     return {"rows": read_table(name, field), "at": at}

@@ -250,8 +250,8 @@ class Refinement(Chooser):
         return True
 
     def number(self, wanted: Wanted) -> tuple[float, ...] | None:
-        """Return the numbers of a run; None if it failed, or lacks one."""
-        return self._numbers[wanted]
+        """Return the numbers of a run; None if it failed, lacks one, or is not known yet."""
+        return self._numbers.get(wanted)
 
     def _numbers_of(self, row: Mapping[str, Any] | str) -> tuple[float, ...] | None:
         """Return the numbers of a row; raise `StudyError` if a variable has not the place."""

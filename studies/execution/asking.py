@@ -8,7 +8,7 @@ along a path that goes on is the task of one worker, which asks for its runs its
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Container, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
@@ -33,12 +33,14 @@ from studies.storage.store import Store
 class Asked(NamedTuple):
     """A loading path that a program asks for.
 
-    Either ``limit`` tells its last run, or it goes on, for as long as ``place`` asks for runs.
+    Either ``limit`` tells its last run, or it goes on, for as long as ``place`` asks for runs. All
+    rounds along one path have the same ``whole``.
     """
 
     path: LoadingPath
     limit: PathLimit | None
     place: Place[Any] | None
+    whole: str
 
 
 class Asking:
@@ -144,6 +146,15 @@ class Asking:
         """Whether each program has one loading path, to its end."""
         return all(place.program.goes_on for place in self.places)
 
+    def complete(self, asked: Asked, there: Container[str]) -> bool:
+        """Tell whether all runs of a path that are needed are among those there."""
+        cases = asked.path.cases  # of a path that goes on they are not known
+        ids = [case.id for case in takewhile(lambda case: case.id in there, cases)]
+        if not ids or len(ids) == len(cases) or asked.limit is None:
+            return bool(ids) and len(ids) == len(cases)
+        rows, limit = self._store.sound(ids), replace(asked.limit)
+        return any(limit(rows[each]) for each in ids if each in rows)
+
     def place(self, path: str) -> Place[Any]:
         """Return the program of a path that goes on, as it is now, for who carries it on."""
         place = self.places[self._paths[path][0]]
@@ -209,9 +220,9 @@ class Asking:
             own = replace(path, id=path.cases[0].id)
             self._paths[own.id] = number, [place.program.key(case.values) for case in own.cases]
             if place.program.goes_on:
-                self._ready.append(Asked(replace(own, cases=()), None, self.place(own.id)))
+                self._ready.append(Asked(replace(own, cases=()), None, self.place(own.id), path.id))
             else:
-                self._ready.append(Asked(own, place.program.limit, None))
+                self._ready.append(Asked(own, place.program.limit, None, path.id))
 
     def _lacking(self, number: int, waits: Collection[Any]) -> list[Any]:
         """Take the runs of a program that are in the store; return the keys of the others."""

@@ -13,7 +13,8 @@ from __future__ import annotations
 import itertools
 import os
 import time
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -26,7 +27,7 @@ from studies.execution.run import StudyEvent
 from studies.execution.task import PathTask, walk
 from studies.scratch import scratch
 from studies.storage.catalogue import Catalogue
-from studies.storage.claims import Claims
+from studies.storage.claims import Claim, Claims
 from studies.storage.store import Store
 
 _MOST_DEATHS = 2
@@ -138,7 +139,7 @@ class _PartWork:
                 if self._complete(unit):
                     moved = True
                     continue
-                with claims.held(unit.path.id) as claim:
+                with unit.held(claims) as claim:
                     if claim is None:
                         waiting.append(unit)
                         continue
@@ -204,11 +205,27 @@ class _Unit:
 
     def complete(self, there: Container[str]) -> bool:
         """Tell whether its runs are there; then its program takes them."""
-        cases = self.path.cases  # of a path that goes on they are not known
-        complete = bool(cases) and all(case.id in there for case in cases)
-        if complete and self.asking:
+        if not (self.asking and self.asked):
+            return all(case.id in there for case in self.path.cases)
+        if complete := self.asking.complete(self.asked, there):
             self.asking.closed(self.path.id)
         return complete
+
+    @contextmanager
+    def held(self, claims: Claims) -> Iterator[Claim | None]:
+        """Claim it; None if another process may be at it.
+
+        A search is claimed as a whole too: a process that begins later, and takes the runs that are
+        there, would ask for the rest of a path under another name. A refinement and a fit are not:
+        several processes may compute what they ask for along one path.
+        """
+        asked = self.asked
+        whole = f"{asked.whole}-whole" if asked and (asked.limit or asked.place) else ""
+        with ExitStack() as own:
+            if whole and not own.enter_context(claims.held(whole)):
+                yield None
+            else:
+                yield own.enter_context(claims.held(self.path.id))
 
     def compute(self, part: _PartWork, hopeless: bool) -> None:
         """Compute its runs that are not there; or store that those who tried have died."""

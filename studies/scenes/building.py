@@ -287,12 +287,16 @@ class Builder:
                 self.mistakes.append(StudyError(f"{where}.amplitude", given, allowed))
             return None
         times, values = [0.0], [0.0]
-        for k, (stage, _) in enumerate(passages):
-            usual = 1.0 if given is None else values[-1]
-            factor = (given or {}).get(stage.name, 0.0 if stage.release else usual)
-            field = f"{where}.amplitude.{stage.name}"
-            found = self.attempt(field, partial(course_of, factor, values[-1], self.meshes))
-            for time, value in [(1.0, values[-1])] if found is None else found.tolist():
+        courses: dict[str, list[tuple[float, float]]] = {}
+        for k, (stage, cycle) in enumerate(passages):
+            if cycle <= 2:  # all later ones begin as the second does
+                usual = 1.0 if given is None else values[-1]
+                factor = (given or {}).get(stage.name, 0.0 if stage.release else usual)
+                field = f"{where}.amplitude.{stage.name}"
+                found = self.attempt(field, partial(course_of, factor, values[-1], self.meshes))
+                known = [(1.0, values[-1])] if found is None else found.tolist()
+                courses[stage.name] = known
+            for time, value in courses[stage.name]:
                 times.append(k + time)
                 values.append(value)
         return Amplitude(np.array(times), np.array(values))

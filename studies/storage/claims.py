@@ -60,12 +60,12 @@ class Claims:
     @contextmanager
     def held(self, name: str) -> Iterator[Claim | None]:
         """Claim a name, until the end of the context; None if another owner may be alive."""
-        number, own = 0, self._own()
+        number, (own, descriptor) = 0, self._own()
         try:
             while self._path(name, number + 1).exists():
                 number += 1
             while not self._linked(own, self._path(name, number)):
-                if not self._dead(self._path(name, number)):
+                if not self._dead(self._path(name, number), descriptor):
                     yield None
                     return
                 number += 1
@@ -77,22 +77,22 @@ class Claims:
             finally:
                 if claim.done:
                     with suppress(OSError):  # then it counts as a death
-                        os.write(self._descriptor, _DONE)
+                        os.write(descriptor, _DONE)
                 else:
                     for path in [*before, self._path(name, number)]:
                         path.unlink(missing_ok=True)
         finally:
             own.unlink(missing_ok=True)
-            os.close(self._descriptor)
+            os.close(descriptor)
 
-    def _own(self) -> Path:
-        """Make the file that will be the claim, and lock it."""
+    def _own(self) -> tuple[Path, int]:
+        """Make the file that will be the claim, and lock it; return it with its descriptor."""
         path = self._directory / f"{uuid.uuid4().hex}.own"
-        self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
-        fcntl.flock(self._descriptor, fcntl.LOCK_EX)
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
         text = json.dumps({"machine": _machine(), "process": os.getpid()})
-        os.write(self._descriptor, text.encode())
-        return path
+        os.write(descriptor, text.encode())
+        return path, descriptor
 
     def _path(self, name: str, number: int) -> Path:
         return self._directory / f"{name}.{number}"
@@ -105,23 +105,24 @@ class Claims:
             return False
         return True
 
-    def _dead(self, claim: Path) -> bool:
+    def _dead(self, claim: Path, own: int) -> bool:
         """Whether the owner of a claim has died; a claim that is gone is none that died."""
         try:
             with claim.open("rb") as file:
                 if json.loads(file.readline())["machine"] == _machine():
                     return _free(file.fileno())
-                age = self._now() - os.fstat(file.fileno()).st_mtime
+                age = self._now(own) - os.fstat(file.fileno()).st_mtime
                 return age > self._stale
         except FileNotFoundError:
             return False
         except (ValueError, LookupError, TypeError):  # no claim of ours
             return True
 
-    def _now(self) -> float:
+    @staticmethod
+    def _now(own: int) -> float:
         """Return the time of the file system, which alone is that of all machines."""
-        os.utime(self._descriptor)
-        return os.fstat(self._descriptor).st_mtime
+        os.utime(own)
+        return os.fstat(own).st_mtime
 
 
 def _done(claim: Path) -> bool:

@@ -118,7 +118,9 @@ def read(run: xr.Dataset) -> MeshFields:
             "stress": np.stack([_at(run, f"stress_{c}", k) for c in parts]),
             "mises": _at(run, "mises", k),
             "plastic_strain": _at(run, "plastic_strain", k),
-            "plastic_tensor": np.stack([_at(run, f"plastic_strain_{c}", k) for c in parts]),
+            "plastic_tensor": np.stack([_at(run, f"plastic_strain_{c}", k) for c in parts])
+            if f"mesh_plastic_strain_{parts[0]}" in run
+            else np.full((len(parts), run.sizes[_NODE]), np.nan),  # of an earlier version
         }
         for k in range(run.sizes[_TIME])
     ]

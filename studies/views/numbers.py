@@ -37,7 +37,7 @@ def _column(values: xr.DataArray, status: xr.DataArray, group: str) -> Column:
     return Column(
         name=str(values.name),
         words=str(values.attrs.get("long_name", str(values.name).replace("_", " "))),
-        unit=str(values.attrs.get("units", "")).removesuffix("1"),
+        unit=unit if (unit := str(values.attrs.get("units", ""))) != "1" else "",
         group=group,
         flags=flags(values) if number else {},
         values=flat.astype(float) if number else flat.astype(str).astype(object),

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from studies.views.columns import or_none
 from studies.views.table import Column
 
 PIECE = 1000
@@ -51,7 +52,7 @@ def as_csv(columns: Columns, at: np.ndarray) -> Iterator[bytes]:
 def as_json(columns: Columns, at: np.ndarray) -> Iterator[bytes]:
     """Yield an object: ``columns`` with name, meaning and unit, ``rows`` with an object a run.
 
-    No value is null.
+    No value is null, and so is infinity, as the condition of a fit may be.
     """
     head = [{"name": each.name, "words": each.words, "unit": each.unit} for each in columns]
     yield f'{{"columns": {json.dumps(head)}, "rows": ['.encode()
@@ -59,7 +60,8 @@ def as_json(columns: Columns, at: np.ndarray) -> Iterator[bytes]:
     for part in _parts(at, PIECE):
         values = zip(*(_values(each, part) for each in columns), strict=True)
         names = [each.name for each in columns]
-        rows = (json.dumps(dict(zip(names, row, strict=True)), allow_nan=False) for row in values)
+        finite = (map(or_none, row) for row in values)
+        rows = (json.dumps(dict(zip(names, row, strict=True)), allow_nan=False) for row in finite)
         yield (between + ",\n".join(rows)).encode()
         between = ",\n"
     yield b"\n]}\n"

@@ -462,6 +462,10 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
     (tmp_path / "p.csv").write_text(PRESSURE)
     two = Study.from_toml(file, [tmp_path / "b.csv", tmp_path / "p.csv@stage=loaded"])
     assert [line.get("at") for line in two.fit["measured"]] == [None, {"stage": "loaded"}]
+    named = file.with_name("named.toml")
+    named.write_text(f'points = [{{ case = "007", half_width = 40.0 }}]\n{file.read_text()}')
+    tested = Study.from_toml(named, [tmp_path / "p.csv@stage=loaded,case=007"])
+    assert tested.fit["measured"][0]["at"] == {"stage": "loaded", "case": "007"}
     with pytest.raises(StudyError, match="must be FILE, or FILE@NAME=VALUE"):
         Study.from_toml(file, [tmp_path / "p.csv@stage=loaded,pass"])
     with pytest.raises(StudyError, match=r"fit\.measured = None: is missing"):

@@ -84,3 +84,7 @@ def test_a_run_without_a_number_has_none(computed: tuple[Study, Store]) -> None:
     failed["peak_contact_pressure"][0, 0] = float("nan")
     column = table_of(failed).columns["peak_contact_pressure"]
     assert b"".join(FORMS["csv"].write([column], np.array([0]))) == b'peak_contact_pressure\n""\n'
+    failed["peak_contact_pressure"][0, 0] = float("inf")  # as the condition of a fit
+    column = table_of(failed).columns["peak_contact_pressure"]
+    (row,) = json.loads(b"".join(FORMS["json"].write([column], np.array([0]))))["rows"]
+    assert row == {"peak_contact_pressure": None}

@@ -17,7 +17,9 @@ import pytest
 from residua.cli import main
 from studies import Store, StoreBusy, Study, StudyError, open_study, run_study
 from studies.definition.identity import solver_hash
+from studies.execution.asking import Asking
 from studies.execution.part import run_part
+from studies.execution.task import PathTask, walk
 from studies.storage.claims import Claim, Claims
 from tests.studies.conftest import write_study
 
@@ -117,6 +119,38 @@ def test_a_goal_is_searched_by_a_part(tmp_path: Path) -> None:
     assert max(begun(tmp_path).values()) == 1
     assert any("round 2 of at most" in each.place for each in events)
     assert run_part(of, tmp_path / "out", (1, 1)).computed == []
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("scene", ["fake", "followed"])
+def test_a_part_that_begins_later_leaves_a_search_to_who_is_at_it(
+    tmp_path: Path, scene: str
+) -> None:
+    of, out = (
+        study(tmp_path, 0.3, scene=scene, goal=GOAL, sweep={"friction": [0.0]}),
+        tmp_path / "out",
+    )
+    (first,) = started(of, out, 1)
+    while len(runs(out)) < 2:
+        time.sleep(0.02)
+    run_part(of, out, (2, 2))
+    first.join(60)
+    assert max(begun(tmp_path).values()) == 1
+    assert run_study(of, Store(out), resume=True).computed == []
+
+
+def test_a_path_that_ended_at_its_goal_is_complete_without_its_last_runs(tmp_path: Path) -> None:
+    of = study(tmp_path, goal=GOAL, sweep={"friction": [0.0]})
+    store = Store(tmp_path / "out")
+    asking = Asking(of, store, resume=True)
+    asked = next(asking.paths())
+    assert asked is not None
+    task = PathTask(of.problem, (asked.path,), store.directory, solver_hash(), limit=asked.limit)
+    walk(task, lambda row: None, lambda: False)
+    there = runs(store.directory)
+    assert 1 < len(there) < len(asked.path.cases)
+    assert asking.complete(asked, there)
+    assert not asking.complete(asked, {asked.path.cases[0].id})
 
 
 def test_parts_of_another_goal_are_not_blamed_for_those_that_have_ended(tmp_path: Path) -> None:

@@ -283,7 +283,7 @@ def test_one_value_of_a_variable_with_dimensions_is_refined(store: Store) -> Non
 
 
 def test_an_interrupted_refinement_goes_on_and_asks_for_the_same_runs(tmp_path: Path) -> None:
-    asked = study({"halvings": 1}, trouble="limit")
+    asked = study({"of": [OF, PRESSURE], "halvings": 1}, trouble="limit")
     at_once = search_here(asked, Store(tmp_path / "a"))
     store, parts = Store(tmp_path / "b"), []
     while some := search_here(asked, store, most=7):

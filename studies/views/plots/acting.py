@@ -33,7 +33,7 @@ _CARETS = {("x", True): CARETLEFT, ("x", False): CARETRIGHT, ("y", True): CARETD
            ("y", False): CARETUP}  # fmt: skip
 """Markers with their tip on the boundary, by component and whether the body is on its lower side:
 seen along the component, the body is before the tip."""
-_NAMES = {"boundary", "amplitude", "position"}
+_NAMES = {"boundary", "amplitude", "position", "region"}
 """Entries of loads that are not told as numbers."""
 
 
@@ -100,10 +100,11 @@ def _single(text: str, at: Any, way: Any, colour: str) -> Arrows:
 
 
 def _of_load(body: Body, load: Load) -> Arrows:
-    where = ", ".join(load.boundaries)
+    where = ", ".join(load.boundaries) or load.removes
     text = f"{words(load.name)} {body.name}{f'.{where}' if where else ''}{_told(load)}"
     if not load.boundaries:
-        middle = body.mesh.p[:, body.mesh.t].mean(axis=(1, 2)).reshape(2, 1)
+        cells = body.region(load.removes) if load.removes else slice(None)
+        middle = body.mesh.p[:, body.mesh.t[:, cells]].mean(axis=(1, 2)).reshape(2, 1)
         force = load.body_force(middle)
         way = np.zeros((2, 1)) if force is None else _unit(force)
         colour = _FIELD if force is None else _FORCE

@@ -50,12 +50,13 @@ _SYMBOLS = {
 
 
 def symbol(values: xr.DataArray) -> str:
-    """Return the symbol of a component of a stress or strain; empty for other variables."""
+    """Return the symbol of a component of stress, strain or displacement; else an empty text."""
     if "component" not in values.coords or values["component"].ndim:
         return ""
     name = str(values["component"].item())
     words_of = f"{values.name} {values.attrs.get('long_name', '')}"
-    letter = r"\varepsilon" if "strain" in words_of else r"\sigma"
+    letters = {"strain": r"\varepsilon", "displacement": "u"}
+    letter = next((each for word, each in letters.items() if word in words_of), r"\sigma")
     return f"${_SYMBOLS.get(name, f'{{0}}_{{{{{name}}}}}').format(letter)}$"
 
 

@@ -76,7 +76,7 @@ def line_figure(
         bodies was computed) or below the surface [mm]; by default depth ends where values have
         decayed
     over : axis of the sweep that ``run`` still has, each of its values has lines; or a dimension of
-        the field, of which alone all values are drawn
+        the field, of which alone several values are drawn
     window : show only this part: horizontal and vertical range
     against : another variable over the same increments, which is horizontal: a loop of force over
         displacement
@@ -149,16 +149,18 @@ def _drawn(
 
     The arguments are those of `line_figure`.
     """
+    check_field(field, line_fields(run))
     own = over if over in run[field].dims and over not in sweep_axes(run) else None
     swept = over if own is None else None
     run = run if swept else one_run(run)
-    check_field(field, line_fields(run))
     values = placed(component_of(run[field], component), run)
     along = line_axis(values)
     assert along is not None
     if zoom is not None and (along not in _LENGTHS or against):
         at = against or words(along)
         raise StudyError("zoom", zoom, f"{field} lies over {at}, no length: leave it out")
+    if INCREMENT in values.dims and TIME in run:
+        values = values.assign_coords({TIME: run[TIME]})  # of several runs each has its own
     if against is not None:
         values = values.assign_coords({AGAINST: _other(run, values, against)})
     for name in values.dims:
@@ -220,9 +222,9 @@ def _happening(values: xr.DataArray, along: Hashable, others: Sequence[Hashable]
 
 def _mark_stages(axes: Axes, run: xr.Dataset, line: xr.DataArray, at: Hashable) -> None:
     """Mark where stages end on a line over increments; stage k ends at time k."""
-    if INCREMENT not in line.dims or TIME not in run or STAGE not in run.coords:
+    if TIME not in line.coords or STAGE not in run.coords:
         return
-    time = run[TIME].sel({INCREMENT: line[INCREMENT]}).to_numpy()
+    time = line[TIME].to_numpy()
     ends = [k for k in range(1, round(float(np.nanmax(time))) + 1) if np.isclose(time, k).any()]
     names = [str(each) for each in np.atleast_1d(run[STAGE].to_numpy())]
     if len(names) != len(ends) or len(ends) > MOST_LINES:

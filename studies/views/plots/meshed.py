@@ -91,8 +91,8 @@ def on_mesh(
         values = values.assign_coords({STAGE: at})
     X = fields.X + deformed * fields.stages[at]["displacement"]
     numbers, name = values.to_numpy(), component_name(values)
-    faces, bodies = fields.faces
-    triangles, edges = _triangles(faces), _edges(faces, bodies)
+    faces, _ = fields.faces
+    triangles, edges = _triangles(faces), _edges(faces)
     if is_half(run) and (fields.X[0] >= -1e-9 * np.ptp(fields.X[0])).all():
         count, odd = X.shape[1], name not in INVARIANTS and name.count("x") == 1
         X = np.hstack([X, X * [[-1.0], [1.0]]])
@@ -110,7 +110,7 @@ def on_mesh(
     inside = np.unique(triangles[shown])
     area = np.zeros(X.shape[1])
     np.add.at(area, triangles[shown], _areas(X, triangles[shown])[:, None] / 3.0)
-    signed = field == _MOVED or (bool(name) and name != "tresca")
+    signed = name not in ("", "tresca")
     unit = str(values.attrs.get("units", "1"))
     most, note = limit(numbers[inside], area[inside], signed, unit)
     if deformed:
@@ -146,11 +146,15 @@ def _values(
             raise StudyError("component", component, one_of(component, known))
         words = {"long_name": f"displacement along {component}", "units": "mm"}
         values = at["displacement"][known.index(component)]
-        return xr.DataArray(values, scalars, _NODE, field, words), None
+        own = scalars | {"component": component}
+        return xr.DataArray(values, own, _NODE, field, words), None
     name = (_AT_THE_END | _STAGED)[field]
     tensor = name == "plastic_strain" and component is not None
     nodal = at["plastic_tensor" if tensor else name]
     words = QUANTITIES[field].attributes
+    if tensor and not np.isfinite(nodal).any():
+        allowed = "is not kept in the file of this run: leave it out"
+        raise StudyError("component", component, allowed)
     if tensor:
         words = words | {"long_name": words["long_name"].removeprefix("equivalent ")}
     if nodal.ndim == 1:
@@ -166,9 +170,8 @@ def _triangles(faces: Array) -> Array:
     return np.vstack([faces[:, :3], faces[four][:, [0, 2, 3]]])
 
 
-def _edges(faces: Array, bodies: Array) -> Array:
-    """Return the edges (n, 2) that only one face of a body has."""
-    del bodies  # bodies share no nodes
+def _edges(faces: Array) -> Array:
+    """Return the edges (n, 2) that only one face has; bodies share no nodes."""
     last = np.where(faces[:, 3:] == NO_NODE, faces[:, :1], faces[:, 3:])
     ring = np.hstack([faces[:, :3], last])
     pairs = np.stack([ring, np.roll(ring, -1, axis=1)], axis=2).reshape(-1, 2)

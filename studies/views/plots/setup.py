@@ -114,7 +114,7 @@ def setup_figure(
     shapes = [_fitted(box) for box in boxes]
     height = max(own[1] for own in shapes)
     size = sum(own[0] + 0.7 for own in shapes) + _LEGEND, height + 1.3
-    sheet = Figure(figsize=size, dpi=150, layout="compressed")
+    sheet = Figure(figsize=size, dpi=150, layout="constrained")
     panels = sheet.subplots(1, len(boxes), squeeze=False, width_ratios=[s[0] for s in shapes])[0]
     handles: dict[str, Any] = {}
     for axes, box, shape in zip(panels, boxes, shapes, strict=True):
@@ -254,7 +254,8 @@ def _draw(
                 f"{rigid.name}.{name}",
                 inch,
             )
-        handles[f"{rigid.name}: rigid"] = Line2D([], [], color="k", linewidth=2.0)
+        if rigid.surfaces:  # else it is a point that moves boundaries by links
+            handles[f"{rigid.name}: rigid"] = Line2D([], [], color="k", linewidth=2.0)
     for name, curve in shown.own.curves.items():
         axes.plot(*curve, color="0.25", linewidth=1.6)
         handles[name] = Line2D([], [], color="0.25", linewidth=1.6)

@@ -47,6 +47,17 @@ def test_ends_of_stages_are_marked_unless_they_are_too_many(count: int) -> None:
     check_inside(sheet)
 
 
+def test_ends_of_stages_are_marked_on_the_lines_of_several_runs() -> None:
+    run = course(2)
+    other = run.assign_coords(friction=[0.2])
+    other["force"] = 2.0 * other["force"]
+    both = xr.concat([run, other], "friction", join="outer")
+    sheet = picture(both, "force", over="friction")
+    marks = [line for line in lines_of(sheet) if line.get_marker() == "o"]
+    found = sorted(float(mark.get_ydata()[0]) for mark in marks)
+    assert found == sorted([k * np.sin(end) for k in (1, 2) for end in (1.0, 2.0)])
+
+
 @pytest.mark.parametrize("parts", COUNTS)
 def test_a_force_over_a_displacement_is_a_loop(parts: int) -> None:
     run = course(5, parts)

@@ -157,6 +157,8 @@ def test_lines_without_values_are_refused() -> None:
     run["pressure"] = (("s",), np.full(2, np.nan))
     with pytest.raises(StudyError, match="field = 'pressure': has no value in the run"):
         line_figure(run, "pressure")
+    with pytest.raises(StudyError, match="field = 'shear': must be one of pressure"):
+        line_figure(run, "shear")
 
 
 def test_a_course_is_drawn_over_increments_and_has_no_zoom() -> None:

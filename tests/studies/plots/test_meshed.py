@@ -71,6 +71,11 @@ def test_both_halves_are_mirrored_with_the_sign_of_shear() -> None:
         np.testing.assert_allclose(drawn.values[half:], sign * drawn.values[:half])
         assert drawn.box == pytest.approx((-1.9, 1.9, -0.9, 0.9))
         assert drawn.signed == (name != "tresca")
+    run = kept(symmetric=True)
+    run["mesh_displacement_x"] = run["mesh_displacement_x"] + 0.3
+    for axis, sign in (("x", -1.0), ("y", 1.0)):
+        moved = on_mesh(run, "map_displacement", axis).values
+        np.testing.assert_allclose(moved[half:], sign * moved[:half])
     on_line = np.abs(drawn.X[0][drawn.edges]).max(axis=1) < 1e-12
     assert not on_line.any()  # the line of symmetry is no outline
 
@@ -121,6 +126,14 @@ def test_a_part_may_lie_outside_of_the_grid_and_a_grid_is_not_needed() -> None:
 def test_what_is_not_there_is_refused(given: dict[str, Any], told: str) -> None:
     with pytest.raises(StudyError, match=told):
         map_figure(kept(), "map_stress", **given)
+
+
+def test_a_run_of_an_earlier_version_lacks_the_components_of_plastic_strain() -> None:
+    run = kept()
+    run = run.drop_vars([name for name in run if str(name).startswith("mesh_plastic_strain_")])
+    assert on_mesh(run, "plastic_strain").values.notnull().all()
+    with pytest.raises(StudyError, match="component = 'xx': is not kept in the file"):
+        on_mesh(run, "plastic_strain", "xx")
 
 
 def test_maps_on_a_grid_have_invariants_too() -> None:

@@ -21,6 +21,7 @@ from studies.views.plots.acting import outward
 from studies.views.plots.setup import setup_figure
 from tests.studies.plots.test_many import check_inside
 
+DATA = Path(__file__).parents[3] / "data/scenes"
 SCENE = """
 name = "block"
 summary = "a block under a rigid ball"
@@ -173,3 +174,14 @@ def test_a_scene_without_a_model_is_refused() -> None:
 
     with pytest.raises(StudyError, match="no model to draw"):
         setup_figure(replace(scene_named("punch"), model=model))
+
+
+def test_a_removal_is_drawn_in_its_region_and_a_panel_is_as_large_as_it_can_be() -> None:
+    sheet = setup_figure(scene_named("expansion.toml", beside(DATA)))
+    sheet.draw_without_rendering()
+    whole, close = sheet.axes
+    (dot,) = (line for line in close.lines if line.get_marker() == "o")
+    assert dot.get_xdata()[0] == pytest.approx(3.1)  # the skin is from 3.0 to 3.2
+    assert "removal plate.skin" in legend_of(sheet)
+    assert close.get_position().width == pytest.approx(whole.get_position().width, rel=0.1)
+    assert "wall: rigid" not in legend_of(setup_figure(scene_named("bending.toml", beside(DATA))))

@@ -62,3 +62,19 @@ def test_a_list_and_a_file_are_the_same_course(course: Any) -> None:
 def test_a_wrong_course_is_refused(course: Any, words: str) -> None:
     with pytest.raises(SceneError, match=words):
         pulsed(course, CSV)
+
+
+def test_a_course_of_a_repeated_stage_is_the_same_in_each_cycle_and_wrong_once() -> None:
+    def repeated(course: Any) -> FileScene:
+        content = blocks()
+        content["stages"] += [{"name": "pulse", "increments": 2}]
+        content["repeat"] = {"stages": ["pulse"], "times": 4}
+        content["loads"][0]["amplitude"] = {"pulse": course}
+        return file_scene(Description("blocks.toml", content, {}), built=True)
+
+    scene = repeated([[0.5, 1.0], [1.0, 0.2]])
+    (load,) = scene.model(scene.parameters()).bodies[0].loads
+    np.testing.assert_allclose(load.amplitude.time, [0, 1, 1.5, 2, 2.5, 3, 3.5, 4, 4.5, 5])
+    np.testing.assert_allclose(load.amplitude.value, [0, 0, *([1.0, 0.2] * 4)])
+    with pytest.raises(SceneError, match=r"has a mistake:\n.*must be 0\.2"):
+        repeated([[0.0, 0.0], [0.5, 1.0], [1.0, 0.2]])
