@@ -159,10 +159,15 @@ class Datasets:
         now = time.monotonic()
         made.until = now + REST * (now - began)
         self._forget(study_id, made.number - 2)  # the one before may still be sent
-        while len(self.made) > KEPT:
-            gone, old = self.made.popitem(last=False)
-            self._forget(gone, old.number)
+        self._keep_few(study_id)
         return target
+
+    def _keep_few(self, latest: str) -> None:
+        """Delete what was asked for longest ago; what is being made, and the latest, stay."""
+        rest = [each for each, old in self.made.items() if old.task is None or old.task.done()]
+        over = max(len(self.made) - KEPT, 0)
+        for gone in [each for each in rest if each != latest][:over]:
+            self._forget(gone, self.made.pop(gone).number)
 
     def _forget(self, study_id: str, last: int) -> None:
         """Delete the files of a study up to this number."""

@@ -120,6 +120,33 @@ def test_a_data_set_is_made_again_when_runs_were_added_but_not_too_often(
     assert not folder.exists()
 
 
+def test_one_that_took_long_stays_though_others_were_asked_for_meanwhile(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(datasets, "KEPT", 1)
+    held, made, first = datasets.Datasets(running.jobs, running.store), datasets.combined, []
+    later = fake_study("later", sweep=AXES | {"load_ratio": [0.3]})
+    running.jobs.accept(later.id, later.to_dict(), later.run_ids())
+    ended = threading.Event()
+
+    def combined(content: dict[str, Any], *given: Any) -> None:
+        assert content["name"] != later.name or ended.wait(10.0)
+        made(content, *given)
+
+    async def both() -> Path:
+        ids = (running.study.id, later.id)
+        tasks = [asyncio.create_task(held.current(running.jobs.get(each))) for each in ids]
+        path = await tasks[0]
+        first.append(path.is_file())
+        ended.set()
+        return await tasks[1]
+
+    monkeypatch.setattr(datasets, "combined", combined)
+    assert asyncio.run(both()).is_file() and first == [True]
+    assert len(list(held.folder.iterdir())) == 1, "the older one is deleted then"
+    held.close()
+
+
 def test_a_study_that_chooses_its_runs_has_none_before_its_end(running: Running) -> None:
     goal = {"find": "first_yield", "between": [0.1, 1.0]}
     study = {"name": "goal", "scene": "fake", "parameters": {}, "sweep": {}, "goal": goal}
