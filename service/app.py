@@ -100,7 +100,7 @@ def assembled(settings: Settings, store: Store, jobs: Jobs, held: int | None) ->
     scenes = settings.max_scenes_bytes, settings.max_key_scenes_bytes
     keeper = Keeper(jobs, store, runner.computes, *kept, *scenes)
     metrics = Metrics(jobs, store, runner)
-    datasets = Datasets(jobs, store)
+    datasets = Datasets(jobs, store, computes=held is not None)
 
     @contextlib.asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:

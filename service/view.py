@@ -28,7 +28,7 @@ from service.job import Job, StudyState, verdict
 from service.jobs import Jobs, put
 from service.recovery import add
 from service.settings import Settings
-from studies import Store, StudyError
+from studies import Store, Study, StudyError
 from studies.scratch import scratch
 from studies.storage.seal import state_of
 
@@ -80,7 +80,14 @@ class ViewedFolder:
             add(study_id, self.jobs, self.store, begun=False)
             add(study_id, self.jobs, self.store)
             return
-        end, message = verdict(self.store.outcomes(study_id), job.stage)
+        if not (counts := self.store.outcomes(study_id)):  # it was deleted or damaged
+            return
+        study = Study.known(self.jobs.study(study_id), self.store.scene)
+        if study.asks:
+            asked = self.store.asked(study) or ()
+            self.jobs.asked(study_id, sorted(asked), study.stage(study.expansion.size))
+            job = self.jobs.get(study_id)
+        end, message = verdict(counts, study.counted)
         self._put(job, state=end, message=message, progress=100.0)
 
     def _follow(self, study_id: str) -> None:
@@ -133,8 +140,7 @@ def application(path: Path) -> Iterator[tuple[FastAPI, str]]:
         store = Unpacked(find_study(path), folder)
         jobs = Jobs(folder / "jobs.sqlite")
         jobs.accept(store.study_id, store.content, store.run_ids)
-        counts = store.catalogue.counts(store.run_ids)
-        jobs.finish(store.study_id, *verdict(counts), standing=StudyState.ACCEPTED)
+        jobs.finish(store.study_id, *verdict(store.counts), standing=StudyState.ACCEPTED)
         yield assembled(settings, store, jobs, None), f"/ui/studies/{store.study_id}"
 
 
