@@ -1,4 +1,4 @@
-"""Check studies before they are accepted, and draw their scenes, in a separate process.
+"""Check studies before they are accepted, in a separate process.
 
 To check every run of a large study and to make its id takes seconds, and memory.
 """
@@ -67,30 +67,6 @@ class Examiner:
         name = content.get("name")
         async with self.process.turn():
             return await self.process.call(examined, *what, name=name, advice=": sweep less")
-
-    async def picture(self, content: Mapping[str, Any]) -> str:
-        """Return the scene of the first run of a study, with its mesh, as SVG.
-
-        Raises
-        ------
-        StudyError
-            If the study has a mistake.
-        Busy
-            If too many others wait, or the process was killed.
-        """
-        async with self.process.turn():
-            name = content.get("name")
-            return await self.process.call(pictured, dict(content), self.directory, name=name)
-
-
-def pictured(content: dict[str, Any], directory: Path) -> str:
-    """Return the scene of the first run of a study; called in a separate process."""
-    from studies.views.scene_picture import scene_svg
-
-    store = Store(directory)
-    study = Study.known(content, partial(_posted, store), store.definition)
-    first = next(iter(study.cases()))
-    return scene_svg(first.scene, first.parameters)
 
 
 def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:

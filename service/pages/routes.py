@@ -31,7 +31,7 @@ from service.dependencies import (
     TheStore,
     TheTables,
 )
-from service.errors import Conflict, NoRoom, NotFound
+from service.errors import Busy, Conflict, NoRoom, NotFound
 from service.examiner import Examined
 from service.job import Job, StudyState
 from service.jobs import Jobs
@@ -45,7 +45,6 @@ from service.routes.health import health
 from service.routes.scenes import post_scene
 from service.schemas import ContentId, StudyFilter, Window
 from service.table import Tables, scene_of_study
-from solver.errors import ModelError
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
@@ -264,7 +263,9 @@ def _given(fields: Iterable[tuple[str, object]]) -> dict[str, list[str]]:
 
 
 @router.get("/scene.svg")
-async def draw_scene(request: Request, store: TheStore, examiner: TheExaminer) -> Response:
+async def draw_scene(
+    request: Request, store: TheStore, inspector: TheInspector, caller: TheName
+) -> Response:
     """Draw the scene that the fields of the form describe, or say why it cannot be drawn."""
     given = _given(request.query_params.multi_items())
     name = given.get("scene", [""])[0]
@@ -274,9 +275,11 @@ async def draw_scene(request: Request, store: TheStore, examiner: TheExaminer) -
         if wrong:
             name, allowed = next(iter(wrong.items()))
             raise StudyError(name, given.get(f"p.{name}"), allowed)
-        picture = await examiner.picture(content)
-    except (StudyError, ModelError):
+        picture = await inspector.picture(store.directory, content, caller)
+    except StudyError:
         picture = sentence("There is no such scene: a field has a mistake.")
+    except Busy:
+        picture = sentence("Too many pictures are drawn now: change a field in a minute.")
     return Response(picture, media_type="image/svg+xml", headers={"cache-control": "no-cache"})
 
 
