@@ -31,7 +31,16 @@ def flags(variable: xr.DataArray) -> dict[int, str]:
 
 
 def sweep_axes(dataset: xr.Dataset) -> list[str]:
-    """Return the sweep dimensions of a data set, including those of size one."""
+    """Return the sweep dimensions of a data set, including those of size one.
+
+    Raises
+    ------
+    StudyError
+        if it is not the data set of a study, or of a run
+    """
+    if "status" not in dataset:
+        path = dataset.encoding.get("source", "")
+        raise StudyError("path", path, "must be the data set of a study, or of a run")
     return [str(name) for name in dataset["status"].dims]
 
 
