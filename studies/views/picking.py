@@ -44,6 +44,13 @@ def sweep_axes(dataset: xr.Dataset) -> list[str]:
     return [str(name) for name in dataset["status"].dims]
 
 
+def only_numbers(dataset: xr.Dataset, *but: str) -> xr.Dataset:
+    """Return a data set without other lines and maps: to stack its runs reads all that it has."""
+    axes = {*sweep_axes(dataset)}
+    wide = [str(name) for name, each in dataset.data_vars.items() if axes < {*map(str, each.dims)}]
+    return dataset.drop_vars([name for name in wide if name not in but])
+
+
 def sweep_coordinates(dataset: xr.Dataset) -> dict[str, str]:
     """Return the coordinates that distinguish runs, each with its sweep dimension.
 
