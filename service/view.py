@@ -17,6 +17,7 @@ import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
@@ -197,6 +198,11 @@ def view(path: Path, port: int = 0, browser: bool = True) -> None:
 
 class _Server(uvicorn.Server):
     """A server for which Ctrl-C is the usual end: it does not send itself the signal again."""
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """End at a signal, and with it the streams of events."""
+        self.config.app.state.closing = True
+        super().handle_exit(sig, frame)
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:

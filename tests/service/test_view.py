@@ -81,6 +81,7 @@ def test_a_folder_is_shown_and_nothing_is_written_there(folder: tuple[Study, Sto
             f"/studies/{study.id}/dataset.nc", f"/studies/{study.id}/log",
         ):  # fmt: skip
             assert client.get(path).status_code == 200, path
+        assert '"successful"' in client.get(f"/studies/{study.id}/events").text
         for method, path in (
             ("POST", "/studies"), ("DELETE", f"/runs/{run}"), ("POST", "/estimate"),
             ("DELETE", f"/studies/{study.id}"), ("POST", f"/ui/studies/{study.id}/retry"),
