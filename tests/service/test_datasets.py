@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import gzip
 import io
+import struct
 import threading
 import time
 from collections.abc import Iterator
@@ -11,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import uvicorn
 import xarray as xr
@@ -188,6 +191,16 @@ def test_keys_of_a_zarr_store_are_chunks_or_nothing(running: Running) -> None:
         "..%2f..%2fdataset.nc", "x/c/" + "9" * 400, ".zgroup", "x/c/\ud800",
     ):  # fmt: skip
         assert get(key.encode("utf-8", "surrogatepass").decode("latin-1")).status_code == 404, key
+
+
+def test_the_last_chunk_of_texts_is_as_long_as_the_others(tmp_path: Path) -> None:
+    path, words = tmp_path / "words.nc", np.array(["a", "bc", "d"], dtype=object)
+    chunks = {"word": {"chunksizes": (2,)}}
+    xr.Dataset({"word": ("run", words)}).to_netcdf(path, engine="h5netcdf", encoding=chunks)
+    tiles = Tiles(path)
+    first, last = (gzip.decompress(tiles.content(f"word/c/{k}") or b"") for k in (0, 1))
+    assert first == struct.pack("<II1sI2s", 2, 1, b"a", 2, b"bc")
+    assert last == struct.pack("<II1sI", 2, 1, b"d", 0)
 
 
 def test_one_who_read_another_layout_gets_an_error_in_place_of_values(running: Running) -> None:
