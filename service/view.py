@@ -192,16 +192,21 @@ def view(path: Path, port: int = 0, browser: bool = True) -> None:
             uvicorn.Config(
                 app, http=limited(app.state.settings), ws="none", log_level="warning",
                 access_log=False, timeout_graceful_shutdown=1, server_header=False,
-            )
+            ),
+            app,
         ).run(sockets=[listening])  # fmt: skip
 
 
 class _Server(uvicorn.Server):
     """A server for which Ctrl-C is the usual end: it does not send itself the signal again."""
 
+    def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
+        super().__init__(config)
+        self.app = app
+
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """End at a signal, and with it the streams of events."""
-        self.config.app.state.closing = True
+        self.app.state.closing = True
         super().handle_exit(sig, frame)
 
     @contextmanager

@@ -175,7 +175,7 @@ def test_runs_that_a_data_set_lacks_are_not_computed_yet(
     folder: tuple[Study, Store], tmp_path: Path
 ) -> None:
     _, store = folder
-    more = fake_study("more", sweep=AXES | {"load_ratio": [0.3, 0.9, 1.0]})
+    more = fake_study("more", sweep=AXES | {"load_ratio": [0.3, 0.9, 0.95]})
     part = combine(more, store, more.cases(), target=tmp_path / "part.nc").path
     with shown(part) as (client, first):
         address = first.removeprefix("/ui")
