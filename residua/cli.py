@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 from residua.neighbours import wrong_package
 from residua.status import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
@@ -38,7 +37,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         load_own_parts()
         if study := getattr(options, "study", None) if hasattr(options, "path") else None:
-            options.path = Path(options.path) / study
+            if isinstance(options.path, str):
+                raise StudyError("--study", study, "must be left out: a URL is that of one study")
+            options.path = options.path / study
         return options.command(options)
     except (ModelError, StudyError) as error:
         return complain(error, BAD_INPUT)

@@ -100,7 +100,7 @@ def assembled(settings: Settings, store: Store, jobs: Jobs, held: int | None) ->
     scenes = settings.max_scenes_bytes, settings.max_key_scenes_bytes
     keeper = Keeper(jobs, store, runner.computes, *kept, *scenes)
     metrics = Metrics(jobs, store, runner)
-    datasets = Datasets(jobs, store)
+    datasets = Datasets(jobs, store, computes=held is not None)
 
     @contextlib.asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -131,7 +131,7 @@ def assembled(settings: Settings, store: Store, jobs: Jobs, held: int | None) ->
         "details": Details(jobs, store), "tables": Tables(jobs, store),
         "pictures": Pictures(settings.map_queue, settings.map_bytes),
     }  # fmt: skip
-    app.state.only_shows = held is None
+    app.state.only_shows, app.state.closing = held is None, False
     for name, part in parts.items():
         setattr(app.state, name, part)
     # Each is outside of the previous ones, so that refused requests are measured and logged too.

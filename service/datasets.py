@@ -42,7 +42,6 @@ PATIENCE = 20.0
 WAITING = 8
 """Number of studies whose data sets may wait to be made."""
 
-
 AGAIN = "the data set was lost or damaged, and is made again from the runs: ask later"
 
 
@@ -63,10 +62,11 @@ class Datasets:
     Parameters
     ----------
     jobs, store : the queue and the store
+    computes : whether somebody takes studies from the queue
     """
 
-    def __init__(self, jobs: Jobs, store: Store) -> None:
-        self.jobs, self.store = jobs, store
+    def __init__(self, jobs: Jobs, store: Store, computes: bool = True) -> None:
+        self.jobs, self.store, self.computes = jobs, store, computes
         self.process = Guarded("data set", WAITING, SECONDS)
         self.made: OrderedDict[str, _Offered] = OrderedDict()
         self.folders = ExitStack()
@@ -79,7 +79,7 @@ class Datasets:
         Raises
         ------
         NotFound
-            if there is none yet
+            if there is none yet, or it was damaged where nothing is computed
         Busy
             if it was lost or damaged, and is made again
         """
@@ -87,12 +87,12 @@ class Datasets:
             return self.store.dataset(job.id)
         except FileDamaged as error:
             held = error.state is not None or job.state is StudyState.SUCCESSFUL
+        if held and not self.computes:
+            raise NotFound("the data set was lost or damaged, and nothing is computed here")
         if held and job.state.final and job.state is not StudyState.DISMISSED:
             with suppress(Conflict):
                 self.jobs.retry(job.id, failed=False)
-            raise Busy(
-                "the data set was lost or damaged, and is made again from the runs: ask later"
-            )
+            raise Busy(AGAIN)
         raise NotFound(
             f"no data set yet: it is written when the work ends, and the study is {job.state}"
         )
@@ -149,7 +149,7 @@ class Datasets:
             self.folder = self.folders.enter_context(scratch())
         made.number += 1
         target = self.folder / f"{study_id}-{made.number}.nc"
-        given = content, self.store.directory.resolve(), target
+        given = content, self.store.directory.resolve(), self.store.aside, target
         try:
             async with self.process.turn():
                 await self.process.call(combined, *given, name=study_id)
@@ -159,10 +159,15 @@ class Datasets:
         now = time.monotonic()
         made.until = now + REST * (now - began)
         self._forget(study_id, made.number - 2)  # the one before may still be sent
-        while len(self.made) > KEPT:
-            gone, old = self.made.popitem(last=False)
-            self._forget(gone, old.number)
+        self._keep_few(study_id)
         return target
+
+    def _keep_few(self, latest: str) -> None:
+        """Delete what was asked for longest ago; what is being made, and the latest, stay."""
+        rest = [each for each, old in self.made.items() if old.task is None or old.task.done()]
+        over = max(len(self.made) - KEPT, 0)
+        for gone in [each for each in rest if each != latest][:over]:
+            self._forget(gone, self.made.pop(gone).number)
 
     def _forget(self, study_id: str, last: int) -> None:
         """Delete the files of a study up to this number."""
@@ -179,10 +184,13 @@ class Datasets:
         self.folders.close()
 
 
-def combined(content: dict[str, Any], directory: Path, target: Path) -> None:
-    """Write the data set of the runs of a study that are there; called in another process."""
+def combined(content: dict[str, Any], directory: Path, aside: Path | None, target: Path) -> None:
+    """Write the data set of the runs of a study that are there; called in another process.
+
+    Nothing is moved in a directory whose lists are ``aside``.
+    """
     from studies.storage.combine import combine
 
-    store = Store(directory)
+    store = Store(directory, aside=aside)
     study = Study.known(content, store.scene)
     combine(study, store, study.cases(), target=target)

@@ -1,4 +1,4 @@
-"""Check studies before they are accepted, and draw their scenes, in a separate process.
+"""Check studies before they are accepted, in a separate process.
 
 To check every run of a large study and to make its id takes seconds, and memory.
 """
@@ -12,8 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from service.guarded import Guarded
-from service.maps import draw_scene
-from service.schemas import SketchQuery
 from service.settings import Settings
 from solver.scenes import Scene
 from studies import Bounds, Estimate, Store, Study, StudyError, estimate
@@ -69,28 +67,6 @@ class Examiner:
         name = content.get("name")
         async with self.process.turn():
             return await self.process.call(examined, *what, name=name, advice=": sweep less")
-
-    async def picture(self, content: Mapping[str, Any]) -> bytes:
-        """Return the scene of the first run of a study before loading, as PNG.
-
-        Raises
-        ------
-        StudyError
-            If the study has a mistake.
-        Busy
-            If too many others wait, or the process was killed.
-        """
-        async with self.process.turn():
-            name = content.get("name")
-            return await self.process.call(pictured, dict(content), self.directory, name=name)
-
-
-def pictured(content: dict[str, Any], directory: Path) -> bytes:
-    """Return the scene of the first run of a study as PNG; called in a separate process."""
-    store = Store(directory)
-    study = Study.known(content, partial(_posted, store), store.definition)
-    first = next(iter(study.cases()))
-    return draw_scene(first.scene, first.values, SketchQuery())
 
 
 def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:

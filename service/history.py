@@ -24,6 +24,7 @@ def log_of(job: Job, jobs: Jobs, store: Store) -> str:
         for row in store.catalogue.rows(runs[first : first + BATCH]).values():
             seconds = "" if row["cpu_seconds"] is None else f", {row['cpu_seconds']:.3g} s of CPU"
             words = f"run {row['id']}: {row['status']}{seconds}"
-            said = " ".join(str(row["message"]).split())
-            lines.append((str(row["created"]), f"{words}: {said}" if said else words))
-    return "".join(f"{at}  {words}\n" for at, words in sorted(lines, key=lambda each: each[0]))
+            said = f"{words}: {row['message']}" if row["message"] else words
+            lines.append((str(row["created"]), said))
+    told = ((at, " ".join(words.split())) for at, words in sorted(lines, key=lambda each: each[0]))
+    return "".join(f"{at}  {words}\n" for at, words in told)

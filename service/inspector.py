@@ -11,15 +11,15 @@ import json
 import logging
 import time
 from base64 import b64decode, b64encode
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from service.alone import CRASHED, FAILED, Answer, alone
 from service.guarded import Budget, Guarded, beyond
 from service.maps import draw_scene
 from service.schemas import KeptScene, SketchQuery
-from studies import Store, StudyError
+from studies import Store, Study, StudyError
 from studies.definition.parameters import read_values
 from studies.errors import SceneError
 from studies.scenes.description import Description, file_names
@@ -40,14 +40,16 @@ LONGEST = 1_000_000
 """Largest size of a scene file, without its meshes [bytes]."""
 _FILE = "scene.toml"
 
+Drawn = TypeVar("Drawn")
+
 
 class Inspector:
     """Checks scenes, two at a time.
 
     Parameters
     ----------
-    seconds : processor time that the scenes of a caller may take in a minute, and the longest of
-        one
+    seconds : processor time that the scenes and pictures of a caller may take in a minute, and the
+        longest of one
     """
 
     def __init__(self, seconds: float) -> None:
@@ -102,9 +104,6 @@ class Inspector:
     async def draw(self, directory: Path, name: str, query: SketchQuery, caller: str) -> bytes:
         """Return the picture of a scene of a store before loading, as PNG.
 
-        Its meshes may be those of a stranger, and its parameters are the caller's: it is drawn in
-        a process with limits, and takes the caller's budget.
-
         Raises
         ------
         StudyError
@@ -112,12 +111,26 @@ class Inspector:
         Busy
             if too many others wait, the budget is used, or the process was killed
         """
+        return await self._charged(caller, name, drawn, directory, name, query)
+
+    async def picture(self, directory: Path, content: Mapping[str, Any], caller: str) -> bytes:
+        """Return the scene of the first run of a study, with its mesh, as SVG; errors as `draw`."""
+        return await self._charged(caller, content.get("name"), pictured, directory, dict(content))
+
+    async def _charged(
+        self, caller: str, name: object, draw: Callable[..., tuple[Drawn, float]], *given: object
+    ) -> Drawn:
+        """Return a picture of a scene.
+
+        Its meshes may be those of a stranger, and its parameters are the caller's: it is drawn in
+        a process with limits, and takes the caller's budget.
+        """
         self.budget.left(caller)
         async with self.process.turn(caller):
             spent = left = self.budget.left(caller)  # all of it if there is no answer
             begun = time.monotonic()
             try:
-                found, spent = await self.process.call(drawn, directory, name, query, name=name)
+                found, spent = await self.process.call(draw, *given, name=name)
             except StudyError:
                 spent = min(left, time.monotonic() - begun)
                 raise
@@ -162,6 +175,14 @@ def drawn(directory: Path, name: str, query: SketchQuery) -> tuple[bytes, float]
     scene = Store(directory).scene(name) or scene_named(name)
     values = read_values(scene, query.selection)
     return draw_scene(scene, values, query), time.process_time() - begun
+
+
+def pictured(directory: Path, content: dict[str, Any]) -> tuple[bytes, float]:
+    """Return the scene of the first run of a study as PNG, and its processor time [s]."""
+    begun = time.process_time()
+    first = next(iter(Study.known(content, Store(directory).scene).cases()))
+    picture = draw_scene(first.scene, first.values, SketchQuery())
+    return picture, time.process_time() - begun
 
 
 def _told(folder: Path) -> str:

@@ -35,7 +35,10 @@ RUN = """CREATE TABLE IF NOT EXISTS run (
     job TEXT NOT NULL, position INTEGER NOT NULL, run TEXT NOT NULL,
     PRIMARY KEY (job, position)
 ) WITHOUT ROWID"""
-TOLD = "CREATE TABLE IF NOT EXISTS told (job TEXT NOT NULL, at TEXT NOT NULL, words TEXT NOT NULL)"
+TOLD = (
+    "CREATE TABLE IF NOT EXISTS told (job TEXT NOT NULL, at TEXT NOT NULL, words TEXT NOT NULL)",
+    "CREATE INDEX IF NOT EXISTS told_by_job ON told (job)",
+)
 """What happened to studies. A queue without it has the same form: it is added."""
 REST = (
     "CREATE INDEX job_by_turn ON job (turn)",
@@ -71,16 +74,17 @@ def prepare(connection: sqlite3.Connection, new: bool) -> None:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     known = {row[0] for row in connection.execute("SELECT name FROM sqlite_master")}
     if version == VERSION and {"job", "run"} <= known:
-        connection.execute(TOLD)
+        for statement in TOLD:
+            connection.execute(statement)
         return
     if version > VERSION:
         allowed = f"must be of form {VERSION}: a later version of the service has made it"
         raise StudyError("jobs.sqlite", f"form {version}", allowed)
     if not new and "job" not in known:
         raise sqlite3.DatabaseError("it holds no queue")
-    statements = [JOB, RUN, TOLD, *REST]
+    statements = [JOB, RUN, *TOLD, *REST]
     if "job" in known:
-        statements = ["ALTER TABLE job RENAME TO old", JOB, RUN, TOLD, *_copied(connection), *REST]
+        statements = ["ALTER TABLE job RENAME TO old", JOB, RUN, *TOLD, *_copied(connection), *REST]
     connection.create_function("checksum", -1, lambda *values: checksum(values))
     for statement in statements:
         connection.execute(statement)

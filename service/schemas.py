@@ -85,13 +85,16 @@ class Selecting(BaseModel):
         return {name: str(value) for name, value in (self.model_extra or {}).items() if value != ""}
 
 
-Millimetres = Annotated[float, Field(allow_inf_nan=False)]
+FARTHEST = 1e9
+"""Largest length in a query [mm], and factor of displacements: no picture overflows."""
+
+Millimetres = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 Resolution = Annotated[int, Field(ge=50, le=600, description="dots per inch")]
 Zoom = Annotated[
     float | None,
     Field(
         gt=0,
-        allow_inf_nan=False,
+        le=FARTHEST,
         description="only what lies within this distance of the contact's centre, or of its edge "
         "where half of the bodies was computed [mm]",
     ),
@@ -147,7 +150,7 @@ class MapQuery(BaseModel):
     zoom: Zoom = None
     window: Part = None
     deformed: float = Field(
-        default=0.0, allow_inf_nan=False,
+        default=0.0, ge=-FARTHEST, le=FARTHEST,
         description="factor of the displacements, of a run that keeps its fields",
     )  # fmt: skip
     resolution: Resolution = 150
@@ -178,7 +181,7 @@ class PlotQuery(Selecting):
 class SketchQuery(Selecting):
     """Which part of a scene is drawn, for which values of its parameters."""
 
-    zoom: Annotated[float | None, Field(gt=0, allow_inf_nan=False)] = Field(
+    zoom: Annotated[float | None, Field(gt=0, le=FARTHEST)] = Field(
         default=None, description="only what lies within this distance of the origin [mm]"
     )
     window: Part = None

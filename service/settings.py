@@ -74,7 +74,8 @@ class Settings(BaseSettings):
     reader_seconds: float = Field(
         default=10.0,
         gt=0,
-        description="processor time in a minute for the scenes that a key posts, and for each [s]",
+        description="processor time in a minute for scenes that a key posts or draws; also the "
+        "longest of one [s]",
     )
     connections: int = Field(default=500, ge=1, description="most connections at a time")
     arrival_seconds: float = Field(

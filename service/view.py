@@ -17,6 +17,7 @@ import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
@@ -28,7 +29,7 @@ from service.job import Job, StudyState, verdict
 from service.jobs import Jobs, put
 from service.recovery import add
 from service.settings import Settings
-from studies import Store, StudyError
+from studies import Store, Study, StudyError
 from studies.scratch import scratch
 from studies.storage.seal import state_of
 
@@ -80,7 +81,14 @@ class ViewedFolder:
             add(study_id, self.jobs, self.store, begun=False)
             add(study_id, self.jobs, self.store)
             return
-        end, message = verdict(self.store.outcomes(study_id), job.stage)
+        if not (counts := self.store.outcomes(study_id)):  # it was deleted or damaged
+            return
+        study = Study.known(self.jobs.study(study_id), self.store.scene)
+        if study.asks:
+            asked = self.store.asked(study) or ()
+            self.jobs.asked(study_id, sorted(asked), study.stage(study.expansion.size))
+            job = self.jobs.get(study_id)
+        end, message = verdict(counts, study.counted)
         self._put(job, state=end, message=message, progress=100.0)
 
     def _follow(self, study_id: str) -> None:
@@ -133,8 +141,7 @@ def application(path: Path) -> Iterator[tuple[FastAPI, str]]:
         store = Unpacked(find_study(path), folder)
         jobs = Jobs(folder / "jobs.sqlite")
         jobs.accept(store.study_id, store.content, store.run_ids)
-        counts = store.catalogue.counts(store.run_ids)
-        jobs.finish(store.study_id, *verdict(counts), standing=StudyState.ACCEPTED)
+        jobs.finish(store.study_id, *verdict(store.counts), standing=StudyState.ACCEPTED)
         yield assembled(settings, store, jobs, None), f"/ui/studies/{store.study_id}"
 
 
@@ -185,12 +192,22 @@ def view(path: Path, port: int = 0, browser: bool = True) -> None:
             uvicorn.Config(
                 app, http=limited(app.state.settings), ws="none", log_level="warning",
                 access_log=False, timeout_graceful_shutdown=1, server_header=False,
-            )
+            ),
+            app,
         ).run(sockets=[listening])  # fmt: skip
 
 
 class _Server(uvicorn.Server):
     """A server for which Ctrl-C is the usual end: it does not send itself the signal again."""
+
+    def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
+        super().__init__(config)
+        self.app = app
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """End at a signal, and with it the streams of events."""
+        self.app.state.closing = True
+        super().handle_exit(sig, frame)
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:

@@ -12,6 +12,7 @@ import io
 import sys
 import time
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TextIO
 
@@ -85,16 +86,16 @@ class Client:
             if isinstance(scene, FileScene) and scene.posted:
                 content["scene"] = self._post(scene.description)["id"]
             return self._submit(content, Path())
-        return self._submit(dict(study), Path())
+        return self._submit(study, Path())
 
-    def _submit(self, content: dict[str, Any], folder: Path) -> RemoteStudy:
-        tables: Any = content
+    def _submit(self, study: Mapping[str, Any], folder: Path) -> RemoteStudy:
+        tables: Any = (content := deepcopy(dict(study)))
         while isinstance(tables, dict):
             scene = tables.get("scene")
             if isinstance(scene, str) and scene.endswith(".toml"):
                 tables["scene"] = self.post_scene(folder / scene)["id"]
             tables = tables.get("extends")
-        return RemoteStudy(self, self.ask("POST", "/studies", json=content).json()["id"])
+        return RemoteStudy(self, self.told("POST", "/studies", json=content)["id"])
 
     def study(self, study_id: str) -> RemoteStudy:
         """Return a study that the service has; that it does is found when it is used."""
@@ -102,7 +103,7 @@ class Client:
 
     def studies(self, **which: str | int) -> list[RemoteStudy]:
         """Return studies, the latest first: of a ``status``, ``tag``, ``scene`` or ``text``."""
-        found = self.ask("GET", "/studies", params=which).json()["items"]
+        found = self.told("GET", "/studies", params=which)["items"]
         return [RemoteStudy(self, each["id"]) for each in found]
 
     def post_scene(self, path: Path | str) -> dict[str, Any]:
@@ -115,7 +116,7 @@ class Client:
         ]
         for name, mesh in (known.meshes or {}).items():
             files.append(("meshes", (name, mesh.data, "application/octet-stream")))
-        return self.ask("POST", "/scenes", files=files).json()
+        return self.told("POST", "/scenes", files=files)
 
     def ask(self, method: str, path: str, **content: Any) -> httpx.Response:
         """Return the answer to a request; what is put off is asked again, for a minute.
@@ -130,6 +131,14 @@ class Client:
             answer = self._client.request(method, path, **content)
             if method != "GET" or not _later(answer, until):
                 return _accepted(answer)
+
+    def told(self, method: str, path: str, **content: Any) -> Any:
+        """Return what the answer to a request tells; errors as `ask`."""
+        answer = self.ask(method, path, **content)
+        try:
+            return answer.json()
+        except ValueError:
+            raise Refused(f"{answer.url} does not answer as a service of studies does") from None
 
     @contextlib.contextmanager
     def read(self, path: str) -> Iterator[httpx.Response]:
@@ -166,7 +175,7 @@ class RemoteStudy:
 
     def detail(self) -> dict[str, Any]:
         """Return where it stands: ``status``, ``progress``, ``counts``, ``sweep`` and so on."""
-        return self.client.ask("GET", self._path, params={"limit": 1}).json()
+        return self.client.told("GET", self._path, params={"limit": 1})
 
     def wait(self, seconds: float | None = None, show: bool = True) -> Self:
         """Return when the work has ended, whatever came of it.
@@ -240,7 +249,7 @@ class RemoteStudy:
 
     def table(self, **which: str) -> list[dict[str, Any]]:
         """Return the numbers of the runs, an entry each: ``friction="0.1..0.4"``, ``sort=``."""
-        return self.client.ask("GET", f"{self._path}/table.json", params=which).json()["rows"]
+        return self.client.told("GET", f"{self._path}/table.json", params=which)["rows"]
 
     def log(self) -> str:
         """Return what happened to the study, a line each."""
@@ -251,7 +260,7 @@ class RemoteStudy:
         return self._summary(self.detail())
 
     def _summary(self, detail: Mapping[str, Any]) -> Summary:
-        found = self.client.ask("GET", f"{self._path}/audit").json()
+        found = self.client.told("GET", f"{self._path}/audit")
         first = found[0] if found else None
         audit = first and (
             Worst(first["name"], first["value"], first["limit"], 0), placed(first["at"])

@@ -306,7 +306,9 @@ def _given(fields: Iterable[tuple[str, object]]) -> dict[str, list[str]]:
 
 
 @router.get("/scene.png")
-async def draw_scene(request: Request, store: TheStore, examiner: TheExaminer) -> Response:
+async def draw_scene(
+    request: Request, store: TheStore, inspector: TheInspector, caller: TheName
+) -> Response:
     """Draw the scene of the first run that the fields describe; of a scene without a model nothing.
 
     A page asks for what may not be there, which no browser takes for an error.
@@ -318,7 +320,7 @@ async def draw_scene(request: Request, store: TheStore, examiner: TheExaminer) -
     for field, allowed in wrong.items():
         raise StudyError(field, given.get(f"p.{field}"), allowed)
     try:
-        picture = await examiner.picture(content)
+        picture = await inspector.picture(store.directory, content, caller)
     except StudyError as error:
         if error.field != "scene":
             raise

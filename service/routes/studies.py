@@ -161,7 +161,12 @@ async def events(
 ) -> AsyncIterator[ServerSentEvent]:
     """Send where a study stands at every change, until its end or that of the caller's key."""
     shown: StudySummary | None = None
-    while runner.alive and await request.state.admitted():
+    state = request.app.state
+
+    def open_still() -> bool:
+        return not state.closing if state.only_shows else runner.alive
+
+    while open_still() and await request.state.admitted():
         now = shown
         try:
             now = overview.summary(await asyncio.to_thread(jobs.get, job.id))

@@ -173,16 +173,11 @@ def _chunk(path: Path, name: str, array: Document, at: tuple[int, ...]) -> bytes
         part = tuple(slice(first, first + size) for first, size in zip(begin, sizes, strict=True))
         text = array["data_type"] == "string"
         values = np.asarray((stored.asstr() if text else stored)[part])
-    packed = _texts(values) if text else _numbers(values, sizes)
-    return gzip.compress(packed, _PACKED, mtime=0)
-
-
-def _numbers(values: np.ndarray, sizes: list[int]) -> bytes:
-    """Return numbers, little endian; at the end of an axis a chunk is filled up."""
-    if list(values.shape) != sizes:
+    if list(values.shape) != sizes:  # at the end of an axis a chunk is filled up
         rest = [(0, size - length) for size, length in zip(sizes, values.shape, strict=True)]
-        values = np.pad(values, rest)
-    return values.astype(values.dtype.newbyteorder("<")).tobytes()
+        values = np.pad(values, rest, constant_values="" if text else 0)
+    packed = _texts(values) if text else values.astype(values.dtype.newbyteorder("<")).tobytes()
+    return gzip.compress(packed, _PACKED, mtime=0)
 
 
 def _texts(values: np.ndarray) -> bytes:

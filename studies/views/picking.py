@@ -31,8 +31,24 @@ def flags(variable: xr.DataArray) -> dict[int, str]:
 
 
 def sweep_axes(dataset: xr.Dataset) -> list[str]:
-    """Return the sweep dimensions of a data set, including those of size one."""
+    """Return the sweep dimensions of a data set, including those of size one.
+
+    Raises
+    ------
+    StudyError
+        if it is not the data set of a study, or of a run
+    """
+    if "status" not in dataset:
+        path = dataset.encoding.get("source", "")
+        raise StudyError("path", path, "must be the data set of a study, or of a run")
     return [str(name) for name in dataset["status"].dims]
+
+
+def only_numbers(dataset: xr.Dataset, *but: str) -> xr.Dataset:
+    """Return a data set without other lines and maps: to stack its runs reads all that it has."""
+    axes = {*sweep_axes(dataset)}
+    wide = [str(name) for name, each in dataset.data_vars.items() if axes < {*map(str, each.dims)}]
+    return dataset.drop_vars([name for name in wide if name not in but])
 
 
 def sweep_coordinates(dataset: xr.Dataset) -> dict[str, str]:

@@ -17,7 +17,13 @@ from studies.errors import StudyError, one_of
 from studies.storage.frame import SETS
 from studies.toml import CASE
 from studies.views.gaussian import Array, Gaussian, in_hull
-from studies.views.picking import positions, select, sweep_axes, sweep_coordinates
+from studies.views.picking import (
+    only_numbers,
+    positions,
+    select,
+    sweep_axes,
+    sweep_coordinates,
+)
 
 WAYS = CELLS, GAUSSIAN = "cells", "gaussian"
 MOST = 1000
@@ -61,7 +67,8 @@ def predict(
     if by is not None and by not in ways:
         raise StudyError("by", by, one_of(by, ways))
     way = by or ways[0]
-    names, between = _names(dataset, of), _placed(dataset, at, whole=way == GAUSSIAN)
+    names = _names(dataset, of)
+    between = _placed(only_numbers(dataset, *names), at, whole=way == GAUSSIAN)
     found = (_in_cells if way == CELLS else _by_process)(dataset, between, names)
     return found.assign_coords(between.fixed | between.place).assign_attrs(by=way)
 

@@ -145,9 +145,11 @@ class RunTable:
                 raise StudyError("where", condition, allowed)
             return np.asarray(compared(column.values.astype(str), match["value"]))
         try:
-            return np.asarray(compared(column.values, float(match["value"])))
+            value = float(match["value"])
         except ValueError:
             raise StudyError("where", condition, f"{match['value']!r} must be a number") from None
+        same = np.isclose(column.values, value, rtol=SAME, atol=0.0)
+        return np.asarray(compared(np.where(same, value, column.values), value))
 
 
 def varied(table: RunTable) -> list[Column]:

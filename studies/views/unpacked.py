@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Lock
@@ -15,6 +16,7 @@ import xarray as xr
 
 from studies.appearing import appearing
 from studies.definition.identity import is_id
+from studies.definition.vocabulary import MISSING
 from studies.errors import StudyError
 from studies.storage import dataset as layout
 from studies.storage import seal
@@ -39,6 +41,7 @@ class Unpacked(Store):
     Attributes
     ----------
     study_id, run_ids : id of the study; id of each run, with its position
+    counts : number of runs by status; those that are missing have no file
     content : what the data set says of its study: name, scene, parameters, sweep
 
     Raises
@@ -56,8 +59,10 @@ class Unpacked(Store):
                 raise StudyError("path", str(path), "must be the data set of a study, or of a run")
             known = str(dataset.attrs.get("id", ""))
             self.study_id = known if is_id(known) else _id(str(path.resolve()), 0)
-            size = int(dataset["status"].size)
-            self.run_ids = {_id(self.study_id, at): at for at in range(size)}
+            outcomes = dataset["status"].to_numpy().ravel().tolist()
+            self.counts = Counter(map(str, outcomes))
+            self.run_ids = {_id(self.study_id, at): at for at in range(len(outcomes))}
+            self._there = {each for each, at in self.run_ids.items() if outcomes[at] != MISSING}
             self.content = _content(dataset)
             self.catalogue.put(self._rows(dataset))
 
@@ -69,7 +74,7 @@ class Unpacked(Store):
         """Return the path of the file of a run, which is made if it is not there."""
         path = super().run_path(run_id)
         with self._one:
-            if run_id in self.run_ids and not path.exists():
+            if run_id in self._there and not path.exists():
                 path.parent.mkdir(exist_ok=True)
                 with appearing(path) as part:
                     with self._opened() as dataset:
@@ -108,12 +113,14 @@ class Unpacked(Store):
         return run.assign_attrs(attrs)
 
     def _rows(self, dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
-        """Yield the rows of all runs for the catalogue."""
+        """Yield the rows of the runs that are there for the catalogue."""
         axes, shape = dataset["status"].dims, dataset["status"].shape
         over = {str(n): each for n, each in dataset.data_vars.items() if each.dims == axes}
         numbers = {n: each.to_numpy() for n, each in over.items() if each.dtype.kind in "fiub"}
         texts = {name: over[name].to_numpy() for name in _TEXTS}
         for run_id, at in zip(self.run_ids, np.ndindex(shape), strict=True):
+            if run_id not in self._there:
+                continue
             place = dict(zip(axes, at, strict=True))
             attributes = {**dataset.attrs, "id": run_id}
             attributes["parameters"] = json.dumps(self._parameters(place))

@@ -276,6 +276,8 @@ def test_show_takes_a_run_a_study_or_a_directory(
         assert main(["show", str(store.directory), "--study", name]) == 0
         assert capsys.readouterr().out.count(" ok ") == study.size
     assert main(["show", str(store.directory), "--study", "nowhere"]) == 2
+    assert main(["table", "http://localhost:1/studies/a", "--study", study.name]) == 2
+    assert "a URL is that of one study" in capsys.readouterr().err
 
 
 @pytest.mark.processes

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import httpx
 import pytest
 import xarray as xr
 
@@ -84,6 +85,30 @@ def test_a_scene_is_sent_with_its_meshes_alone_or_by_a_study_that_has_it(client:
     posted = client.submit(study)
     posted.cancel()
     assert posted.detail()["scene"] == pin.id
+
+
+def test_the_content_that_is_submitted_stays_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    sent: list[dict[str, Any]] = []
+
+    def told(method: str, path: str, json: dict[str, Any]) -> Any:
+        sent.append(json)
+        return {"id": "b" * 32}
+
+    client = Client("http://localhost:1")
+    monkeypatch.setattr(client, "told", told)
+    monkeypatch.setattr(client, "post_scene", lambda path: {"id": "a" * 32})
+    content = {"name": "x", "extends": {"name": "y", "scene": "pin.toml"}}
+    client.submit(content)
+    assert sent[0]["extends"]["scene"] == "a" * 32
+    assert content["extends"] == {"name": "y", "scene": "pin.toml"}
+
+
+def test_what_is_no_service_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    client = Client("http://localhost:1")
+    page = httpx.Response(200, text="<html>", request=httpx.Request("GET", "http://localhost:1/x"))
+    monkeypatch.setattr(client, "ask", lambda *_, **__: page)
+    with pytest.raises(Refused, match="localhost:1/x does not answer as a service"):
+        client.study("0" * 32).detail()
 
 
 def test_the_view_of_a_study_is_short_and_the_same_here_and_there(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import gzip
 import io
+import struct
 import threading
 import time
 from collections.abc import Iterator
@@ -11,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import uvicorn
 import xarray as xr
@@ -120,6 +123,33 @@ def test_a_data_set_is_made_again_when_runs_were_added_but_not_too_often(
     assert not folder.exists()
 
 
+def test_one_that_took_long_stays_though_others_were_asked_for_meanwhile(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(datasets, "KEPT", 1)
+    held, made, first = datasets.Datasets(running.jobs, running.store), datasets.combined, []
+    later = fake_study("later", sweep=AXES | {"load_ratio": [0.3]})
+    running.jobs.accept(later.id, later.to_dict(), later.run_ids())
+    ended = threading.Event()
+
+    def combined(content: dict[str, Any], *given: Any) -> None:
+        assert content["name"] != later.name or ended.wait(10.0)
+        made(content, *given)
+
+    async def both() -> Path:
+        ids = (running.study.id, later.id)
+        tasks = [asyncio.create_task(held.current(running.jobs.get(each))) for each in ids]
+        path = await tasks[0]
+        first.append(path.is_file())
+        ended.set()
+        return await tasks[1]
+
+    monkeypatch.setattr(datasets, "combined", combined)
+    assert asyncio.run(both()).is_file() and first == [True]
+    assert len(list(held.folder.iterdir())) == 1, "the older one is deleted then"
+    held.close()
+
+
 def test_a_study_that_chooses_its_runs_has_none_before_its_end(running: Running) -> None:
     goal = {"find": "first_yield", "between": [0.1, 1.0]}
     study = {"name": "goal", "scene": "fake", "parameters": {}, "sweep": {}, "goal": goal}
@@ -161,6 +191,16 @@ def test_keys_of_a_zarr_store_are_chunks_or_nothing(running: Running) -> None:
         "..%2f..%2fdataset.nc", "x/c/" + "9" * 400, ".zgroup", "x/c/\ud800",
     ):  # fmt: skip
         assert get(key.encode("utf-8", "surrogatepass").decode("latin-1")).status_code == 404, key
+
+
+def test_the_last_chunk_of_texts_is_as_long_as_the_others(tmp_path: Path) -> None:
+    path, words = tmp_path / "words.nc", np.array(["a", "bc", "d"], dtype=object)
+    chunks = {"word": {"chunksizes": (2,)}}
+    xr.Dataset({"word": ("run", words)}).to_netcdf(path, engine="h5netcdf", encoding=chunks)
+    tiles = Tiles(path)
+    first, last = (gzip.decompress(tiles.content(f"word/c/{k}") or b"") for k in (0, 1))
+    assert first == struct.pack("<II1sI2s", 2, 1, b"a", 2, b"bc")
+    assert last == struct.pack("<II1sI", 2, 1, b"d", 0)
 
 
 def test_one_who_read_another_layout_gets_an_error_in_place_of_values(running: Running) -> None:

@@ -305,6 +305,26 @@ def test_a_scene_that_takes_too_long_is_told_and_charged(tmp_path: Path) -> None
     asyncio.run(post(Inspector(1.0)))
 
 
+def test_a_picture_for_the_form_of_a_study_is_charged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is asked for by GET, also by those who may not submit."""
+    inspector = Inspector(10.0)
+
+    async def drawn(*_: object, **__: object) -> tuple[str, float]:
+        return "<svg/>", 5.0
+
+    async def ask(caller: str) -> str:
+        return await inspector.picture(Path(), {"name": "a"}, caller)
+
+    async def several() -> None:
+        assert [await ask("anna") for _ in range(2)] == ["<svg/>"] * 2
+        with pytest.raises(Busy, match="processor time in a minute are used"):
+            await ask("anna")
+        assert await ask("bert") == "<svg/>"
+
+    monkeypatch.setattr(inspector.process, "call", drawn)
+    asyncio.run(several())
+
+
 def test_each_key_has_a_budget_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async def read(*_: object, **__: object) -> None:
         raise StudyError("scene", "a.toml", "was read")

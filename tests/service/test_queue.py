@@ -15,6 +15,7 @@ import h5py
 import pytest
 
 from service.errors import Busy, Conflict, NotFound, QueueLost
+from service.history import log_of
 from service.job import StudyState, row_of
 from service.jobs import Jobs
 from service.recovery import open_queue
@@ -47,6 +48,16 @@ def taken(jobs: Jobs, *busy: str) -> str | None:
     """Return the id of the job whose turn it is."""
     job = jobs.take(busy)
     return job.id if job else None
+
+
+def test_a_reason_of_several_lines_is_one_line_of_the_log(jobs: Jobs, tmp_path: Path) -> None:
+    jobs.accept("a", STUDY, [])
+    jobs.take()
+    jobs.finish("a", StudyState.FAILED, "no worker\nis left")
+    log = log_of(jobs.get("a"), jobs, Store(tmp_path / "out")).splitlines()
+    assert [line.split("  ", 1)[1] for line in log] == [
+        "accepted", "running", "failed: no worker is left",
+    ]  # fmt: skip
 
 
 def test_first_come_first_served(jobs: Jobs) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -24,10 +25,12 @@ from service.job import StudyState
 from service.view import ViewedFolder, application
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.storage import seal
+from studies.storage.combine import combine
 from studies.views.unpacked import Unpacked
 from tests.architecture.sources import ROOT
 from tests.service.servers import wait_until
 from tests.studies.conftest import compute_here, fake_study
+from tests.studies.test_goal import search_here
 
 AXES = {
     "load_ratio": [0.3, 0.9],
@@ -78,6 +81,7 @@ def test_a_folder_is_shown_and_nothing_is_written_there(folder: tuple[Study, Sto
             f"/studies/{study.id}/dataset.nc", f"/studies/{study.id}/log",
         ):  # fmt: skip
             assert client.get(path).status_code == 200, path
+        assert '"successful"' in client.get(f"/studies/{study.id}/events").text
         for method, path in (
             ("POST", "/studies"), ("DELETE", f"/runs/{run}"), ("POST", "/estimate"),
             ("DELETE", f"/studies/{study.id}"), ("POST", f"/ui/studies/{study.id}/retry"),
@@ -108,6 +112,43 @@ def test_a_study_that_is_computed_elsewhere_is_followed(
     assert len(seen.store.catalogue.rows(seen.jobs.runs(begun.id))) == 6
 
 
+def test_the_end_of_a_study_that_is_computed_elsewhere_is_told_in_its_words(tmp_path: Path) -> None:
+    store, sweep = Store(tmp_path / "out"), AXES | {"load_ratio": [0.3, 0.9]}
+    half = fake_study("half", sweep=sweep | {"load_ratio": [0.3]})
+    compute_here(half, store)
+    study = fake_study("stopped", sweep=sweep)
+    store.save_study(study)
+    goal = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0], "within": 0.1}
+    search = Study.from_dict({"name": "goal", "scene": "fake", "goal": goal})
+    store.save_study(search)
+    (tmp_path / "aside").mkdir()
+    seen = ViewedFolder(store.directory, tmp_path / "aside")
+    seen.look()
+    assert seen.jobs.runs(search.id) == []
+    combine(study, store, study.cases())
+    search_here(search, store)
+    seen.look()
+    job = seen.jobs.get(study.id)
+    assert (job.state, job.message) == (StudyState.FAILED, "2 of 4 runs: 2 missing")
+    asked = store.asked(search)
+    assert asked and {*seen.jobs.runs(search.id)} == asked
+    assert seen.jobs.get(search.id).stage == "1 of 1 searches ended"
+
+
+def test_a_damaged_data_set_is_told_and_stays(folder: tuple[Study, Store], tmp_path: Path) -> None:
+    study, store = folder
+    copy = tmp_path / "out"
+    shutil.copytree(store.directory, copy)
+    path = Store(copy).dataset_path(study.id)
+    with shown(copy) as (client, _):
+        path.write_bytes(b"damaged")
+        before = content(copy)
+        answer = client.get(f"/studies/{study.id}/plot.png")
+        assert answer.status_code == 404 and "damaged" in answer.json()["detail"]
+        assert client.get(f"/studies/{study.id}").json()["status"] == "successful"
+        assert content(copy) == before
+
+
 def test_a_data_set_alone_has_the_pages_of_its_runs(
     folder: tuple[Study, Store], tmp_path: Path
 ) -> None:
@@ -128,6 +169,25 @@ def test_a_data_set_alone_has_the_pages_of_its_runs(
         assert client.get(f"/ui/runs/{run}").status_code == 200
         assert client.get(f"/runs/{run}/map.png").headers["content-type"] == "image/png"
     assert len(table) == 4 and list(tmp_path.iterdir()) == [alone]
+
+
+def test_runs_that_a_data_set_lacks_are_not_computed_yet(
+    folder: tuple[Study, Store], tmp_path: Path
+) -> None:
+    _, store = folder
+    more = fake_study("more", sweep=AXES | {"load_ratio": [0.3, 0.9, 0.95]})
+    part = combine(more, store, more.cases(), target=tmp_path / "part.nc").path
+    with shown(part) as (client, first):
+        address = first.removeprefix("/ui")
+        detail = client.get(address).json()
+        assert (detail["status"], detail["message"]) == ("failed", "2 of 6 runs: 2 missing")
+        assert detail["counts"] == {"ok": 4, "pending": 2}
+        assert client.get(first).status_code == 200
+        assert client.get(f"{address}/numbers", params={"name": "status"}).status_code == 200
+        lost = [each["run"] for each in rows(client, more.id) if each["status"] == "pending"]
+        assert len(lost) == 2
+        assert client.get(f"/runs/{lost[0]}").status_code == 404
+        assert client.get(address).json()["counts"] == detail["counts"]
 
 
 def test_a_run_of_a_data_set_is_that_of_its_file(

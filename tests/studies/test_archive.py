@@ -34,6 +34,17 @@ def test_the_file_needs_nothing_else(computed: tuple[Study, Store], tmp_path: Pa
     assert study.id in text
 
 
+def test_a_file_that_is_no_study_is_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = tmp_path / "other.nc"
+    xr.Dataset({"a": 1.0}).to_netcdf(other, engine="h5netcdf")
+    for command in (["report"], ["table"], ["plot", "--out", str(tmp_path / "a.png")]):
+        assert main([command[0], str(other), *command[1:]]) == 2, command
+        told = capsys.readouterr().err
+        assert told.count("\n") == 1 and "must be the data set of a study" in told
+
+
 def test_it_has_the_numbers_of_the_data_set(dataset: xr.Dataset) -> None:
     text = archive(dataset)
     numbers = dataset["peak_contact_pressure"].to_numpy().ravel()

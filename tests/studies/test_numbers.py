@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from residua.cli import main
 from studies import Store, Study, open_study
 from studies.views.numbers import table_of
+from studies.views.table import RunTable, column_of
 from studies.views.written import FORMS
 
 
@@ -88,3 +90,14 @@ def test_a_run_without_a_number_has_none(computed: tuple[Study, Store]) -> None:
     column = table_of(failed).columns["peak_contact_pressure"]
     (row,) = json.loads(b"".join(FORMS["json"].write([column], np.array([0]))))["rows"]
     assert row == {"peak_contact_pressure": None}
+
+
+@pytest.mark.parametrize(
+    ("sign", "met"),
+    [("=", [1]), ("!=", [0, 2]), ("<", [0]), ("<=", [0, 1]), (">", []), (">=", [1])],
+)
+def test_a_number_is_the_one_that_is_named_though_it_was_rounded(sign: str, met: list[int]) -> None:
+    column = column_of("friction", np.array([0.1, 0.1 + 0.2, math.nan]), "sweep")
+    assert column.values[1] != 0.3
+    table = RunTable(axes={}, columns={"friction": column})
+    assert np.flatnonzero(table.meeting(f"friction{sign}0.3")).tolist() == met

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.stats import qmc
+from xarray.backends import BackendArray
+from xarray.core.indexing import LazilyIndexedArray
 
 from studies import Store, Study, StudyError, open_study, predict
 from studies.views.answers import answer
@@ -93,6 +95,26 @@ def test_at_a_run_its_own_number_is_predicted_and_lines_are_too() -> None:
     assert found["number_error"].item() < 1e-2
     between = predict(dataset, "line", x=0.5, y=0.5)
     assert np.allclose(between["line"], smooth(0.5, 0.5) * np.exp(-dataset["depth"]), atol=1e-2)
+
+
+class Unread(BackendArray):
+    """Values of a file that nobody may read."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.shape, self.dtype = shape, np.dtype(float)
+
+    def __getitem__(self, key: Any) -> Any:
+        raise AssertionError("maps are not needed, and may be larger than the memory")
+
+
+def test_only_what_is_asked_for_is_read() -> None:
+    dataset = sampled(smooth)
+    lazy = LazilyIndexedArray(Unread((64, 9)))
+    dataset["map"] = xr.Variable(("point", "z"), lazy)
+    found = predict(dataset, "number", x=0.5, y=0.5)
+    assert found["number"].item() == pytest.approx(smooth(0.5, 0.5), abs=1e-2)
+    with pytest.raises(AssertionError, match="are not needed"):
+        predict(dataset, "map", x=0.5, y=0.5)
 
 
 def test_a_place_outside_the_hull_or_across_failed_runs_is_refused() -> None:

@@ -227,6 +227,10 @@ canvas.addEventListener("pointermove", (event) => {
   show(line);
   hint(line, at);
 });
+canvas.addEventListener("pointercancel", () => { // the finger moves the page
+  brush = null;
+  show(null);
+});
 canvas.addEventListener("pointerleave", (event) => {
   show(null);
   hint(null, place(event));
@@ -244,15 +248,19 @@ canvas.addEventListener("pointerup", (event) => {
   const axis = axes[brush.axis], [from, to] = [brush.from, brush.to].map(snapped).sort((a, b) => a - b);
   const moved = Math.abs(at.y - brush.y) > MOVED;
   brush = null;
-  filter({ [`where.${axis.name}`]: moved ? condition(axis, axis.at(from), axis.at(to)) : null });
+  filter({ [`where.${axis.name}`]: moved ? condition(axis, from, to) : null });
 });
 
 const snapped = (share) => (share < END ? 0 : share > 1 - END ? 1 : share);
 
-function condition(axis, low, high) {
+// What keeps the runs between two shares of an axis: its ends are exact, the rest are parts of its length.
+function condition(axis, from, to) {
+  const { low: least, high: most } = axis, [low, high] = [from, to].map(axis.at);
   const words = axis.labels ?? (Object.keys(axis.flags ?? {}).length ? axis.flags : null);
   if (words) return Object.entries(words).filter(([code]) => code > low - 0.3 && code < high + 0.3).map(([, word]) => word).join(",") || null;
-  return `${Number(low.toPrecision(4))}..${Number(high.toPrecision(4))}`;
+  const step = 10 ** Math.floor(Math.log10((most - least) / 1000));
+  const said = (share, at) => (least === most || share === 0 ? least : share === 1 ? most : Number((Math.round(at / step) * step).toPrecision(12)));
+  return `${said(from, low)}..${said(to, high)}`;
 }
 
 // Drawn when it comes into view, and again when what it shows has changed.

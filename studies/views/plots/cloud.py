@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from studies.errors import StudyError
 from studies.views.grids import parameters_over
-from studies.views.picking import sweep_axes
+from studies.views.picking import only_numbers, sweep_axes
 from studies.views.plots.captions import capitalised, named, setting, short_label, words, wrapped
 from studies.views.plots.curves import label_values
 from studies.views.plots.legends import MOST_LINES, add_head, colours_of, is_number
@@ -57,7 +57,8 @@ def cloud_figure(dataset: xr.Dataset, field: str, points: str) -> Figure:
     size = _PANEL[0] * columns + _LEGEND, _PANEL[1] * rows + 0.9
     sheet = Figure(figsize=size, dpi=130, layout="constrained")
     panels = list(sheet.subplots(rows, columns, sharey=True, squeeze=False).flat)
-    series = dataset.stack({"series": others}) if others else dataset.expand_dims("series")
+    shown = only_numbers(dataset, field)
+    series = shown.stack({"series": others}) if others else shown.expand_dims("series")
     colours = colours_of(series["series"]) if others else ["C0"]
     legend: dict[str, Line2D] = {}
     for axes, name in zip(panels, names, strict=False):

@@ -13,6 +13,7 @@ from solver.results.invariants import component as derived
 from solver.tensors import AXES, components
 from studies.definition.vocabulary import SYMMETRIC
 from studies.errors import StudyError, one_of
+from studies.views.picking import sweep_axes
 from studies.views.plots.captions import DISTANCE
 
 Window = Sequence[float]
@@ -29,7 +30,7 @@ DRAWN = (*AXES, *ALONG)
 
 def sweep_fields(dataset: xr.Dataset) -> list[str]:
     """Return the numbers and flags with one value per run, and ``status``."""
-    sweep = dataset["status"].dims
+    sweep = tuple(sweep_axes(dataset))
     return [
         str(name)
         for name, each in dataset.data_vars.items()
@@ -39,7 +40,7 @@ def sweep_fields(dataset: xr.Dataset) -> list[str]:
 
 def labelled_fields(dataset: xr.Dataset) -> list[str]:
     """Return the variables with one number per run and label, such as body or component."""
-    sweep = set(dataset["status"].dims)
+    sweep = {*sweep_axes(dataset)}
     return [
         str(name)
         for name, each in dataset.data_vars.items()
@@ -50,7 +51,7 @@ def labelled_fields(dataset: xr.Dataset) -> list[str]:
 
 def map_fields(dataset: xr.Dataset) -> list[str]:
     """Return the variables that are drawn as maps of the bodies."""
-    sweep = dataset["status"].dims
+    sweep = tuple(sweep_axes(dataset))
     fields = dataset.data_vars.items()
     return [str(name) for name, each in fields if len(map_axes(each, sweep)) == 2]
 
@@ -66,7 +67,7 @@ def map_axes(values: xr.DataArray, sweep: Sequence[Hashable] = ()) -> tuple[str,
 
 def line_fields(dataset: xr.Dataset) -> list[str]:
     """Return the variables that are drawn as lines."""
-    sweep = dataset["status"].dims
+    sweep = tuple(sweep_axes(dataset))
     return [str(name) for name, each in dataset.data_vars.items() if line_axis(each, sweep)]
 
 

@@ -213,7 +213,8 @@ def _shortest(mesh: Mesh) -> tuple[float, tuple[float, float]]:
 
 
 def _check_part(name: str, value: Any, box: Box, whole: Box, shown: _Subject) -> None:
-    ordered = all(map(math.isfinite, box)) and box[0] < box[1] and box[2] < box[3]
+    sides = box[1] - box[0], box[3] - box[2]
+    ordered = all(map(math.isfinite, (*box, *sides))) and min(sides) > 0.0
     inside = box[0] < whole[1] and box[1] > whole[0] and box[2] < whole[3] and box[3] > whole[2]
     if not (ordered and inside):
         if name == "window":

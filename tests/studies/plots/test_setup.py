@@ -161,6 +161,7 @@ def test_the_command_draws_a_scene_or_the_first_run_of_a_study(
         "p = 'soft'": ["--set", "p=soft"],
         "window": ["--window", "8", "9", "0", "1"],
         "zoom": ["--zoom", "0"],
+        "zoom = 1.7e+308": ["--zoom", "1.7e308"],
         "resolution": ["--resolution", "9"],
     }
     for name, given in mistakes.items():
