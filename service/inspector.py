@@ -114,7 +114,7 @@ class Inspector:
         return await self._charged(caller, name, drawn, directory, name, query)
 
     async def picture(self, directory: Path, content: Mapping[str, Any], caller: str) -> bytes:
-        """Return the scene of the first run of a study, with its mesh, as SVG; errors as `draw`."""
+        """Return the scene of the first run of a study, as PNG; errors as `draw`."""
         return await self._charged(caller, content.get("name"), pictured, directory, dict(content))
 
     async def _charged(

@@ -44,13 +44,15 @@ def test_what_sbatch_does_not_take_is_refused(
     assert not file.exists()
 
 
-def test_parts_of_a_study_that_chooses_its_runs_are_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_study_that_chooses_its_runs_is_computed_by_parts_or_by_a_scheduler(
+    tmp_path: Path,
 ) -> None:
     refine = '[refine]\nof = ["peak_contact_pressure"]\n'
     study = write_study(tmp_path)
     study.write_text(study.read_text() + refine)
-    command = ["slurm", str(study), "--script", str(tmp_path / "job.sbatch")]
-    assert main(command) == 2
-    assert "parts cannot share it: use a scheduler" in capsys.readouterr().err
+    file = tmp_path / "job.sbatch"
+    command = ["slurm", str(study), "--script", str(file)]
+    assert main(command) == 0
+    assert "--part" in file.read_text()
     assert main([*command, "--with-scheduler"]) == 0
+    assert "--part" not in file.read_text()

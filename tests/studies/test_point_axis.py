@@ -192,7 +192,7 @@ def test_points_are_drawn_as_curve_as_grid_as_plane_or_over_each_parameter(store
     labels = {name: [axes.get_xlabel() for axes in each.axes] for name, each in drawn.items()}
     assert labels["curve"] == ["Friction"]
     assert drawn["curve"].axes[0].lines[0].get_xdata().tolist() == [0.1, 0.3, 0.4]
-    assert labels["grid"][0] == labels["plane"][0] == "Friction"
+    assert (labels["grid"][0], labels["plane"][0]) == ("Load ratio", "Friction")
     assert drawn["plane"].axes[0].get_ylabel() == "Load ratio"
     assert len(drawn["plane"].axes[0].collections[0].get_offsets()) == 5
     assert labels["cloud"] == ["Load ratio", "Friction", "Passes"]
@@ -322,7 +322,7 @@ def test_run_show_and_plot_speak_of_points(
     assert "2 in all, 2 to compute" in capsys.readouterr().out
     assert main([*run, "--workers", "1"]) == 0
     told = capsys.readouterr()
-    assert sorted(line.split("ok  ")[1] for line in told.err.splitlines()) == [
+    assert sorted(line.split("ok  ")[1].split("  ")[0] for line in told.err.splitlines()) == [
         "point = 0: T1, load_ratio = 0.3, friction = 0.1",
         "point = 1: T2, load_ratio = 0.6, friction = 0.2",
     ]

@@ -23,7 +23,11 @@ pytestmark = [pytest.mark.solves, pytest.mark.usefixtures("one_worker")]
 ROOT = Path(__file__).parents[2]
 FILES = [
     read_scene(ROOT / file)
-    for file in ("data/scenes/pin.toml", "tests/studies/scenes/everything.toml")
+    for file in (
+        "data/scenes/pin.toml",
+        "data/scenes/bree.toml",
+        "tests/studies/scenes/everything.toml",
+    )
 ]
 OWN = {quantity.name for scene in FILES for quantity in scene.quantities}
 

@@ -286,7 +286,7 @@ def test_extremes_of_the_body_have_a_place_in_three_coordinates(dataset: xr.Data
 def test_the_picture_has_z_across_and_y_up(dataset: xr.Dataset) -> None:
     sheet = picture(dataset, "residual_stress", "yz")
     axes, mesh = mesh_of(sheet)
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("z [mm]", "y [mm]")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$z$ [mm]", "$y$ [mm]")
     drawn = np.ma.getdata(mesh.get_array())
     z, y = dataset["z"].to_numpy(), dataset["y"].to_numpy()
     expected = np.where(y[:, None] <= 0.0, 3 * z + 1, np.nan)

@@ -437,7 +437,8 @@ def test_the_work_of_a_run_is_told_from_its_meshes(path: Path) -> None:
     system = System(scene.model(parameters))
     assert effort.unknowns == system.n_unknowns
     assert effort.elements == sum(body.mesh.nelements for body in system.model.bodies)
-    assert effort.increments == scene.program(parameters).count
+    assert effort.most_increments == scene.program(parameters).count
+    assert effort.increments == effort.most_increments or path.stem == "bree"  # ends by itself
 
 
 def test_a_temperature_may_have_no_value_outside_its_body() -> None:
