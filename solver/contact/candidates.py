@@ -200,7 +200,9 @@ class Candidates:
             out.append(replace(state, normal=normal, tangential=tangential, status=statuses))
         return tuple(out)
 
-    def kept(self, before: tuple[ContactState, ...], span: float) -> tuple[ContactState, ...]:
+    def kept(
+        self, before: tuple[ContactState, ...], span: float, *, grows: bool
+    ) -> tuple[ContactState, ...]:
         """Return the contact states after an increment over ``span`` of time."""
         after = self.states(before, self.forces, self.status)
         moved = np.abs(self.motion[self.along]) if self.frictional else np.zeros(self.n)
@@ -213,7 +215,7 @@ class Candidates:
                 rates = np.stack([gap - old.gap, slip]) / span
                 earlier = np.stack([old.gap, old.earlier[0], old.rates[1] / old.rates[0]])
             rates[:, ~np.isfinite(rates).all(axis=0)] = np.nan
-            earlier[:, not _grew(old.normal, new.normal)] = np.nan
+            earlier[:, not (grows and _grew(old.normal, new.normal))] = np.nan
             past = {"gap": gap, "rates": rates, "earlier": earlier}
             out.append(replace(new, touching=new.status != OPEN, slipped=slipped, **past))
         return tuple(out)

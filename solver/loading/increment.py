@@ -399,7 +399,8 @@ class Increment:
 
     def _commit(self, found: Balanced) -> Converged:
         u, responses, candidates = found.u, found.responses, found.candidates
-        contacts = candidates.kept(self.start.contacts, self.time - self.start.time)
+        span = self.time - self.start.time
+        contacts = candidates.kept(self.start.contacts, span, grows=not self.system.moves)
         spent = [
             part.plastic_work(before, response, self.time)
             for part, before, response in zip(

@@ -126,11 +126,12 @@ class PlainBody:
         """Positions of the points (2, n_points) [mm]."""
         return np.asarray(self.part.basis.global_coordinates()).reshape(2, -1)
 
-    def recovered(self, values: Array) -> Array:
+    def recovered(self, values: Array, time: float | None = None) -> Array:
         """Return nodal values (..., n_nodes) of values at points (..., n_points).
 
         In each element a (bi)linear field is fitted to the points by least squares; a node takes
-        the mean of its elements, weighted with their volume.
+        the mean of its elements, weighted with their volume. Elements that are removed at ``time``
+        do not count; nodes of other elements with an unknown value are NaN.
         """
         basis = self.part.basis
         terms = 4 if basis.mesh.t.shape[0] == 4 else 3
@@ -143,9 +144,12 @@ class PlainBody:
         to_nodes = linear(np.array(basis.elem.doflocs, dtype=float).T) @ fit
         volume, nodes = self.volume.sum(axis=1), self._nodes
         count = self.part.X.shape[1]
+        gone = np.zeros(len(volume), dtype=bool)
+        if time is not None:
+            gone = (self.left(time) <= GHOST).reshape(self.volume.shape)[:, 0]
         weighted = values.reshape(*values.shape[:-1], *self.volume.shape) * volume[:, None]
-        gone = np.isnan(weighted).reshape(-1, *self.volume.shape).any(axis=(0, 2))
-        each = np.moveaxis(np.nan_to_num(weighted) @ to_nodes.T, -1, -2).reshape(-1, nodes.size)
+        weighted = np.where(gone[:, None], 0.0, weighted)
+        each = np.moveaxis(weighted @ to_nodes.T, -1, -2).reshape(-1, nodes.size)
         total = np.bincount(nodes.ravel(), np.tile(np.where(gone, 0, volume), len(nodes)), count)
         total[total == 0] = np.nan if gone.any() else 1.0  # 1: copies of a periodic body
         sums = np.stack([np.bincount(nodes.ravel(), one, count) for one in each]) / total

@@ -68,17 +68,18 @@ class StateFields:
     @cached_property
     def stress(self) -> Array:
         """Stress at the nodes."""
-        return self.plain.recovered(self._points[0])
+        return self.plain.recovered(self._points[0], self._time)
 
     @cached_property
     def mises(self) -> Array:
         """Von Mises stress at the nodes, recovered from the points."""
-        return np.maximum(self.plain.recovered(equivalent(self._points[0])), 0.0)
+        found = self.plain.recovered(equivalent(self._points[0]), self._time)
+        return np.maximum(found, 0.0)
 
     @cached_property
     def accumulated(self) -> Array:
         """Plastic strain at the nodes."""
-        return self.plain.recovered(self._points[1])
+        return self.plain.recovered(self._points[1], self._time)
 
     @property
     def displacement(self) -> Array:
