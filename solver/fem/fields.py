@@ -53,7 +53,7 @@ def recovery(part: Discretisation) -> sparse.csr_array:
     return sparse.csr_array(operator[part.same])
 
 
-def recovered(matrix: sparse.csr_array, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def recovered_beside(matrix: sparse.csr_array, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return nodal values (..., n_nodes) of point values (..., n_points) by `recovery`.
 
     Elements whose points are NaN do not count; nodes of these elements alone are NaN.

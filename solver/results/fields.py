@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from solver.fem.fields import recovered
+from solver.fem.fields import recovered_beside
 from solver.tensors import not_below_zero, to_tensor, von_mises
 
 if TYPE_CHECKING:
@@ -115,8 +115,14 @@ class SystemFields:
         self._at_nodes: Remembered[BodyValues] = Remembered()
 
     def recovered(self, body: str, points: Array) -> Array:
-        """Return nodal values (..., n_nodes) of point values (..., n_points)."""
-        return recovered(self.recovery(body), points)
+        """Return nodal values (..., n_nodes) of point values (..., n_points).
+
+        Of a body from which elements are removed, NaN are the values in these: they do not count.
+        """
+        matrix = self.recovery(body)
+        if any(load.removes for load in self.system.full(body).body.every_load):
+            return recovered_beside(matrix, points)
+        return np.asarray((matrix @ points.T).T)
 
     def at_nodes(self, at: Solved, body: str) -> BodyValues:
         """Return the fields at the nodes of a body."""
