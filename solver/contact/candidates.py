@@ -203,7 +203,10 @@ class Candidates:
     def kept(
         self, before: tuple[ContactState, ...], span: float, *, grows: bool
     ) -> tuple[ContactState, ...]:
-        """Return the contact states after an increment over ``span`` of time."""
+        """Return the contact states after an increment over ``span`` of time.
+
+        ``grows`` is whether contact may grow about its middle: not if a load moves along a body.
+        """
         after = self.states(before, self.forces, self.status)
         moved = np.abs(self.motion[self.along]) if self.frictional else np.zeros(self.n)
         moved, out = np.where(self.status == OPEN, 0.0, moved), []
