@@ -142,6 +142,8 @@ def test_a_scene_is_drawn_before_anything_is_computed(service: Server, pin: str)
         ({"clearance": "wide"}, "clearance", "must be a finite number"),
         ({"window": [5, 4, 0, 1]}, "window", "must be x0 x1 y0 y1"),
         ({"zoom": -1}, "zoom", "greater than 0"),
+        ({"zoom": 5e-324}, "zoom", "must be a length [mm] above"),
+        ({"window": [0, 5e-324, -1, 0]}, "window", "must be x0 x1 y0 y1"),
         ({"zoom": 1.7e308}, "zoom", "at most 1e+09"),
         ({"zoom": "nan"}, "zoom", ""),
     ):

@@ -47,6 +47,8 @@ _MARGIN, _WORTHWHILE = 0.1, 0.35
 those of the whole for a second panel."""
 _NAMED = 0.4
 """Least length of a line that has its name beside it [in]."""
+_SMALLEST = 1e-6
+"""Least side of a part, over the largest coordinate of what there is."""
 _AROUND = 25.0
 """Half the width of a close-up without a map, over the shortest side of an element."""
 
@@ -214,12 +216,14 @@ def _shortest(mesh: Mesh) -> tuple[float, tuple[float, float]]:
 
 def _check_part(name: str, value: Any, box: Box, whole: Box, shown: _Subject) -> None:
     sides = box[1] - box[0], box[3] - box[2]
-    ordered = all(map(math.isfinite, (*box, *sides))) and min(sides) > 0.0
+    least = _SMALLEST * max(map(abs, whole))
+    ordered = all(map(math.isfinite, (*box, *sides))) and min(sides) > least
     inside = box[0] < whole[1] and box[1] > whole[0] and box[2] < whole[3] and box[3] > whole[2]
     if not (ordered and inside):
         if name == "window":
             raise empty_window(value, *shown.axes)
-        raise StudyError(name, value, "must be a length [mm] within which there is a body")
+        allowed = f"must be a length [mm] above {least / 2:.1g} within which there is a body"
+        raise StudyError(name, value, allowed)
 
 
 def _fitted(box: Box) -> tuple[float, float]:
