@@ -77,7 +77,7 @@ class Rail:
         top = np.flatnonzero(self.space[1] == 0.0)
         return SimpleNamespace(
             X=self.X, period=0.0, basis=SimpleNamespace(element_dofs=self.cells.T),
-            body=SimpleNamespace(element="quad4", material=STEEL),
+            body=SimpleNamespace(element="quad4", material=STEEL, every_load=()),
             boundary_nodes=lambda boundary: top,
         )  # fmt: skip
 
