@@ -481,12 +481,11 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
 
 
 @pytest.mark.processes
-@pytest.mark.usefixtures("one_worker")
 def test_a_killed_fit_is_taken_up_and_computes_no_run_twice(tmp_path: Path) -> None:
     marks, out, file = tmp_path / "marks", tmp_path / "out", tmp_path / "study.toml"
     marks.mkdir()
     (tmp_path / "p.csv").write_text(PRESSURE)
-    file.write_text(FAKE_FIT.format(seconds=0.2, mark=marks) + LINES)
+    file.write_text(FAKE_FIT.format(seconds=0.4, mark=marks) + LINES)
     before = runs_before_a_kill("fit", file, out, 4)
     outcome = run_study(Study.from_toml(file), Store(out), workers=1)
     assert outcome.ok

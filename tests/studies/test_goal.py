@@ -552,7 +552,6 @@ def test_progress_grows_to_the_end_and_a_stopped_search_says_so(store: Store) ->
 
 
 @pytest.mark.processes
-@pytest.mark.usefixtures("one_worker")
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_killed_search_is_taken_up_and_computes_no_run_twice(tmp_path: Path, scene: str) -> None:
     marks, out = tmp_path / "marks", tmp_path / "out"

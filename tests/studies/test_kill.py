@@ -56,7 +56,6 @@ def finished(store: Store) -> list[Path]:
     return list((store.directory / "runs").glob("*.nc"))
 
 
-@pytest.mark.usefixtures("one_worker")
 def test_a_killed_parent_leaves_only_whole_runs_and_its_workers_die(
     slow: tuple[Study, Store, Path], tmp_path: Path
 ) -> None:

@@ -366,7 +366,7 @@ def test_a_refinement_needs_axes_of_numbers_and_no_goal() -> None:
 def test_a_killed_refinement_is_taken_up_and_computes_no_run_twice(tmp_path: Path) -> None:
     out, file = tmp_path / "out", tmp_path / "study.toml"
     file.write_text(
-        'name = "refined"\nscene = "fake"\n[parameters]\nseconds = 0.2\n'
+        'name = "refined"\nscene = "fake"\n[parameters]\nseconds = 0.4\n'
         "[sweep]\nload_ratio = [0.1, 0.9]\nfriction = [0.0, 0.4]\n"
         '[refine]\nof = ["peak_contact_pressure"]\n'
     )
