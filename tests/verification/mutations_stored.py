@@ -14,7 +14,6 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from solver.fem.heat import Heat
 
 import solver.contact.interface
 import solver.contact.system
@@ -38,6 +37,7 @@ from solver.contact.candidates import Candidates
 from solver.contact.interface import Interface
 from solver.fem.fields import Sampler
 from solver.fem.loads import Superposed
+from solver.fem.softening import Softening
 from solver.model.loads import InitialStress, Load, Temperature
 from solver.model.model import ContactPair
 from solver.results.contact_result import ContactResult
@@ -467,7 +467,9 @@ MUTATIONS: dict[str, Mutation] = {
     # declared loads
     "thermal strain doubled": _file(eigenstrains_times(Temperature, 2.0), "law"),
     "initial stress dropped": _file(eigenstrains_times(InitialStress, 0.0), "law"),
-    "heat softens nothing": _file(instead(Heat, "of", lambda old: lambda part, x: None), "law"),
+    "heat softens nothing": _file(
+        instead(Softening, "of", lambda old: lambda part, x, elements=None: None), "law"
+    ),
     "interference halved": _fitted(
         instead(ContactPair, "offset", less_interference), "closed_gap", "overlap"
     ),
