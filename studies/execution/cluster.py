@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _APPEARS = 60.0
 """Seconds within which a scheduler must write its file."""
-_CONNECT = 10.0
+_CONNECT = 30.0
 """Seconds within which a scheduler must answer."""
 
 _ABSENT = 30.0
