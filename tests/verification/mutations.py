@@ -142,14 +142,14 @@ def overlooked_contact(patch: Patch) -> None:
 
 def master_stands_still(patch: Patch) -> None:
     """Gaps do not see the master move."""
-    pairing = solver.contact.interface.Interface.pairing
+    facing = solver.contact.interface.Interface.facing
 
     def still(self: Any, u: Any, time: float = 0.0, **options: Any) -> Any:
         number = self.sides[1][0]
         seen = tuple(np.zeros_like(v) if k == number else v for k, v in enumerate(u))
-        return pairing(self, seen, time, **options)
+        return facing(self, seen, time, **options)
 
-    patch.setattr(solver.contact.interface.Interface, "pairing", still)
+    patch.setattr(solver.contact.interface.Interface, "facing", still)
 
 
 # -- the law -----------------------------------------------------------------------------------

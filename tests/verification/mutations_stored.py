@@ -234,8 +234,8 @@ def moved_half_way(old: Any) -> Any:
 def friction_kept(old: Any) -> Any:
     """What has touched once has a history of friction, wherever it is now."""
 
-    def kept(self: Any, before: Any, span: float) -> Any:
-        after = old(self, before, span)
+    def kept(self: Any, before: Any, span: float, **options: Any) -> Any:
+        after = old(self, before, span, **options)
         both = zip(before, after, strict=True)
         return tuple(replace(a, touching=b.touching | a.touching) for b, a in both)
 
@@ -432,7 +432,11 @@ def place_turned(old: Any) -> Any:
 
 
 def other_component(patch: Patch) -> None:
-    patch.setitem(solver.results.requested._COMPONENTS, "yy", 0)
+    component = solver.results.requested.component
+    taken = {"yy": "xx"}
+    patch.setattr(
+        solver.results.requested, "component", lambda of, name: component(of, taken.get(name, name))
+    )
 
 
 def largest_of_all(old: Any) -> Any:
@@ -476,7 +480,7 @@ MUTATIONS: dict[str, Mutation] = {
     "interference forgotten": _fitted(
         instead(
             Interface,
-            "pairing",
+            "facing",
             lambda old: lambda self, u, time=0.0, *, finite=False: self._as_meshed(u, finite),
         ),
         "closed_gap",
