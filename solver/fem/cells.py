@@ -26,7 +26,7 @@ _ACCURATE, _HALVINGS, _MOST = 1e-7, 40, 200_000
 """Error of the integral over a cell, over the largest integral over an element, above which the
 cell is halved; how often at most, and up to which number of cells."""
 _END = 1 - 1e-9
-_LOBATTO = (
+LOBATTO = (
     np.array([-_END, -((3 / 7) ** 0.5), 0.0, (3 / 7) ** 0.5, _END]),
     np.array([1 / 10, 49 / 90, 32 / 45, 49 / 90, 1 / 10]),
 )
@@ -92,7 +92,7 @@ def smooth_cells(basis: CellBasis, field: Callable[[Array], Array]) -> Cells:
     for left in reversed(range(_HALVINGS + 1)):
         gauss_value, *others = (
             (field(some.points(*rules)[1]) * some.share(*rules)).sum(axis=-1)
-            for rules in ((gauss, gauss), (_LOBATTO, gauss), (gauss, _LOBATTO), (_LOBATTO,) * 2)
+            for rules in ((gauss, gauss), (LOBATTO, gauss), (gauss, LOBATTO), (LOBATTO,) * 2)
         )
         off = np.abs(np.array(others) - gauss_value).max(axis=1) * areas[some.element]
         halved = (off.max(axis=0) > _ACCURATE * whole) & (left > 0 and n < _MOST)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
-from solver.fem.cells import smooth_cells
+from solver.fem.cells import LOBATTO, smooth_cells
 from solver.fem.surface import edges_of
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.model.loads import checked
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 _ACCURATE, _HALVINGS = 1e-9, 40
 """Error of the nodal force of a part of an edge, over the largest nodal force, above which the part
 is halved, and how often at most: tractions may bend and jump."""
-_LOBATTO = np.array([1e-9 - 1, -((3 / 7) ** 0.5), 0.0, (3 / 7) ** 0.5, 1 - 1e-9])
-_LOBATTO_WEIGHTS = np.array([1 / 10, 49 / 90, 32 / 45, 49 / 90, 1 / 10])
-"""Lobatto's rule, as exact as four Gauss points; its ends show jumps beyond these."""
 _SAME = 1e-9
 """Ratio of a difference to the larger of two prescribed values; below it they are equal."""
 
@@ -282,7 +279,7 @@ def _tractions(part: Nodes, boundary: str, push: Push, points: int = 0) -> Array
         found = pushed(row, start, width, *gauss)
         halved = np.zeros(len(row), dtype=bool)
         if left:
-            off = np.abs(found - pushed(row, start, width, _LOBATTO, _LOBATTO_WEIGHTS))
+            off = np.abs(found - pushed(row, start, width, *LOBATTO))
             largest = largest or np.abs(found).max(initial=0.0)
             halved = off.max(axis=(0, 2)) > _ACCURATE * largest
         np.add.at(force, edges[row[~halved]], found[:, ~halved].transpose(1, 2, 0))
