@@ -110,11 +110,8 @@ class Candidates:
 
     def on_part(self, part: int, forces: NDArray[np.float64], size: int) -> NDArray[np.float64]:
         """Return the nodal forces (size,) that contact forces exert on a part [N]."""
-        nodal = np.zeros(size)
         rows = self.rows[part]
-        if rows is not None:
-            nodal[rows.dofs] = forces @ rows.block
-        return nodal
+        return np.zeros(size) if rows is None else rows.nodal(forces, size)
 
     def all_on_part(self, part: int, forces: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the same with the forces of pairs that leave [N]."""

@@ -96,10 +96,8 @@ class Links:
 
     def on_part(self, part: int, forces: Array, size: int) -> Array:
         """Return the forces (size,) that forces of the conditions (c,) exert on a part [N]."""
-        nodal, rows = np.zeros(size), self.rows[part]
-        if rows is not None:
-            nodal[rows.dofs] = forces @ rows.block
-        return nodal
+        rows = self.rows[part]
+        return np.zeros(size) if rows is None else rows.nodal(forces, size)
 
 
 def eliminated(

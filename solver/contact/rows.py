@@ -18,6 +18,12 @@ class ContactRows:
     dofs: NDArray[np.int64]
     block: NDArray[np.float64]
 
+    def nodal(self, forces: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+        """Return the forces (size,) on the unknowns of the part that forces of the rows exert."""
+        nodal = np.zeros(size)
+        nodal[self.dofs] = forces @ self.block
+        return nodal
+
 
 def joined(pieces: list[ContactRows]) -> ContactRows | None:
     """Return the rows of all surfaces of a part, on the unknowns that change a gap or slip.
