@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.pages.study import rank
+from solver.results.audit.figures import LIMITS
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.storage.dataset import attributes_of
-from studies.views.audited import LIMITED
 from studies.views.figures import group_of
 
 
@@ -54,7 +54,7 @@ def audited(run: Mapping[str, Any], scene: Scene | None) -> dict[str, list[Figur
             words=words_of(name, scene),
             unit=unit_of(name, scene),
             value=value,
-            limit=LIMITED.get(name),
+            limit=LIMITS.get(name),
         )
         for name, value in run["scalars"].items()
         if group_of(name) == "audit"

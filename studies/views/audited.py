@@ -9,12 +9,6 @@ import numpy as np
 
 from solver.results.audit.figures import LIMITS
 
-OTHER = ("audit_energy", "audit_reactions")
-"""Figures with another limit under finite sliding, and under a travelling load."""
-
-LIMITED = {name: limit for name, limit in LIMITS.items() if name not in OTHER}
-"""Figures with a limit that is the same for every run -> the limit."""
-
 
 @dataclass(frozen=True, slots=True)
 class Worst:
@@ -45,7 +39,7 @@ def worst(numbers: Mapping[str, np.ndarray]) -> list[Worst]:
     numbers : values over all runs by name, NaN where there is none; others than figures are ignored
     """
     found = []
-    for name, limit in LIMITED.items():
+    for name, limit in LIMITS.items():
         values = np.asarray(numbers.get(name, ()), dtype=float).ravel()
         if np.isfinite(values).any():
             at = int(np.nanargmax(values))

@@ -15,10 +15,10 @@ import pytest
 import xarray as xr
 
 from service.pages.form import as_python
+from solver.results.audit.figures import LIMITS
 from studies import Client, Study, open_study, summary
 from studies.client import Refused, RemoteStudy, _Screen
 from studies.scenes.scene import read_scene
-from studies.views.audited import LIMITED
 from tests.architecture.sources import ROOT
 from tests.service.servers import Server, fake_study
 from tests.studies.fakes import FAKE
@@ -153,9 +153,9 @@ class Watched(RemoteStudy):
         from studies.views.audited import Worst
         from studies.views.summary import Failed, summary_of
 
-        name = next(iter(LIMITED))
+        name = next(iter(LIMITS))
         lost = [Failed(place="friction = 0.8", status="limit_load", message="no more <load>")]
-        return summary_of(detail, (Worst(name, 0.5 * LIMITED[name], LIMITED[name], 0), ""), lost)
+        return summary_of(detail, (Worst(name, 0.5 * LIMITS[name], LIMITS[name], 0), ""), lost)
 
 
 @pytest.mark.parametrize("terminal", [True, False])
