@@ -13,6 +13,7 @@ from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.storage.dataset import attributes_of
+from studies.views.columns import unit_text
 from studies.views.figures import group_of
 
 
@@ -100,5 +101,4 @@ def words_of(name: str, scene: Scene | None) -> str:
 
 def unit_of(name: str, scene: Scene | None) -> str:
     """Return the unit of a number; empty for a ratio."""
-    unit = str(attributes_of(name, scene).get("units", ""))
-    return "" if unit == "1" else unit
+    return unit_text(attributes_of(name, scene).get("units"))

@@ -19,7 +19,7 @@ from studies.errors import StudyError
 from studies.scenes.registry import known_names, scene_named
 from studies.storage.dataset import attributes_of
 from studies.views.audited import worst
-from studies.views.columns import value_text
+from studies.views.columns import unit_text, value_text
 from studies.views.figures import FIGURES, group_of
 from studies.views.picking import one_run, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import line_fields, map_fields, sweep_fields, usual_field
@@ -132,7 +132,7 @@ def _fixed(dataset: xr.Dataset) -> list[dict[str, str]]:
         {
             "name": name,
             "words": known[name].description.replace("`", "") if name in known else "",
-            "unit": _plain(known[name].unit) if name in known else "",
+            "unit": unit_text(known[name].unit) if name in known else "",
             "value": "none" if value in (None, [], "") else _exact(value),
         }
         for name, value in given.items()
@@ -221,9 +221,4 @@ def _words(values: xr.DataArray) -> str:
 
 
 def _unit(attrs: Mapping[Any, Any]) -> str:
-    return _plain(str(attrs.get("units", "")))
-
-
-def _plain(unit: str) -> str:
-    """Return a unit; nothing for a ratio."""
-    return "" if unit == "1" else unit
+    return unit_text(attrs.get("units"))

@@ -31,6 +31,11 @@ def or_none(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def unit_text(unit: Any) -> str:
+    """Return a unit as text: that of a ratio, 1, is empty, and so is None."""
+    return "" if unit in (None, "1") else str(unit)
+
+
 def counted(value: Any) -> str:
     """Return a list of points or tables, or the JSON of one, as their number; other text as is."""
     text = str(value)

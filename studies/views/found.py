@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from studies.views.columns import or_none, value_text
+from studies.views.columns import or_none, unit_text, value_text
 from studies.views.fits import fit_rows, measures
 from studies.views.picking import sweep_axes, sweep_coordinates
 from studies.views.tables import run_cells
@@ -117,7 +117,7 @@ def _fit(dataset: xr.Dataset, _: Mapping[str, Any]) -> Found:
         warning=str(dataset["message"].item()),
         headings=headings,
         units=[""] * len(headings),
-        rows=[[*row[:-1], row[-1].removesuffix("1")] for row in rows],
+        rows=[[*row[:-1], unit_text(row[-1])] for row in rows],
         words=1,
         marks=[] if any(np.isnan(value) for value, *_ in place.values()) else [place],
     )
@@ -132,7 +132,7 @@ def _refined(dataset: xr.Dataset, refine: Mapping[str, Any]) -> Found:
     for name in numbers:
         left, values = dataset[f"{_ERROR}{name}"].max().item(), dataset[name]
         width = values.max().item() - values.min().item()
-        unit = str(values.attrs.get("units", "")).removesuffix("1")
+        unit = unit_text(values.attrs.get("units"))
         share = 100.0 * left / width if width > 0.0 else np.nan
         rows.append([_words(name), value_text(left), unit, value_text(share)])
     until = refine["until"]

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import xarray as xr
 
+from studies.views.columns import unit_text
 from studies.views.figures import group_of
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import sweep_fields
@@ -37,7 +38,7 @@ def _column(values: xr.DataArray, status: xr.DataArray, group: str) -> Column:
     return Column(
         name=str(values.name),
         words=str(values.attrs.get("long_name", str(values.name).replace("_", " "))),
-        unit=unit if (unit := str(values.attrs.get("units", ""))) != "1" else "",
+        unit=unit_text(values.attrs.get("units")),
         group=group,
         flags=flags(values) if number else {},
         values=flat.astype(float) if number else flat.astype(str).astype(object),

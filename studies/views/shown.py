@@ -10,6 +10,7 @@ import xarray as xr
 
 from solver.tensors import AXES
 from studies.errors import StudyError
+from studies.views.columns import unit_text
 from studies.views.plots.captions import DISTANCE
 from studies.views.plots.fields import (
     check_field,
@@ -162,8 +163,7 @@ def _labels(values: xr.Dataset | xr.DataArray, name: Hashable) -> dict[str, Any]
 
 
 def _unit(values: xr.DataArray) -> str:
-    unit = str(values.attrs.get("units", ""))
-    return "" if unit == "1" else unit
+    return unit_text(values.attrs.get("units"))
 
 
 def _is_flag(values: xr.DataArray) -> bool:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from studies.definition.sweep import labels
 from studies.definition.vocabulary import MISSING, OK
 from studies.views.audited import Worst, worst
-from studies.views.columns import aligned, value_text
+from studies.views.columns import aligned, unit_text, value_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -200,5 +200,4 @@ def values_text(values: Sequence[Any], unit: str = "", most: int = NAMED) -> str
 
 
 def _unit(values: xr.DataArray) -> str:
-    unit = str(values.attrs.get("units", ""))
-    return "" if unit == "1" else unit
+    return unit_text(values.attrs.get("units"))

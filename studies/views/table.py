@@ -18,6 +18,7 @@ from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.errors import StudyError, one_of
 from studies.storage.dataset import attributes_of
+from studies.views.columns import unit_text
 
 _COMPARED: Mapping[str, Callable[[Any, Any], Any]] = {
     "<=": operator.le, ">=": operator.ge, "!=": operator.ne, "<": operator.lt, ">": operator.gt,
@@ -174,13 +175,12 @@ def column_of(
     words : attributes, in place of those of the variable
     """
     attributes = attributes_of(name, scene) if words is None else words
-    unit = str(attributes.get("units", ""))
     quantity = QUANTITIES.get(name)
     meanings = quantity.flags if quantity else None
     return Column(
         name=name,
         words=str(attributes.get("long_name", name.replace("_", " "))),
-        unit="" if unit == "1" else unit,
+        unit=unit_text(attributes.get("units")),
         group=group,
         flags={flag.value: flag.name.lower() for flag in meanings} if meanings else {},
         values=values,

@@ -15,7 +15,7 @@ from solver.results.quantities import QUANTITIES
 from solver.tensors import AXES
 from studies.definition.vocabulary import LABEL_ATTRIBUTES, OK
 from studies.storage.ugrid import owns
-from studies.views.columns import aligned, in_blocks, stacked, value_text
+from studies.views.columns import aligned, in_blocks, stacked, unit_text, value_text
 from studies.views.figures import FIGURES
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 
@@ -235,8 +235,7 @@ def _figure(variable: xr.DataArray) -> str:
 
 
 def _unit(variable: xr.DataArray) -> str:
-    unit = str(variable.attrs.get("units", ""))
-    return "" if unit == "1" else unit
+    return unit_text(variable.attrs.get("units"))
 
 
 def _bracketed(unit: str) -> str:
