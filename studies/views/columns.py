@@ -28,6 +28,7 @@ def value_text(value: Any) -> str:
 
 def or_none(value: Any) -> Any:
     """Return a value as JSON has it: None for NaN and infinity."""
+    value = value.item() if isinstance(value, np.generic) else value
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,6 +21,7 @@ from studies.storage import dataset as layout
 from studies.storage import seal
 from studies.storage.frame import SETS
 from studies.storage.store import Store
+from studies.views.columns import or_none
 from studies.views.picking import own_grid
 from studies.views.reading import check, indexed
 
@@ -125,7 +125,7 @@ class Unpacked(Store):
             attributes = {**dataset.attrs, "id": run_id}
             attributes["parameters"] = json.dumps(self._parameters(place))
             told = {name: str(each[at]) for name, each in texts.items()}
-            scalars = {name: _plain(each[at]) for name, each in numbers.items()}
+            scalars = {name: or_none(each[at]) for name, each in numbers.items()}
             yield layout.summary(attributes, told) | {
                 "scalars": scalars, "cpu_seconds": scalars.get("cpu_seconds"),
             }  # fmt: skip
@@ -154,21 +154,15 @@ def _content(dataset: xr.Dataset) -> dict[str, Any]:
 
 def _axis(dataset: xr.Dataset, axis: Any) -> Any:
     """Return the values of an axis; of labels and points also the parameters that they set."""
-    values = [_plain(each) for each in dataset[axis].to_numpy()]
+    values = [or_none(each) for each in dataset[axis].to_numpy()]
     if SETS not in dataset[axis].attrs:
         return values
     names = str(dataset[axis].attrs[SETS]).split()
     over = {name: dataset[name].to_numpy() for name in names}
-    sets = [{name: _plain(each[k]) for name, each in over.items()} for k in range(len(values))]
+    sets = [{name: or_none(each[k]) for name, each in over.items()} for k in range(len(values))]
     if dataset[axis].dtype.kind in "if":
         return sets
     return dict(zip(values, sets, strict=True))
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as JSON has it: None for an absent number."""
-    value = value.item() if isinstance(value, np.generic) else value
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _id(study_id: str, position: int) -> str:
