@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
-import io
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from anyio import CapacityLimiter
 from anyio.to_thread import run_sync
@@ -28,9 +27,6 @@ from solver.scenes import Scene
 from studies import StudyError
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 WAITING = 200
 """Number of readings and pictures that may wait for their turn."""
@@ -143,6 +139,7 @@ def draw_map(path: Path, query: MapQuery) -> bytes:
     """
     from studies import open_netcdf
     from studies.views.plots.maps import map_figure  # matplotlib takes a second to import
+    from studies.views.plots.picture import png
 
     verify(path)
     with open_netcdf(path) as run:
@@ -153,7 +150,7 @@ def draw_lines(path: Path, query: LineQuery) -> bytes:
     """Return lines of the run in ``path`` as PNG; raise `StudyError` as `picture` does."""
     from studies import open_netcdf
     from studies.views.plots.fields import check_field, line_fields
-    from studies.views.plots.picture import picture
+    from studies.views.plots.picture import picture, png
 
     verify(path)
     with open_netcdf(path) as run:
@@ -166,7 +163,7 @@ def draw_study(path: Path, query: PlotQuery) -> bytes:
     """Return a field of the study in ``path`` as PNG; raise `StudyError` as `picture` does."""
     from studies import open_netcdf
     from studies.views.kept import drawn_from
-    from studies.views.plots.picture import picture
+    from studies.views.plots.picture import picture, png
 
     with (
         open_netcdf(path) as dataset,
@@ -184,6 +181,7 @@ def draw_scene(scene: Scene, values: Mapping[str, Any], query: SketchQuery) -> b
     StudyError
         If a parameter or the part is refused, or the scene has nothing to draw.
     """
+    from studies.views.plots.picture import png
     from studies.views.plots.setup import setup_figure
 
     try:
@@ -191,10 +189,3 @@ def draw_scene(scene: Scene, values: Mapping[str, Any], query: SketchQuery) -> b
     except ModelError as error:
         raise StudyError(error.field, error.value, error.allowed) from None
     return png(figure, query.resolution)
-
-
-def png(figure: Figure, resolution: int) -> bytes:
-    """Return a figure as PNG."""
-    drawn = io.BytesIO()
-    figure.savefig(drawn, format="png", dpi=resolution)
-    return drawn.getvalue()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 import re
@@ -25,6 +24,7 @@ from studies.views.picking import one_run, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import line_fields, map_fields, sweep_fields, usual_field
 from studies.views.plots.lines import line_figure
 from studies.views.plots.maps import map_figure
+from studies.views.plots.picture import png
 from studies.views.plots.sweep import sweep_figure
 from studies.views.summary import placed, values_text
 from studies.views.tables import FOOTNOTE, messages, run_cells
@@ -171,9 +171,7 @@ def _figures(dataset: xr.Dataset, axes: list[str]) -> Iterator[dict[str, Any]]:
 
 
 def _figure(drawn: Any, words: str, whole: bool = False) -> dict[str, Any]:
-    content = io.BytesIO()
-    drawn.savefig(content, format="png", dpi=_DPI)
-    picture = b64encode(content.getvalue()).decode()
+    picture = b64encode(png(drawn, _DPI)).decode()
     return {"png": picture, "words": words[:1].upper() + words[1:], "whole": whole}
 
 

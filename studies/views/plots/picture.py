@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 
 import xarray as xr
@@ -103,6 +104,13 @@ def picture(
             part = _part(dataset, field, selection or {}, axis)
             figure = line_figure(part, field, component, zoom, over, window, against)
     return resolved(figure, resolution)
+
+
+def png(figure: Figure, resolution: int) -> bytes:
+    """Return a figure as PNG, with a resolution [dpi]."""
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=resolution)
+    return content.getvalue()
 
 
 def resolved(figure: Figure, resolution: float | None) -> Figure:
