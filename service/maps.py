@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
@@ -13,14 +12,12 @@ from typing import Any, TypeVar
 from anyio import CapacityLimiter
 from anyio.to_thread import run_sync
 from fastapi.concurrency import run_in_threadpool
-from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.responses import Response
-from starlette.staticfiles import NotModifiedResponse
 
 import solver
 from service.errors import Busy
-from service.files import TAGS, UNCHANGED
+from service.files import UNCHANGED, tagged, unchanged
 from service.schemas import LineQuery, MapQuery, PlotQuery, SketchQuery
 from solver.errors import ModelError
 from solver.scenes import Scene
@@ -114,12 +111,11 @@ class Pictures:
         ----------
         what : all that the picture depends on, but the version
         """
-        content = f"{solver.__version__} {what!r}".encode("utf-8", "surrogatepass")
-        tag = f'"{hashlib.sha256(content).hexdigest()[:32]}"'
-        headers = Headers({"etag": tag, "cache-control": "no-cache"})
-        if TAGS.is_not_modified(headers, request.headers):
-            return NotModifiedResponse(headers)
-        return Response(await self.get(tag, draw), media_type=PNG, headers=dict(headers))
+        headers = tagged((solver.__version__, what))
+        if known := unchanged(request, headers):
+            return known
+        picture = await self.get(headers["etag"], draw)
+        return Response(picture, media_type=PNG, headers=dict(headers))
 
     async def of_file(
         self, request: Request, path: Path, query: Drawn, draw: Callable[[Path, Drawn], bytes]

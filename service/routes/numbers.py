@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from http import HTTPStatus
@@ -14,13 +13,11 @@ import numpy as np
 from fastapi import APIRouter, HTTPException, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
-from starlette.datastructures import Headers
-from starlette.staticfiles import NotModifiedResponse
 
 import solver
 from service.dependencies import ThePictures, TheRun, TheStore, TheTables
 from service.errors import CONTENT, REFUSED
-from service.files import TAGS, UNCHANGED
+from service.files import UNCHANGED, tagged, unchanged
 from service.octets import MEDIA_TYPE, octets
 from service.schemas import AuditFigure, ContentId, NumbersFilter, TableFilter
 from service.table import OUTCOMES
@@ -166,11 +163,9 @@ async def values(
         raise StudyError("minus", minus, "must be the id of a run")
     files = [store.run_path(each) for each in (run["id"], minus) if each]
     digests = await run_in_threadpool(lambda: [*map(digest, files)])
-    content = repr((solver.__version__, digests, field, component, stage))
-    tag = f'"{hashlib.sha256(content.encode("utf-8", "surrogatepass")).hexdigest()[:32]}"'
-    headers = Headers({"etag": tag, "cache-control": "no-cache"})
-    if TAGS.is_not_modified(headers, request.headers):
-        return NotModifiedResponse(headers)
+    headers = tagged((solver.__version__, digests, field, component, stage))
+    if known := unchanged(request, headers):
+        return known
     found = await pictures.alone(read, files, field, component, stage)
     return Response(found, media_type=MEDIA_TYPE, headers=dict(headers))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import AsyncIterator
-from hashlib import sha256
 from http import HTTPStatus
 from typing import Annotated, Any
 
@@ -14,8 +13,6 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse, PlainTextResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import WithJsonSchema
-from starlette.datastructures import Headers
-from starlette.staticfiles import NotModifiedResponse
 
 from service import maps, overview
 from service.datasets import Datasets
@@ -32,7 +29,7 @@ from service.dependencies import (
     TheStore,
 )
 from service.errors import REFUSED, Conflict, NotFound, QueueLost
-from service.files import NETCDF, TAGS, UNCHANGED, netcdf
+from service.files import NETCDF, UNCHANGED, netcdf, tagged, unchanged
 from service.history import log_of
 from service.job import Job
 from service.jobs import Jobs
@@ -307,10 +304,9 @@ async def tile(job: TheJob, datasets: TheDatasets, request: Request, key: str) -
     run that is missing has no chunks: readers take its values as NaN.
     """
     tiles = await datasets.tiles(job)
-    tag = sha256(f"{await asyncio.to_thread(digest, tiles.path)} {key}".encode("utf-8", "replace"))
-    headers = Headers({"etag": f'"{tag.hexdigest()[:32]}"', "cache-control": "no-cache"})
-    if TAGS.is_not_modified(headers, request.headers):
-        return NotModifiedResponse(headers)
+    headers = tagged((await asyncio.to_thread(digest, tiles.path), key))
+    if known := unchanged(request, headers):
+        return known
     try:
         content = await asyncio.to_thread(tiles.content, key)
     except LookupError as error:
