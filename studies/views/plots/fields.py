@@ -139,6 +139,16 @@ def component_name(values: xr.DataArray) -> str:
     return str(values["component"].item()) if there else ""
 
 
+def is_signed(component: str) -> bool:
+    """Whether values of a component, or invariant, may be negative as well as positive."""
+    return component not in ("", "tresca")
+
+
+def is_odd(component: str, across: str) -> bool:
+    """Whether a component changes its sign in the mirror image across an axis."""
+    return component not in INVARIANTS and component.count(across) == 1
+
+
 def component_names(values: xr.DataArray) -> list[str]:
     """Return the components that a tensor has, and the invariants that it then has too."""
     own = [str(name) for name in values["component"].to_numpy()]

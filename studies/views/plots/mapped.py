@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from solver.model.friction import PatchStatus
-from solver.results.invariants import INVARIANTS
 from studies.errors import StudyError, one_of
 from studies.views.plots.captions import short_number
 from studies.views.plots.fields import (
@@ -22,6 +21,8 @@ from studies.views.plots.fields import (
     empty_window,
     focus,
     is_half,
+    is_odd,
+    is_signed,
     map_axes,
     map_fields,
     too_close,
@@ -93,8 +94,7 @@ def mapped(
         values = within_patch(values, run)
     if window is not None:
         values = _inside(values, window, empty_window(window, across, up))
-    signed = component_name(values) not in ("", "tresca")
-    signed = signed or bool(values.min() < -_SIGNED * values.max())
+    signed = is_signed(component_name(values)) or bool(values.min() < -_SIGNED * values.max())
     known = np.isfinite(values.to_numpy())
     there, area = values.to_numpy()[known], _areas(values)[known]
     high, note = limit(there, area, signed, str(values.attrs.get("units", "1")))
@@ -144,8 +144,7 @@ def whole(values: xr.DataArray) -> xr.DataArray:
     if (start := 2.0 * x[0] - x[1]) > 0.0:  # one step from the map towards the line
         before = values.isel({across: [0]}).assign_coords({across: [start]}) * np.nan
         values = xr.concat([before, values], across)
-    component = component_name(values)
-    sign = -1.0 if component not in INVARIANTS and component.count(across) == 1 else 1.0
+    sign = -1.0 if is_odd(component_name(values), across) else 1.0
     other = sign * values.isel({across: slice(None, 0 if x[0] < 1e-6 * x[-1] else None, -1)})
     both = xr.concat([other.assign_coords({across: -other[across]}), values], across)
     return both.assign_attrs(values.attrs)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from solver.results.invariants import INVARIANTS
 from solver.results.mesh_fields import NO_NODE, MeshFields
 from solver.results.quantities import QUANTITIES
 from solver.tensors import AXES, components
@@ -21,6 +20,8 @@ from studies.views.plots.fields import (
     empty_window,
     focus,
     is_half,
+    is_odd,
+    is_signed,
     too_close,
 )
 from studies.views.plots.mapped import STAGE, Mapped, limit
@@ -94,7 +95,7 @@ def on_mesh(
     faces, _ = fields.faces
     triangles, edges = _triangles(faces), _edges(faces)
     if is_half(run) and (fields.X[0] >= -1e-9 * np.ptp(fields.X[0])).all():
-        count, odd = X.shape[1], name not in INVARIANTS and name.count("x") == 1
+        count, odd = X.shape[1], is_odd(name, AXES[0])
         X = np.hstack([X, X * [[-1.0], [1.0]]])
         numbers = np.concatenate([numbers, -numbers if odd else numbers])
         triangles = np.vstack([triangles, count + triangles])
@@ -110,7 +111,7 @@ def on_mesh(
     inside = np.unique(triangles[shown])
     area = np.zeros(X.shape[1])
     np.add.at(area, triangles[shown], _areas(X, triangles[shown])[:, None] / 3.0)
-    signed = name not in ("", "tresca")
+    signed = is_signed(name)
     unit = str(values.attrs.get("units", "1"))
     most, note = limit(numbers[inside], area[inside], signed, unit)
     if deformed:
