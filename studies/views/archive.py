@@ -26,7 +26,7 @@ from studies.views.plots.lines import line_figure
 from studies.views.plots.maps import map_figure
 from studies.views.plots.picture import png
 from studies.views.plots.sweep import sweep_figure
-from studies.views.summary import placed, values_text
+from studies.views.summary import place_of, placed, values_text
 from studies.views.tables import FOOTNOTE, messages, run_cells
 
 LISTED = 500
@@ -190,8 +190,6 @@ def _audit(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
     status = dataset["status"]
     numbers = {str(n): v.to_numpy() for n, v in dataset.data_vars.items() if v.dims == status.dims}
     for each in worst(numbers):
-        at = np.unravel_index(each.at, status.shape)
-        here = {n: dataset[n].to_numpy()[k] for n, k in zip(status.dims, at, strict=True)}
         decades = DECADES + (math.log10(each.share) if each.share > 0.0 else -DECADES)
         yield {
             "name": each.name,
@@ -199,7 +197,7 @@ def _audit(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
             "value": value_text(each.value),
             "limit": value_text(each.limit),
             "percent": round(100.0 * min(max(decades / DECADES, 0.0), 1.0), 1),
-            "place": placed({str(n): v for n, v in here.items() if dataset.sizes[n] > 1}),
+            "place": place_of(dataset, np.unravel_index(each.at, status.shape)),
         }
 
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from studies.definition.sweep import labels
 from studies.definition.vocabulary import MISSING, OK
@@ -140,11 +140,6 @@ def summary(study: xr.Dataset | Path | str) -> Summary:
     first = next(iter(worst(numbers)), None)
     words, count = np.unique(status.astype(str), return_counts=True)
     lost = [at for at in np.ndindex(status.shape) if status[at] not in (OK, MISSING)]
-
-    def place(at: Sequence[int]) -> str:
-        here = zip(names, at, strict=True)
-        return placed({n: study[n].to_numpy()[k] for n, k in here if study.sizes[n] > 1})
-
     counts = dict(zip(words.tolist(), count.tolist(), strict=True))
     return Summary(
         name=str(study.attrs["title"]),
@@ -155,9 +150,9 @@ def summary(study: xr.Dataset | Path | str) -> Summary:
         axes={n: values_text(study[n].to_numpy().tolist(), _unit(study[n])) for n in names},
         audit=None
         if first is None
-        else (first, place([int(k) for k in np.unravel_index(first.at, status.shape)])),
+        else (first, place_of(study, np.unravel_index(first.at, status.shape))),
         failed=[
-            Failed(place=place(at), status=str(status[at]), message=str(message[at]))
+            Failed(place=place_of(study, at), status=str(status[at]), message=str(message[at]))
             for at in lost[:NAMED]
         ],
     )
@@ -177,6 +172,13 @@ def summary_of(
         audit=audit,
         failed=failed[:NAMED],
     )
+
+
+def place_of(dataset: xr.Dataset, at: Sequence[SupportsIndex]) -> str:
+    """Return where the run at a position (n_axes,) of a data set is, on axes of several values."""
+    here = zip(dataset["status"].dims, at, strict=True)
+    several = ((str(n), k) for n, k in here if dataset.sizes[n] > 1)
+    return placed({name: dataset[name].to_numpy()[k] for name, k in several})
 
 
 def placed(place: Mapping[str, Any]) -> str:
