@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 _APPEARS = 60.0
 """Seconds within which a scheduler must write its file."""
-_CONNECT = 30.0
-"""Seconds within which a scheduler must answer."""
 
 _ABSENT = 30.0
 """Seconds without a sign of life of a worker started here until it is replaced."""
@@ -258,6 +256,8 @@ def _kept(cluster: LocalCluster, workers: int) -> Iterator[None]:
 def connect(access: Access) -> Client:
     """Return a client of a scheduler.
 
+    It must answer within Dask's ``distributed.comm.timeouts.connect`` (30 s, if nothing is set).
+
     Raises
     ------
     StudyError
@@ -284,7 +284,7 @@ def connect(access: Access) -> Client:
             raise Unusable("certificates", files, f"cannot be used: {error}") from None
     try:
         get_address_host_port(access.address)  # a refused client closes badly
-        return Client(access.address, security=security, set_as_default=False, timeout=_CONNECT)
+        return Client(access.address, security=security, set_as_default=False)
     except (OSError, ValueError) as error:
         raise GridLost(f"no scheduler answers at {access.address}: {error}") from error
 

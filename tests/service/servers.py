@@ -23,7 +23,10 @@ PROGRAM = (
     "import sys; from service.app import serve; serve('127.0.0.1', int(sys.argv[1]), sys.argv[2])"
 )
 
-NOWHERE = {"RESIDUA_SCHEDULER": "tcp://127.0.0.1:1"}
+NOWHERE = {
+    "RESIDUA_SCHEDULER": "tcp://127.0.0.1:1",
+    "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "5s",
+}
 """Settings of a service that computes nothing: it loads nothing for workers either."""
 
 COARSE_PUNCH = {"smallest_element": 0.05, "growth": 2.5, "half_plane_size": 4}

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import dask
 import pytest
 from distributed import Security
 
@@ -31,6 +32,9 @@ from studies import (
 )
 from studies.execution.cluster import connect, own_workers
 from tests.studies.conftest import fake_study
+
+ANSWERS = "distributed.comm.timeouts.connect"
+"""Dask's setting: within which time a scheduler must answer."""
 
 pytestmark = pytest.mark.processes
 
@@ -155,9 +159,8 @@ def test_a_file_without_a_scheduler_is_told(
 
 
 def test_a_lost_scheduler_is_told_apart_from_failed_runs(
-    cluster: tuple[str, Process], store: Store, monkeypatch: pytest.MonkeyPatch
+    cluster: tuple[str, Process], store: Store
 ) -> None:
-    monkeypatch.setattr("studies.execution.cluster._CONNECT", 3.0)
     address, scheduler = cluster
     study = fake_study(sweep={"friction": [0.0, 0.1, 0.2]}, seconds=1.0)
 
@@ -165,7 +168,7 @@ def test_a_lost_scheduler_is_told_apart_from_failed_runs(
         if event.kind == "run":
             scheduler.kill()
 
-    with pytest.raises(GridLost):
+    with pytest.raises(GridLost), dask.config.set({ANSWERS: "3s"}):
         answered(study, store, address, on_event=kill_scheduler)
     assert {row["status"] for row in store.catalogue.runs()[0]} == {"ok"}
     outcome = run_study(study, store, workers=1)
@@ -175,10 +178,10 @@ def test_a_lost_scheduler_is_told_apart_from_failed_runs(
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nowhere", "odd://127.0.0.1:1"])
 def test_no_scheduler_at_the_address_is_one_clear_error_and_leaves_nothing(
-    store: Store, monkeypatch: pytest.MonkeyPatch, address: str
+    store: Store, address: str
 ) -> None:
-    monkeypatch.setattr("studies.execution.cluster._CONNECT", 1.0)
-    with pytest.raises(GridLost, match=f"no scheduler answers at {address}: "):
+    no_scheduler = pytest.raises(GridLost, match=f"no scheduler answers at {address}: ")
+    with no_scheduler, dask.config.set({ANSWERS: "1s"}):
         run_study(fake_study(), store, scheduler=address)
     assert not store.directory.exists()
 
