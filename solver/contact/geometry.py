@@ -45,6 +45,8 @@ class Pairing:
     ----------
     area, deformed : (n,) integral of the hat over the part that faces the master, over the
         reference and over the current area [mm2]
+    shared : (n - 1,) integral of the product of the two hats of each edge, over the part that
+        faces the master [mm2]
     covered : (n,) share of the hat that faces the master
     length : (n,) mean length of the edges at the vertex [mm]
     gap : (n,) mean gap under the hat, negative where the bodies overlap [mm]; inf where
@@ -55,6 +57,7 @@ class Pairing:
 
     area: NDArray[np.float64]
     deformed: NDArray[np.float64]
+    shared: NDArray[np.float64]
     covered: NDArray[np.float64]
     length: NDArray[np.float64]
     gap: NDArray[np.float64]
@@ -65,7 +68,8 @@ class Pairing:
     def parted(self) -> Pairing:
         """The pairing with surfaces that face each other nowhere."""
         none = np.zeros_like(self.area)
-        return replace(self, area=none, deformed=none, covered=none, gap=none + np.inf)
+        areas = {"area": none, "deformed": none, "shared": none[1:]}
+        return replace(self, **areas, covered=none, gap=none + np.inf)
 
 
 def _combine(x: NDArray[np.float64], N: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -246,13 +250,13 @@ def _integrate(
                 block[kind, :, :, axis] = each.reshape(rows, size)
         sides.append(block)
 
-    full = at_vertices(slave.lengths * slave.depth(slave.X[:, slave.edges[:, :2]]).mean(axis=1) / 2)
-    covered = area > _MIN_COVERED * full
+    covered = area > _MIN_COVERED * slave.hats
     scale = np.where(covered, 1 / np.where(covered, area, 1.0), 0.0)
     flat = [(side * scale[:, None, None]).reshape(2, rows, -1) for side in sides]
     return Pairing(
         area=np.where(covered, area, 0.0),
         deformed=np.where(covered, deformed, 0.0),
+        shared=np.bincount(edge, hats[0] * (1 + xi) / 2, rows - 1),
         covered=facing / at_vertices(np.ones(len(slave.edges))),
         length=slave.spacing,
         gap=np.where(covered, gap * scale, np.inf),

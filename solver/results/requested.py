@@ -133,11 +133,12 @@ class RequestedNumber:
             found: tuple[float, ...] = (contacts[self.contact].length,)
         else:
             values, X = self._sought(fields, at, lines, contacts)
-            if self.is_force:
-                values = values * contacts[str(self.contact)].depth
             if before is not None:
                 values = values - self._sought(fields, before, lines, contacts)[0]
-            found = self._found(values, X)
+            if self.is_force:
+                found = (float(values @ contacts[str(self.contact)].area),)
+            else:
+                found = self._found(values, X)
         return dict(zip(self.quantities, found, strict=False))
 
     def _found(self, values: Array, X: Array) -> tuple[float, ...]:
