@@ -210,9 +210,9 @@ class AuditedPair:
         x, y = slave.X[:, slave.vertices[at]]
         own, other = _names(self._pair)
         return (
-            f"{own} has its largest pressure at ({x:z.4g}, {y:z.4g}), where {other} ends under it: "
-            "this is a mean over an edge that is not covered whole, and too low. Exchange slave "
-            "and master of this pair, or use smaller elements there",
+            f"{own} has its largest pressure at ({x:z.4g}, {y:z.4g}), where it goes on beyond the "
+            f"end of {other}: pressure there is a mean over an edge that is covered in part, and "
+            "too low. Exchange slave and master of this pair, or use smaller elements there",
         )
 
     def _describe(self, left_out: LeftOut) -> str:
