@@ -20,7 +20,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -46,6 +47,8 @@ _KEYS = ("of", "until", "most", "halvings")
 _UNTIL, _MOST, _HALVINGS = 0.02, 200, 5
 """Entries that are left out."""
 _MOST_AXES, _MOST_HALVINGS = 4, 20
+_NEAR = 1.0 + 1e-9
+"""Factor on a distance within which all runs of this distance are found."""
 _ROUNDING = 1e-12
 """Part of a number that is rounding: it is the same in all runs if it varies by no more."""
 
@@ -169,7 +172,9 @@ class Refinement(Chooser):
     _lacks: dict[Cell, int] = field(default_factory=dict)
     _waits: dict[Wanted, list[Cell]] = field(default_factory=dict)
     _known: list[Cell] = field(default_factory=list)
-    _halvings: list[_Halving] = field(default_factory=list)
+    _halvings: dict[int, list[_Halving]] = field(default_factory=dict)
+    _rounds: Counter[int] = field(default_factory=Counter)
+    _share: float = 0.0
     _allowed: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -181,6 +186,15 @@ class Refinement(Chooser):
         """The runs that it lacks."""
         return list(self._waits)
 
+    def lacking(self, known: Collection[Wanted]) -> list[Wanted]:
+        """Return the runs that it lacks, without some of them that are known."""
+        some = len(known) < len(self._waits)  # at most runs nothing new is asked for
+        return [wanted for wanted in self._waits if wanted not in known] if some else []
+
+    def lacks(self, key: Wanted) -> bool:
+        """Whether it lacks a run now."""
+        return key in self._waits
+
     @property
     def reason(self) -> str:
         """Why it has ended; empty until then."""
@@ -191,8 +205,8 @@ class Refinement(Chooser):
     @property
     def share(self) -> float:
         """Share of the ranges that is settled."""
-        whole = sum(_volume(cell) for cell in self.refine.cells(len(self.branches)))
-        return sum(_volume(each.cell) for each in self.settled) / whole
+        cells = math.prod(len(values) - 1 for values in self.refine.axes.values())
+        return self._share / (cells * len(self.branches))
 
     @property
     def progress(self) -> float:
@@ -202,14 +216,15 @@ class Refinement(Chooser):
     @property
     def told(self) -> str:
         """The round, and how far it is from its end, as text."""
-        stage = 1 + max(map(_round, self._lacks), default=0)
+        stage = 1 + max(self._rounds, default=0)
         runs = f"run {len(self.rows)} of at most {self.refine.most}"
         return f"round {stage}, {runs}, {100 * self.share:.0f} % of the ranges settled"
 
     @property
     def cells(self) -> list[RefinedCell]:
         """The cells that are not divided, those included of which something is still open."""
-        halved = (RefinedCell(each.cell, OPEN, each.left) for each in self._halvings)
+        halvings = itertools.chain(*self._halvings.values())
+        halved = (RefinedCell(each.cell, OPEN, each.left) for each in halvings)
         every = [*self.settled, *halved, *(RefinedCell(cell, OPEN) for cell in self._lacks)]
         return sorted(every, key=lambda each: (each.cell.branch, each.cell))
 
@@ -228,7 +243,7 @@ class Refinement(Chooser):
             self._lacks[cell] -= 1
             if not self._lacks[cell]:
                 self._known.append(cell)
-        if not self._allowed and not self.wants:
+        if not self._allowed and not self._waits:
             self._allowed = self._largest_misses()
         while self._allowed and self._known:
             while self._known:
@@ -278,6 +293,7 @@ class Refinement(Chooser):
                 self._waits.setdefault(wanted, []).append(cell)
                 lacks += 1
         self._lacks[cell] = lacks
+        self._rounds[stage] += 1
         if not lacks:
             self._known.append(cell)
 
@@ -294,11 +310,12 @@ class Refinement(Chooser):
     def _decide(self, cell: Cell) -> None:
         """Settle a cell whose runs are known, or keep it to be divided."""
         del self._lacks[cell]
+        self._rounds -= Counter([_round(cell)])
         known = {at: self.number(Wanted(cell.branch, at)) for at in points_of(cell)}
         there = {at: each for at, each in known.items() if each is not None}
         every, left = set(range(len(cell.low))), ()
         if not there:
-            self.settled.append(RefinedCell(cell, FAILED))
+            self._settle(RefinedCell(cell, FAILED))
             return
         if len(there) < len(known):
             changes = {
@@ -317,39 +334,61 @@ class Refinement(Chooser):
             left = tuple(KINK * sum(each) for each in zip(*misses, strict=True))
         can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
         if can:
-            self._halvings.append(_Halving(cell, can, miss, left))
+            self._halve(_Halving(cell, can, miss, left))
         else:
-            self.settled.append(RefinedCell(cell, SMALLEST if axes else SETTLED, left))
+            self._settle(RefinedCell(cell, SMALLEST if axes else SETTLED, left))
+
+    def _settle(self, found: RefinedCell) -> None:
+        """Keep a cell that is not divided."""
+        self.settled.append(found)
+        self._share += _volume(found.cell)
+
+    def _halve(self, halving: _Halving) -> None:
+        """Keep a cell to be divided."""
+        self._halvings.setdefault(_round(halving.cell), []).append(halving)
 
     def _look_around(self) -> None:
         """Add what the cells miss at runs of their neighbours to the errors that are left in them.
 
         Cells that miss more than is allowed are to be divided after all.
         """
-        known = {each: number for each in self.asked if (number := self.number(each))}
-        keys = list(known)
-        branches = np.array([each.branch for each in keys])
-        at = np.array([each.point for each in keys], dtype=float).reshape(-1, len(self.refine.axes))
-        settled, self.settled = self.settled, []
-        for cell, state, left in settled:
+        settled, self.settled, self._share = self.settled, [], 0.0
+        for (cell, state, left), places in zip(settled, self._inside(settled), strict=True):
             axes: set[int] = set()
             misses = [left]
-            own = {at: known[Wanted(cell.branch, at)] for at in points_of(cell)} if left else {}
-            inside = (branches == cell.branch) & (at >= cell.low).all(1) & (at <= cell.high).all(1)
-            for each in (keys[k] for k in np.flatnonzero(inside)) if left else ():
-                if each.point in own:
+            own = {at: self._numbers[Wanted(cell.branch, at)] for at in points_of(cell)}
+            known = {at: number for at, number in own.items() if number}
+            for at in places if left else ():
+                number = self.number(Wanted(cell.branch, at))
+                if at in own or number is None:
                     continue
-                misses.append(_off(cell, own, each.point, known[each]))
+                misses.append(_off(cell, known, at, number))
                 if self._ratio(misses[-1]) > 1.0:
-                    ends = zip(cell.low, each.point, cell.high, strict=True)
+                    ends = zip(cell.low, at, cell.high, strict=True)
                     axes |= {k for k, (low, x, high) in enumerate(ends) if low < x < high}
             most = tuple(map(max, zip(*misses, strict=True)))
             can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
             if can and state == SETTLED:
-                self._halvings.append(_Halving(cell, can, self._ratio(most), most))
+                self._halve(_Halving(cell, can, self._ratio(most), most))
             else:
                 small = axes and state == SETTLED
-                self.settled.append(RefinedCell(cell, SMALLEST if small else state, most))
+                self._settle(RefinedCell(cell, SMALLEST if small else state, most))
+
+    def _inside(self, found: Sequence[RefinedCell]) -> Iterator[list[Point]]:
+        """Yield of each cell where runs are in it and on its boundary."""
+        from scipy.spatial import KDTree  # takes long to load
+
+        span = np.array([values[-1] - values[0] for values in self.refine.axes.values()])
+        points: dict[int, list[Point]] = {}
+        for branch, point in self.asked:
+            points.setdefault(branch, []).append(point)
+        trees = {branch: KDTree(np.array(each) / span) for branch, each in points.items()}
+        for cell in (each.cell for each in found):
+            low, high = np.array(cell.low) / span, np.array(cell.high) / span
+            reach = (high - low).max() / 2.0 * _NEAR
+            near = trees[cell.branch].query_ball_point((low + high) / 2.0, reach, p=math.inf)
+            every = (points[cell.branch][k] for k in sorted(near))
+            yield [point for point in every if cell.holds(cell.branch, point)]
 
     def _ratio(self, misses: tuple[float, ...]) -> float:
         """Return how far misses are beyond what is allowed: above 1 if they are."""
@@ -360,19 +399,23 @@ class Refinement(Chooser):
 
     def _divide(self) -> None:
         """Divide the cells that may be divided now."""
-        for stage in sorted({_round(each.cell) for each in self._halvings}):
-            own = [each for each in self._halvings if _round(each.cell) == stage]
-            early = any(_round(cell) <= stage for cell in self._lacks)
-            if early and self._at_most(stage) > self.refine.most:
+        while self._halvings:
+            stage = min(self._halvings)
+            if (
+                min(self._rounds, default=math.inf) <= stage
+                and self._at_most(stage) > self.refine.most
+            ):
                 return
-            self._halvings = [each for each in self._halvings if each not in own]
             full = False
-            for cell, axes, _, left in sorted(own, key=lambda each: each.order):
+            for cell, axes, _, left in sorted(
+                self._halvings.pop(stage), key=lambda each: each.order
+            ):
                 parts = cell.parts(axes)
                 new = {Wanted(part.branch, at) for part in parts for at in points_of(part)}
-                full = full or len(self.asked) + len(new - self.asked.keys()) > self.refine.most
+                more = sum(each not in self.asked for each in new)
+                full = full or len(self.asked) + more > self.refine.most
                 if full:
-                    self.settled.append(RefinedCell(cell, MOST, left))
+                    self._settle(RefinedCell(cell, MOST, left))
                     continue
                 for part in parts:
                     self._open(part)
@@ -381,9 +424,9 @@ class Refinement(Chooser):
         """Return the most runs, if all cells up to a round are divided: those not yet known too."""
         axes = len(self.refine.axes)
         each = axes * 2**axes if axes == 1 else 2**axes + (axes - 1) * 2 ** (axes - 2)
-        cells = [*self._lacks, *(halving.cell for halving in self._halvings)]
-        rounds = (stage + axes - _round(cell) for cell in cells if _round(cell) <= stage)
-        return len(self.asked) + sum(each * (2**count - 1) for count in rounds)
+        cells = self._rounds + Counter({k: len(some) for k, some in self._halvings.items()})
+        rounds = {k: stage + axes - k for k in cells if k <= stage}
+        return len(self.asked) + sum(each * (2**n - 1) * cells[k] for k, n in rounds.items())
 
 
 def points_of(cell: Cell) -> list[Point]:
