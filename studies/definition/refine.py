@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -29,7 +30,7 @@ import numpy as np
 
 from solver.parameters import is_number
 from solver.scenes import Scene
-from studies.definition.cells import KINK, Cell, Point, weights
+from studies.definition.cells import KINK, Cell, Point, between, weights
 from studies.definition.line import Read
 from studies.definition.parameters import parameters_of
 from studies.definition.place import Chooser
@@ -122,7 +123,8 @@ class _Halving(NamedTuple):
 
     Attributes
     ----------
-    cell, axes, left : the cell, the axes, and the errors that are left if it is not divided
+    cell, axes, left : the cell, the axes, and the errors that are left if it is not divided;
+        without axes it asks for the run at its centre
     miss : how far it missed what is allowed
     """
 
@@ -284,10 +286,10 @@ class Refinement(Chooser):
                 raise StudyError(f"refine.of[{k}]", each.content, str(error)) from None
         return None if None in found else tuple(map(float, found))
 
-    def _open(self, cell: Cell) -> None:
-        """Ask for the runs of a cell."""
+    def _open(self, cell: Cell, points: Sequence[Point] = ()) -> None:
+        """Ask for some runs of a cell: by default those that it must have."""
         stage, lacks = _round(cell), 0
-        for wanted in (Wanted(cell.branch, point) for point in points_of(cell)):
+        for wanted in (Wanted(cell.branch, point) for point in points or points_of(cell)):
             self.asked[wanted] = min(self.asked.get(wanted, stage), stage)
             if wanted not in self.rows:
                 self._waits.setdefault(wanted, []).append(cell)
@@ -328,15 +330,29 @@ class Refinement(Chooser):
             worst = sorted(every, key=lambda axis: -ratios[axis])
             free = [k for k in worst if ratios[k] > 1.0 and cell.divisible(k, self.refine.halvings)]
             miss, axes = max(ratios), set(free[:1]) or {k for k in worst if ratios[k] > 1.0}
-            if not any(cell.halved) and not axes:
-                miss = self._ratio(_off(cell, there, cell.centre, there[cell.centre]))
-                axes = every if miss > 1.0 else axes
             left = tuple(KINK * sum(each) for each in zip(*misses, strict=True))
+            if not axes:
+                centre, twist = Wanted(cell.branch, cell.centre), self._ratio(_twists(cell, there))
+                if centre in self.rows:
+                    number = self.number(centre)
+                    missed = _off(cell, there, centre.point, number) if number else None
+                    miss = self._ratio(missed) if missed else math.inf
+                    axes = self._across(cell) if miss > 1.0 else axes
+                elif twist > 1.0:
+                    self._halve(_Halving(cell, [], twist, left))
+                    return
         can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
         if can:
             self._halve(_Halving(cell, can, miss, left))
         else:
             self._settle(RefinedCell(cell, SMALLEST if axes else SETTLED, left))
+
+    def _across(self, cell: Cell) -> set[int]:
+        """Return the axes along which a cell is halved that misses the run at its centre."""
+        every = range(len(cell.low))
+        can = [axis for axis in every if cell.divisible(axis, self.refine.halvings)]
+        least = sorted(can or every, key=lambda axis: cell.halved[axis])
+        return set(least[:1] if any(cell.halved) else every)
 
     def _settle(self, found: RefinedCell) -> None:
         """Keep a cell that is not divided."""
@@ -348,19 +364,27 @@ class Refinement(Chooser):
         self._halvings.setdefault(_round(halving.cell), []).append(halving)
 
     def _look_around(self) -> None:
-        """Add what the cells miss at runs of their neighbours to the errors that are left in them.
+        """Find the errors that are left in the cells by the runs of their neighbours.
 
         Cells that miss more than is allowed are to be divided after all.
         """
         settled, self.settled, self._share = self.settled, [], 0.0
+        lines = self._lines()
         for (cell, state, left), places in zip(settled, self._inside(settled), strict=True):
+            if not left:
+                self._settle(RefinedCell(cell, state))
+                continue
+            known = {at: self._numbers[Wanted(cell.branch, at)] or () for at in points_of(cell)}
+            along = self._left(cell, known, lines)
+            misses = [tuple(map(sum, zip(*along, strict=True)))]
             axes: set[int] = set()
-            misses = [left]
-            own = {at: self._numbers[Wanted(cell.branch, at)] for at in points_of(cell)}
-            known = {at: number for at, number in own.items() if number}
-            for at in places if left else ():
+            if self._ratio(misses[0]) > 1.0:
+                worst = sorted(range(len(along)), key=lambda axis: -self._ratio(along[axis]))
+                can = [each for each in worst if cell.divisible(each, self.refine.halvings)]
+                axes = set((can or worst)[:1])
+            for at in places:
                 number = self.number(Wanted(cell.branch, at))
-                if at in own or number is None:
+                if at in known or number is None:
                     continue
                 misses.append(_off(cell, known, at, number))
                 if self._ratio(misses[-1]) > 1.0:
@@ -373,6 +397,39 @@ class Refinement(Chooser):
             else:
                 small = axes and state == SETTLED
                 self._settle(RefinedCell(cell, SMALLEST if small else state, most))
+
+    def _lines(self) -> dict[Any, list[float]]:
+        """Return where runs with numbers are on each line along an axis, in increasing order."""
+        found: dict[Any, list[float]] = {}
+        for branch, at in self.asked:
+            if self.number(Wanted(branch, at)):
+                for axis, value in enumerate(at):
+                    found.setdefault((branch, axis, at[:axis], at[axis + 1 :]), []).append(value)
+        return {line: sorted(values) for line, values in found.items()}
+
+    def _left(
+        self, cell: Cell, known: Mapping[Point, tuple[float, ...]], lines: Mapping[Any, list[float]]
+    ) -> Misses:
+        """Return of each axis the largest error of each number that is left on the edges along it.
+
+        Beyond the first and the last run of a line the slope is taken to change as it does inside.
+        """
+        found = [(0.0,) * len(self.refine.of) for _ in cell.low]
+        for axis, low, high, mid in cell.edges:
+            sides = mid[:axis], mid[axis + 1 :]
+            line = lines[cell.branch, axis, *sides]
+            x0, x1, x2 = (each[axis] for each in (low, mid, high))
+            first, last = _beyond(line, x0, x0 - x1), _beyond(line, x2, x2 - x1)
+            xs = [each for each in (first, x0, x1, x2, last) if each is not None]
+            runs = (Wanted(cell.branch, (*sides[0], x, *sides[1])) for x in xs)
+            slopes = np.diff([self._numbers[each] or () for each in runs], axis=0).T / np.diff(xs)
+            errors = []
+            for jumps in np.diff(slopes).tolist():
+                before, at, after = jumps[0], jumps[first is not None], jumps[-1]
+                halves = between(x1 - x0, before, at, after), between(x2 - x1, after, at, before)
+                errors.append(max(halves))
+            found[axis] = tuple(map(max, zip(found[axis], errors, strict=True)))
+        return found
 
     def _inside(self, found: Sequence[RefinedCell]) -> Iterator[list[Point]]:
         """Yield of each cell where runs are in it and on its boundary."""
@@ -410,15 +467,16 @@ class Refinement(Chooser):
             for cell, axes, _, left in sorted(
                 self._halvings.pop(stage), key=lambda each: each.order
             ):
-                parts = cell.parts(axes)
-                new = {Wanted(part.branch, at) for part in parts for at in points_of(part)}
+                parts = {each: points_of(each) for each in cell.parts(axes)} if axes else {}
+                asks = parts or {cell: [cell.centre]}
+                new = {Wanted(cell.branch, at) for points in asks.values() for at in points}
                 more = sum(each not in self.asked for each in new)
                 full = full or len(self.asked) + more > self.refine.most
                 if full:
                     self._settle(RefinedCell(cell, MOST, left))
                     continue
-                for part in parts:
-                    self._open(part)
+                for part, points in asks.items():
+                    self._open(part, points)
 
     def _at_most(self, stage: int) -> int:
         """Return the most runs, if all cells up to a round are divided: those not yet known too."""
@@ -426,7 +484,7 @@ class Refinement(Chooser):
         each = axes * 2**axes if axes == 1 else 2**axes + (axes - 1) * 2 ** (axes - 2)
         cells = self._rounds + Counter({k: len(some) for k, some in self._halvings.items()})
         rounds = {k: stage + axes - k for k in cells if k <= stage}
-        return len(self.asked) + sum(each * (2**n - 1) * cells[k] for k, n in rounds.items())
+        return len(self.asked) + sum((each + 1) * (2**n - 1) * cells[k] for k, n in rounds.items())
 
 
 def points_of(cell: Cell) -> list[Point]:
@@ -454,6 +512,33 @@ def _misses(cell: Cell, known: Mapping[Point, tuple[float, ...]]) -> Misses:
         for k, (a, b, m) in enumerate(zip(known[low], known[high], known[mid], strict=True)):
             most[axis][k] = max(most[axis][k], abs(m - a - (b - a) * share))
     return [tuple(each) for each in most]
+
+
+def _twists(cell: Cell, known: Mapping[Point, tuple[float, ...]]) -> tuple[float, ...]:
+    """Return by how much each number at the centre may be off without a miss on any edge.
+
+    A kink through two opposite corners of a face leaves no miss on its edges: all that tells is
+    that its corners are in no plane.
+    """
+    most = [0.0] * len(known[cell.low])
+    for (a, b), corner in itertools.product(
+        itertools.combinations(range(len(cell.low)), 2), cell.corners
+    ):
+        if corner[a] != cell.low[a] or corner[b] != cell.low[b]:
+            continue
+        one, other = ((*corner[:axis], cell.high[axis], *corner[axis + 1 :]) for axis in (a, b))
+        both = (*one[:b], cell.high[b], *one[b + 1 :])
+        corners = zip(*(known[at] for at in (corner, one, other, both)), strict=True)
+        for k, (p, q, r, s) in enumerate(corners):
+            most[k] = max(most[k], abs(p - q - r + s) / 4.0)
+    return tuple(most)
+
+
+def _beyond(line: Sequence[float], at: float, step: float) -> float | None:
+    """Return the run of a line beyond another one, about a step away; None if there is none."""
+    k = bisect_left(line, at + step)
+    near = [each for each in line[max(k - 1, 0) : k + 1] if (each - at) * step > 0.0]
+    return min(near, key=lambda each: abs(math.log((each - at) / step)), default=None)
 
 
 def _off(
