@@ -375,8 +375,10 @@ class Refinement(Chooser):
                 self._settle(RefinedCell(cell, state))
                 continue
             known = {at: self._numbers[Wanted(cell.branch, at)] or () for at in points_of(cell)}
-            along = self._left(cell, known, lines)
+            along, turns = self._left(cell, known, lines)
             misses = [tuple(map(sum, zip(*along, strict=True)))]
+            if Wanted(cell.branch, cell.centre) not in self.rows:
+                misses.append(tuple(map(min, zip(_twists(cell, known), turns, strict=True))))
             axes: set[int] = set()
             if self._ratio(misses[0]) > 1.0:
                 worst = sorted(range(len(along)), key=lambda axis: -self._ratio(along[axis]))
@@ -409,12 +411,15 @@ class Refinement(Chooser):
 
     def _left(
         self, cell: Cell, known: Mapping[Point, tuple[float, ...]], lines: Mapping[Any, list[float]]
-    ) -> Misses:
+    ) -> tuple[Misses, tuple[float, ...]]:
         """Return of each axis the largest error of each number that is left on the edges along it.
 
         Beyond the first and the last run of a line the slope is taken to change as it does inside.
+        The second result is the largest error of each number that kinks at corners may leave inside:
+        a quarter of what a change of slope at a corner makes along an edge.
         """
         found = [(0.0,) * len(self.refine.of) for _ in cell.low]
+        turns = found[0]
         for axis, low, high, mid in cell.edges:
             sides = mid[:axis], mid[axis + 1 :]
             line = lines[cell.branch, axis, *sides]
@@ -423,13 +428,15 @@ class Refinement(Chooser):
             xs = [each for each in (first, x0, x1, x2, last) if each is not None]
             runs = (Wanted(cell.branch, (*sides[0], x, *sides[1])) for x in xs)
             slopes = np.diff([self._numbers[each] or () for each in runs], axis=0).T / np.diff(xs)
-            errors = []
+            errors, corners = [], []
             for jumps in np.diff(slopes).tolist():
                 before, at, after = jumps[0], jumps[first is not None], jumps[-1]
                 halves = between(x1 - x0, before, at, after), between(x2 - x1, after, at, before)
                 errors.append(max(halves))
+                corners.append(max(abs(before - at), abs(after - at)) * (x2 - x0) / 4.0)
             found[axis] = tuple(map(max, zip(found[axis], errors, strict=True)))
-        return found
+            turns = tuple(map(max, zip(turns, corners, strict=True)))
+        return found, turns
 
     def _inside(self, found: Sequence[RefinedCell]) -> Iterator[list[Point]]:
         """Yield of each cell where runs are in it and on its boundary."""
