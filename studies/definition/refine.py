@@ -378,7 +378,7 @@ class Refinement(Chooser):
             along, turns = self._left(cell, known, lines)
             misses = [tuple(map(sum, zip(*along, strict=True)))]
             if Wanted(cell.branch, cell.centre) not in self.rows:
-                misses.append(tuple(map(min, zip(_twists(cell, known), turns, strict=True))))
+            misses: list[tuple[float, ...]] = [tuple(sum(each) for each in zip(*along, strict=True))]
             axes: set[int] = set()
             if self._ratio(misses[0]) > 1.0:
                 worst = sorted(range(len(along)), key=lambda axis: -self._ratio(along[axis]))
@@ -415,8 +415,8 @@ class Refinement(Chooser):
         """Return of each axis the largest error of each number that is left on the edges along it.
 
         Beyond the first and the last run of a line the slope is taken to change as it does inside.
-        The second result is the largest error of each number that kinks at corners may leave inside:
-        a quarter of what a change of slope at a corner makes along an edge.
+        The second result is the largest error of each number that kinks at corners may leave: a
+        quarter of what a change of slope at a corner makes along an edge.
         """
         found = [(0.0,) * len(self.refine.of) for _ in cell.low]
         turns = found[0]
