@@ -376,9 +376,9 @@ class Refinement(Chooser):
                 continue
             known = {at: self._numbers[Wanted(cell.branch, at)] or () for at in points_of(cell)}
             along, turns = self._left(cell, known, lines)
-            misses = [tuple(map(sum, zip(*along, strict=True)))]
+            misses = [tuple(float(sum(each)) for each in zip(*along, strict=True))]
             if Wanted(cell.branch, cell.centre) not in self.rows:
-            misses: list[tuple[float, ...]] = [tuple(sum(each) for each in zip(*along, strict=True))]
+                misses.append(tuple(map(min, zip(_twists(cell, known), turns, strict=True))))
             axes: set[int] = set()
             if self._ratio(misses[0]) > 1.0:
                 worst = sorted(range(len(along)), key=lambda axis: -self._ratio(along[axis]))
