@@ -331,8 +331,11 @@ class Refinement(Chooser):
             free = [k for k in worst if ratios[k] > 1.0 and cell.divisible(k, self.refine.halvings)]
             miss, axes = max(ratios), set(free[:1]) or {k for k in worst if ratios[k] > 1.0}
             left = tuple(KINK * sum(each) for each in zip(*misses, strict=True))
+            twist = self._ratio(_twists(cell, there))
+            if axes and not free and twist > 1.0:
+                axes = self._across(cell)  # a slanting kink is resolved along any axis
             if not axes:
-                centre, twist = Wanted(cell.branch, cell.centre), self._ratio(_twists(cell, there))
+                centre = Wanted(cell.branch, cell.centre)
                 if centre in self.rows:
                     number = self.number(centre)
                     missed = _off(cell, there, centre.point, number) if number else None
