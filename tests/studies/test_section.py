@@ -107,6 +107,9 @@ class Rail:
             stress=mandel, state=SimpleNamespace(accumulated=strain, plastic_strain=mandel / 1e5)
         )
 
+    def strain(self, name: str, at: Any) -> np.ndarray:
+        return 2e-5 * to_mandel(at.factor * self.stress)
+
     def displacement(self, name: str, state: Any) -> np.ndarray:
         return displaced(self.space)[-len(self.X) :].T.ravel() * state.factor
 
