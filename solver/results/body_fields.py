@@ -66,12 +66,12 @@ class BodyField(NamedTuple):
 
 
 BODY_FIELDS = {
-    "displacement": BodyField("displacement", "mm", "displacement", "axis"),
     "stress": BodyField("stress", "MPa", "stress", "component"),
     "mises": BodyField("von Mises stress", "MPa", "mises"),
     "plastic_strain": BodyField("equivalent plastic strain", "1", "plastic_strain"),
     "plastic_tensor": BodyField("plastic strain", "1", "plastic_strain", "component"),
     "strain": BodyField("strain", "1", "strain", "component"),
+    "displacement": BodyField("displacement", "mm", "displacement", "axis"),
 }
 """Fields by their names in `BodyValues`."""
 STORED = tuple(name for name in BODY_FIELDS if name != "displacement")

@@ -341,7 +341,7 @@ def test_fields_that_are_kept_are_read_as_they_were(computed: tuple[Study, Store
     ("asked", "told"),
     [
         ({"of": "stress.yz"}, "must be one of stress.xx, stress.yy, stress.zz, stress.xy"),
-        ({"of": "displacement.z"}, "plastic_strain, displacement.x, displacement.y$"),
+        ({"of": "displacement.z"}, "hydrostatic, displacement.x, displacement.y$"),
         ({"of": "mises", "z": (0.0, 1.0)}, "must be left out: places of this body have x, y"),
     ],
 )

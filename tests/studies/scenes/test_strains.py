@@ -93,7 +93,9 @@ def test_strain_is_that_of_the_displacements_with_heat_in_it() -> None:
 
 def test_every_field_of_a_body_may_be_requested() -> None:
     asked = of_body(2)
-    assert {"strain.xy", "plastic_strain.zz", "plastic_strain", "mises", "displacement.y"} < {*asked}
+    assert {"strain.xy", "plastic_strain.zz", "plastic_strain", "mises", "displacement.y"} < {
+        *asked
+    }
     assert "strain" not in asked and "displacement.z" not in asked
     tables = copy.deepcopy(strip())
     tables["outputs"]["thick"]["of"] = "strain.zy"
