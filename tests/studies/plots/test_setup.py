@@ -104,7 +104,7 @@ def test_it_shows_what_acts_where_and_in_which_direction(file: Path) -> None:
     known = legend_of(sheet)
     told = (
         "pressure block.right: 30 MPa",
-        "temperature block: rise 50 K, expansion 1e-05 1/K",
+        "temperature block: rise 50 K",
         "contact block.top – ball.face",
         "ball: moved y \N{MINUS SIGN}0.1 mm",
         "held: x, y",
