@@ -386,6 +386,17 @@ def test_the_audit_finds_forces_and_motions_that_a_link_does_not_have(
     assert any("audit_links" in text for text in found.violations)
 
 
+def test_a_tie_with_a_slave_of_much_longer_edges_passes() -> None:
+    """Its conditions hold in the mean over edges along which the master bends in eight pieces."""
+    lower = block("lower", np.linspace(0, 4, 9), np.linspace(0, 1, 3), supports={"bottom": "xy"})
+    upper = block("upper", np.array([0.9, 2.9]), np.linspace(1, 2, 4),
+                  loads=(Traction(boundary="top", x=50.0, y=-100.0),))  # fmt: skip
+    tie = Link(slave=("upper", "bottom"), master=("lower", "top"))
+    audit = solve(Model(bodies=(lower, upper), links=(tie,))).audit()
+    assert audit.passed, audit.violations
+    assert 0 < audit.figures["audit_links"] < 3e-4
+
+
 PLATE = RigidBody(name="plate")
 SLAVE = {"slave": ("block", "top")}
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
