@@ -119,8 +119,8 @@ def eliminated(
     held, loose = ways[:rank].T, ways[rank:].T
     _, moved, ways = linalg.svd(loose[touched])
     loose = loose @ ways[: int((moved > _DEPENDENT).sum())].T
-    # of forces and motions, which differ in magnitude by the compliance
-    held = held * (np.abs(np.diag(W)[m:]).max() / size)
+    # of forces and motions, which differ in magnitude by the compliance; supports have none
+    held = held * ((np.abs(np.diag(W)[m:]).max(initial=0.0) or 1.0) / size)
     S = np.zeros((links + rank,) * 2)
     S[:links, :links] = W[m:, m:]
     S[:links, links:] = A[m:] @ held
