@@ -20,7 +20,6 @@ from solver import (
     Model,
     ModelError,
     Moved,
-    NotConverged,
     Pressure,
     Pushed,
     RigidBody,
