@@ -177,8 +177,8 @@ def caged(number: int, rng: Rng) -> Draw:
                               key=lambda f: f.value)  # fmt: skip
         return out
 
-    # the mean gaps of coarse vertices are open: the body stands apart from both plates, and friction
-    # then holds it on two vertices of each anywhere between one slip of either
+    # the mean gaps of coarse vertices are open: the body stands apart from both plates. Friction
+    # then holds it on two vertices of each, anywhere between the slip of the one and the other
     excused = (COARSE, ADRIFT) if fine > 0.5 * deep else ()
     return Draw(
         f"{'disc' if solid else 'ring'} {state} a/R {deep} h/R {fine:.2g}",
