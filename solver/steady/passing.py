@@ -58,7 +58,7 @@ _FLOWS, _RUNS = 0.1, 1.0
 """A stalled solve counts as a limit load above the first plastic strain, any solve above the
 second. A material that hardens has no limit load: Newton's method has then diverged."""
 _SOLVES = 20_000
-"""Largest number of solves with the stiffness in a search for a pass; one takes 50 to 1500."""
+"""Largest number of solves with the stiffness in a search for a pass; one takes 50 to 2100."""
 _PATIENCE, _PROGRESS = 14, 0.7
 """Over this number of steps the residual must drop to this ratio, or the pass is given up."""
 
