@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import signal
 import sys
 from collections.abc import Iterator, Sequence
@@ -56,6 +57,7 @@ def run(options: argparse.Namespace) -> int:
     workers = options.workers
     if workers is None and foreseen.short and limits == Limits():
         workers = 0
+        gc.freeze()  # what is loaded stays: who looks for memory to free need not look there
     progress, preparing = Progress(study), Thread(target=prepare)
 
     def hear(event: StudyEvent) -> None:
