@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import sys
 from collections.abc import Sequence
 
 from residua.neighbours import wrong_package
 from residua.status import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
+
+# A search for garbage at the end, among all that libraries have loaded, takes 0.3 s.
+atexit.register(gc.freeze)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
