@@ -212,11 +212,12 @@ def _conditions(
     number, slave = names.index(link.slave[0]), surfaces[link.slave]
     rows: list[tuple[int, ContactRows]] = []
     if link.master is None:
-        areas = np.tile(slave.areas, len(link.axes))
-        nodes = np.tile(np.arange(len(slave.nodes)), len(link.axes))
-        axes = np.repeat(link.axes, len(slave.nodes))
-        block = np.eye(2 * len(slave.nodes))[2 * nodes + axes]
-        X = slave.X[:, nodes]
+        along_each = _ways(link, slave)
+        nodes = np.tile(np.arange(len(slave.nodes)), len(along_each))
+        areas, X = slave.areas[nodes], slave.X[:, nodes]
+        block = np.zeros((len(nodes), 2 * len(slave.nodes)))
+        for axis, along in enumerate(np.concatenate(along_each, axis=1)):
+            block[np.arange(len(nodes)), 2 * nodes + axis] = along
     else:
         bodies = [parts[names.index(of)].body for of, _ in link.sides]
         at_rest = [np.zeros_like(surfaces[side].X) for side in link.sides]
@@ -244,7 +245,8 @@ def _conditions(
             areas = np.full(len(block), np.inf)
         rows.append((reference, ContactRows(np.arange(3), -motion)))
     elif link.master is None and not link.grounded:  # the slave moves as one
-        first = np.repeat(np.arange(len(link.axes)) * len(slave.nodes), len(slave.nodes))
+        count = len(slave.nodes)
+        first = np.arange(len(block)) // count * count
         block = block - block[first]
         others_ = np.arange(len(block)) != first
         block, areas, X = block[others_], areas[others_], X[:, others_]
@@ -254,6 +256,14 @@ def _conditions(
     acts = areas > _LITTLE * areas.max()
     rows = [(k, ContactRows(own.dofs, own.block[acts])) for k, own in rows]
     return _LinkRows(rows, 1 / (link.stiffness * areas[acts]), X[:, acts])
+
+
+def _ways(link: Link, slave: Surface) -> list[Array]:
+    """Return unit vectors (2, n_nodes) along each of the components of a link at its slave."""
+    if link.local:
+        x, y = slave.normals
+        return [np.stack([x, y] if link.components == "normal" else [-y, x])]
+    return [np.repeat(np.eye(2)[:, [axis]], len(slave.nodes), axis=1) for axis in link.axes]
 
 
 def _mean(

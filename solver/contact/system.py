@@ -398,6 +398,13 @@ class System:
         stress = np.where(gone, np.nan, found.stress)
         return found._replace(stress=stress, state=replace(found.state, **unknown))
 
+    def strain(self, name: str, converged: Converged) -> Array:
+        """Return the strain (4, n_points, Mandel) of a whole body; NaN in removed elements."""
+        whole, time = self.full(name), converged.state.time
+        found = self.response(name, converged)
+        strain = whole.law(time).elastic_strain(found.stress) + found.state.plastic_strain
+        return strain + whole.eigenstrain(time)
+
     def initial(self) -> State:
         """Return the unloaded, undeformed state."""
         u = tuple(part.start() for part in self.parts)

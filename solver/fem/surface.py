@@ -82,6 +82,16 @@ class Surface:
         return np.asarray(areas, dtype=float)
 
     @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """Outward unit normals (2, n_nodes): means over the shape function of each node."""
+        xi, weights = np.polynomial.legendre.leggauss(4)
+        count = self.edges.shape[1]
+        along = self.X[:, self.edges] @ shape_derivatives(xi, count).T
+        x, y = (each * weights @ shape_functions(xi, count) for each in along)
+        sums = [np.bincount(self.edges.ravel(), each.ravel()) for each in (y, -x)]
+        return np.asarray(sums / np.hypot(*sums))
+
+    @cached_property
     def dofs(self) -> NDArray[np.int64]:
         """(2 n_nodes,) unknowns of the body, node by node."""
         return np.stack([2 * self.nodes, 2 * self.nodes + 1], axis=1).ravel()

@@ -146,6 +146,56 @@ def test_a_force_that_is_distributed_around_an_axis_leaves_radial_motion_free() 
         System(Model(bodies=(cylinder,), rigid=(pull,), links=(replace(link, components="x"),)))
 
 
+# -- along normals and tangents --------------------------------------------------------------------
+
+
+def lame(pressure: float, foundation: float) -> float:
+    """Return how far the outside of a ring of the radii 5 and 10 moves on springs all around [mm].
+
+    Plane strain: u = (1 + nu)/E ((1 - 2 nu) A r + C / r), radial stress A - C / r^2.
+    """
+    a, b, nu = 5.0, 10.0, 0.3
+
+    def outside(p: float, q: float) -> float:
+        A, C = (p * a**2 - q * b**2) / (b**2 - a**2), (p - q) * a**2 * b**2 / (b**2 - a**2)
+        return (1 + nu) / E * ((1 - 2 * nu) * A * b + C / b)
+
+    alone, eased = outside(pressure, 0.0), -outside(0.0, 1.0)
+    return alone / (1 + foundation * eased)
+
+
+@pytest.mark.parametrize("element", ["quad8", "tri6"])
+def test_springs_along_the_normal_carry_a_ring_as_its_closed_form_says(element: str) -> None:
+    ring = sector(np.linspace(5.0, 10.0, 7), 12, element, material=steel(),
+                  loads=(Pressure(boundary="left", value=100.0),))  # fmt: skip
+    wall = RigidBody(name="wall")
+    sprung = Link(slave=("ring", "right"), components="normal", stiffness=2e4)
+    for link, rigid, exact in (
+        (sprung, (), lame(100.0, 2e4)),
+        (replace(sprung, rigid="wall"), (wall,), lame(100.0, 2e4)),
+        (Link(slave=("ring", "right"), rigid="wall", components="normal"), (wall,), 0.0),
+        (Link(slave=("ring", "right"), components="normal"), (), lame(100.0, 0.0)),
+        (replace(sprung, components="tangential"), (), lame(100.0, 0.0)),
+    ):
+        found = solve(Model(bodies=(ring,), rigid=rigid, links=(link,)))
+        x, u = found.nodes("ring"), found.displacement("ring", "loaded")
+        edge = found.system.full("ring").boundary_nodes("right")
+        radial = (x * u).sum(axis=0)[edge] / 10.0
+        assert radial == pytest.approx(exact, rel=2e-3, abs=2e-3 * lame(100.0, 0.0))
+        audit = found.audit()
+        assert audit.passed and audit.figures["audit_links"] < 1e-6, audit.violations
+
+
+def test_a_link_that_holds_another_component_than_it_says_fails_its_audit() -> None:
+    ring = sector(np.linspace(5.0, 10.0, 3), 4, material=steel(),
+                  loads=(Pressure(boundary="left", value=100.0),))  # fmt: skip
+    sprung = Link(slave=("ring", "right"), components="normal", stiffness=2e4)
+    found = solve(Model(bodies=(ring,), links=(sprung,)))
+    for other in (replace(sprung, components="tangential"), replace(sprung, stiffness=2.2e4)):
+        object.__setattr__(found.system.model, "links", (other,))
+        assert found.audit().figures["audit_links"] > 1e-2
+
+
 # -- ties ----------------------------------------------------------------------------------------
 
 
@@ -395,7 +445,11 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "itself": ({**SLAVE, "master": ("block", "top")}, r"links\[0\].master .* another surface"),
     "contact": ({"slave": ("block", "right")}, r"links\[0\].slave .* link or contact, not both"),
     "rigid": ({**SLAVE, "rigid": "block"}, r"links\[0\].rigid = 'block': must be a rigid body"),
-    "components": ({**SLAVE, "components": "z"}, "components = 'z': must be x, y or xy"),
+    "components": ({**SLAVE, "components": "z"}, "must be one of x, y, xy, normal, tangential"),
+    "normal of a tie": (
+        {**SLAVE, "components": "normal", "master": ("other", "left")},
+        "components = 'normal': must be x, y or xy with a master",
+    ),
     "stiffness": ({**SLAVE, "stiffness": 0.0}, "stiffness = 0.0: must be positive"),
     "distributed": ({**SLAVE, "distributed": True}, "distributed = True: needs a rigid body"),
     "not facing": ({**SLAVE, "master": ("block", "bottom")}, r"links\[0\] .* do not face"),

@@ -200,21 +200,28 @@ class PlainBody:
             return self.body.law
         return Heated(law=self.body.law, stiff=stiff, strong=strong)
 
-    def stress(self, u: Array, plastic: PlasticState | None, time: float) -> Array:
-        """Return Mandel stress (4, n_points) by Hooke's law [MPa].
+    def strains(self, u: Array, plastic: PlasticState | None, time: float) -> tuple[Array, Array]:
+        """Return the strain and its elastic part (4, n_points), Mandel, in plane stress with zz.
 
         Parameters
         ----------
         u : (n,) displacements [mm]
         plastic : internal variables at the points, None if nothing has yielded
         """
+        inelastic = self.eigenstrain(time)
+        if plastic is not None:
+            inelastic = inelastic + plastic.plastic_strain
+        elastic = self.strain(u).reshape(4, -1) - inelastic
+        if self.body.kinematics == "plane_stress":
+            nu = self.body.material.elasticity.poisson_ratio
+            elastic[2] = -nu / (1 - nu) * (elastic[0] + elastic[1])
+        return elastic + inelastic, elastic
+
+    def stress(self, u: Array, plastic: PlasticState | None, time: float) -> Array:
+        """Return Mandel stress (4, n_points) by Hooke's law [MPa]; see `strains`."""
         elasticity = self.body.material.elasticity
         nu, double_shear = elasticity.poisson_ratio, 2 * elasticity.shear_modulus
-        strain = self.strain(u).reshape(4, -1) - self.eigenstrain(time)
-        if plastic is not None:
-            strain -= plastic.plastic_strain
-        if self.body.kinematics == "plane_stress":
-            strain[2] = -nu / (1 - nu) * (strain[0] + strain[1])
+        _, strain = self.strains(u, plastic, time)
         out = double_shear * strain
         out[:3] += double_shear * nu / (1 - 2 * nu) * strain[:3].sum(axis=0)
         if self.body.kinematics == "plane_stress":
