@@ -35,6 +35,10 @@ MINUTE = 60.0
 Found = TypeVar("Found")
 
 
+class Beyond(StudyError):
+    """An input that takes more time or memory than is allowed."""
+
+
 def memory(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path("/sys/fs/cgroup")) -> int:
     """Return the memory that this process and those it starts may have [bytes].
 
@@ -107,7 +111,7 @@ class Guarded:
 
         Raises
         ------
-        StudyError
+        Beyond
             if time or memory did not suffice; errors of the function are raised too
         Busy
             if the process was killed
@@ -125,10 +129,10 @@ class Guarded:
             raise beyond(self.field, name, self.seconds, advice) from None
 
 
-def beyond(field: str, name: object, seconds: float, advice: str = "") -> StudyError:
+def beyond(field: str, name: object, seconds: float, advice: str = "") -> Beyond:
     """Return the error for what takes more than this time, or more memory than is allowed."""
     allowed = f"must be read within {seconds:g} s and {BYTES / 2**30:.3g} GiB of memory"
-    return StudyError(field, name, allowed + advice)
+    return Beyond(field, name, allowed + advice)
 
 
 def _limited(function: Callable[..., object], *given: object) -> bytes:
