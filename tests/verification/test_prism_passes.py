@@ -97,9 +97,9 @@ class Alone:
 
         xx + yy = -2/pi Re(F w),    yy - xx + 2 i xy = 2/pi (X w - i y F w^2)
 
-    Of forces L apart w becomes ``pi/L cot(pi s/L)``, and w^2 ``(pi/L / sin(pi s/L))^2``. The mean of
-    xx is Y / L then; in a strip, which keeps its length, it is nu / (1 - nu) of that.
-    N.I. Muskhelishvili, Some Basic Problems (1953), section 93.
+    Of forces L apart w becomes ``pi/L cot(pi s/L)``, and w^2 ``(pi/L / sin(pi s/L))^2``. The mean
+    of xx is Y / L then; in a strip, which keeps its length, it is nu / (1 - nu) of that.
+    K.L. Johnson, Contact Mechanics (1985), sections 2.2 and 2.3: a force on a half-plane.
     """
 
     def __init__(self, track: PrismTrack, width: float) -> None:
