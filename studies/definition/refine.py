@@ -32,7 +32,7 @@ from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.definition.cells import KINK, Cell, Point, between, weights
 from studies.definition.line import Read
-from studies.definition.parameters import parameters_of
+from studies.definition.parameters import in_unit, parameters_of
 from studies.definition.place import Chooser
 from studies.definition.quantity import RunNumber, checked_number
 from studies.definition.spaced import is_finite
@@ -592,7 +592,8 @@ def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
     if not 1 <= len(numbers) <= _MOST_AXES or any(len(each) < 2 for each in numbers.values()):
         allowed = f"needs 1 to {_MOST_AXES} axes of two numbers or more: the ends of their ranges"
         raise StudyError("refine", dict(content), allowed)
-    until = _until(content.get("until", _UNTIL), names)
+    units = {each.name: scene.known_quantities[each.of].units for each in numbers_of}
+    until = _until(content.get("until", _UNTIL), units)
     most = _whole("most", content.get("most", _MOST), MAXIMUM_RUNS)
     halvings = _whole("halvings", content.get("halvings", _HALVINGS), _MOST_HALVINGS)
     found = Refine(of=tuple(numbers_of), until=until, most=most, halvings=halvings, axes=numbers)
@@ -603,12 +604,13 @@ def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
     return found
 
 
-def _until(until: Any, names: list[str]) -> float | dict[str, float]:
+def _until(until: Any, units: Mapping[str, str]) -> float | dict[str, float]:
     if is_number(until) and 1e-6 <= until <= 1.0:
         return float(until)
-    own = until if isinstance(until, Mapping) and until.keys() == set(names) else {}
+    own = until if isinstance(until, Mapping) and until.keys() == units.keys() else {}
+    own = {name: in_unit(units[name], own[name], f"refine.until.{name}") for name in own}
     if own and all(is_finite(each) and each > 0.0 for each in own.values()):
-        return {name: float(own[name]) for name in names}
+        return {name: float(own[name]) for name in units}
     allowed = "must be a share of the range, >= 1e-06 and <= 1, or a number > 0 for each of `of`"
     raise StudyError("refine.until", until, allowed)
 
