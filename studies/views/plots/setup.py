@@ -384,8 +384,8 @@ def _label(
     _, k, left, ha, box = best
     taken.append(box)
     axes.annotate(
-        name, here[:, k], xytext=tuple(72.0 * _OFF * left), textcoords="offset points", fontsize=_NAME,
-        color="0.15", ha=ha, va="center", annotation_clip=True,
+        name, here[:, k], xytext=tuple(72.0 * _OFF * left), textcoords="offset points",
+        fontsize=_NAME, color="0.15", ha=ha, va="center", annotation_clip=True,
         bbox={"boxstyle": "round,pad=0.15", "facecolor": "w", "edgecolor": "none", "alpha": 0.7},
     )  # fmt: skip
 
