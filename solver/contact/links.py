@@ -17,7 +17,7 @@ from scipy import linalg
 from solver.contact.geometry import pair
 from solver.contact.overlap import largest_overlap
 from solver.contact.problem import ContactProblem, ContactSolution
-from solver.contact.rows import ContactRows, joined
+from solver.contact.rows import ContactRows, OnParts, joined
 from solver.errors import ModelError
 from solver.fem.loads import comparing
 from solver.fem.rigid import RigidPart
@@ -46,7 +46,7 @@ _LITTLE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Links:
+class Links(OnParts):
     """The conditions of all links.
 
     Attributes
@@ -94,11 +94,6 @@ class Links:
             energy += float(stiffness @ nodal**2) / 2
         return force, energy
 
-    def on_part(self, part: int, forces: Array, size: int) -> Array:
-        """Return the forces (size,) that forces of the conditions (c,) exert on a part [N]."""
-        rows = self.rows[part]
-        return np.zeros(size) if rows is None else rows.nodal(forces, size)
-
 
 def eliminated(
     problem: ContactProblem, links: int, touched: NDArray[np.bool_]
@@ -124,8 +119,8 @@ def eliminated(
     held, loose = ways[:rank].T, ways[rank:].T
     _, moved, ways = linalg.svd(loose[touched])
     loose = loose @ ways[: int((moved > _DEPENDENT).sum())].T
-    # of forces and motions, which differ in magnitude by the compliance
-    held = held * (np.abs(np.diag(W)[m:]).max() / size)
+    # of forces and motions, which differ in magnitude by the compliance; supports have none
+    held = held * ((np.abs(np.diag(W)[m:]).max(initial=0.0) or 1.0) / size)
     S = np.zeros((links + rank,) * 2)
     S[:links, :links] = W[m:, m:]
     S[:links, links:] = A[m:] @ held

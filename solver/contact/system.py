@@ -249,6 +249,12 @@ class System:
         return _TOUCHING * float(max(lengths, default=0.0))
 
     @cached_property
+    def blur(self) -> float:
+        """Error of a gap by rounding of positions [mm]."""
+        farthest = [np.abs(i.slave_surface.X).max() for i in self.interfaces]
+        return float(np.finfo(float).eps * max(farthest, default=0.0))
+
+    @cached_property
     def moves(self) -> bool:
         """Whether a load moves along a body."""
         return any(part.moves for part in self.parts)

@@ -45,7 +45,7 @@ class Surface:
             return np.asarray(2 * np.pi * x[0])
         return np.full(x.shape[1:], self.thickness)
 
-    @property
+    @cached_property
     def vertices(self) -> NDArray[np.int64]:
         """(n_edges + 1,) positions in ``nodes`` of the edge ends, along the chain."""
         return np.append(self.edges[:, 0], self.edges[-1, 1])
@@ -91,7 +91,7 @@ class Surface:
         sums = [np.bincount(self.edges.ravel(), each.ravel()) for each in (y, -x)]
         return np.asarray(sums / np.hypot(*sums))
 
-    @property
+    @cached_property
     def dofs(self) -> NDArray[np.int64]:
         """(2 n_nodes,) unknowns of the body, node by node."""
         return np.stack([2 * self.nodes, 2 * self.nodes + 1], axis=1).ravel()

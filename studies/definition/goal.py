@@ -32,6 +32,7 @@ from typing import Any, NamedTuple
 from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.definition.parameters import Parameter, in_unit, parameters_of
+from studies.definition.place import Chooser
 from studies.definition.quantity import number_of_a_run
 from studies.definition.spaced import is_finite, rounded
 from studies.definition.vocabulary import NO_EQUILIBRIUM, SOLVED
@@ -230,7 +231,7 @@ class PathLimit:
 
 
 @dataclass(slots=True)
-class Search:
+class Search(Chooser):
     """The search for the goal at one place of the other axes.
 
     Attributes

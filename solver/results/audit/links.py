@@ -6,6 +6,7 @@ nearest place of the master, and of the rigid body.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _PIECES = 16
-"""Number of pieces of an edge."""
+"""Number of pieces of an edge; more where edges of the other side are shorter."""
 _FINER = 8
 """Number of parts of a piece, for normals and areas of nodes on curved edges."""
 _FACING = 0.05
@@ -65,11 +66,18 @@ def links_error(system: System, converged: Converged) -> float:
     )  # fmt: skip
 
 
-def _places(system: System, side: Side, converged: Converged) -> _Sampled:
+def _places(
+    system: System, side: Side, converged: Converged, opposite: _Sampled | None = None
+) -> _Sampled:
+    """Return the pieces of a boundary; they are no longer than those of the ``opposite`` one."""
     name, boundary = side
     whole = system.full(name)
-    edges = edges_of(whole, boundary)
-    ends = np.linspace(-1.0, 1.0, _PIECES + 1)
+    edges, count = edges_of(whole, boundary), _PIECES
+    if opposite is not None:
+        long = np.linalg.norm(whole.X[:, edges[:, 1]] - whole.X[:, edges[:, 0]], axis=0) / count
+        short = np.linalg.norm(opposite.ends[1] - opposite.ends[0], axis=0)
+        count *= math.ceil(max(float(long.mean() / short.mean()), 1.0))
+    ends = np.linspace(-1.0, 1.0, count + 1)
     moved = system.displacement(name, converged.state).reshape(-1, 2).T
 
     def at(xi: Array, field: Array) -> Array:
@@ -166,9 +174,9 @@ def _unbalanced(system: System, k: int, converged: Converged) -> float:
 def _misfit(system: System, k: int, converged: Converged) -> float:
     """Return the motion that a link should prevent over the largest motion of what it joins."""
     link: Link = system.model.links[k]
-    slave, others = _places(system, link.slave, converged), []
-    if link.master is not None:
-        master = _places(system, link.master, converged)
+    others, master = [], link.master and _places(system, link.master, converged)
+    slave = _places(system, link.slave, converged, master)
+    if master is not None:
         slave = _opposite(slave, master)
         others.append(_facing(slave.X, master)[1])
     X, u, area, *_ = slave
