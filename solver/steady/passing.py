@@ -63,7 +63,7 @@ _PATIENCE, _PROGRESS = 14, 0.7
 """Over this number of steps the residual must drop to this ratio, or the pass is given up."""
 
 
-class Effort:
+class SolveBudget:
     """Counts the solves with the stiffness of all attempts to find a pass."""
 
     def __init__(self, most: int = _SOLVES) -> None:
@@ -142,7 +142,7 @@ def passing(
     *,
     parts: int | None = None,
     tolerance: float = TOLERANCE,
-    effort: Effort | None = None,
+    budget: SolveBudget | None = None,
 ) -> Pass[S]:
     """Return the steady pass of a load over a body.
 
@@ -155,7 +155,7 @@ def passing(
     guess : strains (n_rows, n_columns, n_components) to start from, for instance of a similar pass
     parts : number of increments between two points of a row, `usual_parts` if None
     tolerance : largest deviatoric strain of the residual, times 2 G / yield stress
-    effort : counts the solves, those of earlier attempts included
+    budget : counts the solves, those of earlier attempts included
 
     Raises
     ------
@@ -171,11 +171,11 @@ def passing(
     parts = parts or usual_parts(material)
     scale, rough = np.sqrt(track.weights)[..., None], track.rough
     double_shear = 2 * material.elasticity.shear_modulus
-    effort, krylov = effort or Effort(), _KRYLOV
-    before_it = effort.solves
+    budget, krylov = budget or SolveBudget(), _KRYLOV
+    before_it = budget.solves
 
     def at(added: Array, elastic: AppliedLoad | None = None) -> _At[S]:
-        effort.solve()
+        budget.solve()
         flow = track.flow(material, before, added, parts)
         if elastic is not None and not flow.force.any():  # nothing yields
             return _At(added, flow, elastic, np.zeros_like(added), 0.0)
@@ -208,11 +208,11 @@ def passing(
                 loading=here.loading,
                 left_over=left_over,
                 steps=step,
-                solves=effort.solves - before_it,
+                solves=budget.solves - before_it,
             )
 
         def newton(scaled: Array, here: _At[S] = here) -> Array:
-            effort.solve()
+            budget.solve()
             change = scaled.reshape(shape) / scale
             made = rough.strain(here.loading.along(rough.solve(here.flow.along(change))))
             return np.asarray((scale * (change - made)).ravel())

@@ -20,7 +20,7 @@ import numpy as np
 
 from solver.errors import LimitLoad, NoContact, NotConverged, Spins, TooLong, WindowTooSmall
 from solver.materials.material import Material
-from solver.steady.passing import TOLERANCE, Effort, passing
+from solver.steady.passing import TOLERANCE, SolveBudget, passing
 from solver.steady.touching import RollingContact
 
 if TYPE_CHECKING:
@@ -72,17 +72,17 @@ def search(
         as `passing` does, `TooLong` for all attempts together; `LimitLoad` also if a pass adds more
         than 30 % of plastic strain in a material without hardening
     """
-    effort = Effort()
+    budget = SolveBudget()
 
     def exactly(load: PassingLoad, guess: Array | None = None) -> Pass[Layers]:
         return passing(
-            track, material, load, before, guess, parts=parts, tolerance=tolerance, effort=effort
+            track, material, load, before, guess, parts=parts, tolerance=tolerance, budget=budget
         )
 
     def eased(load: PassingLoad, ratio: float, guess: Array | None) -> Pass[Layers]:
         return passing(
             track, _linear(material, ratio), load, before, guess, parts=_PARTS,
-            tolerance=_TOLERANCE, effort=effort,
+            tolerance=_TOLERANCE, budget=budget,
         )  # fmt: skip
 
     own = 0.0
