@@ -53,8 +53,8 @@ gap = np.average(np.linalg.norm(foot - point, axis=0), weights=hat * lengths)
 print(f"mean gap under the hat: {gap:.5f} mm by sampling, {found.gap[VERTEX]:.5f} mm by segments")
 assert np.isclose(gap, found.gap[VERTEX], rtol=1e-4)
 
-figure = Figure(figsize=(7, 3.6), layout="constrained")
-axes = figure.add_subplot(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
+figure = Figure(figsize=(7, 4.4), layout="constrained")
+axes = figure.add_subplot(aspect="equal", xlabel="$x$ [mm]", ylabel="$y$ [mm]")
 for body in (above, below):
     for ends in body.mesh.p[:, body.mesh.facets].transpose(2, 0, 1):
         axes.plot(*ends, color="0.75", linewidth=0.8)
@@ -64,5 +64,5 @@ for k in range(0, len(hat), 80):
     axes.plot(*np.stack([point[:, k], foot[:, k]], axis=1), color="tab:blue", linewidth=0.8)
 axes.plot(*slave.X[:, slave.vertices], "o-", color="black", label="slave")
 axes.plot(*profile, "s-", color="0.4", label="master")
-axes.legend(loc="upper center", ncols=4, fontsize=8)
+axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=8, frameon=False)
 figure.savefig("mortar.png", dpi=150)

@@ -55,14 +55,15 @@ def drawn(data):
             section["z"], section["y"], section, cmap="RdBu_r", vmin=-most, vmax=most,
             rasterized=True,
         )  # fmt: skip
-        axes.set(title=f"{traffic}, {count[-1]} passes", xlabel="z [mm]", xlim=(-25, 25))
+        axes.set_title(f"{traffic}, {count[-1]} passes", loc="left", fontsize=9, weight="bold")
+        axes.set(xlabel="$z$ [mm]", xlim=(-25, 25))
         axes.set(aspect="equal", facecolor="0.86", ylim=(-12, 0.4))
-    maps[0].set_ylabel("y [mm]")
+    maps[0].set_ylabel("$y$ [mm]")
     bar = below.colorbar(image, ax=maps, shrink=0.9)
-    bar.set_label("residual stress xx [MPa]", fontsize=8)
+    bar.set_label("residual stress\n" r"$\sigma_{xx}$ [MPa]", fontsize=8)
     for axes in (stress, strain):
         axes.xaxis.set_major_formatter("{x:g}")
-    stress.set(xlabel="passes", ylabel="lowest residual stress xx [MPa]")
+    stress.set(xlabel="passes", ylabel=r"lowest residual stress $\sigma_{xx}$ [MPa]")
     strain.set(xlabel="passes", ylabel="largest plastic strain", ylim=(0, None))
     stress.legend(frameon=False)
     return figure

@@ -138,7 +138,10 @@ def _add_window(one: argparse.ArgumentParser) -> None:
 def _add_run(one: argparse.ArgumentParser) -> None:
     one.add_argument("study", type=_path, metavar="STUDY.toml")
     one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
-    one.add_argument("--workers", type=_integer(1, 1024), help="processes (default: one per core)")
+    one.add_argument(
+        "--workers", type=_integer(0, 1024),
+        help="processes; 0: this one (default: one per core, 0 for a study of some seconds)",
+    )  # fmt: skip
     where = one.add_mutually_exclusive_group()
     where.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
     where.add_argument(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import signal
 import sys
 from collections.abc import Iterator, Sequence
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
-    from residua.cost import dry_run, long_run
+    from residua.cost import Foreseen, dry_run
     from residua.progress import Progress
     from studies.definition.fit import NO_FIT
     from studies.definition.study import Study
@@ -50,8 +51,13 @@ def run(options: argparse.Namespace) -> int:
     access = options.scheduler and Access(options.scheduler, *certificates)
     if options.scheduler_file:
         access = Access.of_file(options.scheduler_file, *certificates)
-    if warning := long_run(study, store):
-        print(warning, file=sys.stderr)
+    foreseen = Foreseen.of(study, store)
+    if foreseen.warning:
+        print(foreseen.warning, file=sys.stderr)
+    workers = options.workers
+    if workers is None and foreseen.short and limits == Limits():
+        workers = 0
+        gc.freeze()  # what is loaded stays: who looks for memory to free need not look there
     progress, preparing = Progress(study), Thread(target=prepare)
 
     def hear(event: StudyEvent) -> None:
@@ -65,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
         outcome = run_study(
             study,
             store,
-            workers=options.workers,
+            workers=workers,
             scheduler=access,
             resume=options.resume,
             limits=limits,

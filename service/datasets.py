@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import math
 import time
 from collections import OrderedDict
 from contextlib import ExitStack, suppress
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from service.errors import Busy, Conflict, NotFound
-from service.guarded import Guarded
+from service.guarded import Beyond, Guarded
 from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.overview import chooses
@@ -42,12 +43,20 @@ PATIENCE = 20.0
 WAITING = 8
 """Number of studies whose data sets may wait to be made."""
 
+LARGE = (
+    "the data set of the runs that are there takes too long, or too much memory, to be made in "
+    "between: it is written when the study ends. Until then read the numbers of all runs in "
+    "/studies/{id}/table.csv, and single runs in /runs/{run}.nc"
+)
 AGAIN = "the data set was lost or damaged, and is made again from the runs: ask later"
 
 
 @dataclass(slots=True)
 class _Offered:
-    """A data set: of which state of the catalogue, where it is, and until when it stays."""
+    """A data set: of which state of the catalogue, where it is, and until when it stays.
+
+    It is nowhere if it could not be made; then it is tried again after this time.
+    """
 
     of: State | None = None
     path: Path | None = None
@@ -118,9 +127,9 @@ class Datasets:
         """Return the current data set of a study as a Zarr store; errors as `current`."""
         path = await self.current(job)
         found = await asyncio.to_thread(Tiles, path)
-        layout, turn = self.layouts.get(job.id, (found.layout, 0))
+        layout, turn = self.layouts.get(job.id, ("", 0))
         if layout != found.layout:
-            turn += 1
+            turn = await asyncio.to_thread(self.jobs.layout_turn, job.id, found.layout)
         self.layouts[job.id] = found.layout, turn
         return await asyncio.to_thread(Tiles, path, turn) if turn else found
 
@@ -142,9 +151,11 @@ class Datasets:
 
     async def _current(self, study_id: str, content: dict[str, Any], made: _Offered) -> Path:
         of = await asyncio.to_thread(state_of, self.store.catalogue.path)
-        if made.path and (made.of == of or time.monotonic() < made.until):
-            return made.path
         began = time.monotonic()
+        if made.path and (made.of == of or began < made.until):
+            return made.path
+        if began < made.until:
+            raise Busy(LARGE, math.ceil(made.until - began))
         if self.folder is None:
             self.folder = self.folders.enter_context(scratch())
         made.number += 1
@@ -155,6 +166,10 @@ class Datasets:
                 await self.process.call(combined, *given, name=study_id)
         except StoreFull:  # not the data directory
             raise OSError(errno.ENOSPC, "no room is left for temporary files") from None
+        except Beyond:
+            now = time.monotonic()
+            made.path, made.until = None, now + REST * (now - began)
+            raise Busy(LARGE, math.ceil(REST * (now - began))) from None
         made.of, made.path = of, target
         now = time.monotonic()
         made.until = now + REST * (now - began)

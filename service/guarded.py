@@ -6,15 +6,18 @@ Meanwhile the service answers other requests.
 
 from __future__ import annotations
 
+import copyreg
 import os
+import pickle
 import resource
 import signal
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
+from io import BytesIO
 from math import ceil
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 from weakref import WeakValueDictionary
 
 from anyio import BrokenWorkerProcess, CapacityLimiter, Lock, fail_after
@@ -30,6 +33,10 @@ MINUTE = 60.0
 """Time after which a caller has its whole budget again [s]."""
 
 Found = TypeVar("Found")
+
+
+class Beyond(StudyError):
+    """An input that takes more time or memory than is allowed."""
 
 
 def memory(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path("/sys/fs/cgroup")) -> int:
@@ -104,30 +111,52 @@ class Guarded:
 
         Raises
         ------
-        StudyError
+        Beyond
             if time or memory did not suffice; errors of the function are raised too
         Busy
             if the process was killed
         """
         try:
             with fail_after(self.seconds):
-                return await run_sync(_limited, function, *given, cancellable=True)
+                answer = await run_sync(_limited, function, *given, cancellable=True)
+            found, error = pickle.loads(answer)
+            if error is not None:
+                raise error
+            return cast("Found", found)
         except BrokenWorkerProcess:
             raise Busy(f"the process that reads a {self.field} has ended: ask again") from None
         except (TimeoutError, MemoryError):
             raise beyond(self.field, name, self.seconds, advice) from None
 
 
-def beyond(field: str, name: object, seconds: float, advice: str = "") -> StudyError:
+def beyond(field: str, name: object, seconds: float, advice: str = "") -> Beyond:
     """Return the error for what takes more than this time, or more memory than is allowed."""
     allowed = f"must be read within {seconds:g} s and {BYTES / 2**30:.3g} GiB of memory"
-    return StudyError(field, name, allowed + advice)
+    return Beyond(field, name, allowed + advice)
 
 
-def _limited(function: Callable[..., Found], *given: object) -> Found:
+def _limited(function: Callable[..., object], *given: object) -> bytes:
+    """Return what a function returns, and None, or None and the error that it raises, as a pickle.
+
+    An error is pickled by its own rule. That of `tblib`, which Dask sets for all errors, adds what
+    the error came from; in the errors of pydantic that has no end.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the service's to handle
     resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
-    return function(*given)
+    answer: tuple[object, Exception | None]
+    try:
+        answer = function(*given), None
+    except Exception as error:
+        answer = None, error
+    out = BytesIO()
+    pickler = pickle.Pickler(out)
+    pickler.dispatch_table = {
+        kind: rule
+        for kind, rule in copyreg.dispatch_table.items()
+        if not issubclass(kind, BaseException)
+    }
+    pickler.dump(answer)
+    return out.getvalue()
 
 
 class Budget:

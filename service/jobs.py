@@ -123,6 +123,17 @@ class Jobs(Database):
             )
             return [tuple(row) for row in found]
 
+    def layout_turn(self, job_id: str, digest: str) -> int:
+        """Return how many other layouts the data set of a job had before the one of a digest."""
+        with self.transaction() as connection:
+            found = connection.execute(
+                "INSERT INTO layout VALUES (?, ?, 0) ON CONFLICT (job) DO UPDATE SET"
+                " turn = turn + (digest <> excluded.digest), digest = excluded.digest"
+                " RETURNING turn",
+                (job_id, digest),
+            )
+            return int(found.fetchone()["turn"])
+
     def get(self, job_id: str) -> Job:
         """Return one job.
 
@@ -361,6 +372,13 @@ def put(connection: sqlite3.Connection, job: Job, **changes: Any) -> Job:
         tell(connection, job)
     connection.execute(f"UPDATE job SET ({ALL}) = ({MARKS}) WHERE id = ?", [*row_of(job), job.id])
     return job
+
+
+def forget(connection: sqlite3.Connection, job_id: str) -> None:
+    """Delete a job, and all that is known of it, in the transaction of a connection."""
+    for table in ("run", "told", "layout"):
+        connection.execute(f"DELETE FROM {table} WHERE job = ?", (job_id,))
+    connection.execute("DELETE FROM job WHERE id = ?", (job_id,))
 
 
 def tell(connection: sqlite3.Connection, job: Job) -> None:

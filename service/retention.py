@@ -23,7 +23,7 @@ from pathlib import Path
 from service.errors import Busy, Conflict, NoRoom, NotFound
 from service.examiner import Examined
 from service.job import Job, StudyState
-from service.jobs import Jobs, put
+from service.jobs import Jobs, forget, put
 from studies import FileDamaged, Store
 from studies.scenes.description import Description
 from studies.storage.seal import content_of
@@ -205,9 +205,7 @@ class Keeper:
             self.store.discard(unneeded)
             with suppress(FileNotFoundError):
                 shutil.rmtree(directory)
-            queue.execute("DELETE FROM run WHERE job = ?", (study_id,))
-            queue.execute("DELETE FROM told WHERE job = ?", (study_id,))
-            queue.execute("DELETE FROM job WHERE id = ?", (study_id,))
+            forget(queue, study_id)
         return freed
 
     def sweep(self) -> None:

@@ -39,7 +39,13 @@ TOLD = (
     "CREATE TABLE IF NOT EXISTS told (job TEXT NOT NULL, at TEXT NOT NULL, words TEXT NOT NULL)",
     "CREATE INDEX IF NOT EXISTS told_by_job ON told (job)",
 )
-"""What happened to studies. A queue without it has the same form: it is added."""
+"""What happened to studies."""
+LAYOUT = """CREATE TABLE IF NOT EXISTS layout (
+    job TEXT PRIMARY KEY, digest TEXT NOT NULL, turn INTEGER NOT NULL
+)"""
+"""The layout of the data set of a study that was shown last, and how many it had before."""
+ADDED_TABLES = (*TOLD, LAYOUT)
+"""A queue without them has the same form: they are added."""
 REST = (
     "CREATE INDEX job_by_turn ON job (turn)",
     "CREATE INDEX job_by_state ON job (state, priority, turn)",
@@ -74,7 +80,7 @@ def prepare(connection: sqlite3.Connection, new: bool) -> None:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     known = {row[0] for row in connection.execute("SELECT name FROM sqlite_master")}
     if version == VERSION and {"job", "run"} <= known:
-        for statement in TOLD:
+        for statement in ADDED_TABLES:
             connection.execute(statement)
         return
     if version > VERSION:
@@ -82,9 +88,16 @@ def prepare(connection: sqlite3.Connection, new: bool) -> None:
         raise StudyError("jobs.sqlite", f"form {version}", allowed)
     if not new and "job" not in known:
         raise sqlite3.DatabaseError("it holds no queue")
-    statements = [JOB, RUN, *TOLD, *REST]
+    statements = [JOB, RUN, *ADDED_TABLES, *REST]
     if "job" in known:
-        statements = ["ALTER TABLE job RENAME TO old", JOB, RUN, *TOLD, *_copied(connection), *REST]
+        statements = [
+            "ALTER TABLE job RENAME TO old",
+            JOB,
+            RUN,
+            *ADDED_TABLES,
+            *_copied(connection),
+            *REST,
+        ]
     connection.create_function("checksum", -1, lambda *values: checksum(values))
     for statement in statements:
         connection.execute(statement)

@@ -26,7 +26,7 @@ from service.app import assembled
 from service.connections import limited
 from service.errors import Conflict, NotFound
 from service.job import Job, StudyState, verdict
-from service.jobs import Jobs, put
+from service.jobs import Jobs, forget, put
 from service.recovery import add
 from service.settings import Settings
 from studies import Store, Study, StudyError
@@ -65,7 +65,12 @@ class ViewedFolder:
     def look(self) -> None:
         """Bring catalogue and queue to what is in the folder now."""
         self.store.reconcile()
-        for study_id in self.store.study_ids():
+        there = self.store.study_ids()
+        for study_id in self._seen.keys() - there:
+            with self.jobs.transaction() as connection:
+                forget(connection, study_id)
+            del self._seen[study_id]
+        for study_id in there:
             state = state_of(self.store.dataset_path(study_id))
             if self._seen.get(study_id, 0) != state:
                 self._take(study_id)

@@ -51,6 +51,10 @@ class NoContact(NotConverged):
     """The contact problem has no solution for this shape of the surfaces; for another it may."""
 
 
+class TooLong(NotConverged):
+    """A search used up the work that it may take."""
+
+
 class LimitLoad(NotConverged):
     """No equilibrium exists above the load ``reached``: a body flows plastically, or slides off."""
 

@@ -16,6 +16,8 @@ from typing import Any
 
 UNITLESS = ("", "1", "-")
 """Units of a number without one."""
+COHERENT = "coherent"
+"""In place of a unit: that of N, mm, MPa, t, s, K which has the dimension of what is written."""
 LONGEST = 40
 """Largest number of characters of a number with its unit."""
 _POWER = r"(?:\^?-?[1-9])?"
@@ -44,6 +46,8 @@ class UnitError(ValueError):
 
 def number_in(unit: str) -> str:
     """Return what an entry with a unit takes, in words."""
+    if unit == COHERENT:
+        return "a number, or one with a unit that N, mm, MPa, t, s, K have too"
     return "a number without unit" if unit in UNITLESS else f"a number in {unit}"
 
 
@@ -69,6 +73,8 @@ def converted(text: str, unit: str) -> float:
     if not match:
         raise UnitError(f"a number with a unit has at most {LONGEST} characters, such as 195 GPa")
     given = (match["unit"] + match["more"]).strip()
+    if unit == COHERENT:
+        unit = _coherent(given)
     factor = _factor(given, "1" if unit in UNITLESS else unit)
     if isinstance(factor, str):
         raise UnitError(factor)
@@ -145,6 +151,19 @@ def _roots(text: str) -> tuple[Fraction | None, Any]:
     except TypeError:  # a logarithm
         multiple = False
     return Fraction(factor) if multiple else None, roots
+
+
+def _coherent(given: str) -> str:
+    """Return the unit of the project for what has a unit.
+
+    An angle has none: it is in degrees in a scene file, and in radians in its functions.
+    """
+    roots = _roots(given)[1]
+    found = (unit for name, unit in _KINDS.items() if _roots(unit)[1] == roots and name != "angle")
+    unit = next(found, None)
+    if unit is None:
+        raise UnitError(f"{given} is {_kind(roots)}")
+    return unit
 
 
 @lru_cache(maxsize=256)

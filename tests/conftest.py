@@ -13,6 +13,7 @@ import pytest
 
 from tests.marks import allowed, of_folder
 from tests.order import Order, place
+from tests.programs import Programs
 
 if TYPE_CHECKING:
     from xdist.remote import Producer
@@ -86,6 +87,13 @@ def no_settings_from_outside() -> Iterator[None]:
         for name in [name for name in os.environ if name.startswith("RESIDUA_")]:
             patch.delenv(name)
         yield
+
+
+@pytest.fixture(scope="session")
+def programs() -> Iterator[Programs]:
+    """What runs a file of Python in a process of its own, without loading libraries each time."""
+    with Programs() as running:
+        yield running
 
 
 @pytest.fixture(scope="session")

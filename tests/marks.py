@@ -28,6 +28,7 @@ EXPENSIVE = {
     "processes": (
         "subprocess.Popen.__init__",
         "multiprocessing.process.BaseProcess.start",
+        "tests.programs.Programs.run",
         "studies.execution.run._Work.compute",
     ),
 }

@@ -6,6 +6,7 @@ wait, other processes compute.
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 from xdist.scheduler import LoadFileScheduling
@@ -65,6 +66,7 @@ def unit(file: Path) -> Path:
     return TOGETHER if TOGETHER in file.parents and file not in FIRST else file
 
 
+@cache
 def place(file: Path) -> int:
     """Return by what the files of the test run are sorted."""
     return FIRST.index(unit(file)) if unit(file) in FIRST else len(FIRST)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from residua.cli import main
 from tests.architecture.sources import ROOT
+from tests.programs import Programs
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
@@ -22,21 +21,18 @@ def test_there_are_examples() -> None:
     assert "study_to_figure.ipynb" in {path.name for path in NOTEBOOKS}
 
 
-def run(arguments: list[str], folder: Path) -> None:
+def run(file: Path, folder: Path, programs: Programs) -> None:
     paths = [str(ROOT), os.environ.get("PYTHONPATH", "")]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
     environment["RESIDUA_WORKERS"] = "1"  # of the service: each imports for seconds
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
+    done = programs.run(file, folder, environment, strict=True)
     assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.pages
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
-def test_an_example_runs(script: Path, tmp_path: Path) -> None:
-    run(["-W", "error", str(script)], tmp_path)
+def test_an_example_runs(script: Path, tmp_path: Path, programs: Programs) -> None:
+    run(script, tmp_path, programs)
     assert "assert" in script.read_text(), "an example checks what it shows"
 
 
@@ -44,7 +40,7 @@ def test_an_example_runs(script: Path, tmp_path: Path) -> None:
 @pytest.mark.usefixtures("one_worker")
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_the_cells_of_a_notebook_run_after_make_run(
-    notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    notebook: Path, tmp_path: Path, programs: Programs, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They run on a coarse and small form of the study that `make run` computes."""
     study = (ROOT / "data/studies/punch.toml").read_text()
@@ -59,6 +55,6 @@ def test_the_cells_of_a_notebook_run_after_make_run(
     assert not any(cell.get("outputs") for cell in cells), "a notebook is kept without its outputs"
     assert "assert" in "".join(code), "a notebook checks what it shows"
     (tmp_path / "cells.py").write_text("\n".join(code))
-    run(["-W", "error", "cells.py"], tmp_path)
+    run(tmp_path / "cells.py", tmp_path, programs)
     assert (tmp_path / "punch.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "punch.pdf").read_bytes().startswith(b"%PDF")

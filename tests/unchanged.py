@@ -75,6 +75,7 @@ def runs() -> dict[str, tuple[str, dict[str, Any]]]:
     add("ball", "friction", **draft, friction=0.3)
     add("ball", "cycles", **draft, cycles=3, hardening="chaboche", back_stresses=((5e4, 400.0),))
     add("rolling", "finite, wheel", **_TRACK)
+    add("rolling", "finite, quad4", **_TRACK, element="quad4")
     add("rolling", "finite, slip", **_TRACK, traction=1.0, hardening="kinematic")
     add("rolling", "finite, two passes", **_TRACK, load="hertz", passes=2)
     add("rolling", "finite, periodic", accuracy="draft", track=60.0, periodic=True, load="hertz")

@@ -7,7 +7,9 @@ import gzip
 import json
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from functools import lru_cache
 from http import HTTPStatus
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import urlencode
 
@@ -54,6 +56,7 @@ from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
 from studies.scenes.registry import known_names, known_scenes
+from studies.storage.seal import State, state_of
 from studies.views.table import MESSAGE, RUN, STATUS, varied
 
 if TYPE_CHECKING:
@@ -66,6 +69,8 @@ FOR_GOOD = {"cache-control": "public, max-age=31536000, immutable", "vary": "acc
 LISTED = 25
 """Number of studies on a page."""
 POLLED = ("accepted", "running")
+KEPT = 16
+"""Number of studies of which is kept what they found."""
 
 
 @home.get("/")
@@ -148,10 +153,17 @@ async def study_page(
 
 def _found(job: Job, datasets: Datasets) -> Found | None:
     """Return what a study that chooses its runs has found."""
+    path = datasets.ended(job)
+    return _found_in(path, state_of(path))
+
+
+@lru_cache(maxsize=KEPT)
+def _found_in(path: Path, state: State | None) -> Found | None:
+    """Return the same of a data set in a state of its file."""
     from studies import open_netcdf  # xarray takes half a second to import
     from studies.views.found import found_of
 
-    with open_netcdf(datasets.ended(job)) as dataset:
+    with open_netcdf(path) as dataset:
         return found_of(dataset)
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.problem import OPEN
-from solver.contact.rows import ContactRows, joined
+from solver.contact.rows import ContactRows, OnParts, joined
 from solver.model.friction import BoundLines
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ _FELL = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Candidates:
+class Candidates(OnParts):
     """Vertices near contact; gaps first, then slips since the last converged state, then links.
 
     Attributes
@@ -114,13 +114,8 @@ class Candidates:
         """Return the same candidates without friction."""
         return replace(self, lines=BoundLines.none(self.n))
 
-    def on_part(self, part: int, forces: NDArray[np.float64], size: int) -> NDArray[np.float64]:
-        """Return the nodal forces (size,) that contact forces exert on a part [N]."""
-        rows = self.rows[part]
-        return np.zeros(size) if rows is None else rows.nodal(forces, size)
-
     def all_on_part(self, part: int, forces: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the same with the forces of pairs that leave [N]."""
+        """Return the nodal forces on a part, with those of pairs that leave [N]."""
         pushes = self.pushes[part]
         return self.on_part(part, forces, len(pushes)) + pushes
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 _MAX_SETS = 40
 _MAX_PASSES = 20
+_LESS = 0.1
+"""Ratio of a friction bound to the one before, with which friction alone bore the load."""
 _TOLERANCE = LEAST_FRICTION
 _ROUNDING = 1e-14
 _ACCURATE = 1e-6
@@ -213,7 +215,8 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
         found = _active_sets(problem, status, on)
         if found is not None:
             return ContactSolution(found.forces, found.rigid, found.status, True)
-        before, bound = bound, lines.least(N)
+        # friction along surfaces that lean may bear all of the load, without any pressure
+        before, bound = bound, lines.least(N) if (status != OPEN).any() else _LESS * bound
         if np.abs(bound - before).max() <= 1e-12 * before.max():
             F = np.where(np.resize(status, len(F)) == OPEN, 0.0, F)
             return ContactSolution(F, q, status, True) if _holds(problem, F, q) else None

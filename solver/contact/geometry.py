@@ -19,12 +19,15 @@ import numpy as np
 
 from solver.contact.normals import end_normals
 from solver.fem.surface import at_vertices
-from solver.mesh.edges import shape_derivatives, shape_functions
+from solver.mesh.edges import shape_functions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from solver.fem.surface import Surface
+
+    Array = NDArray[np.float64]
+    Numbers = NDArray[np.int64]
 
 _GAUSS_XI, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 _NEWTON_STEPS = 6
@@ -55,14 +58,14 @@ class Pairing:
         of slip (slave relative to master along the surface) on the surfaces' unknowns
     """
 
-    area: NDArray[np.float64]
-    deformed: NDArray[np.float64]
-    shared: NDArray[np.float64]
-    covered: NDArray[np.float64]
-    length: NDArray[np.float64]
-    gap: NDArray[np.float64]
-    normal: tuple[NDArray[np.float64], NDArray[np.float64]]
-    tangent: tuple[NDArray[np.float64], NDArray[np.float64]]
+    area: Array
+    deformed: Array
+    shared: Array
+    covered: Array
+    length: Array
+    gap: Array
+    normal: tuple[Array, Array]
+    tangent: tuple[Array, Array]
 
     @property
     def parted(self) -> Pairing:
@@ -72,16 +75,47 @@ class Pairing:
         return replace(self, **areas, covered=none, gap=none + np.inf)
 
 
-def _combine(x: NDArray[np.float64], N: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the sum over an edge's nodes, the last axis of both."""
-    return np.asarray(np.einsum("...k,...k->...", x, N))
+def _powers(x: Array, edges: Numbers, origin: Array | float = 0.0) -> Array:
+    """Return the positions on edges (n, 2 or 3) by powers of xi, constant first: (2, 2 or 3, n).
+
+    ``x`` (2, n_nodes) are the nodes; positions are relative to ``origin`` (2, n).
+    """
+    start, end, *middle = np.moveaxis(x[:, edges], -1, 0)
+    mean, half = (start + end) / 2, (end - start) / 2
+    at = middle[0] if middle else mean
+    return np.stack([at - origin, half, *(mean - each for each in middle)], axis=1)
 
 
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _value(powers: Array, xi: Array) -> Array:
+    """Return polynomials at xi (n,), given their coefficients (..., degree + 1, n)."""
+    out = powers[..., -1, :]
+    for k in range(powers.shape[-2] - 2, -1, -1):
+        out = out * xi + powers[..., k, :]
+    return np.asarray(out)
+
+
+def _slopes(powers: Array) -> Array:
+    """Return the coefficients of the derivatives of polynomials."""
+    return powers[..., 1:, :] * np.arange(1, powers.shape[-2])[:, None]
+
+
+def _root(powers: Array) -> Array:
+    """Return a root (n,) of each polynomial by Newton's method from 0, kept within [-3, 3]."""
+    xi, slopes = np.zeros(powers.shape[-1]), _slopes(powers)
+    for _ in range(_NEWTON_STEPS):
+        slope = _value(slopes, xi)
+        step = _value(powers, xi) / np.where(slope == 0, 1.0, slope)
+        xi = np.clip(xi - step, -3.0, 3.0)
+        if np.abs(step).max(initial=0.0) < _LAST_STEP:
+            break
+    return xi
+
+
+def _cross(a: Array, b: Array) -> Array:
     return np.asarray(a[0] * b[1] - a[1] * b[0])
 
 
-def _near(start: NDArray[np.float64], end: NDArray[np.float64]) -> tuple[NDArray[np.int64], ...]:
+def _near(start: Array, end: Array) -> tuple[Numbers, ...]:
     """Return the edges that a line may cross, given its signed distances from their ends.
 
     The line is tested against the chord, extended for the curvature of the edge: it may cross the
@@ -91,59 +125,41 @@ def _near(start: NDArray[np.float64], end: NDArray[np.float64]) -> tuple[NDArray
 
 
 def _project_on_slave(
-    x: NDArray[np.float64],
-    normals: NDArray[np.float64],
+    x: Array,
+    normals: Array,
     slave: Surface,
-    points: NDArray[np.float64],
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    points: Array,
+) -> tuple[Numbers, Array]:
     """Return edges, and xi on them, where the slave's normal passes through a point."""
-    count = slave.edges.shape[1]
     ends = x[:, slave.edges[:, :2].T]
     edge, point = _near(*_cross(normals[..., None], ends[..., None] - points[:, None, None]))
-    xe, points = x[:, slave.edges[edge]], points[:, point]
+    offset = _powers(x, slave.edges[edge], points[:, point])
     n0, n1 = normals[:, 0, edge], normals[:, 1, edge]
-    xi = np.zeros(len(edge))
-    for _ in range(_NEWTON_STEPS):
-        offset = _combine(xe, shape_functions(xi, count)) - points
-        slope = _combine(xe, shape_derivatives(xi, count))
-        n = (1 - xi) / 2 * n0 + (1 + xi) / 2 * n1
-        value = _cross(n, offset)
-        derivative = _cross((n1 - n0) / 2, offset) + _cross(n, slope)
-        step = value / np.where(derivative == 0, 1.0, derivative)
-        xi = np.clip(xi - step, -3.0, 3.0)
-        if np.abs(step).max(initial=0.0) < _LAST_STEP:
-            break
-    return edge, xi
+    powers = np.zeros((offset.shape[1] + 1, len(edge)))  # the normal is linear along an edge
+    powers[:-1] += _cross((n0 + n1)[:, None] / 2, offset)
+    powers[1:] += _cross((n1 - n0)[:, None] / 2, offset)
+    return edge, _root(powers)
 
 
 def _project_on_master(
-    x: NDArray[np.float64],
-    edges: NDArray[np.int64],
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    x: Array,
+    edges: Numbers,
+    points: Array,
+    normals: Array,
+) -> tuple[Array, Array]:
     """Return eta (n,) and the distance along ``normals`` of points (2, n) on master edges."""
-    count = edges.shape[-1]
-    xe = x[:, edges]
-    eta = np.zeros(len(edges))
-    for _ in range(_NEWTON_STEPS):
-        offset = _combine(xe, shape_functions(eta, count)) - points
-        slope = _cross(normals, _combine(xe, shape_derivatives(eta, count)))
-        step = _cross(normals, offset) / np.where(slope == 0, 1.0, slope)
-        eta = np.clip(eta - step, -3.0, 3.0)
-        if np.abs(step).max(initial=0.0) < _LAST_STEP:
-            break
-    offset = _combine(xe, shape_functions(eta, count)) - points
-    return eta, (normals * offset).sum(axis=0)
+    offset = _powers(x, edges, points)
+    eta = _root(_cross(normals[:, None], offset))
+    return eta, (normals * _value(offset, eta)).sum(axis=0)
 
 
 def _nearest(
-    x: NDArray[np.float64],
+    x: Array,
     master: Surface,
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
+    points: Array,
+    normals: Array,
     reach: float,
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+) -> tuple[Numbers, NDArray[np.bool_]]:
     """Return the master edge that faces each point and is nearest, and whether there is one.
 
     An edge faces a point if the normals are opposite within 75 degrees, at any distance in front
@@ -162,9 +178,7 @@ def _nearest(
     return partner, np.isfinite(distance[np.arange(len(partner)), partner])
 
 
-def _segments(
-    edge: NDArray[np.int64], xi: NDArray[np.float64], n_edges: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+def _segments(edge: Numbers, xi: Array, n_edges: int) -> tuple[Numbers, Array, Array]:
     """Return edge, start and end of the pieces that breakpoints ``xi`` on ``edge`` cut."""
     inner = np.abs(xi) < 1 - _EDGE_TOLERANCE
     owner = np.concatenate([edge[inner], np.arange(n_edges), np.arange(n_edges)])
@@ -177,9 +191,9 @@ def _segments(
 
 def pair(
     slave: Surface,
-    slave_u: NDArray[np.float64],
+    slave_u: Array,
     master: Surface,
-    master_u: NDArray[np.float64],
+    master_u: Array,
     reach: float = np.inf,
     *,
     tied: bool = False,
@@ -195,12 +209,11 @@ def pair(
     cut, xi = _project_on_slave(xs, normals, slave, xm[:, master.vertices])
     edge, start, end = _segments(cut, xi, len(slave.edges))
 
-    def on_slave(
-        e: NDArray[np.int64], at: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        position = (xs[:, slave.edges[e]] * shape_functions(at, slave.edges.shape[1])).sum(axis=-1)
+    along = _powers(xs, slave.edges)
+
+    def on_slave(e: Numbers, at: Array) -> tuple[Array, Array]:
         n = (1 - at) / 2 * normals[:, 0, e] + (1 + at) / 2 * normals[:, 1, e]
-        return position, n / np.linalg.norm(n, axis=0)
+        return _value(along[..., e], at), n / np.sqrt(n[0] ** 2 + n[1] ** 2)
 
     middle, n = on_slave(edge, (start + end) / 2)
     partner, facing = _nearest(xm, master, middle, n, reach)
@@ -212,47 +225,43 @@ def pair(
     at = at.ravel()
     point, n = on_slave(edge, at)
     eta, distance = _project_on_master(xm, master.edges[partner], point, n)
-    ways = tuple(np.eye(2)[..., None] + 0 * n) if tied else (n, np.stack([n[1], -n[0]]))
+    ways = np.eye(2)[..., None] + 0 * n if tied else np.stack([n, [n[1], -n[0]]])
     return _integrate(slave, xs, master, edge, partner, at, eta, ways, distance, weight)
 
 
 def _integrate(
     slave: Surface,
-    xs: NDArray[np.float64],
+    xs: Array,
     master: Surface,
-    edge: NDArray[np.int64],
-    partner: NDArray[np.int64],
-    xi: NDArray[np.float64],
-    eta: NDArray[np.float64],
-    ways: tuple[NDArray[np.float64], ...],
-    distance: NDArray[np.float64],
-    weight: NDArray[np.float64],
+    edge: Numbers,
+    partner: Numbers,
+    xi: Array,
+    eta: Array,
+    ways: Array,
+    distance: Array,
+    weight: Array,
 ) -> Pairing:
-    """Sum the integration points into rows, one per slave vertex, along two ways (2, n) each."""
+    """Sum the integration points into rows, one per slave vertex, along two ways (2, 2, n)."""
     rows, vertex = len(slave.edges) + 1, np.stack([edge, edge + 1])
     bare = np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight
     hats, deformed_hats = (bare * _area_per_xi(slave, x, edge, xi) for x in (slave.X, xs))
 
-    def summed(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def summed(values: Array) -> Array:
         return np.asarray(np.bincount(vertex.ravel(), values.ravel(), rows), dtype=float)
 
     area, deformed, gap, facing = map(summed, (hats, deformed_hats, hats * distance, bare))
-    sides = []
-    for surface, own, at, sign in ((slave, edge, xi, -1.0), (master, partner, eta, 1.0)):
-        N = shape_functions(at, surface.edges.shape[1])
-        size = len(surface.nodes)
-        place = (vertex[..., None] * size + surface.edges[own]).ravel()
-        value = sign * hats[..., None] * N
-        block = np.empty((2, rows, size, 2))
-        for kind, direction in enumerate(ways):
-            for axis, along in enumerate(direction):
-                each = np.bincount(place, (value * along[:, None]).ravel(), rows * size)
-                block[kind, :, :, axis] = each.reshape(rows, size)
-        sides.append(block)
-
     covered = area > _MIN_COVERED * slave.hats
     scale = np.where(covered, 1 / np.where(covered, area, 1.0), 0.0)
-    flat = [(side * scale[:, None, None]).reshape(2, rows, -1) for side in sides]
+    means = hats * scale[vertex]
+    along = (means * ways[:, :, None]).transpose(0, 2, 3, 1)  # way, vertex, point, axis
+    first = (np.arange(2)[:, None, None] * rows + vertex)[..., None, None]
+    sides = []
+    for surface, own, at, sign in ((slave, edge, xi, -1.0), (master, partner, eta, 1.0)):
+        N, size = sign * shape_functions(at, surface.edges.shape[1]), len(surface.nodes)
+        place = 2 * (first * size + surface.edges[own][..., None]) + np.arange(2)
+        value = along[..., None, :] * N[..., None]
+        each = np.bincount(place.ravel(), value.ravel(), 4 * rows * size)
+        sides.append(each.reshape(2, rows, 2 * size))
     return Pairing(
         area=np.where(covered, area, 0.0),
         deformed=np.where(covered, deformed, 0.0),
@@ -260,15 +269,13 @@ def _integrate(
         covered=facing / at_vertices(np.ones(len(slave.edges))),
         length=slave.spacing,
         gap=np.where(covered, gap * scale, np.inf),
-        normal=(flat[0][0], flat[1][0]),
-        tangent=(flat[0][1], flat[1][1]),
+        normal=(sides[0][0], sides[1][0]),
+        tangent=(sides[0][1], sides[1][1]),
     )
 
 
-def _area_per_xi(
-    surface: Surface, x: NDArray[np.float64], edge: NDArray[np.int64], xi: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _area_per_xi(surface: Surface, x: Array, edge: Numbers, xi: Array) -> Array:
     """Return the derivative of area along edges, whose nodes are at x (2, n_nodes) [mm2]."""
-    xe, k = x[:, surface.edges[edge]], surface.edges.shape[1]
-    along = np.linalg.norm(_combine(xe, shape_derivatives(xi, k)), axis=0)
-    return np.asarray(along * surface.depth(_combine(xe, shape_functions(xi, k))))
+    powers = _powers(x, surface.edges)[..., edge]
+    along = _value(_slopes(powers), xi)
+    return np.asarray(np.hypot(*along) * surface.depth(_value(powers, xi)))

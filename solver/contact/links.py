@@ -17,7 +17,7 @@ from scipy import linalg
 from solver.contact.geometry import pair
 from solver.contact.overlap import largest_overlap
 from solver.contact.problem import ContactProblem, ContactSolution
-from solver.contact.rows import ContactRows, joined
+from solver.contact.rows import ContactRows, OnParts, joined
 from solver.errors import ModelError
 from solver.fem.loads import comparing
 from solver.fem.rigid import RigidPart
@@ -46,7 +46,7 @@ _LITTLE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Links:
+class Links(OnParts):
     """The conditions of all links.
 
     Attributes
@@ -94,11 +94,6 @@ class Links:
             energy += float(stiffness @ nodal**2) / 2
         return force, energy
 
-    def on_part(self, part: int, forces: Array, size: int) -> Array:
-        """Return the forces (size,) that forces of the conditions (c,) exert on a part [N]."""
-        rows = self.rows[part]
-        return np.zeros(size) if rows is None else rows.nodal(forces, size)
-
 
 def eliminated(
     problem: ContactProblem, links: int, touched: NDArray[np.bool_]
@@ -124,8 +119,8 @@ def eliminated(
     held, loose = ways[:rank].T, ways[rank:].T
     _, moved, ways = linalg.svd(loose[touched])
     loose = loose @ ways[: int((moved > _DEPENDENT).sum())].T
-    # of forces and motions, which differ in magnitude by the compliance
-    held = held * (np.abs(np.diag(W)[m:]).max() / size)
+    # of forces and motions, which differ in magnitude by the compliance; supports have none
+    held = held * ((np.abs(np.diag(W)[m:]).max(initial=0.0) or 1.0) / size)
     S = np.zeros((links + rank,) * 2)
     S[:links, :links] = W[m:, m:]
     S[:links, links:] = A[m:] @ held
@@ -212,11 +207,12 @@ def _conditions(
     number, slave = names.index(link.slave[0]), surfaces[link.slave]
     rows: list[tuple[int, ContactRows]] = []
     if link.master is None:
-        areas = np.tile(slave.areas, len(link.axes))
-        nodes = np.tile(np.arange(len(slave.nodes)), len(link.axes))
-        axes = np.repeat(link.axes, len(slave.nodes))
-        block = np.eye(2 * len(slave.nodes))[2 * nodes + axes]
-        X = slave.X[:, nodes]
+        along_each = _ways(link, slave)
+        nodes = np.tile(np.arange(len(slave.nodes)), len(along_each))
+        areas, X = slave.areas[nodes], slave.X[:, nodes]
+        block = np.zeros((len(nodes), 2 * len(slave.nodes)))
+        for axis, along in enumerate(np.concatenate(along_each, axis=1)):
+            block[np.arange(len(nodes)), 2 * nodes + axis] = along
     else:
         bodies = [parts[names.index(of)].body for of, _ in link.sides]
         at_rest = [np.zeros_like(surfaces[side].X) for side in link.sides]
@@ -244,7 +240,8 @@ def _conditions(
             areas = np.full(len(block), np.inf)
         rows.append((reference, ContactRows(np.arange(3), -motion)))
     elif link.master is None and not link.grounded:  # the slave moves as one
-        first = np.repeat(np.arange(len(link.axes)) * len(slave.nodes), len(slave.nodes))
+        count = len(slave.nodes)
+        first = np.arange(len(block)) // count * count
         block = block - block[first]
         others_ = np.arange(len(block)) != first
         block, areas, X = block[others_], areas[others_], X[:, others_]
@@ -254,6 +251,14 @@ def _conditions(
     acts = areas > _LITTLE * areas.max()
     rows = [(k, ContactRows(own.dofs, own.block[acts])) for k, own in rows]
     return _LinkRows(rows, 1 / (link.stiffness * areas[acts]), X[:, acts])
+
+
+def _ways(link: Link, slave: Surface) -> list[Array]:
+    """Return unit vectors (2, n_nodes) along each of the components of a link at its slave."""
+    if link.local:
+        x, y = slave.normals
+        return [np.stack([x, y] if link.components == "normal" else [-y, x])]
+    return [np.repeat(np.eye(2)[:, [axis]], len(slave.nodes), axis=1) for axis in link.axes]
 
 
 def _mean(

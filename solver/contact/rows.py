@@ -18,10 +18,18 @@ class ContactRows:
     dofs: NDArray[np.int64]
     block: NDArray[np.float64]
 
-    def nodal(self, forces: NDArray[np.float64], size: int) -> NDArray[np.float64]:
-        """Return the forces (size,) on the unknowns of the part that forces of the rows exert."""
-        nodal = np.zeros(size)
-        nodal[self.dofs] = forces @ self.block
+
+class OnParts:
+    """Conditions between parts: ``rows`` are their derivatives on each part, or None."""
+
+    __slots__ = ()
+    rows: tuple[ContactRows | None, ...]
+
+    def on_part(self, part: int, forces: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+        """Return the forces (size,) that forces of the conditions exert on a part [N]."""
+        rows, nodal = self.rows[part], np.zeros(size)
+        if rows is not None:
+            nodal[rows.dofs] = forces @ rows.block
         return nodal
 
 

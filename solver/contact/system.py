@@ -262,6 +262,12 @@ class System:
         return _TOUCHING * float(max(lengths, default=0.0))
 
     @cached_property
+    def blur(self) -> float:
+        """Error of a gap by rounding of positions [mm]."""
+        farthest = [np.abs(i.slave_surface.X).max() for i in self.interfaces]
+        return float(np.finfo(float).eps * max(farthest, default=0.0))
+
+    @cached_property
     def moves(self) -> bool:
         """Whether a load moves along a body."""
         return any(part.moves for part in self.parts)
@@ -410,6 +416,13 @@ class System:
         }
         stress = np.where(gone, np.nan, found.stress)
         return found._replace(stress=stress, state=replace(found.state, **unknown))
+
+    def strain(self, name: str, converged: Converged) -> Array:
+        """Return the strain (4, n_points, Mandel) of a whole body; NaN in removed elements."""
+        whole, time = self.full(name), converged.state.time
+        found = self.response(name, converged)
+        strain = whole.law(time).elastic_strain(found.stress) + found.state.plastic_strain
+        return strain + whole.eigenstrain(time)
 
     def initial(self) -> State:
         """Return the unloaded, undeformed state."""

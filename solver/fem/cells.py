@@ -3,11 +3,12 @@
 An element is the image of the unit square; that of a triangle has one side drawn together to a
 point. Cells begin as whole squares. Where the integral of the field differs between Gauss's and
 Lobatto's rule, the cell is halved along the direction in which it differs more. What is narrower
-than a sixth of an element may lie between all points of both, and is then missed.
+than a sixth of the first cells may lie between all points of both, and is then missed.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -83,12 +84,20 @@ class Cells:
         return Cells(self.basis, np.tile(self.element, 2), corners, np.tile(size, 2))
 
 
-def smooth_cells(basis: CellBasis, field: Callable[[Array], Array]) -> Cells:
-    """Return cells on each of which ``field``, (2, n, k) -> (2, n, k), is smooth."""
-    gauss, n = np.polynomial.legendre.leggauss(4), basis.mesh.nelements
-    some, done = Cells(basis, np.arange(n), np.zeros((2, n)), np.ones((2, n))), []
+def smooth_cells(basis: CellBasis, field: Callable[[Array], Array], parts: int = 1) -> Cells:
+    """Return cells on each of which ``field``, (2, n, k) -> (2, n, k), is smooth.
+
+    The sides of an element are first divided into at most so many ``parts``.
+    """
+    gauss, count = np.polynomial.legendre.leggauss(4), basis.mesh.nelements
+    parts = min(parts, max(math.isqrt(_MOST // (4 * count)), 1))
+    element, n = np.repeat(np.arange(count), parts**2), count * parts**2
+    corner = np.tile(np.indices((parts, parts)).reshape(2, -1) / parts, count)
+    some, done = Cells(basis, element, corner, np.full((2, n), 1 / parts)), []
     _, x, area = some.points(gauss, gauss)
-    whole, areas = float((np.abs(field(x)) * area).sum(axis=-1).max(initial=0.0)), area.sum(axis=1)
+    areas = np.bincount(element, area.sum(axis=1))
+    each = (np.bincount(element, own) for own in (np.abs(field(x)) * area).sum(axis=-1))
+    whole = max(float(own.max(initial=0.0)) for own in each)
     for left in reversed(range(_HALVINGS + 1)):
         gauss_value, *others = (
             (field(some.points(*rules)[1]) * some.share(*rules)).sum(axis=-1)

@@ -45,7 +45,7 @@ class Surface:
             return np.asarray(2 * np.pi * x[0])
         return np.full(x.shape[1:], self.thickness)
 
-    @property
+    @cached_property
     def vertices(self) -> NDArray[np.int64]:
         """(n_edges + 1,) positions in ``nodes`` of the edge ends, along the chain."""
         return np.append(self.edges[:, 0], self.edges[-1, 1])
@@ -92,7 +92,17 @@ class Surface:
         weights = along * self.depth(xe @ shape_functions(xi, count).T) * weights
         return np.asarray(weights @ shape_functions(xi, functions))
 
-    @property
+    @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """Outward unit normals (2, n_nodes): means over the shape function of each node."""
+        xi, weights = np.polynomial.legendre.leggauss(4)
+        count = self.edges.shape[1]
+        along = self.X[:, self.edges] @ shape_derivatives(xi, count).T
+        x, y = (each * weights @ shape_functions(xi, count) for each in along)
+        sums = [np.bincount(self.edges.ravel(), each.ravel()) for each in (y, -x)]
+        return np.asarray(sums / np.hypot(*sums))
+
+    @cached_property
     def dofs(self) -> NDArray[np.int64]:
         """(2 n_nodes,) unknowns of the body, node by node."""
         return np.stack([2 * self.nodes, 2 * self.nodes + 1], axis=1).ravel()

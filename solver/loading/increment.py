@@ -209,7 +209,8 @@ class Increment:
                 raise
             if iteration >= _LATE and not self.system.links.springy:
                 softest = softer(softest, self.system.parts, step.u, responses)
-            before, found = u, self._search(u, residuals, candidates, step, error * scale)
+            out = max(error, tolerances.residual / _LESS) * scale
+            before, found = u, self._search(u, residuals, candidates, step, out)
             share, u, responses, residuals = found
             crawled = crawled + 1 if share < _SHORT else 0
             moving = share * largest(step.u) > _MOVING * largest(u, self.start.u)
@@ -333,8 +334,12 @@ class Increment:
         balanced = error < limit
         little = 0 < error < _UNBALANCED * limit
         balanced |= little and error * scale <= rounding(self.system, u)
-        met = violation < self.tolerances.contact and candidates.beyond >= 0
-        return balanced and met
+        limit = self.tolerances.contact
+        met = violation < limit
+        if not met and balanced and violation < _UNBALANCED * limit:
+            stiffest = 1 / np.diag(self._compliance(candidates)).min()
+            met = violation * scale <= stiffest * self.system.blur
+        return balanced and met and candidates.beyond >= 0
 
     def _compliance(self, candidates: Candidates) -> NDArray[np.float64]:
         """Return the elastic compliance of the contact points [mm/N], a scale; computed once."""
@@ -386,7 +391,8 @@ class Increment:
     ) -> tuple[float, Vectors, tuple[Response, ...], Vectors]:
         """Return a share of the step, and displacements, responses and residuals after it.
 
-        ``out`` is the norm of the out-of-balance forces before the step [N].
+        ``out`` is the norm of the out-of-balance forces before the step, or twice what is allowed
+        if that is more [N].
         """
         trial: tuple[Vectors, tuple[Response, ...], Vectors]
 

@@ -21,6 +21,8 @@ from solver.loading.increment import Increment
 from solver.loading.outcome import IncrementFailed
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from solver.contact.candidates import Candidates
@@ -75,10 +77,13 @@ def narrowed(
     yields: Yields = [now if now is None or was is None else now | was for now, was in both]
     if not before.windows and not any(own is not None and own.any() for own in yields):
         return None
-    candidates = find_candidates(system, start, at.u, at.contacts, at.links, time - start.time)
-    needed = _needed(system, candidates, yields)
+    touched: Candidates | None = None  # contact that leaves the windows so far is told by them
+    needed = _needed(system, touched, yields)
     compliance: dict[tuple[bytes, ...], NDArray[np.float64]] = {}
     for _ in range(_ROUNDS):
+        if touched is None and not _hold(windows, needed):
+            touched = find_candidates(system, start, at.u, at.contacts, at.links, time - start.time)
+            needed = _needed(system, touched, yields)
         windows = tuple(_around(system, k, windows[k], need) for k, need in enumerate(needed))
         if not any(windows):
             return None
@@ -99,7 +104,12 @@ def narrowed(
                 tolerances=longer,
                 compliance=compliance,
             ).approach()
-        except (IncrementFailed, Singular):
+        except Singular:
+            if touched is not None:
+                return None
+            windows = (None,) * len(windows)
+            continue
+        except IncrementFailed:
             return None
         if _loose(system, found):
             return None
@@ -114,7 +124,8 @@ def narrowed(
             whole = Increment(system, start, time, tolerances=tolerances, compliance=compliance)
             converged = whole.closed(found)
             return converged and replace(converged, windows=windows)
-        needed = _needed(system, found.candidates, yields)
+        touched = found.candidates
+        needed = _needed(system, touched, yields)
     return None
 
 
@@ -155,15 +166,22 @@ def _yields(system: System, responses: tuple[Response, ...]) -> Yields:
     ]
 
 
-def _needed(system: System, candidates: Candidates, yields: Yields) -> list[Region | None]:
-    """Return where each meshed part yields and touches."""
+def _hold(windows: Sequence[Region | None], needed: Sequence[Region | None]) -> bool:
+    """Whether windows have all that is needed."""
+    both = zip(windows, needed, strict=True)
+    return all(need is None or (own is not None and own.has(need)) for own, need in both)
+
+
+def _needed(system: System, touched: Candidates | None, yields: Yields) -> list[Region | None]:
+    """Return where each meshed part yields and, if it is known, touches."""
     needed: list[Region | None] = []
     for number, elements in enumerate(yields):
         if elements is None:
             needed.append(None)
             continue
         contact = np.zeros(system.parts[number].n, dtype=bool)
-        contact[candidates.touched(number)] = True
+        if touched is not None:
+            contact[touched.touched(number)] = True
         needed.append(Region(elements, contact))
     return needed
 

@@ -47,6 +47,13 @@ class Elasticity:
         deviator = np.eye(n_components) - np.outer(one, one) / 3.0
         return self.bulk_modulus * np.outer(one, one) + 2 * self.shear_modulus * deviator
 
+    def strain(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the Mandel strain (n_components, ...) of Mandel stress of that shape [MPa]."""
+        E, nu = self.youngs_modulus, self.poisson_ratio
+        out = (1 + nu) / E * stress
+        out[:3] -= nu / E * stress[:3].sum(axis=0)
+        return np.asarray(out)
+
     def energy_density(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the elastic energy (...) of Mandel stress (n_components, ...) [N mm/mm3]."""
         E, nu = self.youngs_modulus, self.poisson_ratio

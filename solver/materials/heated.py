@@ -90,6 +90,10 @@ class Heated(Wrapped):
         own = stress / self.strong, flow * k, growth * k, after.stretched(k)
         return self.law.flow_rule_error(*own) / k
 
+    def elastic_strain(self, stress: Array) -> Array:
+        """Return the elastic strain (n_components, n_points) of Mandel stress."""
+        return self.law.elastic_strain(stress) / self.stiff
+
     def energy_density(self, stress: Array) -> Array:
         """Return the elastic energy (n_points,) of Mandel stress [N mm/mm3]."""
         return self.law.energy_density(stress) / self.stiff

@@ -94,6 +94,10 @@ class Law(ABC):
         """Return a special form of this law for plane stress; None means `PlaneStress`."""
         return None
 
+    def elastic_strain(self, stress: Array) -> Array:
+        """Return the elastic Mandel strain (n_components, n_points) of a stress, all components."""
+        return self.elasticity.strain(stress)
+
     def energy_density(self, stress: Array) -> Array:
         """Return the elastic energy (n_points,) of Mandel stress [N mm/mm3]."""
         return self.elasticity.energy_density(stress)

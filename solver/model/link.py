@@ -10,7 +10,7 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 
-Components = Literal["x", "y", "xy"]
+Components = Literal["x", "y", "xy", "normal", "tangential"]
 Side = tuple[str, str]
 """Name of a body and of its boundary."""
 
@@ -28,7 +28,8 @@ class Link:
     master : body and boundary to which the slave is tied; their nodes need not match
     rigid : the rigid body whose motion the slave follows; with a master, the motion of the slave
         relative to the master, such as the shortening of a bolt. Rotations are small
-    components : of the displacement that it holds
+    components : of the displacement that it holds: along the axes, or along the normal or the
+        tangent of the slave at each node. At a corner the normal is the mean of both sides
     stiffness : of springs between the two, force per area and displacement [N/mm3]; inf is rigid
     distributed : whether only the mean motion of the slave is that of ``rigid``: its force and
         moment act on the slave by a linear traction, and it may deform. In axisymmetric bodies
@@ -44,7 +45,11 @@ class Link:
 
     def __post_init__(self) -> None:
         if self.components not in get_args(Components):
-            raise ModelError("components", self.components, "must be x, y or xy")
+            allowed = f"must be one of {', '.join(get_args(Components))}"
+            raise ModelError("components", self.components, allowed)
+        if self.local and (self.master or self.distributed):
+            allowed = "must be x, y or xy with a master, and where it is distributed"
+            raise ModelError("components", self.components, allowed)
         if not self.stiffness > 0:
             raise ModelError("stiffness", self.stiffness, "must be positive [N/mm3]")
         if self.distributed and (
@@ -55,8 +60,13 @@ class Link:
 
     @property
     def axes(self) -> tuple[int, ...]:
-        """Its components: 0 (x), 1 (y)."""
-        return tuple("xy".index(axis) for axis in self.components)
+        """Its components along axes: 0 (x), 1 (y); none of a `local` link."""
+        return () if self.local else tuple("xy".index(axis) for axis in self.components)
+
+    @property
+    def local(self) -> bool:
+        """Whether it holds the component along the normal, or the tangent, of the slave."""
+        return self.components in ("normal", "tangential")
 
     @property
     def grounded(self) -> bool:

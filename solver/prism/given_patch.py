@@ -32,8 +32,8 @@ class EllipticPatch:
     Across tractions are the nearest hats. Waves along take those of a station for a sample: that of
     a smooth pressure is its mean over the distance of stations, less a 24th of the second
     difference of means. Their sum is exact. At the edge a vertex outside the ellipse may have a
-    tension of p0 / 16. Stress below is that of the ellipse within 1 % of p0 from half an element
-    down, under its edge from 1.2 elements down.
+    tension of p0 / 16. Stress from half an element down is that of the ellipse within 1 % of p0;
+    under its edge, with elements of b / 6, within 1.2 %.
 
     Attributes
     ----------

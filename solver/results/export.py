@@ -10,7 +10,6 @@ from xml.etree import ElementTree
 import numpy as np
 
 from solver.errors import ModelError
-from solver.tensors import components
 
 if TYPE_CHECKING:
     import meshio
@@ -78,23 +77,19 @@ def to_meshio(fields: MeshFields, stage: str) -> meshio.Mesh:
     """Return a stage as one mesh of meshio with all bodies.
 
     The cell field ``body`` is the number of the body. Displacement has three components for
-    ParaView's *Warp By Vector*; stress is in the fields ``stress_xx`` and
-    so on, and so is plastic strain. Units: N, mm, MPa.
+    ParaView's *Warp By Vector*; stress is in the fields ``stress_xx`` and so on, and so are strain
+    and plastic strain. Units: N, mm, MPa.
     """
     import meshio  # imported here: only export needs it
 
-    values = dict(fields.stages[stage])
-    moved, stress = values.pop("displacement"), values.pop("stress")
-    plastic, names = values.pop("plastic_tensor"), components(len(stress))
+    values = fields.stages[stage]
     every = list(fields.bodies.values())
     return meshio.Mesh(
         _in_space(fields.X),
         [(_CELLS[cells.shape[1]], cells) for _, cells in every],
         point_data={
-            "displacement": _in_space(moved),
-            **{f"stress_{c}": each for c, each in zip(names, stress, strict=True)},
-            **{f"plastic_strain_{c}": each for c, each in zip(names, plastic, strict=True)},
-            **values,
+            "displacement": _in_space(values["displacement"]),
+            **{name: each for name, each in fields.parts(stage) if name[:-2] != "displacement"},
         },
         cell_data={"body": [np.full(len(cells), k) for k, (_, cells) in enumerate(every)]},
     )

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from solver.fem.fields import recovered_beside
+from solver.results.body_fields import BodyValues
 from solver.tensors import not_below_zero, to_tensor, von_mises
 
 if TYPE_CHECKING:
@@ -76,31 +77,14 @@ class Bodies(Protocol):
     def response(self, name: str, converged: Any) -> Response:
         """Return stress and internal variables at the points of a body."""
 
+    def strain(self, name: str, converged: Any) -> Array:
+        """Return the strain (n_components, n_points, Mandel) at the points of a body."""
+
     def displacement(self, name: str, state: State) -> Array:
         """Return the displacements (n,) of a body [mm]."""
 
     def axle(self, converged: Any) -> RigidMotion | None:
         """Return the motion of the first wheel, or None without a wheel."""
-
-
-class BodyValues(NamedTuple):
-    """Fields of a body at n of its nodes, or at n places.
-
-    Attributes
-    ----------
-    displacement : (n_axes, n) with two or three axes [mm]
-    stress : (n_components, n) recovered, components xx, yy, zz, xy (, yz, zx) [MPa]
-    mises : (n,) von Mises stress, recovered from its values at the integration points: computed
-        from the recovered stress it would exceed the strength [MPa]
-    plastic_strain : (n,) equivalent plastic strain, recovered
-    plastic_tensor : (n_components, n) plastic strain, recovered, components as of stress
-    """
-
-    displacement: Array
-    stress: Array
-    mises: Array
-    plastic_strain: Array
-    plastic_tensor: Array
 
 
 _POSITIVE = ("mises", "plastic_strain")
@@ -138,6 +122,7 @@ class SystemFields:
             mises=mises,
             plastic_strain=not_below_zero(self.recovered(body, response.state.accumulated)),
             plastic_tensor=to_tensor(self.recovered(body, response.state.plastic_strain)),
+            strain=to_tensor(self.recovered(body, self.system.strain(body, at))),
         )
 
     def at_points(self, at: Solved, body: str) -> tuple[Array, Array, Array]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver.results.body_fields import BODY_FIELDS, STORED
 from solver.results.outputs import output
 from solver.results.quantities import declare
 from solver.tensors import stress_difference
 
 if TYPE_CHECKING:
+    from solver.results.quantities import Quantity
     from solver.results.run import FinishedRun, Values
 
 _MAP = ("y", "x")
@@ -18,11 +20,14 @@ _MAP = ("y", "x")
 
 RESIDUAL_STRESS = declare("residual_stress", "residual stress", "MPa", dims=("component", *_MAP))
 PLASTIC_STRAIN = declare("plastic_strain", "equivalent plastic strain after unloading", dims=_MAP)
-MAP_STRESS = declare("map_stress", "stress", "MPa", dims=("stage", "component", *_MAP))
-MAP_MISES = declare("map_mises", "von Mises stress", "MPa", dims=("stage", *_MAP))
-MAP_PLASTIC_STRAIN = declare(
-    "map_plastic_strain", "equivalent plastic strain", dims=("stage", *_MAP)
-)
+MAP_FIELDS = {
+    name: declare(
+        f"map_{name}", BODY_FIELDS[name].long_name, BODY_FIELDS[name].units,
+        dims=("stage", *filter(None, [BODY_FIELDS[name].over]), *_MAP),
+    )
+    for name in STORED
+}  # fmt: skip
+"""Variables on the map in every stage, by field."""
 STRESS_DIFFERENCE = declare(
     "stress_difference",
     "difference of the principal stresses in the plane under load", "MPa", dims=_MAP,
@@ -52,24 +57,29 @@ HOOP_STRESS = declare(
 @output("maps", "map")
 def maps(run: FinishedRun) -> Values:
     """Return maps around the contact: all stages if the bodies are not unloaded at the end."""
-    samples = run.samples
-
-    def staged(name: str) -> np.ndarray:
-        return np.stack([samples.on_map(name, at) for at, _ in run.stages])
-
     if not run.view.unloaded:
-        found = {
-            MAP_STRESS: staged("stress"),
-            MAP_MISES: staged("mises"),
-            MAP_PLASTIC_STRAIN: staged("plastic_strain"),
-        }
-    else:
-        found = {
-            RESIDUAL_STRESS: samples.on_map("stress", run.unloaded),
-            PLASTIC_STRAIN: samples.on_map("plastic_strain", run.unloaded),
-            MAP_MISES: staged("mises"),
-        }
-    return _on_map(run, found)
+        return _staged(run, "stress", "mises", "plastic_strain")
+    samples = run.samples
+    residual = {
+        RESIDUAL_STRESS: samples.on_map("stress", run.unloaded),
+        PLASTIC_STRAIN: samples.on_map("plastic_strain", run.unloaded),
+    }
+    return _on_map(run, residual) | _staged(run, "mises")
+
+
+@output("strains", "map")
+def strains(run: FinishedRun) -> Values:
+    """Return maps of the components of strain and of plastic strain in every stage."""
+    return _staged(run, "strain", "plastic_tensor")
+
+
+def _staged(run: FinishedRun, *names: str) -> dict[Quantity, Any]:
+    """Return maps of fields in every stage."""
+    on_map = run.samples.on_map
+    return _on_map(
+        run,
+        {MAP_FIELDS[n]: np.stack([on_map(n, at) for at, _ in run.stages]) for n in names},
+    )
 
 
 @output("isochromatics", "map")
@@ -79,7 +89,7 @@ def isochromatics(run: FinishedRun) -> Values:
     return _on_map(run, {STRESS_DIFFERENCE: stress_difference(stress, run.view.map_axes)})
 
 
-def _on_map(run: FinishedRun, values: Values) -> Values:
+def _on_map(run: FinishedRun, values: Values) -> dict[Quantity, Any]:
     """Return values on the map, with the axes of the view as the last two dimensions."""
     across, up = run.view.map_axes
     return {each.at(*each.dims[:-2], up, across): value for each, value in values.items()}

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.results.body_fields import BODY_FIELDS
+
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -43,9 +45,7 @@ class MeshFields:
     X : (n_axes, n_nodes) positions of the nodes before loading
     bodies : for each body its element and the nodes (n_cells, k) of its cells: corners, mid-sides,
         middle; in two dimensions counterclockwise; of a hexahedron as VTK orders them
-    stages : for each stage ``displacement`` (n_axes, n_nodes), ``stress`` (n_components, n_nodes)
-        and ``plastic_tensor`` with components xx, yy, zz, xy (, yz, zx), ``mises`` and
-        ``plastic_strain`` (n_nodes,)
+    stages : for each stage the fields of `BodyValues` by name
     """
 
     X: Array
@@ -70,6 +70,12 @@ class MeshFields:
                 faces.append(np.pad(nodes, lacking, constant_values=NO_NODE))
                 numbers.append(np.full(len(nodes), number))
         return np.vstack(faces), np.concatenate(numbers)
+
+    def parts(self, stage: str) -> Iterator[tuple[str, Array]]:
+        """Yield the fields of a stage as numbers (n_nodes,) with names such as ``stress_xx``."""
+        for name, field in BODY_FIELDS.items():
+            values = np.atleast_2d(self.stages[stage][name])
+            yield from zip(field.numbers(len(self.X)), values, strict=True)
 
     def joined(self, other: MeshFields) -> MeshFields:
         """Return the bodies of both, which have the same axes and stages."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.results.body_fields import BODY_FIELDS, STORED
 from solver.results.quantities import along_axes, declare, declare_along, placed
 from solver.tensors import AXES
 
@@ -30,34 +31,28 @@ LINE = declare("line", "line", "", dims=("line",))
 POINT = declare("point", "point", "", dims=("point",))
 
 _LINE = ("line", "fraction")
-_STATES = ("line", "stage", "fraction")
 LINE_AT = declare_along("line_{}", "position along {} of a point of the line", "mm", dims=_LINE)
 LINE_S = declare("line_s", "distance from the start of the line", "mm", dims=_LINE)
-LINE_STRESS = declare(
-    "line_stress",
-    "stress along the line",
-    "MPa",
-    dims=("line", "stage", "component", "fraction"),
-    beside=placed("line", *AXES, "s"),
-)
-LINE_MISES = declare("line_mises", "von Mises stress along the line", "MPa", dims=_STATES)
-LINE_STRAIN = declare(
-    "line_plastic_strain", "equivalent plastic strain along the line", dims=_STATES
-)
+LINE_FIELDS = {
+    name: declare(
+        f"line_{name}", f"{BODY_FIELDS[name].long_name} along the line", BODY_FIELDS[name].units,
+        dims=("line", "stage", *filter(None, [BODY_FIELDS[name].over]), "fraction"),
+        beside=placed("line", *AXES, "s"),
+    )
+    for name in STORED
+}  # fmt: skip
+"""Variables along lines, by field."""
 
 _POINT = ("point", "stage")
 POINT_AT = declare_along("point_{}", "position of the point along {}", "mm", dims=("point",))
-POINT_STRESS = declare(
-    "point_stress",
-    "stress at the point",
-    "MPa",
-    dims=("point", "stage", "component"),
-    beside=placed("point", *AXES),
-)
-POINT_MISES = declare("point_mises", "von Mises stress at the point", "MPa", dims=_POINT)
-POINT_STRAIN = declare(
-    "point_plastic_strain", "equivalent plastic strain at the point", dims=_POINT
-)
+POINT_FIELDS = {
+    name: declare(
+        f"point_{name}", f"{BODY_FIELDS[name].long_name} at the point", BODY_FIELDS[name].units,
+        dims=(*_POINT, *filter(None, [BODY_FIELDS[name].over])), beside=placed("point", *AXES),
+    )
+    for name in STORED
+}  # fmt: skip
+"""Variables at points, by field."""
 POINT_MOVED = declare_along(
     "point_displacement_{}", "displacement of the point along {}", "mm", dims=_POINT
 )
@@ -66,7 +61,7 @@ POINT_MOVED = declare_along(
 def along_lines(
     fields: SystemFields, lines: Mapping[str, Places], states: Sequence[Solved]
 ) -> Values:
-    """Return stress and plastic strain in each state along lines with equal numbers of points."""
+    """Return the fields in each state along lines with equal numbers of points."""
     X = np.stack([line.X for line in lines.values()])
     distance = np.linalg.norm(np.diff(X, axis=2), axis=1)
     found = _states(fields, lines, states)
@@ -75,24 +70,20 @@ def along_lines(
         FRACTION: np.linspace(0.0, 1.0, X.shape[2]),
         **along_axes(LINE_AT, X.swapaxes(0, 1)),
         LINE_S: np.pad(np.cumsum(distance, axis=1), ((0, 0), (1, 0))),
-        LINE_STRESS: found["stress"],
-        LINE_MISES: found["mises"],
-        LINE_STRAIN: found["plastic_strain"],
+        **{quantity: found[name] for name, quantity in LINE_FIELDS.items()},
     }
 
 
 def at_points(
     fields: SystemFields, points: Mapping[str, Places], states: Sequence[Solved]
 ) -> Values:
-    """Return stress, plastic strain and displacement at points in each state."""
+    """Return the fields and displacement at points in each state."""
     found = {name: each[..., 0] for name, each in _states(fields, points, states).items()}
     X = np.stack([point.X[:, 0] for point in points.values()])
     return {
         POINT: np.array(list(points)),
         **along_axes(POINT_AT, X.T),
-        POINT_STRESS: found["stress"],
-        POINT_MISES: found["mises"],
-        POINT_STRAIN: found["plastic_strain"],
+        **{quantity: found[name] for name, quantity in POINT_FIELDS.items()},
         **along_axes(POINT_MOVED, np.moveaxis(found["displacement"], -1, 0)),
     }
 

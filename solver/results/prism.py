@@ -106,6 +106,13 @@ class PrismBody:
         del name
         return converged.response
 
+    def strain(self, name: str, converged: PrismStage) -> Array:
+        """Return the strain (6, n, Mandel) at the points, without that of an initial stress."""
+        del name
+        found = converged.response
+        strain = self._law.elastic_strain(found.stress) + found.state.plastic_strain
+        return strain - self.track.initial_strain.T
+
     def displacement(self, name: str, state: State) -> Array:
         """Return the displacements (n,) [mm]."""
         del name

@@ -68,7 +68,10 @@ def zone_fields(body: PrismBody, found: Pass[PrismState], loaded: str, left: str
         both = each[..., main, :], each[..., between, :][..., corners]
         return np.concatenate([own.reshape(*own.shape[:-2], -1) for own in both], axis=-1)
 
+    initial = track.initial_strain[modes.points, None]
+
     def stage(elastic: Array, plastic: Array, accumulated: Array, u: Array) -> Mapping[str, Array]:
+        strain = np.moveaxis(elastic + plastic - initial, -1, 0)
         stress = np.einsum("ab,pcb->apc", found.law.stiffness(6), elastic)
         return {
             "displacement": u,
@@ -76,6 +79,7 @@ def zone_fields(body: PrismBody, found: Pass[PrismState], loaded: str, left: str
             "mises": not_below_zero(at_nodes(von_mises(stress))),
             "plastic_strain": not_below_zero(at_nodes(accumulated)),
             "plastic_tensor": to_tensor(at_nodes(np.moveaxis(plastic, -1, 0))),
+            "strain": to_tensor(at_nodes(strain)),
         }
 
     x = track.before * (modes.length / modes.stations) + modes.x

@@ -10,6 +10,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.parameters import Coordinate
+from solver.results.body_fields import BODY_FIELDS, BodyField
 from solver.results.invariants import component, known_components
 from solver.results.quantities import Quantity
 from solver.tensors import AXES
@@ -26,23 +27,27 @@ if TYPE_CHECKING:
 
 Span = tuple[Coordinate, Coordinate]
 Take = Literal["maximum", "minimum", "integral", "extent"]
-_UNITS = {"stress": "MPa", "mises": "MPa", "plastic_strain": "1", "displacement": "mm",
-          "pressure": "MPa", "shear": "MPa", "gap": "mm", "slip": "mm"}  # fmt: skip
-_TENSORS = {"stress": "stress", "plastic_strain": "plastic_tensor"}
-"""Tensors by the names of requests, and of `BodyValues`."""
+_OF_PAIR = {"pressure": "MPa", "shear": "MPa", "gap": "mm", "slip": "mm"}
+_UNITS = {name: field.units for name, field in BODY_FIELDS.items()} | _OF_PAIR
 EXTREME = ("maximum", "minimum")
 FORCES = ("pressure", "shear")
 """Fields of a contact whose integral is a force: over the area, not along the surface."""
-OF_CONTACT = (*FORCES, "gap", "slip")
+OF_CONTACT = tuple(_OF_PAIR)
 """Fields of a contact of which a number can be requested."""
 
 
 def of_body(axes: int) -> tuple[str, ...]:
     """Return the fields of a body with this many axes of which a number can be requested."""
-    names = known_components(2 * axes)
-    moved = (f"displacement.{name}" for name in AXES[:axes])
-    tensors = (f"{tensor}.{name}" for tensor in _TENSORS for name in names)
-    return (*tensors, "mises", "plastic_strain", *moved)
+    return tuple(
+        name
+        for own, field in BODY_FIELDS.items()
+        for name in ([f"{field.stem}.{part}" for part in _parts(field, axes)] or [own])
+    )
+
+
+def _parts(field: BodyField, axes: int) -> tuple[str, ...]:
+    """Return the components and invariants of a field."""
+    return known_components(2 * axes) if field.over == "component" else field.parts(axes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,7 +176,11 @@ class RequestedNumber:
         body = str(self.body)
         X = fields.system.full(body).X if self.line is None else lines[self.line].X
         self._check(of_body(len(X)))
-        field = _TENSORS[kind] if part and kind in _TENSORS else kind
+        field = kind
+        if part:
+            field = next(
+                own for own, each in BODY_FIELDS.items() if each.over and each.stem == kind
+            )
         if self.line is not None:
             (there,) = fields.at_places(lines[self.line], [at])
             found = getattr(there, field)
@@ -181,7 +190,7 @@ class RequestedNumber:
         else:
             found = getattr(fields.at_nodes(at, body), field)
         if part:
-            of_axis = kind == "displacement"
+            of_axis = BODY_FIELDS[field].over == "axis"
             values = found[AXES.index(part)] if of_axis else component(found, part)
         else:
             values = found

@@ -118,13 +118,26 @@ class Solution:
         """Return the recovered equivalent plastic strain at the nodes (n_nodes,)."""
         return self._fields.at_nodes(self._at(stage), body).plastic_strain
 
+    def strain(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
+        """Return the recovered nodal strain (4, n_nodes), components xx, yy, zz, xy.
+
+        It is that of the displacements: elastic, plastic and of heat together. In plane stress zz
+        is the strain of the thickness.
+        """
+        return self._fields.at_nodes(self._at(stage), body).strain
+
+    def plastic_tensor(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
+        """Return the recovered nodal plastic strain (4, n_nodes), components xx, yy, zz, xy."""
+        return self._fields.at_nodes(self._at(stage), body).plastic_tensor
+
     def at(
         self, body: str, places: ArrayLike, stage: str = "unloaded"
     ) -> dict[str, NDArray[np.float64]]:
         """Return fields at places (2, n) [mm] of a body; NaN outside the body.
 
         They are ``displacement`` (2, n) [mm], ``stress`` (4, n) [MPa], components xx, yy, zz, xy,
-        ``mises`` (n,) [MPa] and ``plastic_strain`` (n,). Raises `ModelError` for an unknown body or
+        ``strain`` and ``plastic_tensor`` (4, n), plastic strain, ``mises`` (n,) [MPa] and
+        ``plastic_strain`` (n,), its equivalent. Raises `ModelError` for an unknown body or
         stage, or places of another shape.
         """
         X = np.asarray(places, dtype=float)

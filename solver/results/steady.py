@@ -116,6 +116,11 @@ class TrackBody:
         del name
         return converged.response
 
+    def strain(self, name: str, converged: TrackState) -> Array:
+        """Return the strain (4, n, Mandel) at the points, then at the surface above them."""
+        found = converged.response
+        return self.full(name).body.law.elastic_strain(found.stress) + found.state.plastic_strain
+
     def displacement(self, name: str, state: State) -> Array:
         """Return the displacements (n,) [mm]."""
         del name

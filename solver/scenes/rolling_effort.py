@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from solver.scenes.rolling_parameters import RollingParameters
 
-_ELEMENT = "quad8"
 _DECIDED = 3
 """Smallest number of passes after which a shakedown state may be decided."""
 
@@ -50,12 +49,12 @@ def _size(parameters: RollingParameters) -> tuple[int, int]:
     """
     p = parameters
     if p.endless:
-        elements, unknowns = _endless(p.mesh_width, p.element_size, p.growth)
+        elements, unknowns = _endless(p.mesh_width, p.element_size, p.growth, p.element)
     else:
-        elements, unknowns = _track(*track_grid(p))
+        elements, unknowns = _track(*track_grid(p), p.element)
     if p.load == "hertz":
         return elements, unknowns
-    own, rim = _wheel(p.radius, p.widest.reach, p.element_size)
+    own, rim = _wheel(p.radius, p.widest.reach, p.element_size, p.element)
     if p.endless:
         return elements + own, unknowns
     hub = 1 if p.guided else 2  # its height, and its rotation
@@ -64,37 +63,37 @@ def _size(parameters: RollingParameters) -> tuple[int, int]:
 
 @lru_cache(maxsize=4096)
 def _track(
-    fine: float, far: float, a: float, h: float, growth: float, periodic: bool
+    fine: float, far: float, a: float, h: float, growth: float, periodic: bool, element: str
 ) -> tuple[int, int]:
     """Return elements and unknowns of the half-space."""
     x, y = half_space_nodes(fine, far, a, h, growth, periodic)
     if not periodic:
-        return _held(len(x), len(y))
-    track = grid_size(len(x) - 1, len(y) - 1, _ELEMENT)
+        return _held(len(x), len(y), element)
+    track = grid_size(len(x) - 1, len(y) - 1, element)
     # the right side has the unknowns of the left one; the bottom is held
     return track.elements, 2 * (track.nodes - track.up) - 2 * (track.along - 1)
 
 
 @lru_cache(maxsize=4096)
-def _endless(a: float, h: float, growth: float) -> tuple[int, int]:
+def _endless(a: float, h: float, growth: float, element: str) -> tuple[int, int]:
     """Return elements and unknowns of the half-space of steady passes."""
     x, y = track_lines(a, h, growth)
-    return _held(len(x), len(y))
+    return _held(len(x), len(y), element)
 
 
-def _held(columns: int, rows: int) -> tuple[int, int]:
+def _held(columns: int, rows: int, element: str) -> tuple[int, int]:
     """Return elements and unknowns of a half-space of so many grid lines.
 
     x is held at both sides, x and y at the bottom.
     """
-    track = grid_size(columns - 1, rows - 1, _ELEMENT)
+    track = grid_size(columns - 1, rows - 1, element)
     # at both lower corners x is held by the side and by the bottom
     return track.elements, 2 * track.nodes - 2 * track.up - 2 * track.along + 2
 
 
 @lru_cache(maxsize=4096)
-def _wheel(radius: float, reach: float, h: float) -> tuple[int, int]:
+def _wheel(radius: float, reach: float, h: float, element: str) -> tuple[int, int]:
     """Return the elements of the wheel, and the unknowns of its rim."""
     angle, rings = wheel_nodes(radius, reach, h)
-    ring = grid_size(len(angle) - 1, len(rings) - 1, _ELEMENT)
-    return ring.elements, 2 * grid_size(rim_elements(reach, h), 0, _ELEMENT).along
+    ring = grid_size(len(angle) - 1, len(rings) - 1, element)
+    return ring.elements, 2 * grid_size(rim_elements(reach, h), 0, element).along

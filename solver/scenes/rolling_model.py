@@ -49,6 +49,7 @@ def _half_space(parameters: RollingParameters) -> Body:
         name="half_space",
         mesh=within(grid(x, y), "track", ["top"], x=(-parameters.fine, parameters.fine)),
         material=parameters.material(),
+        element=parameters.element,
         supports={"bottom": "xy"} if periodic else {"left": "x", "right": "x", "bottom": "xy"},
         travelling=travelling,
         periodic=("left", "right") if periodic else None,
@@ -67,12 +68,15 @@ def _ring(R: float, reach: float, h: float, turned: float) -> Mesh:
     return merged(mapped(ring, around))
 
 
-def wheel_body(axle: Axle, reach: float, h: float, material: Material) -> Body:
+def wheel_body(
+    axle: Axle, reach: float, h: float, material: Material, element: str = "quad8"
+) -> Body:
     """Return a wheel on its axle; see `wheel_nodes`."""
     return Body(
         name="wheel",
         mesh=_ring(axle.radius, reach, h, -axle.turned),
         material=material,
+        element=element,
         supports={"bottom": "xy"},
         axle=axle,
     )
@@ -99,7 +103,8 @@ def _wheel(parameters: RollingParameters) -> Body:
         rotation=rotation,
         turned=-turned,
     )
-    return wheel_body(axle, parameters.reach, parameters.element_size, parameters.wheel_material)
+    p = parameters
+    return wheel_body(axle, p.reach, p.element_size, p.wheel_material, p.element)
 
 
 def sketch(parameters: RollingParameters) -> Sketch | None:

@@ -84,6 +84,11 @@ class RollingParameters(WheelParameters):
     element_size: Annotated[float, Interval(gt=0.0, le=100.0), Unit("mm")] = by_accuracy(
         "element side along the track and at the surface"
     )
+    element: Literal["quad8", "quad4"] = described(
+        "quad8",
+        "element of both bodies, on a track of given length",
+        needs={"track": Other(ENDLESS)},
+    )
     growth: Annotated[float, Interval(ge=1.0, le=3.0), Unit("1")] = by_accuracy(
         "ratio of neighbouring element sides in depth"
     )
@@ -131,6 +136,7 @@ class RollingParameters(WheelParameters):
         """Raise `ModelError` for parameters that an endless track cannot have."""
         for name, usual in (
             ("periodic", False), ("advance_tolerance", 0.0), ("half_space_size", 400.0),
+            ("element", "quad8"),
         ):  # fmt: skip
             if (value := getattr(self, name)) != usual:
                 raise ModelError(name, value, f"must be {usual} with track = endless")

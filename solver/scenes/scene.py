@@ -16,6 +16,7 @@ from solver.loading.refinement import StepRefinement
 from solver.model.model import Model
 from solver.results.audit.figures import AUDIT
 from solver.results.mesh_fields import mesh_fields
+from solver.results.outlines import outlines
 from solver.results.quantities import QUANTITIES, Quantity
 from solver.results.record import Record, Status
 from solver.results.run import FinishedRun, Output, Values
@@ -186,7 +187,7 @@ class Scene:
         states = {stage: run.outcome.points[stage] for stage in run.view.stages}
         own = self.warnings(run) if self.warnings else ()
         figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
-        values = {**cost, **figures, **_merged(run, (singular_points, *self.outputs))}
+        values = {**cost, **figures, **_merged(run, (singular_points, outlines, *self.outputs))}
         written = self._labelled(run, Status.OK, (), values)
         places = self.places(run.parameters) if self.places else None
         comparison = stored(run, written, self.view(run.parameters), places)

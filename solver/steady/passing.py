@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
 
-from solver.errors import LimitLoad, NotConverged, WindowTooSmall
+from solver.errors import LimitLoad, NotConverged, TooLong, WindowTooSmall
 from solver.linear.krylov import gmres
 from solver.steady.body import S
 from solver.steady.flow import usual_parts
@@ -57,8 +57,26 @@ _AWAY = 3.0
 _FLOWS, _RUNS = 0.1, 1.0
 """A stalled solve counts as a limit load above the first plastic strain, any solve above the
 second. A material that hardens has no limit load: Newton's method has then diverged."""
+_SOLVES = 20_000
+"""Largest number of solves with the stiffness in a search for a pass; one takes 50 to 2100."""
 _PATIENCE, _PROGRESS = 14, 0.7
 """Over this number of steps the residual must drop to this ratio, or the pass is given up."""
+
+
+class SolveBudget:
+    """Counts the solves with the stiffness of all attempts to find a pass."""
+
+    def __init__(self, most: int = _SOLVES) -> None:
+        self.solves, self._most = 0, most
+
+    def solve(self) -> None:
+        """Count one; raise `TooLong` above the largest number."""
+        if self.solves >= self._most:
+            raise TooLong(
+                f"no steady pass was found in {self._most} solves with the stiffness; larger "
+                "elements or more hardening make it easier to find, and each solve faster"
+            )
+        self.solves += 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +142,7 @@ def passing(
     *,
     parts: int | None = None,
     tolerance: float = TOLERANCE,
+    budget: SolveBudget | None = None,
 ) -> Pass[S]:
     """Return the steady pass of a load over a body.
 
@@ -136,9 +155,12 @@ def passing(
     guess : strains (n_rows, n_columns, n_components) to start from, for instance of a similar pass
     parts : number of increments between two points of a row, `usual_parts` if None
     tolerance : largest deviatoric strain of the residual, times 2 G / yield stress
+    budget : counts the solves, those of earlier attempts included
 
     Raises
     ------
+    TooLong
+        if that takes too many solves
     LimitLoad
         if plastic strain grows without bound in a material that does not harden
     WindowTooSmall
@@ -149,11 +171,11 @@ def passing(
     parts = parts or usual_parts(material)
     scale, rough = np.sqrt(track.weights)[..., None], track.rough
     double_shear = 2 * material.elasticity.shear_modulus
-    solves, krylov = 0, _KRYLOV
+    budget, krylov = budget or SolveBudget(), _KRYLOV
+    before_it = budget.solves
 
     def at(added: Array, elastic: AppliedLoad | None = None) -> _At[S]:
-        nonlocal solves
-        solves += 1
+        budget.solve()
         flow = track.flow(material, before, added, parts)
         if elastic is not None and not flow.force.any():  # nothing yields
             return _At(added, flow, elastic, np.zeros_like(added), 0.0)
@@ -186,12 +208,11 @@ def passing(
                 loading=here.loading,
                 left_over=left_over,
                 steps=step,
-                solves=solves,
+                solves=budget.solves - before_it,
             )
 
         def newton(scaled: Array, here: _At[S] = here) -> Array:
-            nonlocal solves
-            solves += 1
+            budget.solve()
             change = scaled.reshape(shape) / scale
             made = rough.strain(here.loading.along(rough.solve(here.flow.along(change))))
             return np.asarray((scale * (change - made)).ravel())
@@ -257,6 +278,8 @@ def searched(at: Callable[[float], Sized], size: float, shortest: float = _SHORT
     while share >= shortest:
         try:
             there = at(share)
+        except TooLong:
+            raise
         except NotConverged as error:  # no contact was found for this shape of the surface
             failure = error
         else:

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.errors import LimitLoad, NoContact, NotConverged, Spins, WindowTooSmall
+from solver.errors import LimitLoad, NoContact, NotConverged, Spins, TooLong, WindowTooSmall
 from solver.materials.material import Material
-from solver.steady.passing import TOLERANCE, passing
+from solver.steady.passing import TOLERANCE, SolveBudget, passing
 from solver.steady.touching import RollingContact
 
 if TYPE_CHECKING:
@@ -68,18 +68,22 @@ def search(
 
     Raises
     ------
-    LimitLoad, WindowTooSmall, NotConverged
-        as `passing` does; `LimitLoad` also if a pass adds more than 30 % of plastic strain in a
-        material without hardening
+    LimitLoad, WindowTooSmall, TooLong, NotConverged
+        as `passing` does, `TooLong` for all attempts together; `LimitLoad` also if a pass adds more
+        than 30 % of plastic strain in a material without hardening
     """
+    budget = SolveBudget()
 
     def exactly(load: PassingLoad, guess: Array | None = None) -> Pass[Layers]:
-        return passing(track, material, load, before, guess, parts=parts, tolerance=tolerance)
+        return passing(
+            track, material, load, before, guess, parts=parts, tolerance=tolerance, budget=budget
+        )
 
     def eased(load: PassingLoad, ratio: float, guess: Array | None) -> Pass[Layers]:
         return passing(
-            track, _linear(material, ratio), load, before, guess, parts=_PARTS, tolerance=_TOLERANCE
-        )
+            track, _linear(material, ratio), load, before, guess, parts=_PARTS,
+            tolerance=_TOLERANCE, budget=budget,
+        )  # fmt: skip
 
     own = 0.0
     if isinstance(material, Material) and material.hardens:
@@ -145,10 +149,10 @@ def _check_spinning(exactly: Callable[[PassingLoad], Pass[Layers]], load: Passin
 
 
 def _tried(solve: Callable[..., Pass[Layers]], *given: Any) -> Pass[Layers] | NotConverged:
-    """Return a pass, or the reason why it was not found; raise `WindowTooSmall`."""
+    """Return a pass, or the reason why it was not found; raise `WindowTooSmall` and `TooLong`."""
     try:
         return solve(*given)
-    except WindowTooSmall:
+    except (WindowTooSmall, TooLong):
         raise
     except NotConverged as failure:
         return failure

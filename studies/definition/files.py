@@ -97,8 +97,11 @@ def _with_rows(line: Any, field: str, folder: Path) -> Any:
 
 def _at_place(text: str, field: str) -> dict[str, Any]:
     """Return the rows of a measured line, and its place, which may be behind the file's name."""
-    name, _, places = text.rpartition("@")
-    if not name or "=" not in places:
+    signs = [k for k in range(len(text) - 1, 0, -1) if text[k] == "@" and "=" in text[k:]]
+    there = (k for k in [len(text), *signs] if Path(text[:k]).is_file())
+    end = next(there, signs[0] if signs else len(text))  # names and folders may have these signs
+    name, places = text[:end], text[end + 1 :]
+    if not places:
         return {"rows": read_table(text, field)}
     at: dict[str, Any] = {}
     for each in places.split(","):

@@ -31,7 +31,8 @@ from typing import Any, NamedTuple
 
 from solver.parameters import is_number
 from solver.scenes import Scene
-from studies.definition.parameters import Parameter, parameters_of
+from studies.definition.parameters import Parameter, in_unit, parameters_of
+from studies.definition.place import Chooser
 from studies.definition.quantity import number_of_a_run
 from studies.definition.spaced import is_finite, rounded
 from studies.definition.vocabulary import NO_EQUILIBRIUM, SOLVED
@@ -230,7 +231,7 @@ class PathLimit:
 
 
 @dataclass(slots=True)
-class Search:
+class Search(Chooser):
     """The search for the goal at one place of the other axes.
 
     Attributes
@@ -482,6 +483,7 @@ def _threshold(field_: str, value: Any, of: Any, scene: Scene) -> float:
         if value not in words:
             raise StudyError(field_, value, one_of(value, words))
         return words[value]
-    if not is_finite(value):
+    number = in_unit(scene.known_quantities[of].units, value, field_)
+    if not is_finite(number):
         raise StudyError(field_, value, "must be a finite number")
-    return float(value)
+    return float(number)

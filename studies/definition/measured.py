@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.definition.line import Read, picked
+from studies.definition.parameters import in_unit
 from studies.definition.spaced import is_finite
 from studies.errors import StudyError, check_entries, nearest, one_of
 from studies.units import UnitError, number_in, under
@@ -161,9 +161,12 @@ def _checked(field: str, content: Any, scene: Scene, axes: Collection[str]) -> M
     check_entries(field, given, _KEYS)
     of = _known(f"{field}.of", given.get("of"), scene)
     over = _known(f"{field}.over", given["over"], scene) if given.get("over", "") != "" else ""
-    values = _numbers(f"{field}.values", given.get("values"))
-    places = _numbers(f"{field}.places", given.get("places", [])) if over else np.empty(0)
+    unit = scene.known_quantities[of].units
+    values = _numbers(f"{field}.values", given.get("values"), unit)
+    places = np.empty(0)
     if over:
+        along = scene.known_quantities[over].units
+        places = _numbers(f"{field}.places", given.get("places", []), along)
         if len(places) != len(values) or len(places) < 2 or not np.ptp(places) > 0.0:
             allowed = (
                 f"must be as many as the values, {len(values)}, and two different ones at least"
@@ -177,8 +180,8 @@ def _checked(field: str, content: Any, scene: Scene, axes: Collection[str]) -> M
         raise StudyError(f"{field}.values", given.get("values"), "must be one number or more")
     told = "sigma" in given
     raw = given.get("sigma", _USUAL * float(np.abs(values).max()) or 1.0)
-    many = [raw] * len(values) if is_number(raw) else raw
-    sigma = _numbers(f"{field}.sigma", many)
+    many = raw if isinstance(raw, list | tuple) else [raw] * len(values)
+    sigma = _numbers(f"{field}.sigma", many, unit)
     if len(sigma) != len(values) or not (sigma > 0.0).all():
         allowed = "must be a number > 0, or one for each value"
         raise StudyError(f"{field}.sigma", raw, allowed)
@@ -191,7 +194,7 @@ def _checked(field: str, content: Any, scene: Scene, axes: Collection[str]) -> M
             raise StudyError(f"{field}.at.{name}", value, one_of(name, [*axes, *quantity.dims]))
     return MeasuredLine(
         of=of, over=over, at=dict(at), places=places, values=values, sigma=sigma, told=told,
-        unit=quantity.units,
+        unit=unit,
     )  # fmt: skip
 
 
@@ -248,7 +251,11 @@ def _known(field: str, name: Any, scene: Scene) -> str:
     return name
 
 
-def _numbers(field: str, values: Any) -> Numbers:
+def _numbers(field: str, values: Any, unit: str) -> Numbers:
+    if isinstance(values, list | tuple):
+        values = [
+            in_unit(unit, each, f"{field}[{k}]") for k, each in enumerate(values[: _MOST + 1])
+        ]
     fits = isinstance(values, list | tuple) and len(values) <= _MOST and all(map(is_finite, values))
     if not fits:
         raise StudyError(field, values, "must be a list of finite numbers")

@@ -18,10 +18,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from heapq import heapify, heappop, heappush
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from solver.parameters import is_number
 from studies.definition.identity import canonical
@@ -30,6 +32,8 @@ Array = NDArray[np.float64]
 
 _NEAREST = 12
 """Largest number of places by which a value is foreseen."""
+_ROUNDING = 1.0 + 1e-9
+"""Factor on a distance within which all places of this distance are found."""
 
 
 class Neighbours:
@@ -60,20 +64,17 @@ class Neighbours:
     def _order(self, group: NDArray[np.int64]) -> None:
         """Tell of each place of a group which it waits for."""
         at = self._at[group]
-        level = np.zeros(len(group), dtype=int)
-        away = np.linalg.norm(at - at[0], axis=1)
-        farthest = away.max()
-        first = True
-        while away.max() > 0.0:
-            k = int(away.argmax())
-            level[k] = 0 if first else 1 + int(math.log2(farthest / away[k]) + 1e-9)
-            first = False
-            away = np.minimum(away, np.linalg.norm(at - at[k], axis=1))
-        for k in np.flatnonzero(level).tolist():
-            lower = np.flatnonzero(level < level[k])
-            apart = np.linalg.norm(at[lower] - at[k], axis=1)
-            nearest = lower[np.argsort(apart, kind="stable")[:_NEAREST]]
-            self.before[group[k]] = group[nearest].tolist()
+        level = _levels(at)
+        for each in range(1, level.max() + 1):
+            lower, own = (np.flatnonzero(level < each), np.flatnonzero(level == each))
+            tree = KDTree(at[lower])
+            farthest = tree.query(at[own], [min(_NEAREST, len(lower))])[0][:, 0]
+            balls = tree.query_ball_point(at[own], farthest * _ROUNDING)
+            for k, ball in zip(own.tolist(), balls, strict=True):
+                near = lower[np.sort(ball)]  # several may be equally far: the first ones count
+                apart = np.linalg.norm(at[near] - at[k], axis=1)
+                nearest = near[np.argsort(apart, kind="stable")[:_NEAREST]]
+                self.before[group[k]] = group[nearest].tolist()
 
     def foreseen(self, number: int, values: Sequence[float]) -> float | None:
         """Return what the values of the places it waits for let expect at a place; None of none.
@@ -97,6 +98,35 @@ class Neighbours:
         right[:count] = np.asarray(values)[known]
         weights = np.linalg.lstsq(system, right, rcond=1e-10)[0]  # too few places: the least slope
         return float((terms(self._at[[number]]) @ weights).item())
+
+
+def _levels(at: Array) -> NDArray[np.int64]:
+    """Return the level (n,) of each place (n, d) of a group.
+
+    A place that comes changes the distances only of places nearer to it than it was to all before
+    it: these are found by a tree, and the farthest of all by a heap.
+    """
+    level = np.zeros(len(at), dtype=int)
+    away = np.linalg.norm(at - at[0], axis=1)
+    farthest = float(away.max())
+    if farthest == 0.0:
+        return level
+    tree, first = KDTree(at), True
+    order = [(-far, k) for k, far in enumerate(away.tolist())]
+    heapify(order)
+    while order[0][0] < 0.0:
+        far, k = heappop(order)
+        if -far != away[k]:
+            continue  # it is in the order once more, as it is now
+        level[k] = 0 if first else 1 + int(math.log2(farthest / away[k]) + 1e-9)
+        first = False
+        near = np.array(tree.query_ball_point(at[k], -far * _ROUNDING))
+        apart = np.linalg.norm(at[near] - at[k], axis=1)
+        closer = apart < away[near]
+        away[near[closer]] = apart[closer]
+        for each, distance in zip(near[closer].tolist(), apart[closer].tolist(), strict=True):
+            heappush(order, (-distance, each))
+    return level
 
 
 def _without_switches(at: Array) -> Array:

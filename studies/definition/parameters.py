@@ -23,7 +23,7 @@ from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.errors import StudyError, one_of
 from studies.scenes.registry import scene_named
-from studies.units import UnitError, converted, is_quantity
+from studies.units import UnitError, converted, is_quantity, number_in
 
 _RELATIONS = {
     "exclusiveMinimum": ">",
@@ -95,10 +95,7 @@ class Parameter:
             each.get("type") for each in options
         ):
             return value
-        try:
-            return converted(value, self.unit)
-        except UnitError as error:
-            raise StudyError(field, value, f"must be {self.allowed}; {error}") from None
+        return in_unit(self.unit, value, field, self.allowed)
 
     def read(self, text: str, field: str) -> Any:
         """Return the normalised value that a text stands for: a word, or else JSON.
@@ -274,6 +271,22 @@ def _describe(schema: Mapping[str, Any]) -> str:
     return " ".join(
         [words.get(kind, f"of type {kind}"), *([" and ".join(limits)] if limits else [])]
     )
+
+
+def in_unit(unit: str, value: Any, field: str, allowed: str = "") -> Any:
+    """Return the number of a text such as ``195 GPa`` in a unit; other values stay.
+
+    Raises
+    ------
+    StudyError
+        naming ``field``, when the unit has another dimension
+    """
+    if not is_quantity(value):
+        return value
+    try:
+        return converted(value, unit)
+    except UnitError as error:
+        raise StudyError(field, value, f"must be {allowed or number_in(unit)}; {error}") from None
 
 
 def plain(value: Any, usual: Any) -> Any:

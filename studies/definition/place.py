@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -31,6 +31,10 @@ class Chooser(Protocol):
     def wants(self) -> list[Any]:
         """The runs that it lacks now, by a key of its own; none at the end."""
 
+    def lacking(self, known: Collection[Any]) -> list[Any]:
+        """Return the runs that it lacks, without some of them that are known."""
+        return [key for key in self.wants if key not in known]
+
     @property
     def reason(self) -> str:
         """Why it has ended; empty until then."""
@@ -57,6 +61,10 @@ class Chooser(Protocol):
     def limit(self) -> Any:
         """What tells the last run that is needed on a loading path; None if all are."""
         return None
+
+    def lacks(self, key: Any) -> bool:
+        """Whether it lacks a run now."""
+        return key in self.wants
 
     def sets(self, key: Any) -> dict[str, Any]:
         """Return the parameters that a run sets."""
@@ -117,7 +125,7 @@ class Place(Generic[Asks]):
     def hear(self, row: Mapping[str, Any]) -> bool:
         """Tell the program of a run; return whether it had asked for it."""
         key = self.program.key(row["parameters"])
-        asked = key in self.program.wants
+        asked = self.program.lacks(key)
         if asked:
             self.program.tell(key, row)
         return asked

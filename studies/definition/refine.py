@@ -20,7 +20,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from bisect import bisect_left
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -28,9 +30,9 @@ import numpy as np
 
 from solver.parameters import is_number
 from solver.scenes import Scene
-from studies.definition.cells import KINK, Cell, Point, weights
+from studies.definition.cells import KINK, Cell, Point, between, weights
 from studies.definition.line import Read
-from studies.definition.parameters import parameters_of
+from studies.definition.parameters import in_unit, parameters_of
 from studies.definition.place import Chooser
 from studies.definition.quantity import RunNumber, checked_number
 from studies.definition.spaced import is_finite
@@ -46,6 +48,8 @@ _KEYS = ("of", "until", "most", "halvings")
 _UNTIL, _MOST, _HALVINGS = 0.02, 200, 5
 """Entries that are left out."""
 _MOST_AXES, _MOST_HALVINGS = 4, 20
+_NEAR = 1.0 + 1e-9
+"""Factor on a distance within which all runs of this distance are found."""
 _ROUNDING = 1e-12
 """Part of a number that is rounding: it is the same in all runs if it varies by no more."""
 
@@ -119,7 +123,8 @@ class _Halving(NamedTuple):
 
     Attributes
     ----------
-    cell, axes, left : the cell, the axes, and the errors that are left if it is not divided
+    cell, axes, left : the cell, the axes, and the errors that are left if it is not divided;
+        without axes it asks for the run at its centre
     miss : how far it missed what is allowed
     """
 
@@ -169,7 +174,9 @@ class Refinement(Chooser):
     _lacks: dict[Cell, int] = field(default_factory=dict)
     _waits: dict[Wanted, list[Cell]] = field(default_factory=dict)
     _known: list[Cell] = field(default_factory=list)
-    _halvings: list[_Halving] = field(default_factory=list)
+    _halvings: dict[int, list[_Halving]] = field(default_factory=dict)
+    _rounds: Counter[int] = field(default_factory=Counter)
+    _share: float = 0.0
     _allowed: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -181,6 +188,15 @@ class Refinement(Chooser):
         """The runs that it lacks."""
         return list(self._waits)
 
+    def lacking(self, known: Collection[Wanted]) -> list[Wanted]:
+        """Return the runs that it lacks, without some of them that are known."""
+        some = len(known) < len(self._waits)  # at most runs nothing new is asked for
+        return [wanted for wanted in self._waits if wanted not in known] if some else []
+
+    def lacks(self, key: Wanted) -> bool:
+        """Whether it lacks a run now."""
+        return key in self._waits
+
     @property
     def reason(self) -> str:
         """Why it has ended; empty until then."""
@@ -191,8 +207,8 @@ class Refinement(Chooser):
     @property
     def share(self) -> float:
         """Share of the ranges that is settled."""
-        whole = sum(_volume(cell) for cell in self.refine.cells(len(self.branches)))
-        return sum(_volume(each.cell) for each in self.settled) / whole
+        cells = math.prod(len(values) - 1 for values in self.refine.axes.values())
+        return self._share / (cells * len(self.branches))
 
     @property
     def progress(self) -> float:
@@ -202,14 +218,15 @@ class Refinement(Chooser):
     @property
     def told(self) -> str:
         """The round, and how far it is from its end, as text."""
-        stage = 1 + max(map(_round, self._lacks), default=0)
+        stage = 1 + max(self._rounds, default=0)
         runs = f"run {len(self.rows)} of at most {self.refine.most}"
         return f"round {stage}, {runs}, {100 * self.share:.0f} % of the ranges settled"
 
     @property
     def cells(self) -> list[RefinedCell]:
         """The cells that are not divided, those included of which something is still open."""
-        halved = (RefinedCell(each.cell, OPEN, each.left) for each in self._halvings)
+        halvings = itertools.chain(*self._halvings.values())
+        halved = (RefinedCell(each.cell, OPEN, each.left) for each in halvings)
         every = [*self.settled, *halved, *(RefinedCell(cell, OPEN) for cell in self._lacks)]
         return sorted(every, key=lambda each: (each.cell.branch, each.cell))
 
@@ -228,7 +245,7 @@ class Refinement(Chooser):
             self._lacks[cell] -= 1
             if not self._lacks[cell]:
                 self._known.append(cell)
-        if not self._allowed and not self.wants:
+        if not self._allowed and not self._waits:
             self._allowed = self._largest_misses()
         while self._allowed and self._known:
             while self._known:
@@ -269,15 +286,16 @@ class Refinement(Chooser):
                 raise StudyError(f"refine.of[{k}]", each.content, str(error)) from None
         return None if None in found else tuple(map(float, found))
 
-    def _open(self, cell: Cell) -> None:
-        """Ask for the runs of a cell."""
+    def _open(self, cell: Cell, points: Sequence[Point] = ()) -> None:
+        """Ask for some runs of a cell: by default those that it must have."""
         stage, lacks = _round(cell), 0
-        for wanted in (Wanted(cell.branch, point) for point in points_of(cell)):
+        for wanted in (Wanted(cell.branch, point) for point in points or points_of(cell)):
             self.asked[wanted] = min(self.asked.get(wanted, stage), stage)
             if wanted not in self.rows:
                 self._waits.setdefault(wanted, []).append(cell)
                 lacks += 1
         self._lacks[cell] = lacks
+        self._rounds[stage] += 1
         if not lacks:
             self._known.append(cell)
 
@@ -294,11 +312,12 @@ class Refinement(Chooser):
     def _decide(self, cell: Cell) -> None:
         """Settle a cell whose runs are known, or keep it to be divided."""
         del self._lacks[cell]
+        self._rounds -= Counter([_round(cell)])
         known = {at: self.number(Wanted(cell.branch, at)) for at in points_of(cell)}
         there = {at: each for at, each in known.items() if each is not None}
         every, left = set(range(len(cell.low))), ()
         if not there:
-            self.settled.append(RefinedCell(cell, FAILED))
+            self._settle(RefinedCell(cell, FAILED))
             return
         if len(there) < len(known):
             changes = {
@@ -311,45 +330,132 @@ class Refinement(Chooser):
             worst = sorted(every, key=lambda axis: -ratios[axis])
             free = [k for k in worst if ratios[k] > 1.0 and cell.divisible(k, self.refine.halvings)]
             miss, axes = max(ratios), set(free[:1]) or {k for k in worst if ratios[k] > 1.0}
-            if not any(cell.halved) and not axes:
-                miss = self._ratio(_off(cell, there, cell.centre, there[cell.centre]))
-                axes = every if miss > 1.0 else axes
             left = tuple(KINK * sum(each) for each in zip(*misses, strict=True))
+            twist = self._ratio(_twists(cell, there))
+            if axes and not free and twist > 1.0:
+                axes = self._across(cell)  # a slanting kink is resolved along any axis
+            if not axes:
+                centre = Wanted(cell.branch, cell.centre)
+                if centre in self.rows:
+                    number = self.number(centre)
+                    missed = _off(cell, there, centre.point, number) if number else None
+                    miss = self._ratio(missed) if missed else math.inf
+                    axes = self._across(cell) if miss > 1.0 else axes
+                elif twist > 1.0:
+                    self._halve(_Halving(cell, [], twist, left))
+                    return
         can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
         if can:
-            self._halvings.append(_Halving(cell, can, miss, left))
+            self._halve(_Halving(cell, can, miss, left))
         else:
-            self.settled.append(RefinedCell(cell, SMALLEST if axes else SETTLED, left))
+            self._settle(RefinedCell(cell, SMALLEST if axes else SETTLED, left))
+
+    def _across(self, cell: Cell) -> set[int]:
+        """Return the axes along which a cell is halved that misses the run at its centre."""
+        every = range(len(cell.low))
+        can = [axis for axis in every if cell.divisible(axis, self.refine.halvings)]
+        least = sorted(can or every, key=lambda axis: cell.halved[axis])
+        return set(least[:1] if any(cell.halved) else every)
+
+    def _settle(self, found: RefinedCell) -> None:
+        """Keep a cell that is not divided."""
+        self.settled.append(found)
+        self._share += _volume(found.cell)
+
+    def _halve(self, halving: _Halving) -> None:
+        """Keep a cell to be divided."""
+        self._halvings.setdefault(_round(halving.cell), []).append(halving)
 
     def _look_around(self) -> None:
-        """Add what the cells miss at runs of their neighbours to the errors that are left in them.
+        """Find the errors that are left in the cells by the runs of their neighbours.
 
         Cells that miss more than is allowed are to be divided after all.
         """
-        known = {each: number for each in self.asked if (number := self.number(each))}
-        keys = list(known)
-        branches = np.array([each.branch for each in keys])
-        at = np.array([each.point for each in keys], dtype=float).reshape(-1, len(self.refine.axes))
-        settled, self.settled = self.settled, []
-        for cell, state, left in settled:
+        settled, self.settled, self._share = self.settled, [], 0.0
+        lines = self._lines()
+        for (cell, state, left), places in zip(settled, self._inside(settled), strict=True):
+            if not left:
+                self._settle(RefinedCell(cell, state))
+                continue
+            known = {at: self._numbers[Wanted(cell.branch, at)] or () for at in points_of(cell)}
+            along, turns = self._left(cell, known, lines)
+            misses = [tuple(float(sum(each)) for each in zip(*along, strict=True))]
+            if Wanted(cell.branch, cell.centre) not in self.rows:
+                misses.append(tuple(map(min, zip(_twists(cell, known), turns, strict=True))))
             axes: set[int] = set()
-            misses = [left]
-            own = {at: known[Wanted(cell.branch, at)] for at in points_of(cell)} if left else {}
-            inside = (branches == cell.branch) & (at >= cell.low).all(1) & (at <= cell.high).all(1)
-            for each in (keys[k] for k in np.flatnonzero(inside)) if left else ():
-                if each.point in own:
+            if self._ratio(misses[0]) > 1.0:
+                worst = sorted(range(len(along)), key=lambda axis: -self._ratio(along[axis]))
+                can = [each for each in worst if cell.divisible(each, self.refine.halvings)]
+                axes = set((can or worst)[:1])
+            for at in places:
+                number = self.number(Wanted(cell.branch, at))
+                if at in known or number is None:
                     continue
-                misses.append(_off(cell, own, each.point, known[each]))
+                misses.append(_off(cell, known, at, number))
                 if self._ratio(misses[-1]) > 1.0:
-                    ends = zip(cell.low, each.point, cell.high, strict=True)
+                    ends = zip(cell.low, at, cell.high, strict=True)
                     axes |= {k for k, (low, x, high) in enumerate(ends) if low < x < high}
             most = tuple(map(max, zip(*misses, strict=True)))
             can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
             if can and state == SETTLED:
-                self._halvings.append(_Halving(cell, can, self._ratio(most), most))
+                self._halve(_Halving(cell, can, self._ratio(most), most))
             else:
                 small = axes and state == SETTLED
-                self.settled.append(RefinedCell(cell, SMALLEST if small else state, most))
+                self._settle(RefinedCell(cell, SMALLEST if small else state, most))
+
+    def _lines(self) -> dict[Any, list[float]]:
+        """Return where runs with numbers are on each line along an axis, in increasing order."""
+        found: dict[Any, list[float]] = {}
+        for branch, at in self.asked:
+            if self.number(Wanted(branch, at)):
+                for axis, value in enumerate(at):
+                    found.setdefault((branch, axis, at[:axis], at[axis + 1 :]), []).append(value)
+        return {line: sorted(values) for line, values in found.items()}
+
+    def _left(
+        self, cell: Cell, known: Mapping[Point, tuple[float, ...]], lines: Mapping[Any, list[float]]
+    ) -> tuple[Misses, tuple[float, ...]]:
+        """Return of each axis the largest error of each number that is left on the edges along it.
+
+        Beyond the first and the last run of a line the slope is taken to change as it does inside.
+        The second result is the largest error of each number that kinks at corners may leave: a
+        quarter of what a change of slope at a corner makes along an edge.
+        """
+        found = [(0.0,) * len(self.refine.of) for _ in cell.low]
+        turns = found[0]
+        for axis, low, high, mid in cell.edges:
+            sides = mid[:axis], mid[axis + 1 :]
+            line = lines[cell.branch, axis, *sides]
+            x0, x1, x2 = (each[axis] for each in (low, mid, high))
+            first, last = _beyond(line, x0, x0 - x1), _beyond(line, x2, x2 - x1)
+            xs = [each for each in (first, x0, x1, x2, last) if each is not None]
+            runs = (Wanted(cell.branch, (*sides[0], x, *sides[1])) for x in xs)
+            slopes = np.diff([self._numbers[each] or () for each in runs], axis=0).T / np.diff(xs)
+            errors, corners = [], []
+            for jumps in np.diff(slopes).tolist():
+                before, at, after = jumps[0], jumps[first is not None], jumps[-1]
+                halves = between(x1 - x0, before, at, after), between(x2 - x1, after, at, before)
+                errors.append(max(halves))
+                corners.append(max(abs(before - at), abs(after - at)) * (x2 - x0) / 4.0)
+            found[axis] = tuple(map(max, zip(found[axis], errors, strict=True)))
+            turns = tuple(map(max, zip(turns, corners, strict=True)))
+        return found, turns
+
+    def _inside(self, found: Sequence[RefinedCell]) -> Iterator[list[Point]]:
+        """Yield of each cell where runs are in it and on its boundary."""
+        from scipy.spatial import KDTree  # takes long to load
+
+        span = np.array([values[-1] - values[0] for values in self.refine.axes.values()])
+        points: dict[int, list[Point]] = {}
+        for branch, point in self.asked:
+            points.setdefault(branch, []).append(point)
+        trees = {branch: KDTree(np.array(each) / span) for branch, each in points.items()}
+        for cell in (each.cell for each in found):
+            low, high = np.array(cell.low) / span, np.array(cell.high) / span
+            reach = (high - low).max() / 2.0 * _NEAR
+            near = trees[cell.branch].query_ball_point((low + high) / 2.0, reach, p=math.inf)
+            every = (points[cell.branch][k] for k in sorted(near))
+            yield [point for point in every if cell.holds(cell.branch, point)]
 
     def _ratio(self, misses: tuple[float, ...]) -> float:
         """Return how far misses are beyond what is allowed: above 1 if they are."""
@@ -360,30 +466,35 @@ class Refinement(Chooser):
 
     def _divide(self) -> None:
         """Divide the cells that may be divided now."""
-        for stage in sorted({_round(each.cell) for each in self._halvings}):
-            own = [each for each in self._halvings if _round(each.cell) == stage]
-            early = any(_round(cell) <= stage for cell in self._lacks)
-            if early and self._at_most(stage) > self.refine.most:
+        while self._halvings:
+            stage = min(self._halvings)
+            if (
+                min(self._rounds, default=math.inf) <= stage
+                and self._at_most(stage) > self.refine.most
+            ):
                 return
-            self._halvings = [each for each in self._halvings if each not in own]
             full = False
-            for cell, axes, _, left in sorted(own, key=lambda each: each.order):
-                parts = cell.parts(axes)
-                new = {Wanted(part.branch, at) for part in parts for at in points_of(part)}
-                full = full or len(self.asked) + len(new - self.asked.keys()) > self.refine.most
+            for cell, axes, _, left in sorted(
+                self._halvings.pop(stage), key=lambda each: each.order
+            ):
+                parts = {each: points_of(each) for each in cell.parts(axes)} if axes else {}
+                asks = parts or {cell: [cell.centre]}
+                new = {Wanted(cell.branch, at) for points in asks.values() for at in points}
+                more = sum(each not in self.asked for each in new)
+                full = full or len(self.asked) + more > self.refine.most
                 if full:
-                    self.settled.append(RefinedCell(cell, MOST, left))
+                    self._settle(RefinedCell(cell, MOST, left))
                     continue
-                for part in parts:
-                    self._open(part)
+                for part, points in asks.items():
+                    self._open(part, points)
 
     def _at_most(self, stage: int) -> int:
         """Return the most runs, if all cells up to a round are divided: those not yet known too."""
         axes = len(self.refine.axes)
         each = axes * 2**axes if axes == 1 else 2**axes + (axes - 1) * 2 ** (axes - 2)
-        cells = [*self._lacks, *(halving.cell for halving in self._halvings)]
-        rounds = (stage + axes - _round(cell) for cell in cells if _round(cell) <= stage)
-        return len(self.asked) + sum(each * (2**count - 1) for count in rounds)
+        cells = self._rounds + Counter({k: len(some) for k, some in self._halvings.items()})
+        rounds = {k: stage + axes - k for k in cells if k <= stage}
+        return len(self.asked) + sum((each + 1) * (2**n - 1) * cells[k] for k, n in rounds.items())
 
 
 def points_of(cell: Cell) -> list[Point]:
@@ -411,6 +522,33 @@ def _misses(cell: Cell, known: Mapping[Point, tuple[float, ...]]) -> Misses:
         for k, (a, b, m) in enumerate(zip(known[low], known[high], known[mid], strict=True)):
             most[axis][k] = max(most[axis][k], abs(m - a - (b - a) * share))
     return [tuple(each) for each in most]
+
+
+def _twists(cell: Cell, known: Mapping[Point, tuple[float, ...]]) -> tuple[float, ...]:
+    """Return by how much each number at the centre may be off without a miss on any edge.
+
+    A kink through two opposite corners of a face leaves no miss on its edges: all that tells is
+    that its corners are in no plane.
+    """
+    most = [0.0] * len(known[cell.low])
+    for (a, b), corner in itertools.product(
+        itertools.combinations(range(len(cell.low)), 2), cell.corners
+    ):
+        if corner[a] != cell.low[a] or corner[b] != cell.low[b]:
+            continue
+        one, other = ((*corner[:axis], cell.high[axis], *corner[axis + 1 :]) for axis in (a, b))
+        both = (*one[:b], cell.high[b], *one[b + 1 :])
+        corners = zip(*(known[at] for at in (corner, one, other, both)), strict=True)
+        for k, (p, q, r, s) in enumerate(corners):
+            most[k] = max(most[k], abs(p - q - r + s) / 4.0)
+    return tuple(most)
+
+
+def _beyond(line: Sequence[float], at: float, step: float) -> float | None:
+    """Return the run of a line beyond another one, about a step away; None if there is none."""
+    k = bisect_left(line, at + step)
+    near = [each for each in line[max(k - 1, 0) : k + 1] if (each - at) * step > 0.0]
+    return min(near, key=lambda each: abs(math.log((each - at) / step)), default=None)
 
 
 def _off(
@@ -454,7 +592,8 @@ def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
     if not 1 <= len(numbers) <= _MOST_AXES or any(len(each) < 2 for each in numbers.values()):
         allowed = f"needs 1 to {_MOST_AXES} axes of two numbers or more: the ends of their ranges"
         raise StudyError("refine", dict(content), allowed)
-    until = _until(content.get("until", _UNTIL), names)
+    units = {each.name: scene.known_quantities[each.of].units for each in numbers_of}
+    until = _until(content.get("until", _UNTIL), units)
     most = _whole("most", content.get("most", _MOST), MAXIMUM_RUNS)
     halvings = _whole("halvings", content.get("halvings", _HALVINGS), _MOST_HALVINGS)
     found = Refine(of=tuple(numbers_of), until=until, most=most, halvings=halvings, axes=numbers)
@@ -465,12 +604,13 @@ def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
     return found
 
 
-def _until(until: Any, names: list[str]) -> float | dict[str, float]:
+def _until(until: Any, units: Mapping[str, str]) -> float | dict[str, float]:
     if is_number(until) and 1e-6 <= until <= 1.0:
         return float(until)
-    own = until if isinstance(until, Mapping) and until.keys() == set(names) else {}
+    own = until if isinstance(until, Mapping) and until.keys() == units.keys() else {}
+    own = {name: in_unit(units[name], own[name], f"refine.until.{name}") for name in own}
     if own and all(is_finite(each) and each > 0.0 for each in own.values()):
-        return {name: float(own[name]) for name in names}
+        return {name: float(own[name]) for name in units}
     allowed = "must be a share of the range, >= 1e-06 and <= 1, or a number > 0 for each of `of`"
     raise StudyError("refine.until", until, allowed)
 

@@ -79,6 +79,7 @@ class Asking:
                     since=since,
                 )
             )
+        self._open, self._done = set(range(len(self.places))), np.zeros(len(self.places))
         self._paths: dict[str, tuple[int, list[Any]]] = {}
         self._waits: list[set[Any]] = [set() for _ in self.places]
         self._ready: deque[Asked] = deque()
@@ -95,7 +96,7 @@ class Asking:
     @property
     def ended(self) -> bool:
         """Whether all programs have ended."""
-        return all(place.program.reason for place in self.places)
+        return not self._open
 
     @property
     def asked(self) -> list[str]:
@@ -106,13 +107,13 @@ class Asking:
     @property
     def stage(self) -> str:
         """How far the programs are, as text: see `Study.stage`."""
-        ended = sum(bool(place.program.reason) for place in self.places)
+        ended = len(self.places) - len(self._open)
         return self._study.stage(ended, self.places[0].program.told)
 
     @property
     def progress(self) -> float:
         """Share of all programs that is done, 0 to 1."""
-        return float(np.mean([place.program.progress for place in self.places]))
+        return float(self._done.mean())
 
     def paths(self) -> Iterator[Asked | None]:
         """Yield the loading paths that are asked for; None while all programs wait for runs."""
@@ -125,8 +126,10 @@ class Asking:
         number = self._paths[path][0]
         place = self.places[number]
         self._waits[number].discard(place.program.key(row["parameters"]))
-        if place.hear(row) and not place.program.goes_on:
-            self._go_on(number)
+        if place.hear(row):
+            self._take_stock(number)
+            if not place.program.goes_on:
+                self._go_on(number)
         return about
 
     def owed(self, path: str) -> Case | None:
@@ -227,13 +230,22 @@ class Asking:
     def _lacking(self, number: int, waits: Collection[Any]) -> list[Any]:
         """Take the runs of a program that are in the store; return the keys of the others."""
         place = self.places[number]
-        while wanted := [key for key in place.program.wants if key not in waits]:
+        lacking: list[Any] = []
+        while not lacking and (wanted := place.program.lacking(waits)):
             runs = place.runs(wanted)
             rows = self._store.sound([case.id for case in runs.cases()])
             stand = [rows[case.id] for case in runs.cases() if case.id in rows]
             if not sum(place.hear(row) for row in stand if place.stands(row)):
-                return wanted
-        return []
+                lacking = wanted
+        self._take_stock(number)
+        return lacking
+
+    def _take_stock(self, number: int) -> None:
+        """Keep how far a program is: all are too many to be asked at each run."""
+        program = self.places[number].program
+        self._done[number] = program.progress
+        if program.reason:
+            self._open.discard(number)
 
 
 def _programs(study: Study, store: Store) -> Iterator[tuple[list[str], dict[str, Any], Any]]:

@@ -40,3 +40,15 @@ class Limits:
                 raise StudyError(name, value, "must be greater than 0")
         if self.memory is not None and not bytes_in(self.memory):
             raise StudyError("memory", self.memory, "must be a size such as 500MB or 2GB")
+
+    def check_without_workers(self) -> None:
+        """Refuse limits that need workers, because there are none.
+
+        Raises
+        ------
+        StudyError
+            naming the limit
+        """
+        for name in ("path_seconds", "memory"):
+            if (value := getattr(self, name)) is not None:
+                raise StudyError(name, value, "must be left out with 0 workers: it ends a worker")

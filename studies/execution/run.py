@@ -133,7 +133,7 @@ def run_study(
     store : the store of runs, shared by all studies
     scene : for the content of a study file, the user's own scene in place of a scene's name
     workers : number of worker processes on this machine; by default one per core, or fewer if they
-        need more memory than the machine has
+        need more memory than the machine has. 0 computes in this process, which no limit ends
     scheduler : a running dask scheduler to use instead; its workers must see the store under the
         same path
     resume : compute only runs without a stored status; by default failed runs are computed again
@@ -152,8 +152,9 @@ def run_study(
     ModelError
         if the environment variable `RESIDUA_KEPT_MEMORY` is not a size
     StudyError
-        if the store cannot be written to, the certificates cannot be used, or a script calls this
-        outside of ``if __name__ == "__main__":``, so that its workers would call it too
+        if the store cannot be written to, the certificates cannot be used, `limits` are those of
+        workers and there are none, or a script calls this outside of ``if __name__ ==
+        "__main__":``, so that its workers would call it too
     StoreFull
         if the disk is full; with free space, the same call computes the rest
     FileDiffers
@@ -174,6 +175,8 @@ def run_study(
         return stop_requested
 
     access = Access(scheduler) if isinstance(scheduler, str) else scheduler
+    if here := workers == 0 and access is None:
+        limits.check_without_workers()
     if access and not store.directory.exists():
         _answering(access)
     with store.writing():
@@ -193,7 +196,10 @@ def run_study(
         if wanted or (asking and not asking.ended):
             if shutil.disk_usage(store.directory).free < _ROOM:
                 raise StoreFull(str(store.directory))  # before any path is computed in vain
-            work.compute(workers, access, stop)
+            if here:
+                work.compute_here(stop)
+            else:
+                work.compute(workers, access, stop)
         if asking:
             stopped, anew = not asking.ended, bool(work.computed)
             if study.goal:
@@ -275,13 +281,42 @@ class _Work:
                         unwritable.append(error)
                     case Finished(task, error, path):
                         self._close(task, error, path)
-        for error in unwritable:  # with the directory as the user gave it, not the worker's path
-            directory = str(self.store.directory)
-            if isinstance(error, StoreFull):
-                raise StoreFull(directory)
-            raise Unusable("directory", directory, error.allowed)
+        for error in unwritable:
+            raise self._of_directory(error)
 
-    def _tasks(self, proof: Proof, workers: Callable[[], int]) -> Iterator[PathTask | None]:
+    def compute_here(self, stop: Callable[[], bool]) -> None:
+        """Run the tasks in this process, one after the other."""
+        failed: list[Exception] = []  # a task takes an error of its reports for its worker's end
+
+        def hear(content: Mapping[str, Any]) -> None:
+            try:
+                self._hear(content)
+            except Exception as error:
+                failed.append(error)
+                raise
+
+        def leave() -> bool:
+            return bool(failed) or stop()
+
+        for task in self._tasks(None, lambda: 1):
+            if task is None or stop():
+                return
+            try:
+                walk(task, hear, leave)
+            except (StoreFull, StudyError) as error:
+                raise self._of_directory(error) from None
+            for each in failed:
+                raise each
+            self._close(task, None)
+
+    def _of_directory(self, error: StoreFull | StudyError) -> StoreFull | StudyError:
+        """Return an error with the directory as the user gave it, not with the path of a task."""
+        directory = str(self.store.directory)
+        if isinstance(error, StoreFull):
+            return StoreFull(directory)
+        return Unusable("directory", directory, error.allowed)
+
+    def _tasks(self, proof: Proof | None, workers: Callable[[], int]) -> Iterator[PathTask | None]:
         if self.asking is None:
             lacking = (path for path in map(self._rest, self.study.paths()) if path.cases)
             for paths in bundles(self.study.problem, lacking, workers):
@@ -292,7 +327,7 @@ class _Work:
                 self._task(proof, (asked.path,)), limit=asked.limit, place=asked.place
             )
 
-    def _task(self, proof: Proof, paths: Bundle) -> PathTask:
+    def _task(self, proof: Proof | None, paths: Bundle) -> PathTask:
         scene, directory = self.study.problem, self.store.directory.resolve()
         self._walking.update({path.id: (len(path.cases), 0.0) for path in paths})
         task = PathTask(scene, paths, directory, solver_hash(), self.study.keep, proof)

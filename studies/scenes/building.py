@@ -360,6 +360,17 @@ def program_of(scene: tables.SceneFile, files: Mapping[str, MeshFile] | None = N
     return Program(laps=(Lap(stages),), place=_place(scene.passages))
 
 
+def increments_of(scene: tables.SceneFile, files: Mapping[str, MeshFile] | None = None) -> int:
+    """Return the largest number of increments that the loading history may have, not making it."""
+    loading = scene.loading
+    if loading is not None:
+        loaded = math.ceil(min(loading.factor / (loading.step or loading.factor), 1e9))
+        return (loaded + loading.release_increments) * (loading.cycles or 1)
+    bends = _bends(scene, files)
+    own = {s.name: s.increments + len(bends.get(s.name, ())) for s in scene.stages}
+    return sum(own[passage.stage.name] for passage in scene.passages)
+
+
 def _bends(scene: tables.SceneFile, files: Mapping[str, MeshFile] | None) -> dict[str, list[float]]:
     """Return for each stage the shares of it at which an amplitude bends, in order."""
     motions = [getattr(body, axis) for body in scene.rigid.values() for axis in _MOTIONS]

@@ -225,13 +225,13 @@ class Description:
             from_it = {k: v for k, v in usual.items() if k in defaults and defaults[k] is None}
             defaults |= {ACCURACY: "standard"} | from_it
         known = {name: each if _is_value(each) else None for name, each in defaults.items()}
-        known |= {str(where[1]): None for where in self._wrong_parameters}
+        known |= {str(name): None for table, name, *_ in self._wrong_numbers if table != "derived"}
         return known | {name: field.default for name, (_, field) in self.opened.items()}
 
     @cached_property
-    def _wrong_parameters(self) -> dict[Where, StudyError]:
-        """The mistakes of declared numbers whose unit is not that of the parameter, by place."""
-        return wrong_units({"parameters": self.content.get("parameters")})
+    def _wrong_numbers(self) -> dict[Where, StudyError]:
+        """The mistakes of declared and derived numbers with a wrong unit, by place."""
+        return wrong_units({key: self.content.get(key) for key in ("parameters", "derived")})
 
     def _levels(self, mistakes: Mistakes) -> Any:
         """Return the table of accuracies; its texts are expressions without parameters."""
@@ -254,7 +254,7 @@ class Description:
 
     def _evaluated(self, values: Mapping[str, Any]) -> tuple[dict[str, Any], Mistakes]:
         """Return the tables with values in place of expressions, and the mistakes."""
-        mistakes: Mistakes = {**self._wrong_parameters}
+        mistakes: Mistakes = {**self._wrong_numbers}
         known = dict(values)
         for name, text in self._derived.items():
             where = ("derived", name)

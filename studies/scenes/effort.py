@@ -13,10 +13,13 @@ from solver.scenes.effort import Effort
 from studies.errors import StudyError
 from studies.scenes import tables
 from studies.scenes.body_size import BodySize, is_grid, size_of_grid, size_of_mesh
-from studies.scenes.building import friction_of, load_of, mesh_of_body
+from studies.scenes.building import friction_of, increments_of, load_of, mesh_of_body
 
 if TYPE_CHECKING:
     from studies.scenes.description import Description
+
+_MOST_INCREMENTS = 200_000
+"""Largest number of increments of a loading history."""
 
 
 def effort_of(
@@ -65,6 +68,18 @@ def too_large(description: Description, scene: tables.SceneFile) -> Iterator[Stu
                 _size_of(description, name, body)
             except StudyError as error:
                 yield error
+
+
+def too_long(description: Description, scene: tables.SceneFile) -> Iterator[StudyError]:
+    """Yield the mistake of a loading history of too many increments, before it is made."""
+    count = increments_of(scene, description.meshes)
+    if count > _MOST_INCREMENTS:
+        field = "loading" if scene.loading else "repeat.times" if scene.repeat else "stages"
+        allowed = (
+            f"makes more than {_MOST_INCREMENTS} increments: take fewer cycles, fewer increments, "
+            "or amplitudes with fewer times"
+        )
+        yield StudyError(field, scene.repeat.times if scene.repeat else "", allowed)
 
 
 def in_one_increment(scene: tables.SceneFile) -> bool:

@@ -16,6 +16,7 @@ from studies.scenes.checking import (
     wrong_parameters,
 )
 from studies.scenes.description import Description
+from studies.scenes.effort import too_long
 from studies.scenes.mending import Where
 from studies.scenes.refusals import dotted
 from studies.scenes.results import view_of
@@ -47,6 +48,7 @@ def examined(description: Description, *, built: bool) -> tables.SceneFile:
     if found.tables:
         others = [*wrong_parameters(found.tables, description.used())]
         others += contradictions(found.tables, description.meshes)
+        others += too_long(description, found.tables)
         if not {where[0] for where in found.own} & {"accuracy", "parameters"}:
             others += wrong_accuracies(found.tables)
         if not found.own:  # a table with a stand-in may be the one that is needed

@@ -27,7 +27,7 @@ from studies.scenes import tables
 from studies.scenes.building import Builder, friction_of, law_of, program_of
 from studies.scenes.checking import contradictions, failed_checks, unmet_needs
 from studies.scenes.description import Description
-from studies.scenes.effort import effort_of, in_one_increment, too_large
+from studies.scenes.effort import effort_of, in_one_increment, too_large, too_long
 from studies.scenes.examining import examined
 from studies.scenes.results import numbers_of, output_of, places_of, view_of
 from studies.scenes.tables import ACCURACY
@@ -279,7 +279,11 @@ def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
                 *unmet_needs(found),
             ]
             if not mistakes:
-                mistakes = [*_wrong_laws(description, found), *too_large(description, found)]
+                mistakes = [
+                    *_wrong_laws(description, found),
+                    *too_large(description, found),
+                    *too_long(description, found),
+                ]
         except SceneError as error:
             mistakes = list(error.mistakes)
         for first in mistakes[:1]:

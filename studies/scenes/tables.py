@@ -47,6 +47,7 @@ from studies.scenes.table import (
     Span,
     TabulatedTable,
 )
+from studies.units import COHERENT
 
 # -- bodies ------------------------------------------------------------------------------------
 
@@ -551,7 +552,7 @@ class SceneFile(SceneTable):
     parameters: dict[Label, ParameterTable] = Field(default_factory=dict)
     accuracy: AccuracyTable | None = None
     checks: tuple[CheckTable, ...] = ()
-    derived: dict[Label, Any] = Field(default_factory=dict)
+    derived: dict[Label, Annotated[Any, Unit(COHERENT)]] = Field(default_factory=dict)
     materials: Annotated[dict[Label, Material], Field(min_length=1)]  # type: ignore[valid-type]
     bodies: Annotated[dict[Label, BodyTable], Field(min_length=1)]
     rigid: dict[Label, RigidTable] = Field(default_factory=dict)

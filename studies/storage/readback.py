@@ -176,10 +176,11 @@ def _expected_mesh(fields: MeshFields) -> Iterator[tuple[str, _Required]]:
     at = list(fields.stages.values())
     parts = {f"displacement_{a}": ("mm", [s["displacement"][k] for s in at])
              for k, a in enumerate(AXES[: len(at[0]["displacement"])])}  # fmt: skip
-    names = components(len(at[0]["stress"]))
-    parts |= {f"stress_{c}": ("MPa", [s["stress"][k] for s in at]) for k, c in enumerate(names)}
-    parts |= {f"plastic_strain_{c}": ("1", [s["plastic_tensor"][k] for s in at])
-              for k, c in enumerate(names)}  # fmt: skip
+    tensors = {"stress": ("stress", "MPa"), "plastic_strain": ("plastic_tensor", "1"),
+               "strain": ("strain", "1")}  # fmt: skip
+    for k, c in enumerate(components(len(at[0]["stress"]))):
+        parts |= {f"{own}_{c}": (unit, [s[name][k] for s in at])
+                  for own, (name, unit) in tensors.items()}  # fmt: skip
     parts |= {"mises": ("MPa", [s["mises"] for s in at]),
               "plastic_strain": ("1", [s["plastic_strain"] for s in at])}  # fmt: skip
     for name, (units, values) in parts.items():

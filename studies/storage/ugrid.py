@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver.results.body_fields import BODY_FIELDS
 from solver.results.mesh_fields import NO_NODE, MeshFields
-from solver.tensors import AXES, components
+from solver.tensors import AXES
 from studies.definition.vocabulary import FIELDS, KEEP
 from studies.errors import StudyError
 
@@ -29,7 +30,7 @@ _TIME, _NODE, _FACE, _CELL = "time", "mesh_node", "mesh_face", "mesh_cell"
 
 def variables(fields: MeshFields) -> dict[str, Any]:
     """Return the variables for a run's data set: dimensions, values, attributes."""
-    faces, of = fields.faces
+    (faces, of), axes = fields.faces, len(fields.X)
     every = list(fields.bodies.items())
     widest = max(cells.shape[1] for _, (_, cells) in every)
     cells = np.vstack([
@@ -45,7 +46,7 @@ def variables(fields: MeshFields) -> dict[str, Any]:
     topology = {
         "cf_role": "mesh_topology",
         "topology_dimension": np.int32(2),
-        "node_coordinates": " ".join(f"mesh_node_{a}" for a in AXES[: len(fields.X)]),
+        "node_coordinates": " ".join(f"mesh_node_{a}" for a in AXES[:axes]),
         "face_node_connectivity": "mesh_face_nodes",
         "face_dimension": _FACE,
         "long_name": "faces through all nodes of the bodies",
@@ -77,8 +78,11 @@ def variables(fields: MeshFields) -> dict[str, Any]:
     for axis, values in zip(AXES, fields.X, strict=False):
         words = {"long_name": f"position of the node along {axis}", "units": "mm"}
         out[f"mesh_node_{axis}"] = (_NODE, values, words)
-    for name, values in _parts(fields).items():
-        words = {"long_name": name.replace("_", " "), "units": _unit(name)}
+    stages = [dict(fields.parts(stage)) for stage in fields.stages]
+    units = {name: each.units for each in BODY_FIELDS.values() for name in each.numbers(axes)}
+    for name in stages[0]:
+        values = np.stack([at[name] for at in stages])
+        words = {"long_name": name.replace("_", " "), "units": units[name]}
         out[f"mesh_{name}"] = ((_TIME, _NODE), values, words | {"mesh": _MESH, "location": "node"})
     return out
 
@@ -111,44 +115,17 @@ def read(run: xr.Dataset) -> MeshFields:
         own = cells[of == number]
         bodies[name] = (element, own[:, (own != NO_NODE).all(axis=0)])
     axes = [a for a in AXES if f"{_MESH}_node_{a}" in run]
-    parts = components(2 * len(axes))
     stages = [
         {
-            "displacement": np.stack([_at(run, f"displacement_{a}", k) for a in axes]),
-            "stress": np.stack([_at(run, f"stress_{c}", k) for c in parts]),
-            "mises": _at(run, "mises", k),
-            "plastic_strain": _at(run, "plastic_strain", k),
-            "plastic_tensor": np.stack([_at(run, f"plastic_strain_{c}", k) for c in parts])
-            if f"mesh_plastic_strain_{parts[0]}" in run
-            else np.full((len(parts), run.sizes[_NODE]), np.nan),  # of an earlier version
+            name: np.stack(values) if field.over else values[0]
+            for name, field in BODY_FIELDS.items()
+            for values in [[_at(run, number, k) for number in field.numbers(len(axes))]]
         }
         for k in range(run.sizes[_TIME])
     ]
     names = [str(name) for name in run["mesh_stage"].to_numpy()]
     X = np.stack([run[f"mesh_node_{a}"].to_numpy() for a in axes])
     return MeshFields(X=X, bodies=bodies, stages=dict(zip(names, stages, strict=True)))
-
-
-def _parts(fields: MeshFields) -> dict[str, np.ndarray]:
-    """Return fields of one component each over stages and nodes, for ParaView's reader."""
-    stacked = {
-        name: np.stack([at[name] for at in fields.stages.values()])
-        for name in next(iter(fields.stages.values()))
-    }
-    moved, stress = stacked.pop("displacement"), stacked.pop("stress")
-    plastic, names = stacked.pop("plastic_tensor"), components(stress.shape[1])
-    return {
-        **{f"displacement_{a}": moved[:, k] for k, a in enumerate(AXES[: moved.shape[1]])},
-        **{f"stress_{c}": stress[:, k] for k, c in enumerate(names)},
-        **{f"plastic_strain_{c}": plastic[:, k] for k, c in enumerate(names)},
-        **stacked,
-    }
-
-
-def _unit(name: str) -> str:
-    if name.startswith("displacement"):
-        return "mm"
-    return "1" if name.startswith("plastic_strain") else "MPa"
 
 
 def _whole(values: np.ndarray) -> np.ndarray:
@@ -161,4 +138,7 @@ def _nodes(variable: xr.DataArray) -> np.ndarray:
 
 
 def _at(run: xr.Dataset, name: str, stage: int) -> np.ndarray:
+    """Return values at the nodes (n,); NaN if an earlier version has not stored them."""
+    if f"mesh_{name}" not in run:
+        return np.full(run.sizes[_NODE], np.nan)
     return run[f"mesh_{name}"].isel({_TIME: stage}).to_numpy()

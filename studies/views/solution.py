@@ -7,25 +7,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from solver.results.body_fields import BODY_FIELDS
 from solver.tensors import AXES, components
 
 if TYPE_CHECKING:
     from solver import Solution
-
-_DIMS = {
-    "displacement": ("axis", "node"),
-    "stress": ("component", "node"),
-    "mises": ("node",),
-    "plastic_strain": ("node",),
-}
-_UNITS = {"displacement": "mm", "stress": "MPa", "mises": "MPa", "plastic_strain": "1"}
 
 
 def to_xarray(solution: Solution) -> xr.Dataset:
     """Return fields at all nodes and stages, with the body and the position [mm] of each node.
 
     Variables: ``displacement`` (stage, axis, node) [mm], ``stress`` (stage, component, node) [MPa],
-    ``mises`` (stage, node) [MPa] and ``plastic_strain`` (stage, node).
+    ``mises`` (stage, node) [MPa], ``plastic_strain`` (stage, node), and over components too
+    ``strain`` and ``plastic_tensor``.
     """
     fields = solution.mesh_fields()
     axes = AXES[: len(fields.X)]
@@ -34,8 +28,12 @@ def to_xarray(solution: Solution) -> xr.Dataset:
     stages = fields.stages.values()
     return xr.Dataset(
         {
-            name: (("stage", *own), np.stack([at[name] for at in stages]), {"units": _UNITS[name]})
-            for name, own in _DIMS.items()
+            name: (
+                ("stage", *filter(None, [field.over]), "node"),
+                np.stack([at[name] for at in stages]),
+                {"long_name": field.long_name, "units": field.units},
+            )
+            for name, field in BODY_FIELDS.items()
         },
         coords={
             "stage": list(fields.stages),

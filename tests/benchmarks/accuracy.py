@@ -24,7 +24,7 @@ from tests.benchmarks.measure import Point, timed
 
 Array = NDArray[np.float64]
 LEVELS = ("draft", "standard", "fine")
-MEASURES = {"largest": "largest error of residual sigma_x [% of the yield stress]"}
+MEASURES = {"largest": "largest error of residual σxx [% of the yield stress]"}
 _SHALLOW = 1.0  # mm
 _FROM_CORNER = {"punch": 0.028, "half_plane": 0.005}
 

@@ -192,7 +192,7 @@ def test_bad_input_is_one_line_and_returns_2(
         ([], "are required: COMMAND"),
         (["fly"], "invalid choice: 'fly'"),
         (["run"], "are required: STUDY.toml"),
-        (["run", "a.toml", "--workers", "0"], "argument --workers"),
+        (["run", "a.toml", "--workers", "-1"], "argument --workers"),
         (["serve", "--port", "99999"], "argument --port"),
         (["run", "study.toml", "--out", ""], EMPTY),
         (["run", ""], EMPTY),

@@ -21,7 +21,7 @@ from fastapi.testclient import TestClient
 
 from service import datasets
 from service.app import create_app
-from service.guarded import Guarded
+from service.guarded import Guarded, beyond
 from service.settings import Settings
 from studies import Store, open_study
 from studies.storage.tiles import KEYS, Tiles
@@ -212,10 +212,37 @@ def test_one_who_read_another_layout_gets_an_error_in_place_of_values(running: R
             Tiles(path, turn).content("x/c/0")
     held = running.app.state.datasets
     job = running.jobs.get(running.half.id)
-    held.layouts[job.id] = "another layout", 0
+    with running.jobs.transaction() as queue:
+        queue.execute("DELETE FROM layout")
+    held.layouts.clear()  # as at a restart: the queue knows the layout that was shown last
+    assert running.jobs.layout_turn(job.id, "another layout") == 0
     address = f"/studies/{job.id}/zarr/"
     assert running.client.get(f"{address}x/c/0").status_code == 409
     metadata = running.client.get(f"{address}x/zarr.json").json()
     assert metadata["chunk_key_encoding"]["configuration"] == {"separator": "."}
     assert running.client.get(f"{address}x/c.0").content == before.content("x/c/0")
+    layout = before.layout
+    turns = [running.jobs.layout_turn(job.id, each) for each in (layout, "other", layout)]
+    assert turns == [1, 2, 3]
     held.layouts.clear()
+
+
+def test_a_data_set_that_takes_too_long_to_make_is_told_with_what_to_do(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: list[object] = []
+
+    def combined(*given: Any) -> None:
+        tried.append(given)
+        time.sleep(0.01)
+        raise beyond("data set", running.study.id, datasets.SECONDS)
+
+    monkeypatch.setattr(datasets, "combined", combined)
+    monkeypatch.setattr(datasets, "REST", 1e4)
+    running.app.state.datasets.made.clear()
+    for _ in range(2):
+        answer = running.dataset()
+        assert answer.status_code == 503 and "table.csv" in answer.json()["detail"]
+        assert int(answer.headers["retry-after"]) >= 90
+    assert len(tried) == 1, "it is not tried again at once"
+    running.app.state.datasets.made.clear()

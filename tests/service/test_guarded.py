@@ -26,7 +26,7 @@ from service.guarded import BYTES, Budget, Guarded, memory
 from service.inspector import Inspector
 from service.keys import Keys, Scope
 from service.settings import Settings
-from studies import StudyError
+from studies import Study, StudyError
 from studies.scenes.meshfile import MeshFile
 from tests.service.test_access import asking
 from tests.service.test_errors import problem
@@ -52,6 +52,12 @@ def wrong(number: int) -> None:
     raise StudyError("scene", number, "must be even")
 
 
+def refused(_: int) -> None:
+    """Refuse a study as one does that has converted a unit, with what pint loads of Dask."""
+    Study.from_dict({"scene": "punch", "name": "a", "parameters": {"half_width": "2 in"}})
+    Study.from_dict({"scene": "punch", "name": "a", "parameters": {"half_width": "2 N"}})
+
+
 @pytest.mark.parametrize(
     ("function", "seconds", "error", "words"),
     [
@@ -64,6 +70,7 @@ def wrong(number: int) -> None:
         (too_large, 60.0, StudyError, r"scene = 'a': must be read within 60 s"),
         (killed, 60.0, Busy, "the process that reads a scene has ended: ask again"),
         (wrong, 60.0, StudyError, "scene = 3: must be even"),
+        (refused, 60.0, StudyError, "parameters.half_width = '2 N': .* N is a force"),
     ],
 )
 def test_what_fails_in_the_process_is_told_and_the_next_call_is_answered(

@@ -112,6 +112,21 @@ def test_a_study_that_is_computed_elsewhere_is_followed(
     assert len(seen.store.catalogue.rows(seen.jobs.runs(begun.id))) == 6
 
 
+def test_a_study_that_is_deleted_from_the_folder_is_not_shown_any_more(tmp_path: Path) -> None:
+    store = Store(tmp_path / "out")
+    stays, goes = (fake_study(name, sweep=AXES | {"load_ratio": [0.1]}) for name in ("a", "b"))
+    for each in (stays, goes):
+        store.save_study(each)
+    (tmp_path / "aside").mkdir()
+    seen = ViewedFolder(store.directory, tmp_path / "aside")
+    for there in ([stays, goes], [stays], [stays, goes]):
+        shutil.rmtree(store.study_directory(goes.id), ignore_errors=True)
+        for each in there:
+            store.save_study(each)
+        seen.look()
+        assert {job.id for job in seen.jobs.page(limit=9, offset=0)[0]} == {s.id for s in there}
+
+
 def test_the_end_of_a_study_that_is_computed_elsewhere_is_told_in_its_words(tmp_path: Path) -> None:
     store, sweep = Store(tmp_path / "out"), AXES | {"load_ratio": [0.3, 0.9]}
     half = fake_study("half", sweep=sweep | {"load_ratio": [0.3]})

@@ -262,3 +262,26 @@ def test_two_points_at_one_place_do_not_hold_a_body_that_may_tilt():
         balance=np.array([-1.0, -6.405920704482398]),
     )
     assert given_bound(problem, np.zeros(2)) is None
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_ring_between_plates_is_held_where_friction_alone_could_bear_the_load(seed):
+    """Its points lean: with friction bounds that are given, forces along them may bear a plate."""
+    n, radius, angle = 12, 5.4, np.array([-0.125, -0.075, -0.025, 0.025, 0.075, 0.125])
+    c, s, one, none = np.cos(angle), np.sin(angle), np.ones(6), np.zeros(6)
+    columns = [(s, -c, none, c), (-s, c, none, none), (-c, -s, one, s), (c, s, one, none)]
+    A = np.vstack([np.stack(own, axis=1) for own in columns])  # ring: x, y, rotation; plate: y
+    gap = radius * (angle**2 - 0.025**2) / 2 - 1.4e-5
+    slip = 7e-5 - 5.6e-3 * angle
+    B = np.eye(2 * n) + 0.1 * np.random.default_rng(seed).normal(size=(2 * n, 2 * n))
+    problem = ContactProblem(
+        W=4e-5 * B @ B.T,
+        offset=np.concatenate([gap, gap, slip, slip]),
+        lines=lines(n, 0.3),
+        A=A,
+        balance=np.array([0.0, 0.0, 0.0, -0.2115]),
+    )
+    found = solve_contact(problem, np.full(n, OPEN))
+    assert found is not None
+    assert found.forces[:6].sum() == pytest.approx(0.2115, rel=0.01)
+    assert natural_residual(problem, found) < 1e-8

@@ -14,7 +14,7 @@ from solver.fem.discretisation import Discretisation
 from solver.mesh import grid
 from solver.mesh.elements import ELEMENTS, element_type
 from solver.mesh.grids import mapped, merged
-from solver.model.loads import Array, BoundaryLoad, Load
+from solver.model.loads import Array, BodyForce, BoundaryLoad, Load
 
 pytestmark = pytest.mark.solves
 
@@ -136,6 +136,15 @@ def test_a_force_per_volume_may_jump_within_elements(element: str, slope: float)
     turn = force[:, 1] @ (found.nodes("block")[0] - 2.0)
     assert turn == pytest.approx(-2.0 * slope * 4.0**3 / 12, abs=1e-5)
     assert found.audit().passed, found.audit().violations
+
+
+def test_a_force_per_volume_between_all_points_of_the_solver_is_found_by_the_audit() -> None:
+    """On a strip of an eighth of an element."""
+    strip = BodyForce(x=lambda x: 1.0 * ((1.36 < x[0]) & (x[0] < 1.48)))
+    found = solve(Model(bodies=(block(load=strip),)))
+    assert not found.stress("block", "loaded").any()  # it is lost
+    audit = found.audit()
+    assert any("audit_reactions" in each for each in audit.violations), audit.violations
 
 
 def test_a_condensed_body_has_its_force_per_volume() -> None:

@@ -65,6 +65,13 @@ def test_its_size_is_refused_where_it_means_nothing(own: dict[str, Any], allowed
     assert refusal.value.field == "half_space_size"
 
 
+def test_steady_passes_have_quadratic_elements() -> None:
+    with pytest.raises(ModelError, match="must be quad8 with track = endless") as refusal:
+        RollingParameters(element="quad4")
+    assert refusal.value.field == "element"
+    assert RollingParameters(element="quad4", track=50.0).element == "quad4"
+
+
 @pytest.mark.parametrize("half_width", [0.05, 1.0, 8.3, 100.0])
 def test_recorded_positions_are_dense_in_the_contact(half_width: float) -> None:
     step = recorded_step(half_width)

@@ -19,7 +19,7 @@ from solver.scenes.rolling_parameters import RollingParameters
 
 PRESSED = PunchParameters(accuracy="draft", friction=0.3, load_ratio=0.6)
 ROLLED = RollingParameters(
-    track=24.0, element_size=2.0, advance_step=2.0, growth=1.3, traction=0.5, passes=2
+    track=12.0, element_size=3.0, advance_step=3.0, growth=1.5, traction=0.5, passes=2
 )
 
 

@@ -8,19 +8,23 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection, wait
 
+import psutil
+
 from tests.stability.families import scene
 from tests.stability.trial import Trial, Verdict, attempt
 
 START = 120.0
 """Seconds that a process has to begin with."""
+_BUSY = 10.0
+"""Largest ratio of the clock to CPU time: more than that no process waits for others."""
 
 
 def trials(names: Sequence[str], jobs: int, patience: float) -> Iterator[Trial]:
     """Yield the ends of scenes as they come, computed by so many processes.
 
     A scene that uses up its CPU time is stopped where it can be (see `trial.deadline`). A process
-    that does not answer after twice as long by the clock, and half a minute, is ended, and the
-    scene counts as hanging; so does one that took its process with it.
+    that does not answer after twice as much and half a minute, or ten times as long by the clock,
+    is ended, and the scene counts as hanging; so does one that took its process with it.
     """
     waiting = deque(names)
     workers = [_Worker(patience) for _ in range(min(jobs, len(names)))]
@@ -49,7 +53,7 @@ class _Worker:
     def __init__(self, patience: float) -> None:
         context = multiprocessing.get_context("spawn")
         self.pipe, other = context.Pipe()
-        self.name, self._began, self._patience = "", 0.0, patience
+        self.name, self._began, self._used, self._patience = "", 0.0, 0.0, patience
         self._room = START
         self._process = context.Process(target=_serve, args=(other, patience), daemon=True)
         self._process.start()
@@ -57,7 +61,7 @@ class _Worker:
 
     def take(self, name: str) -> None:
         """Begin a scene."""
-        self.name, self._began = name, time.monotonic()
+        self.name, self._began, self._used = name, time.monotonic(), self._cpu()
         self.pipe.send(name)
 
     def end(self) -> Trial | None:
@@ -74,8 +78,8 @@ class _Worker:
 
     def lost(self) -> Trial | None:
         """Return the end of a scene that hangs, or that ended its process; None while it runs."""
-        seconds = time.monotonic() - self._began
-        if self._process.is_alive() and seconds < 2 * self._patience + self._room:
+        seconds, most = time.monotonic() - self._began, 2 * self._patience + self._room
+        if self._process.is_alive() and seconds < _BUSY * most and self._cpu() - self._used < most:
             return None
         code = self._process.exitcode
         self.stop()
@@ -84,6 +88,14 @@ class _Worker:
             name=self.name, what=scene(self.name).what, verdict=Verdict.HUNG, message=text,
             seconds=seconds,
         )  # fmt: skip
+
+    def _cpu(self) -> float:
+        """Return the CPU time of the process [s]; infinite for one that has ended."""
+        try:
+            times = psutil.Process(self._process.pid).cpu_times()
+        except psutil.Error:
+            return float("inf")
+        return float(times.user + times.system)
 
     def stop(self) -> None:
         """End the process."""

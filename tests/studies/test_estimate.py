@@ -7,13 +7,12 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from residua.cli import main
-from residua.cost import long_run
+from residua.cost import Foreseen
 from studies import Store, Study, StudyError
 from studies.execution.estimate import Bounds, Estimate, estimate, memory_needed
 from tests.studies.conftest import fake_study
@@ -283,10 +282,14 @@ def test_dry_run_tells_what_is_not_known(
     assert lines["unknowns"] == lines["increments"] == "not known"
 
 
-def test_a_long_study_is_said_to_be_long(store: Store) -> None:
-    short: dict[str, Any] = PUNCH
-    assert not long_run(Study.from_dict(short), store)
-    told = long_run(Study.from_dict(many(4000)), store)
+def test_a_long_study_is_said_to_be_long_and_a_tour_short(
+    store: Store,
+) -> None:
+    usual, long = Study.from_dict(many(40)), Study.from_dict(many(4000))
+    tour = Study.from_toml(ROOT / "data" / "studies" / "tour.toml")
+    assert Foreseen.of(tour, store) == Foreseen(short=True)
+    assert Foreseen.of(usual, store) == Foreseen()
+    told = Foreseen.of(long, store).warning
     assert told.startswith("many: about ") and "hours (" in told and "\n" not in told
 
 

@@ -466,6 +466,11 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
     named.write_text(f'points = [{{ case = "007", half_width = 40.0 }}]\n{file.read_text()}')
     tested = Study.from_toml(named, [tmp_path / "p.csv@stage=loaded,case=007"])
     assert tested.fit["measured"][0]["at"] == {"stage": "loaded", "case": "007"}
+    (folder := tmp_path / "a@b=1").mkdir()
+    (folder / "p.csv").write_text(PRESSURE)
+    for place, at in (("", None), ("@stage=loaded", {"stage": "loaded"})):
+        inside = Study.from_toml(file, [folder / f"p.csv{place}"])
+        assert inside.fit["measured"][0].get("at") == at
     with pytest.raises(StudyError, match="must be FILE, or FILE@NAME=VALUE"):
         Study.from_toml(file, [tmp_path / "p.csv@stage=loaded,pass"])
     with pytest.raises(StudyError, match=r"fit\.measured = None: is missing"):

@@ -217,6 +217,21 @@ def test_words_part_the_places_that_foresee_each_other() -> None:
     assert grid.foreseen(last, values) == pytest.approx(smooth[last], abs=0.03)
 
 
+def test_the_farthest_place_comes_next_and_waits_for_the_nearest_of_lower_levels() -> None:
+    """The same by all distances, with ties, as places of a grid have them."""
+    sets = [{"x": x, "y": y / 3.0} for x in range(12) for y in range(11)]
+    at = np.array([[each["x"] / 11.0, each["y"] * 0.3] for each in sets])
+    apart = np.linalg.norm(at[:, None] - at[None], axis=2)
+    level, order = np.zeros(len(at), dtype=int), [0, int(apart[0].argmax())]
+    while (away := apart[order].min(axis=0)).max() > 0.0:
+        order.append(int(away.argmax()))
+        level[order[-1]] = 1 + int(math.log2(apart[0].max() / away.max()) + 1e-9)
+    for k, before in enumerate(Neighbours(sets).before):
+        lower = np.flatnonzero(level < level[k])
+        nearest = lower[np.argsort(apart[k, lower], kind="stable")]
+        assert before == (nearest[:12].tolist() if level[k] else [])
+
+
 def test_a_run_that_fails_its_audit_is_before_the_limit_load_and_has_no_number() -> None:
     limit = checked_goal({"find": "limit_load", "between": [0.1, 4.0]}, FAKE)
     row = {"id": "a", "status": "audit_failed", "scalars": {"peak_contact_pressure": 1.0}}

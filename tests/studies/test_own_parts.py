@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import os
 import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.architecture.sources import ROOT
+from tests.programs import Programs
 
 BAR = """
 name = "bar"
@@ -74,47 +75,64 @@ print(next(iter(study.cases())).id)
 """
 
 
-def called(folder: Path, parts: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run Python with these files of parts, in a folder with the examples."""
+def command(*words: str) -> str:
+    """Return a program that does what the command ``residua`` does."""
+    run = f"sys.exit(main({[*words]}))"
+    return f'import sys\nfrom residua.cli import main\nif __name__ == "__main__":\n    {run}\n'
+
+
+Called = Callable[[str, str], subprocess.CompletedProcess[str]]
+RUN = command("run", "study.toml", "--out", "out", "--workers", "1")
+SCENES = command("scenes", "punch")
+
+
+@pytest.fixture
+def called(tmp_path: Path, programs: Programs) -> Called:
+    """Run a program with some files of parts, in a folder with the examples."""
     for name in ("own_curve.py", "own_back_stress.py", "own_yield_surface.py"):
-        (folder / name).write_text((ROOT / "examples" / name).read_text())
+        (tmp_path / name).write_text((ROOT / "examples" / name).read_text())
     paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
-    return subprocess.run(
-        [sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False,
-        env=os.environ | {"PYTHONPATH": paths, "RESIDUA_PARTS": parts},
-    )  # fmt: skip
+
+    def run(parts: str, program: str) -> subprocess.CompletedProcess[str]:
+        (tmp_path / "program.py").write_text(program)
+        environment = os.environ | {"PYTHONPATH": paths, "RESIDUA_PARTS": parts}
+        return programs.run(tmp_path / "program.py", tmp_path, environment)
+
+    return run
 
 
 BOTH = os.pathsep.join(["own_curve.py", "own_back_stress.py"])
 
 
 @pytest.mark.processes
-def test_a_study_of_a_scene_file_is_computed_with_words_of_ones_own(tmp_path: Path) -> None:
+def test_a_study_of_a_scene_file_is_computed_with_words_of_ones_own(
+    tmp_path: Path, called: Called
+) -> None:
     (tmp_path / "bar.toml").write_text(BAR)
     (tmp_path / "study.toml").write_text(STUDY)
-    command = ["-m", "residua", "run", "study.toml", "--out", "out", "--workers", "1"]
-    done = called(tmp_path, BOTH, *command)
+    done = called(BOTH, RUN)
     assert done.returncode == 0, done.stderr
     rows = [line.split() for line in done.stdout.splitlines()]
     strain = {row[0]: float(row[2]) for row in rows if row[:1] in (["swift"], ["threshold"])}
     assert strain["swift"] == pytest.approx(SWIFT, rel=1e-3)
     # 350 MPa and 70 MPa of the back stress: 40 MPa without recall, the rest fading
     assert strain["threshold"] == pytest.approx(40 / 6e4 - math.log(1 - 30 / 100) / 600, rel=0.02)
-    again = called(tmp_path, BOTH, *command)
+    again = called(BOTH, RUN)
     assert "0 computed" in again.stdout
-    refused = called(tmp_path, "own_curve.py", *command)
+    refused = called("own_curve.py", RUN)
     assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
     known = " or ".join([", ".join(f"'{word}'" for word in WORDS.split(", ")), "'swift'"])
     assert f"hardening = 'threshold': must be {known} (at rule = threshold)" in refused.stderr
 
 
 @pytest.mark.processes
-def test_a_yield_surface_of_ones_own_is_swept_in_a_scene_file(tmp_path: Path) -> None:
+def test_a_yield_surface_of_ones_own_is_swept_in_a_scene_file(
+    tmp_path: Path, called: Called
+) -> None:
     (tmp_path / "bar.toml").write_text(HELD)
     study = STUDY.replace('["swift", "threshold"]', str([*EXPONENTS]))
     (tmp_path / "study.toml").write_text(study)
-    command = ["-m", "residua", "run", "study.toml", "--out", "out", "--workers", "1"]
-    done = called(tmp_path, "own_yield_surface.py", *command)
+    done = called("own_yield_surface.py", RUN)
     assert done.returncode == 0, done.stderr
     rows = [line.split() for line in done.stdout.splitlines()]
     stress = [float(row[2]) for row in rows if row[:1] in [[f"{a:g}"] for a in EXPONENTS]]
@@ -157,8 +175,8 @@ for refused in (
 
 
 @pytest.mark.processes
-def test_a_yield_surface_of_ones_own_is_known_to_scenes_and_rolls(tmp_path: Path) -> None:
-    done = called(tmp_path, "own_yield_surface.py", "-c", SURFACE)
+def test_a_yield_surface_of_ones_own_is_known_to_scenes_and_rolls(called: Called) -> None:
+    done = called("own_yield_surface.py", SURFACE)
     assert done.returncode == 0, done.stderr
     *found, word, exponent, rule, idle = done.stdout.splitlines()
     assert found == [
@@ -179,11 +197,11 @@ def test_a_yield_surface_of_ones_own_is_known_to_scenes_and_rolls(tmp_path: Path
 
 
 @pytest.mark.processes
-def test_ids_of_runs_follow_what_a_file_of_parts_computes(tmp_path: Path) -> None:
+def test_ids_of_runs_follow_what_a_file_of_parts_computes(tmp_path: Path, called: Called) -> None:
     def run_id(text: str = "") -> str:
         own = tmp_path / "mine.py"
         own.write_text(text)
-        done = called(tmp_path, str(own) if text else "", "-c", RUN_ID)
+        done = called(str(own) if text else "", RUN_ID)
         assert done.returncode == 0, done.stderr
         return done.stdout
 
@@ -196,12 +214,14 @@ def test_ids_of_runs_follow_what_a_file_of_parts_computes(tmp_path: Path) -> Non
 
 
 @pytest.mark.processes
-def test_a_word_is_listed_with_its_parameters_and_a_bad_file_is_one_line(tmp_path: Path) -> None:
-    listed = called(tmp_path, BOTH, "-m", "residua", "scenes", "punch")
+def test_a_word_is_listed_with_its_parameters_and_a_bad_file_is_one_line(
+    tmp_path: Path, called: Called
+) -> None:
+    listed = called(BOTH, SCENES)
     assert f"one of {WORDS}, swift, threshold" in listed.stdout
     assert "n of swift hardening" in listed.stdout
     (tmp_path / "bad.py").write_text("import solver.scenes\n")
-    refused = called(tmp_path, "bad.py", "-m", "residua", "scenes", "punch")
+    refused = called("bad.py", SCENES)
     assert refused.returncode == 2
     (line,) = refused.stderr.splitlines()
     assert line.startswith("residua: RESIDUA_PARTS = ")

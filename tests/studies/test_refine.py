@@ -24,7 +24,7 @@ from studies import (
     predict,
     run_study,
 )
-from studies.definition.cells import weights
+from studies.definition.cells import between, weights
 from studies.definition.quantity import RunNumber
 from studies.definition.refine import Refine, Refinement, Wanted
 from studies.execution.asking import Asking
@@ -56,6 +56,11 @@ def power(x: float, y: float) -> float:
 def steep(x: float, y: float) -> float:
     """Return a number that jumps at a slanting line."""
     return 1.0 if x + 0.31 * y > 0.7 else 0.3 * x
+
+
+def slanting(x: float, y: float) -> float:
+    """Return a number with a kink through opposite corners of cells."""
+    return max(0.0, x + y - 0.75)
 
 
 def refined_by(number: Number, seed: int = 0, **asked: Any) -> Refinement:
@@ -126,7 +131,23 @@ def test_the_stated_error_is_that_between_the_runs_within_a_factor_of_two(number
     assert 0.5 <= stated / largest <= 2.0
 
 
-@pytest.mark.parametrize("number", [kinked, bounded, steep])
+def test_a_kink_through_corners_of_cells_is_found() -> None:
+    """No edge of a small cell misses its middle."""
+    found = refined_by(slanting)
+    largest, _ = errors(found, slanting, 400)
+    assert largest < 0.02 * 1.25
+    stated = max(each.left[0] for each in found.settled)
+    assert 0.5 <= stated / largest <= 2.0
+
+
+def test_between_two_runs_a_kink_and_a_parabola_leave_what_they_leave() -> None:
+    """The largest distance of a function from the line between its values at two places."""
+    for kink in (0.1, 0.5, 0.7):
+        assert between(1.0, 1.0 - kink, kink, 0.0) == pytest.approx(kink * (1.0 - kink))
+    assert between(2.0, 4.0, 4.0, 4.0) == pytest.approx(1.0), "of x^2, whose slope changes by 4"
+
+
+@pytest.mark.parametrize("number", [kinked, bounded, steep, slanting])
 def test_the_runs_do_not_depend_on_the_order_in_which_they_end(number: Number) -> None:
     for most in (1000, 60, 31):
         first = refined_by(number, most=most)

@@ -5,17 +5,22 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from studies import Study, StudyError
+from studies.definition.goal import checked_goal
+from studies.definition.measured import checked_measured, content_of
 from studies.definition.parameters import parameters_of, read_values
+from studies.definition.refine import checked_refine
+from studies.errors import SceneError
 from studies.scenes.description import Description
 from studies.scenes.registry import scene_named
 from studies.units import LONGEST, UnitError, converted, is_quantity
 from tests.studies.conftest import fake_study
-from tests.studies.scenes.conftest import blocks
+from tests.studies.scenes.conftest import blocks, built
 from tests.studies.scenes.mistakes import put
 
 INCH, POUND, GRAVITY = 25.4, 0.45359237, 9.80665
@@ -155,6 +160,9 @@ def test_words_stay_words_and_the_command_takes_units() -> None:
             {"x": [{"start": 10, "stop": 11, "num": 2}, 50.8]},
         ),
         ("outputs.least.x", ["-1 in", 0], [-25.4, 0]),
+        ("derived.side", "1 in", 25.4),
+        ("derived.side", "195 GPa", 195000),
+        ("derived.side", "3 kN m", 3000000),
     ],
 )
 def test_a_scene_file_with_units_has_the_id_of_that_without(
@@ -167,6 +175,70 @@ def test_a_scene_file_with_units_has_the_id_of_that_without(
         found.append(Description("blocks.toml", content, {}))
     assert found[0].content == found[1].content
     assert found[0].digest == found[1].digest
+
+
+@pytest.mark.parametrize(
+    ("text", "why"), [("30 deg", "deg is an angle"), ("3 candela", "candela is something else")]
+)
+def test_a_derived_number_has_a_unit_of_the_project(text: str, why: str) -> None:
+    content = blocks()
+    content["derived"]["side"] = text
+    with pytest.raises(SceneError, match=rf"derived\.side = '{text}'.* N, mm, MPa.*; {why}"):
+        built(content)
+
+
+PUNCH = scene_named("punch")
+
+
+def test_what_chooses_runs_has_units_of_the_numbers_that_it_compares() -> None:
+    goal = {"of": "peak_residual_tension", "between": [0.1, 0.9]}
+    found = [checked_goal(goal | {"at": each}, PUNCH) for each in (1500, "1.5 GPa")]
+    assert found[0] == found[1]
+    refine = {"of": ["peak_residual_tension", "contact_half_width"]}
+    axes: Any = {"load_ratio": [0.5, 0.9]}
+    until = {"peak_residual_tension": 5.0, "contact_half_width": 0.0254}, {
+        "peak_residual_tension": "0.005 GPa", "contact_half_width": "0.001 in",
+    }  # fmt: skip
+    refined = [checked_refine(refine | {"until": each}, PUNCH, axes) for each in until]
+    assert refined[0] == refined[1]
+    line = {"of": "residual_profile", "over": "depth", "places": [0, 25.4], "values": [-50, 20],
+            "sigma": 2.0, "at": {"component": "xx"}}  # fmt: skip
+    units = {"places": [0, "1 in"], "values": [-50, "0.02 GPa"], "sigma": "2e6 Pa"}
+    lines = [checked_measured([each], PUNCH, ())[0] for each in (line, line | units)]
+    assert content_of(lines[0]) == content_of(lines[1])
+
+
+@pytest.mark.parametrize(
+    ("check", "told"),
+    [
+        (
+            lambda: checked_goal(
+                {"of": "peak_residual_tension", "at": "3 mm", "between": [0.1, 0.9]}, PUNCH
+            ),
+            "goal.at = '3 mm': must be a number in MPa; mm is a length",
+        ),
+        (
+            lambda: checked_refine(
+                {"of": "contact_half_width", "until": {"contact_half_width": "1 N"}}, PUNCH,
+                {"load_ratio": [0.5, 0.9]},
+            ),
+            "refine.until.contact_half_width = '1 N': must be a number in mm; N is a force",
+        ),
+        (
+            lambda: checked_measured(
+                [{"of": "residual_profile", "over": "depth", "places": ["1 s", 2], "values": [1, 2],
+                  "at": {}}], PUNCH, (),
+            ),
+            "fit.measured[0].places[0] = '1 s': must be a number in mm; s is a time",
+        ),
+    ],
+)  # fmt: skip
+def test_another_dimension_of_a_number_that_is_compared_is_refused(
+    check: Callable[[], Any], told: str
+) -> None:
+    with pytest.raises(StudyError) as caught:
+        check()
+    assert str(caught.value) == told
 
 
 @pytest.mark.processes

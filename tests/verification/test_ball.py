@@ -19,16 +19,20 @@ LOADED = {"unload_steps": 1}
 """For what is asked under load."""
 
 
-@cache
 def pressed(**own: Any) -> Record:
-    parameters = BALL.parameters(**({"accuracy": "draft"} | own))
+    return record_of(BALL.parameters(**({"accuracy": "draft"} | own)))
+
+
+@cache
+def record_of(parameters: Any) -> Record:
     (record,) = BALL.path(parameters, [parameters.cycles], lambda fraction: None)
     assert record.status is Status.OK, record.message
     return kept(record)
 
 
-@pytest.mark.parametrize("yielding", ["half_space", "ball"])
-@pytest.mark.parametrize("stiffness", [1.0, 20.0])
+@pytest.mark.parametrize(
+    ("yielding", "stiffness"), [("half_space", 1.0), ("half_space", 20.0), ("ball", 20.0)]
+)
 def test_an_elastic_ball_is_the_contact_of_hertz(yielding: str, stiffness: float) -> None:
     own = {"load_ratio": 1.4, "yielding": yielding, "ball_stiffness": stiffness} | LOADED
     found = pressed(accuracy="standard", load_step=0.25, **own).scalars
@@ -56,7 +60,7 @@ def test_a_contact_that_yields_all_over_has_the_mean_pressure_of_an_indentation(
     assert 2.8 * RE < found["mean_contact_pressure"] < 3.1 * RE
 
 
-@pytest.mark.parametrize("load_ratio", [1.66, 3.0, 4.5, 6.5, 10.0])
+@pytest.mark.parametrize("load_ratio", [1.66, 3.0, 4.5, 10.0])
 def test_a_ball_is_flattened_as_published(load_ratio: float) -> None:
     own = {"load_ratio": load_ratio, "yielding": "ball", "element_size": 1 / 16} | LOADED
     found = pressed(**own).scalars

@@ -1,6 +1,6 @@
 """Contact of curved bodies in coarser steps and on coarser meshes: right, or not ok.
 
-Each scene is run with one, two and four times its increments' size, on its mesh and one of twice
+Each scene is run with one, two and four times its increments' size, and with two on a mesh of twice
 the side. What is ok is within the errors that `docs/models.md` claims; what is coarser says so.
 """
 
@@ -137,8 +137,8 @@ Run = Callable[[Path, int, int], tuple[Record, Errors]]
 CASES = [
     (run, steps, sides)
     for run in (pressed_pad, ball, pin_in_hole, rolling)
-    for steps in (1, 2, 4)
-    for sides in ((1,) if run is pin_in_hole else (1, 2))
+    for steps, sides in ((1, 1), (2, 1), (4, 1), (2, 2))
+    if (run, sides) != (pin_in_hole, 2)
 ]
 
 

@@ -131,7 +131,7 @@ def test_what_passes_has_the_shear_of_small_increments(
     divided, and 0.29 where 85 % of the friction acts; both passed their audit.
     """
     exact = leaned(slave, aside, 24).stages["loaded"].state.contacts[0]
-    for increments in (1, 2, 3, 4):
+    for increments in (1, 2, 4):
         found = leaned(slave, aside, increments)
         contact = found.stages["loaded"].state.contacts[0]
         error = np.abs(contact.tangential - exact.tangential).sum()
@@ -201,9 +201,13 @@ def test_what_slides_has_forgotten_when_it_touched(monkeypatch: pytest.MonkeyPat
     assert ratio(found) == pytest.approx(FRICTION, rel=1e-6)
 
 
-@pytest.mark.parametrize("sliding", ["auto", "small"])
-@pytest.mark.parametrize("slave", ["wheel", "block"])
-@pytest.mark.parametrize("gap", [0.0, 0.01, -0.003])
+@pytest.mark.parametrize(
+    ("slave", "sliding", "gap"),
+    [
+        ("wheel", "auto", 0.0), ("wheel", "small", 0.01), ("wheel", "auto", -0.003),
+        ("block", "small", 0.0), ("block", "auto", 0.01), ("block", "small", -0.003),
+    ],
+)  # fmt: skip
 def test_a_free_curved_body_is_held_by_its_first_contact(
     slave: str, sliding: str, gap: float
 ) -> None:

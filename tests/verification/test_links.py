@@ -20,7 +20,6 @@ from solver import (
     Model,
     ModelError,
     Moved,
-    NotConverged,
     Pressure,
     Pushed,
     RigidBody,
@@ -144,6 +143,56 @@ def test_a_force_that_is_distributed_around_an_axis_leaves_radial_motion_free() 
     assert found.audit().passed
     with pytest.raises(ModelError, match=r"links\[0\].components = 'x': must include y"):
         System(Model(bodies=(cylinder,), rigid=(pull,), links=(replace(link, components="x"),)))
+
+
+# -- along normals and tangents --------------------------------------------------------------------
+
+
+def lame(pressure: float, foundation: float) -> float:
+    """Return how far the outside of a ring of the radii 5 and 10 moves on springs all around [mm].
+
+    Plane strain: u = (1 + nu)/E ((1 - 2 nu) A r + C / r), radial stress A - C / r^2.
+    """
+    a, b, nu = 5.0, 10.0, 0.3
+
+    def outside(p: float, q: float) -> float:
+        A, C = (p * a**2 - q * b**2) / (b**2 - a**2), (p - q) * a**2 * b**2 / (b**2 - a**2)
+        return (1 + nu) / E * ((1 - 2 * nu) * A * b + C / b)
+
+    alone, eased = outside(pressure, 0.0), -outside(0.0, 1.0)
+    return alone / (1 + foundation * eased)
+
+
+@pytest.mark.parametrize("element", ["quad8", "tri6"])
+def test_springs_along_the_normal_carry_a_ring_as_its_closed_form_says(element: str) -> None:
+    ring = sector(np.linspace(5.0, 10.0, 7), 12, element, material=steel(),
+                  loads=(Pressure(boundary="left", value=100.0),))  # fmt: skip
+    wall = RigidBody(name="wall")
+    sprung = Link(slave=("ring", "right"), components="normal", stiffness=2e4)
+    for link, rigid, exact in (
+        (sprung, (), lame(100.0, 2e4)),
+        (replace(sprung, rigid="wall"), (wall,), lame(100.0, 2e4)),
+        (Link(slave=("ring", "right"), rigid="wall", components="normal"), (wall,), 0.0),
+        (Link(slave=("ring", "right"), components="normal"), (), lame(100.0, 0.0)),
+        (replace(sprung, components="tangential"), (), lame(100.0, 0.0)),
+    ):
+        found = solve(Model(bodies=(ring,), rigid=rigid, links=(link,)))
+        x, u = found.nodes("ring"), found.displacement("ring", "loaded")
+        edge = found.system.full("ring").boundary_nodes("right")
+        radial = (x * u).sum(axis=0)[edge] / 10.0
+        assert radial == pytest.approx(exact, rel=2e-3, abs=2e-3 * lame(100.0, 0.0))
+        audit = found.audit()
+        assert audit.passed and audit.figures["audit_links"] < 1e-6, audit.violations
+
+
+def test_a_link_that_holds_another_component_than_it_says_fails_its_audit() -> None:
+    ring = sector(np.linspace(5.0, 10.0, 3), 4, material=steel(),
+                  loads=(Pressure(boundary="left", value=100.0),))  # fmt: skip
+    sprung = Link(slave=("ring", "right"), components="normal", stiffness=2e4)
+    found = solve(Model(bodies=(ring,), links=(sprung,)))
+    for other in (replace(sprung, components="tangential"), replace(sprung, stiffness=2.2e4)):
+        object.__setattr__(found.system.model, "links", (other,))
+        assert found.audit().figures["audit_links"] > 1e-2
 
 
 # -- ties ----------------------------------------------------------------------------------------
@@ -354,6 +403,22 @@ def test_the_bolt_of_the_scene_file_shares_a_pull_with_its_gasket() -> None:
     assert 20000.0 < -nut[2] < 24000.0
 
 
+@pytest.mark.parametrize("distributed", [False, True])
+def test_a_force_on_a_boundary_that_supports_hold_is_that_of_the_supports(
+    distributed: bool,
+) -> None:
+    held = block("block", np.linspace(0, 4, 3), np.linspace(0, 4, 3),
+                 supports={"bottom": "xy", "top": "xy"})  # fmt: skip
+    plate = RigidBody(name="plate", centre=(2.0, 4.0), y=Pushed(value=-100.0),
+                      x=Pushed(value=5.0), rotation=Pushed(value=3.0))  # fmt: skip
+    link = Link(slave=("block", "top"), rigid="plate", distributed=distributed)
+    found = solve(Model(bodies=(held,), rigid=(plate,), links=(link,)))
+    assert found.motion("plate") == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+    assert not found.stress("block", "loaded").any()
+    assert found.reaction("plate") == pytest.approx((5.0, -100.0, 3.0))
+    assert found.audit().passed
+
+
 # -- the audit, and what is refused --------------------------------------------------------------
 
 
@@ -386,6 +451,17 @@ def test_the_audit_finds_forces_and_motions_that_a_link_does_not_have(
     assert any("audit_links" in text for text in found.violations)
 
 
+def test_a_tie_with_a_slave_of_much_longer_edges_passes() -> None:
+    """Its conditions hold in the mean over edges along which the master bends in eight pieces."""
+    lower = block("lower", np.linspace(0, 4, 9), np.linspace(0, 1, 3), supports={"bottom": "xy"})
+    upper = block("upper", np.array([0.9, 2.9]), np.linspace(1, 2, 4),
+                  loads=(Traction(boundary="top", x=50.0, y=-100.0),))  # fmt: skip
+    tie = Link(slave=("upper", "bottom"), master=("lower", "top"))
+    audit = solve(Model(bodies=(lower, upper), links=(tie,))).audit()
+    assert audit.passed, audit.violations
+    assert 0 < audit.figures["audit_links"] < 3e-4
+
+
 PLATE = RigidBody(name="plate")
 SLAVE = {"slave": ("block", "top")}
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
@@ -395,7 +471,11 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "itself": ({**SLAVE, "master": ("block", "top")}, r"links\[0\].master .* another surface"),
     "contact": ({"slave": ("block", "right")}, r"links\[0\].slave .* link or contact, not both"),
     "rigid": ({**SLAVE, "rigid": "block"}, r"links\[0\].rigid = 'block': must be a rigid body"),
-    "components": ({**SLAVE, "components": "z"}, "components = 'z': must be x, y or xy"),
+    "components": ({**SLAVE, "components": "z"}, "must be one of x, y, xy, normal, tangential"),
+    "normal of a tie": (
+        {**SLAVE, "components": "normal", "master": ("other", "left")},
+        "components = 'normal': must be x, y or xy with a master",
+    ),
     "stiffness": ({**SLAVE, "stiffness": 0.0}, "stiffness = 0.0: must be positive"),
     "distributed": ({**SLAVE, "distributed": True}, "distributed = True: needs a rigid body"),
     "not facing": ({**SLAVE, "master": ("block", "bottom")}, r"links\[0\] .* do not face"),
@@ -439,14 +519,6 @@ def test_a_link_that_moves_as_a_prescribed_displacement_does_is_met() -> None:
     other = replace(plate, y=Moved(value=0.02, amplitude=Amplitude(times, half**2)))
     with pytest.raises(ModelError, match="must not move what supports, motions"):
         System(replace(model, rigid=(other,)))
-
-
-def test_a_force_on_a_support_is_not_said_to_need_contact() -> None:
-    body = block("block", np.linspace(0, 4, 3), np.linspace(0, 4, 3), supports={"bottom": "xy"})
-    push = RigidBody(name="push", y=Pushed(value=-10.0))
-    link = Link(slave=("block", "bottom"), rigid="push", components="y")
-    with pytest.raises(NotConverged, match=r"balance this load$"):
-        solve(Model(bodies=(body,), rigid=(push,), links=(link,)))
 
 
 def test_links_that_agree_may_share_a_corner() -> None:

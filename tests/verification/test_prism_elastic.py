@@ -512,24 +512,42 @@ def test_a_clamped_bar_is_the_clamped_beam(span: float) -> None:
     assert found == pytest.approx(beam * [1, -1], rel=0.01)
 
 
+@cache
+def long_bar() -> tuple[Modes, FarField, FarField]:
+    """The bar, its far field where it is endless, and where it is clamped at both ends."""
+    section, _ = rail()
+    rows = section.rows(on_top(section, 15.0))
+    modes = Modes(section, np.ones(len(section.weights), bool), 2048.0, 128, surface=rows)
+    endless, clamped = (FarField(modes, modes.x[64], levels=3, span=span) for span in (None, 960.0))
+    return modes, endless, clamped
+
+
 @pytest.mark.parametrize("resultant", range(4))
 def test_a_clamped_bar_does_not_move_at_its_ends(resultant: int) -> None:
     """0.25 % at most of the endless one's motion there: the section is held in the mean."""
     section, _ = rail()
     rows = section.rows(on_top(section, 15.0))
-    modes = Modes(section, np.ones(len(section.weights), bool), 2048.0, 128, surface=rows)
+    modes, endless, clamped = long_bar()
     middle, at_ends = 64, [34, 94]
     forces = np.zeros((rows.shape[0], 128))
     forces[:, middle] = np.linalg.pinv((rows @ section.rigid).T)[:, resultant] / 16.0
     near = modes.solve(forces=forces).displacement[:, at_ends]
-    endless, clamped = (
-        FarField(modes, modes.x[middle], levels=3, span=span) for span in (None, 960.0)
-    )
     held, moved = (
         np.abs(near + far.displacement[:, at_ends] @ far.resultants(forces)).max()
         for far in (clamped, endless)
     )
     assert held < 0.003 * moved
+
+
+@cache
+def resting(length: float) -> tuple[Modes, FarField, sparse.csr_array]:
+    """The bar held along as across, stations of 16 mm; its far field, and the rows of its top."""
+    mesh = grid(np.linspace(-15.0, 15.0, 3), np.linspace(-60.0, 0.0, 7))
+    section = Section(mesh, STEEL, springs={"bottom": (0.03, 0.03, 0.03)})
+    rows = section.rows(on_top(section, 15.0))
+    modes = Modes(section, np.ones(len(section.weights), bool), length, round(length / 16.0),
+                  window=11, surface=rows)  # fmt: skip
+    return modes, FarField(modes, modes.x[5]), rows
 
 
 @pytest.mark.parametrize("resultant", range(4))
@@ -538,17 +556,12 @@ def test_each_resultant_has_its_far_field(resultant: int) -> None:
 
     What is left at L = 512 are the shapes of forces that no resultant tells, from one length away.
     """
-    mesh = grid(np.linspace(-15.0, 15.0, 3), np.linspace(-60.0, 0.0, 7))
-    section = Section(mesh, STEEL, springs={"bottom": (0.03, 0.03, 0.03)})
-    rows = section.rows(on_top(section, 15.0))
-    shape = (rows @ section.rigid)[:, resultant]
-    deep = section.points[1].ravel() < -40.0  # above, stations of 16 mm do not resolve the load
     found, alone = [], []
     for length in (512.0, 4096.0):
-        n = round(length / 16.0)
-        modes = Modes(section, np.ones(len(section.weights), bool), length, n, window=11,
-                      surface=rows)  # fmt: skip
-        far = FarField(modes, modes.x[5])
+        modes, far, rows = resting(length)
+        section = modes.section
+        shape = (rows @ section.rigid)[:, resultant]
+        deep = section.points[1].ravel() < -40.0  # above, stations do not resolve the load
         forces = np.zeros((len(shape), 11))
         forces[:, 5] = shape / 16.0 / (shape @ shape)
         near, resultants = modes.solve(forces=forces), far.resultants(forces)

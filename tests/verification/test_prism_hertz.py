@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from solver.prism.given_patch import EllipticPatch
 from solver.prism.track import PrismField, PrismTrack
-from solver.tensors import von_mises
+from solver.tensors import to_tensor, von_mises
 from tests.verification.closed_forms import HertzEllipse
 from tests.verification.prism_blocks import PERFECT, A, B, block
 
@@ -28,12 +28,13 @@ def stress(track: PrismTrack, ellipse: HertzEllipse) -> Array:
 
 
 def test_stress_half_an_element_down_is_that_of_the_half_space() -> None:
-    """Over the largest pressure p0, from the middle to beyond the edge.
+    """Over the largest pressure p0, from the middle to beyond the edge; elements of b/6.
 
     Half an element down the middle errs by 0.7 % of p0. Under the edge, where the pressure falls
-    with the root of the distance, the error is 1.5 % at 0.8 of an element, 1.0 % at 1.2, 0.3 % at
-    1.8. The section makes it there, not the load: forces that work on all of its quadratic shape
-    functions, and those of all waves that stations carry, leave 1.4, 1.0, 0.3 %.
+    with the root of the distance, the error is 1.2 % at 0.8 of an element, 0.8 % at 1.2, 0.3 % at
+    1.8; with elements of b/12.5 it is 0.9 % at 0.8. The section makes it there, not the load:
+    forces that work on all of its quadratic shape functions, and those of all waves that stations
+    carry, hardly change it.
     """
     track, ellipse = body(), HertzEllipse(a=A, b=B, peak_pressure=1360.0)
     found = stress(track, ellipse)
@@ -44,13 +45,13 @@ def test_stress_half_an_element_down_is_that_of_the_half_space() -> None:
     x = track.modes.x[stations] - track.modes.x[track.before]
     place = [each.ravel() for each in np.broadcast_arrays(x, -y[rows, None], z[rows, None])]
     exact = ellipse.stress(*place, PERFECT.poisson_ratio).T / ellipse.peak_pressure
-    error = np.abs(some.reshape(-1, 6) - exact).max(axis=1)
+    error = np.abs(to_tensor((some.reshape(-1, 6) - exact).T)).max(axis=0)
     at, deep, across = place
     inside = (at / A) ** 2 + (across / B) ** 2 < 0.7**2
     assert error[inside].max() < 0.01
-    assert error.max() < 0.016
-    assert error[deep > 1.0].max() < 0.0105
-    assert error[deep > 1.5].max() < 0.004
+    assert error.max() < 0.013
+    assert error[deep > 1.0].max() < 0.009
+    assert error[deep > 1.5].max() < 0.0035
 
 
 def test_a_circle_yields_first_at_1613_of_the_yield_stress_half_a_radius_down() -> None:

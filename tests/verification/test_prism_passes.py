@@ -27,7 +27,7 @@ from solver.prism.state import PrismState
 from solver.prism.track import PrismTrack
 from solver.steady import track_of
 from solver.steady.passing import Pass, passing
-from solver.tensors import von_mises
+from solver.tensors import SQRT2, von_mises
 from tests.verification.prism_blocks import (
     HARDENS,
     PERFECT,
@@ -89,8 +89,47 @@ class Line:
         )
 
 
-def strip(length: float, h: float = 2.0, split: int = 0) -> PrismTrack:
-    """A strip held across and at its bottom, 400 mm deep; stations of 2 mm.
+class Alone:
+    """What a line load on a half-plane adds to one on a strip that repeats itself, in closed form.
+
+    Of a force F = X + i Y per width at x = 0, with s = x + i y in the half-plane y < 0 and
+    w = 1 / s, Flamant's stress is
+
+        xx + yy = -2/pi Re(F w),    yy - xx + 2 i xy = 2/pi (X w - i y F w^2)
+
+    Of forces L apart w becomes ``pi/L cot(pi s/L)``, and w^2 ``(pi/L / sin(pi s/L))^2``. The mean
+    of xx is Y / L then; in a strip, which keeps its length, it is nu / (1 - nu) of that.
+    K.L. Johnson, Contact Mechanics (1985), sections 2.2 and 2.3: a force on a half-plane.
+    """
+
+    def __init__(self, track: PrismTrack, width: float) -> None:
+        modes, law = track.modes, track.elasticity
+        self._motions = modes.rows @ modes.section.rigid[modes.unknowns]
+        self._spacing = modes.length / modes.stations
+        x, y = np.broadcast_arrays(modes.x - modes.x[track.before], track.points[1][:, None])
+        s, L = x + 1j * y, modes.length
+        turn = np.pi * s / L
+        w = 1 / s - np.pi / L / np.tan(turn)
+        square = 1 / s**2 - (np.pi / L / np.sin(turn)) ** 2
+        nu = law.poisson_ratio
+        stress = np.zeros((*x.shape, 6, 4))
+        for axis, force in enumerate((1.0, 1j)):
+            both = -2 / np.pi * (force * w).real
+            apart = 2 / np.pi * (force.real * w - 1j * y * force * square)
+            stress[..., 0, axis] = (both - apart.real) / 2 + force.imag * (1 - nu / (1 - nu)) / L
+            stress[..., 1, axis] = (both + apart.real) / 2
+            stress[..., 3, axis] = apart.imag / SQRT2
+        stress[..., 2, :] = nu * (stress[..., 0, :] + stress[..., 1, :])
+        inverse = np.linalg.inv(law.stiffness(6)) / width
+        self.strain = np.einsum("ab,pcbq->pcaq", inverse, stress)
+
+    def resultants(self, forces: Array) -> Array:
+        """See `FarField`."""
+        return np.asarray(self._spacing * (self._motions.T @ forces.sum(axis=1)))
+
+
+def strip(length: float, h: float = 2.0, split: int = 0, spacing: float = 2.0) -> PrismTrack:
+    """A strip held across and at its bottom, 400 mm deep.
 
     Elements are h thick, those of the uppermost ``split`` rows h / 2.
     """
@@ -102,29 +141,30 @@ def strip(length: float, h: float = 2.0, split: int = 0) -> PrismTrack:
     )
     return PrismTrack(
         section, section.points[1].mean(axis=1) > -26.0, "top",
-        length=length, spacing=2.0, ahead=24.0, behind=32.0, reach=10.0, levels=0,
+        length=length, spacing=spacing, ahead=24.0, behind=32.0, reach=10.0, levels=0,
     )  # fmt: skip
 
 
 def test_a_strip_held_across_has_the_pass_of_plane_strain() -> None:
-    """With a shear of 0.09 p, on elements of 2 mm; the error of a length is as 1 / length."""
-    a, peak, depths = 8.29, 1360.0, np.array([3.0, 5.0, 8.0, 12.0])
-    each = []
-    for length in (256.0, 512.0):
-        track = strip(length)
-        load = PatchPassing(Line(track, a, peak, -0.09))  # type: ignore[arg-type]
-        left = rolled(track, PERFECT, load).after
-        stress = residual(PERFECT, left)
-        assert np.abs(stress[[1, 3, 4, 5]]).max() < 1e-3 * RE
-        down = np.argsort(-track.points[1])
-        each.append([np.interp(depths, -track.points[1][down], stress[k][down]) for k in (0, 2)])
-    endless = 2 * np.array(each[1]) - each[0]
-    half_plane = track_of(a, 2.0, 1.15, PERFECT.elasticity)
+    """With a shear of -0.09 p, within 3 MPa from 1 mm down.
+
+    Without what `Alone` adds it errs by 20 MPa; stations 1 mm apart err by 5 at 1 mm.
+    """
+    a, peak, shear, depths = 8.29, 1360.0, -0.09, np.array([1.0, 2.0, 3.0, 5.0, 8.0, 10.0, 12.0])
+    track = strip(512.0, 1.0, 3, spacing=0.5)
+    track.far = Alone(track, width=2.0)  # type: ignore[assignment]
+    load = PatchPassing(Line(track, a, peak, shear))  # type: ignore[arg-type]
+    left = rolled(track, PERFECT, load).after
+    stress = residual(PERFECT, left)
+    assert np.abs(stress[[1, 3, 4, 5]]).max() < 1e-3 * RE
+    down = np.argsort(-track.points[1])
+    found = [np.interp(depths, -track.points[1][down], stress[k][down]) for k in (0, 2)]
+    half_plane = track_of(a, 0.5, 1.05, PERFECT.elasticity)
     before = half_plane.rows.virgin(PERFECT)
-    plane = passing(half_plane, PERFECT, half_plane.hertz(peak, -0.09), before).after
+    plane = passing(half_plane, PERFECT, half_plane.hertz(peak, shear), before).after
     own = plane.stress(PERFECT.elasticity)
     exact = [np.interp(depths, plane.depth, own[:, k]) for k in (0, 2)]
-    assert np.abs(endless - exact).max() < 0.025 * RE
+    assert np.abs(np.subtract(found, exact)).max() < 3.0
     assert left.accumulated.max() == pytest.approx(plane.accumulated.max(), rel=0.03)
 
 

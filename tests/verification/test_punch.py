@@ -40,13 +40,17 @@ def yielded(solution):
     }
 
 
-@cache
 def press(**fields):
-    """Solve a punch once; distances from the corner are over the half-width, pressures over p0.
+    """What is asked of a punch, solved once however it is told."""
+    return pressed(PunchParameters(**(USUAL | fields)))
+
+
+@cache
+def pressed(parameters):
+    """Solve a punch; distances from the corner are over the half-width, pressures over p0.
 
     What is asked of it is kept, not the solution: some thirty would take a gigabyte.
     """
-    parameters = PunchParameters(**(USUAL | fields))
     a, p0 = parameters.half_width, parameters.load_ratio * parameters.yield_stress
     solution = solved(parameters)
     acting = solution.contact()

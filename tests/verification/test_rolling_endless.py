@@ -15,7 +15,8 @@ from solver.results.audit.steady import audit_pass
 from solver.scenes import rolling_endless, rolling_steady
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import load_on, track_for
-from solver.steady import rolling
+from solver.steady import rolling, search
+from solver.steady.passing import SolveBudget
 from tests.records import kept
 
 COARSE = {"element_size": 2.0, "growth": 1.3}
@@ -353,6 +354,21 @@ def test_what_hardens_has_no_limit_but_leaves_small_strain_theory():
     assert len(strain) == 5
     assert 0.2 < strain[0] < 0.4
     assert (np.diff(strain) > 0.05).all()
+
+
+def test_a_pass_that_is_not_found_ends_after_so_many_solves(monkeypatch):
+    """Of all its attempts together, on the way over coarser meshes too."""
+    made: list[search.SolveBudget] = []
+
+    def little():
+        made.append(SolveBudget(30))
+        return made[-1]
+
+    monkeypatch.setattr(search, "SolveBudget", little)
+    (record,) = records.__wrapped__((5,), **HEAVY, traction=-0.9)
+    assert record.status is Status.NOT_CONVERGED
+    assert "no steady pass was found in 30 solves" in record.message
+    assert [each.solves for each in made] == [30]
 
 
 def test_a_pass_beyond_its_window_is_found_in_a_larger_one(monkeypatch):

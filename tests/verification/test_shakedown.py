@@ -31,7 +31,7 @@ FEW = {"press_steps": 2, "unload_steps": 1}
 
 @cache
 def rolled(pressure, passes, *, half_width=8.0, status=None, **fields):
-    """The record of passes at p0 / k = ``pressure`` over a track without ends of 10 a."""
+    """The record of passes at p0 / k = ``pressure`` over a track without ends of 8 a."""
     p0, modulus = pressure * 502.0 / sqrt(3), 2e5 / (2 * (1 - 0.3**2))
     parameters = RollingParameters(
         **{
@@ -40,10 +40,10 @@ def rolled(pressure, passes, *, half_width=8.0, status=None, **fields):
             "periodic": True,
             "load_ratio": p0 / 502.0,
             "radius": half_width * modulus / (2 * p0),
-            "track": 10 * half_width,
+            "track": 8 * half_width,
             "element_size": half_width / 4,
             "advance_step": half_width / 2,
-            "growth": 1.3,
+            "growth": 1.5,
             "passes": passes,
         }
         | (FEW if fields.get("load") != "contact" else {})
@@ -221,7 +221,7 @@ def test_frictionless_limit_lies_between_3_7_and_4_3():
 
 
 def test_advance_a_pass_does_not_depend_on_the_length_of_the_track():
-    short, long = rolled(4.3, 6), rolled(4.3, 6, track=120.0)
+    short, long = rolled(4.3, 6), rolled(4.3, 6, track=96.0)
     for name in ("plastic_increment", "net_increment", "surface_advance"):
         values = of_passes(short, name), of_passes(long, name)
         assert values[0][-1] == pytest.approx(values[1][-1], rel=0.15)
@@ -236,9 +236,9 @@ def test_hardening_ends_ratchetting():
     assert of_passes(isotropic, "plastic_increment")[-1] < 0.01 * YIELD_STRAIN
 
 
-@pytest.mark.parametrize(("friction", "below", "above"), [(0.15, 3.1, 3.65), (0.3, 2.65, 3.15)])
-def test_friction_lowers_the_computed_limit(friction, below, above):
-    assert below < johnson_limit(friction) < above < 4.0
+def test_friction_lowers_the_computed_limit():
+    friction, below, above = 0.3, 2.65, 3.15
+    assert below < johnson_limit(friction) < above < 3.7
     shaken, moving = (rolled(p, 6, friction=friction, traction=1.0) for p in (below, above))
     assert state(shaken) is State.ELASTIC_SHAKEDOWN
     assert state(moving) is State.RATCHETTING

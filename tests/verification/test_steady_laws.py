@@ -11,6 +11,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from functools import cache
+from itertools import cycle
 from math import sqrt
 from pathlib import Path
 
@@ -84,8 +85,8 @@ def exactly(monkeypatch):
     monkeypatch.setattr(module, "TOLERANCE", 1e-11)
 
 
-def place(size=2.0):
-    return track_of(A, size, 1.15, ELASTIC)
+def place(size=4.0):
+    return track_of(A, size, 1.3, ELASTIC)
 
 
 def passes(law, ways, *, shear=0.1, pressure=4.7, parts=None):
@@ -120,7 +121,7 @@ def _by_both(run, monkeypatch):
 
 
 @pytest.mark.usefixtures("exactly")
-@pytest.mark.parametrize("hardening", LINEAR)
+@pytest.mark.parametrize("hardening", ["none", "mixed"])
 def test_passes_there_and_back_are_the_same_both_ways(hardening, monkeypatch):
     for one, other in _by_both(lambda: passes(linear(hardening), [1, -1, 1], parts=4), monkeypatch):
         seen, left = one.after.whole.state.packed, other.after.whole.state.packed
@@ -129,9 +130,8 @@ def test_passes_there_and_back_are_the_same_both_ways(hardening, monkeypatch):
 
 
 @pytest.mark.usefixtures("exactly")
-@pytest.mark.parametrize("hardening", ["none", "kinematic"])
-def test_so_are_those_of_a_wheel(hardening, monkeypatch):
-    p = RollingParameters(element_size=2.0, growth=1.3, traction=0.3, hardening=hardening)
+def test_so_are_those_of_a_wheel(monkeypatch):
+    p = RollingParameters(element_size=3.0, growth=1.5, traction=0.3, hardening="kinematic")
     track = track_for(p)
     for one, other in _by_both(
         lambda: list(rolling(track, p.material(), load_on(track, p, p), [1, 1], parts=4)),
@@ -181,8 +181,8 @@ def test_recall_makes_a_load_ratchet_that_prager_s_rule_shakes_down():
 
 @pytest.mark.parametrize("name", LAWS)
 def test_the_derivative_of_one_increment_a_column_is_that_of_differences(name):
-    law, rows = LAWS[name], place(1.0).rows
-    loaded = rows.strain(place(1.0).hertz(4.7 * K, 0.1).u)
+    law, rows = LAWS[name], place(2.0).rows
+    loaded = rows.strain(place(2.0).hertz(4.7 * K, 0.1).u)
     change = loaded * np.random.default_rng(3).normal(size=loaded.shape)
     step = 1e-6
 
@@ -228,7 +228,7 @@ def test_a_steady_pass_is_a_fixed_point_of_one_increment(name):
     An increment of one element takes each point to the place of the one two columns before.
     """
     law = LAWS[name]
-    track = Track(A, 2.0, 1.15, ELASTIC, interleaved=True)
+    track = Track(A, 4.0, 1.3, ELASTIC, interleaved=True)
     (one,) = rolling(track, law, track.hertz(4.7 * K, 0.09), [1], parts=1)
     state, points = under_load(track, one).plastic, track.rows.points
     upstream = np.concatenate(
@@ -244,7 +244,7 @@ def test_a_steady_pass_is_a_fixed_point_of_one_increment(name):
 
 def test_a_pass_of_a_wheel_on_fading_back_stresses_is_one_too():
     one = SteadyIncrement(
-        element_size=2.0, traction=0.3, hardening="chaboche", back_stresses=FADING
+        element_size=3.0, traction=0.3, hardening="chaboche", back_stresses=FADING
     )
     found = one.solve(from_touch=False)
     assert one.change(found) < 1.0  # MPa
@@ -263,11 +263,10 @@ WORDS = {
 }
 
 
-@pytest.mark.parametrize("word", WORDS)
-@pytest.mark.parametrize("load", ["hertz", "contact"])
+@pytest.mark.parametrize(("word", "load"), zip(WORDS, cycle(["contact", "hertz"]), strict=False))
 def test_every_word_rolls_and_its_audit_agrees(word, load):
     p = RollingParameters(
-        element_size=2.0, growth=1.3, traction=0.2, load=load, passes=2, yield_stress=YIELD,
+        element_size=3.0, growth=1.5, traction=0.2, load=load, passes=2, yield_stress=YIELD,
         direction="back_and_forth", **WORDS[word],
     )  # fmt: skip
     (record,) = SCENES["rolling"].path(p, [2], lambda share: None)
@@ -280,7 +279,7 @@ def test_every_word_rolls_and_its_audit_agrees(word, load):
 @cache
 def _two():
     p = RollingParameters(
-        element_size=2.0, growth=1.3, traction=0.3, load="hertz", **WORDS["chaboche"]
+        element_size=3.0, growth=1.5, traction=0.3, load="hertz", **WORDS["chaboche"]
     )
     track = track_for(p)
     first, second = rolling(track, p.material(), load_on(track, p, p), [1, -1])

@@ -20,13 +20,11 @@ from solver.scenes.rolling_steady import load_on
 from solver.steady import Track, rolling
 
 SIDE = 4.0
-FREE = {"load": "hertz", "friction": 0.0, "element_size": SIDE, "growth": 1.5}
-LAWS = {
-    "none": {},
-    "chaboche": {
-        "hardening": "chaboche", "back_stresses": ((60_000.0, 600.0), (4000.0, 20.0))
-    },
+FREE = {
+    "load": "hertz", "friction": 0.0, "element_size": SIDE, "growth": 1.5,
+    "hardening": "chaboche", "back_stresses": ((60_000.0, 600.0), (4000.0, 20.0)),
 }  # fmt: skip
+"""A law that the endless track asks from column to column, as increments do at their points."""
 LENGTHS = (100.0, 200.0, 400.0)
 YIELD = RollingParameters().yield_stress
 ENOUGH = Control(tolerances=Tolerances(residual=1e-4))
@@ -37,19 +35,19 @@ SAME = 0.05
 """Difference in depth of the rows of both meshes, up to which they are the same [mm]."""
 
 
-def endless(law):
+def endless():
     """Depth of the rows and residual sigma_x there, mean of both chains of points."""
-    p = RollingParameters(**FREE, **LAWS[law])
+    p = RollingParameters(**FREE)
     track = Track(p.mesh_width, SIDE, p.growth, p.material().elasticity, interleaved=True)
     (one,) = rolling(track, p.material(), load_on(track, p, p), [1], parts=1)
     stress = one.after.stress(p.material().elasticity)[:, 0]
     return one.after.depth[::2], stress.reshape(-1, 2).mean(axis=1)
 
 
-def with_ends(law, length, depth):
+def with_ends(length, depth):
     """Residual sigma_x under mid-track at these depths."""
     steps = {"advance_step": SIDE, "press_steps": 2, "unload_steps": 1}
-    p = RollingParameters(**FREE, **LAWS[law], **steps, track=length)
+    p = RollingParameters(**FREE, **steps, track=length)
     system = System(model(p))
     (outcome,) = Walker(system, ENOUGH).walk([p.schedule.program])
     assert outcome.error is None
@@ -60,26 +58,22 @@ def with_ends(law, length, depth):
 
 
 @cache
-def beyond_endless(law):
+def beyond_endless():
     """Depths below 1 mm, and sigma_x that tracks of `LENGTHS` have above the endless one."""
-    depth, stress = endless(law)
+    depth, stress = endless()
     rows = depth > 1.0
-    return depth[rows], np.array([with_ends(law, each, depth[rows]) for each in LENGTHS]) - stress[
-        rows
-    ]
+    return depth[rows], np.array([with_ends(each, depth[rows]) for each in LENGTHS]) - stress[rows]
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_extrapolated_in_1_over_length_they_are_the_endless_track(law):
-    _, beyond = beyond_endless(law)
+def test_extrapolated_in_1_over_length_they_are_the_endless_track():
+    _, beyond = beyond_endless()
     extrapolated = 2 * beyond[2] - beyond[1]
     assert abs(extrapolated).max() < 0.02 * YIELD
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_what_the_ends_add_halves_with_twice_the_length(law):
+def test_what_the_ends_add_halves_with_twice_the_length():
     """Where material yields; below, the ends of short tracks are too near for that."""
-    depth, beyond = beyond_endless(law)
+    depth, beyond = beyond_endless()
     yields = depth < 2 * RollingParameters(**FREE).half_width
     means = beyond[:, yields].mean(axis=1)
     assert means[0] / means[1] == pytest.approx(2.0, abs=0.3)

@@ -36,8 +36,8 @@ def of_turns(*order: str) -> Record:
 
 @cache
 def scattered() -> tuple[Record, ...]:
-    """The records of 2 and of 12 random passes."""
-    return rolled(2, passes=12, **RANDOM)
+    """The records of 2 and of 8 random passes."""
+    return rolled(2, passes=8, **RANDOM)
 
 
 def rolled(*also: int, **changes: Any) -> tuple[Record, ...]:
@@ -57,7 +57,7 @@ def field(record: Record, name: str) -> np.ndarray:
 
 
 def test_a_sequence_of_one_wheel_is_that_many_plain_passes() -> None:
-    (plain,), (turns,) = rolled(passes=3), rolled(passes=3, load=50e3, sequence=({"load": 110e3},))
+    (plain,), (turns,) = rolled(passes=2), rolled(passes=2, load=50e3, sequence=({"load": 110e3},))
     assert plain.fields.keys() == turns.fields.keys()
     for name, (_, values) in plain.fields.items():
         np.testing.assert_array_equal(values, field(turns, name), err_msg=name)
@@ -234,13 +234,13 @@ def test_random_passes_decide_no_state_but_tell_a_mean() -> None:
     assert np.isnan(record.scalars["steady_plastic_increment"])
     added = np.diff(field(record, "pass_max_plastic_strain"), prepend=0.0)
     mean = record.scalars["mean_plastic_increment"]
-    assert added[6:].sum() / 6 <= mean <= field(record, "pass_plastic_increment")[6:].sum() / 6
+    assert added[4:].sum() / 4 <= mean <= field(record, "pass_plastic_increment")[4:].sum() / 4
 
 
 def test_a_pass_where_nothing_yields_takes_one_solve() -> None:
-    (record,) = rolled(passes=6, yield_stress=3000.0, hardening="none", **RANDOM)
+    (record,) = rolled(passes=3, yield_stress=3000.0, hardening="none", **RANDOM)
     assert record.scalars["shakedown_state"] == ShakedownState.ELASTIC
-    assert record.scalars["iterations"] == 6  # a pass counts as one at least
+    assert record.scalars["iterations"] == 3  # a pass counts as one at least
     assert record.scalars["mean_plastic_increment"] == 0.0
 
 

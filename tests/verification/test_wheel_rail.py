@@ -170,10 +170,10 @@ def test_the_creepage_of_a_moment_makes_that_moment() -> None:
 def test_lateral_creepage_drags_the_rail_along_up_to_friction() -> None:
     forces = [
         rolled(*CROWNED.items(), ("lateral_creepage", creepage))[0].scalars["lateral_force"]
-        for creepage in (-0.03, 0.0, 0.03)
+        for creepage in (-0.03, 0.03)
     ]
     full = 0.17 * 100e3
-    np.testing.assert_allclose(forces, [-full, 0.0, full], atol=0.03 * full)
+    np.testing.assert_allclose(forces, [-full, full], atol=0.03 * full)
 
 
 def test_a_crowned_wheel_on_an_elastic_rail_presses_as_hertz() -> None:

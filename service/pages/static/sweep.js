@@ -107,7 +107,7 @@ function marked(what, count, kept) {
   const { x, y } = markedPlaces();
   const at = (run, place) => (place.number ? raw(run, place) : plain(words(wordsAt(place.name)[raw(run, place)])));
   const every = Array.from({ length: count }, (_, run) => run).filter((run) => kept === null || kept.has(run));
-  const runs = every.length > MOST_MARKS ? every.filter((_, k) => k % Math.ceil(every.length / MOST_MARKS) === 0) : every;
+  const runs = every.length > MOST_MARKS ? every.filter((run, k) => k % Math.ceil(every.length / MOST_MARKS) === 0 || run === study.at) : every;
   return { x, y, runs, of: every.length, spotOf: (run) => [at(run, x), y ? at(run, y) : value(run, what)] };
 }
 

@@ -6,11 +6,12 @@ nearest place of the master, and of the rigid body.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from solver.contact.system import LEAST
+from solver.contact.system import LEAST, LEAST_ENERGY
 from solver.fem.rigid import RigidPart
 from solver.fem.surface import edges_of
 from solver.mesh.edges import shape_functions
@@ -26,7 +27,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _PIECES = 16
-"""Number of pieces of an edge."""
+"""Number of pieces of an edge; more where edges of the other side are shorter."""
+_FINER = 8
+"""Number of parts of a piece, for normals and areas of nodes on curved edges."""
 _FACING = 0.05
 """Ratio of the distance from the master to the length of the slave; above it a place of the slave
 faces no master."""
@@ -63,11 +66,18 @@ def links_error(system: System, converged: Converged) -> float:
     )  # fmt: skip
 
 
-def _places(system: System, side: Side, converged: Converged) -> _Sampled:
+def _places(
+    system: System, side: Side, converged: Converged, opposite: _Sampled | None = None
+) -> _Sampled:
+    """Return the pieces of a boundary; they are no longer than those of the ``opposite`` one."""
     name, boundary = side
     whole = system.full(name)
-    edges = edges_of(whole, boundary)
-    ends = np.linspace(-1.0, 1.0, _PIECES + 1)
+    edges, count = edges_of(whole, boundary), _PIECES
+    if opposite is not None:
+        long = np.linalg.norm(whole.X[:, edges[:, 1]] - whole.X[:, edges[:, 0]], axis=0) / count
+        short = np.linalg.norm(opposite.ends[1] - opposite.ends[0], axis=0)
+        count *= math.ceil(max(float(long.mean() / short.mean()), 1.0))
+    ends = np.linspace(-1.0, 1.0, count + 1)
     moved = system.displacement(name, converged.state).reshape(-1, 2).T
 
     def at(xi: Array, field: Array) -> Array:
@@ -82,6 +92,15 @@ def _places(system: System, side: Side, converged: Converged) -> _Sampled:
     length = np.linalg.norm(outline[1] - outline[0], axis=0).reshape(X.shape[1:])
     area = (length * whole.measure(X)).ravel()
     return _Sampled(X.reshape(2, -1), u.reshape(2, -1), area, outline, pieces(moved))
+
+
+def least_energy(system: System, force: float) -> float:
+    """Return the energy [N mm] below which values are rounding, if links hold bodies.
+
+    A condensed body may be held at all unknowns that are left: then its energy counts from zero.
+    """
+    held = {link.slave[0] for link in system.model.links}
+    return LEAST_ENERGY * force * max((_moved_by(system, name, force) for name in held), default=0)
 
 
 def turned(system: System, converged: Converged) -> tuple[str, ...]:
@@ -155,9 +174,9 @@ def _unbalanced(system: System, k: int, converged: Converged) -> float:
 def _misfit(system: System, k: int, converged: Converged) -> float:
     """Return the motion that a link should prevent over the largest motion of what it joins."""
     link: Link = system.model.links[k]
-    slave, others = _places(system, link.slave, converged), []
-    if link.master is not None:
-        master = _places(system, link.master, converged)
+    others, master = [], link.master and _places(system, link.master, converged)
+    slave = _places(system, link.slave, converged, master)
+    if master is not None:
         slave = _opposite(slave, master)
         others.append(_facing(slave.X, master)[1])
     X, u, area, *_ = slave
@@ -168,10 +187,12 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
         others.append(np.array([x - angle * arm[1], y + angle * arm[0]]))
     size = max(float(np.abs(each).max()) for each in (u, *others))
     size = max(size, LEAST * _moved_by(system, link.slave[0], converged.state.force_scale))
-    axes = [1] if _is_ring(system, link) else list(link.axes)
-    jump = (u - sum(others, np.zeros_like(u)))[axes]
     if not size:
         return 0.0
+    if link.local:
+        return _misfit_along(system, k, converged, size)
+    axes = [1] if _is_ring(system, link) else list(link.axes)
+    jump = (u - sum(others, np.zeros_like(u)))[axes]
     if link.master is None and not link.distributed and np.isinf(link.stiffness):
         jump = jump - jump[:, :1] if link.rigid is None else jump
         return float(np.abs(jump).max()) / size
@@ -179,6 +200,38 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
     if np.isfinite(link.stiffness):
         mean = mean + _forces(system, k, converged, link.slave[0])[0][axes] / link.stiffness
     return float(np.abs(mean).max()) / area.sum() / size
+
+
+def _misfit_along(system: System, k: int, converged: Converged, size: float) -> float:
+    """Return the motion over ``size`` that a link along normals or tangents should prevent.
+
+    It is looked for at the nodes, where it is held.
+    """
+    link = system.model.links[k]
+    name, boundary = link.slave
+    whole, edges = system.full(name), edges_of(system.full(name), boundary)
+    nodes, local = np.unique(edges, return_inverse=True)
+    local = local.reshape(edges.shape)
+    X, u = whole.X[:, nodes], system.displacement(name, converged.state).reshape(-1, 2).T[:, nodes]
+    ends = np.linspace(-1.0, 1.0, _PIECES * _FINER + 1)
+    shapes = shape_functions((ends[1:] + ends[:-1]) / 2, edges.shape[1])
+    outline = X[:, local] @ shape_functions(ends, edges.shape[1]).T
+    along = np.diff(outline, axis=2)
+    depth = whole.measure(X[:, local] @ shapes.T)
+    area = np.bincount(local.ravel(), ((np.hypot(*along) * depth) @ shapes).ravel())
+    x, y = (np.bincount(local.ravel(), (each @ shapes).ravel()) for each in along)
+    way = np.stack([y, -x] if link.components == "normal" else [x, y]) / np.hypot(x, y)
+    if link.rigid is not None:
+        across, up, angle = _motion(system, link.rigid, converged)
+        centre = system.parts[system.part(link.rigid)].body.centre  # type: ignore[union-attr]
+        arm = X - np.reshape(centre, (2, 1))
+        u = u - np.array([across - angle * arm[1], up + angle * arm[0]])
+    jump = (way * u).sum(axis=0)
+    if np.isfinite(link.stiffness):
+        sprung = (area * jump * way).sum(axis=1)
+        force = _forces(system, k, converged, name)[0] / link.stiffness
+        return float(np.abs(sprung + force).max()) / area.sum() / size
+    return float(np.abs(jump if link.rigid else jump - jump[0]).max()) / size
 
 
 def _opposite(slave: _Sampled, master: _Sampled) -> _Sampled:

@@ -15,6 +15,8 @@ from solver.results.audit.values import Located, flowed
 from solver.tensors import AXES, components
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from solver.results.audit.sources import OfStates
@@ -29,6 +31,9 @@ if TYPE_CHECKING:
 _LEAST_LENGTH = 1e-9
 """Least scale of displacement, gap and slip, over the size of the bodies."""
 _PARTS = {name: k for names in (components(6), AXES) for k, name in enumerate(names)}
+_FIELDS = ("stress", "mises", "plastic_strain", "plastic_tensor", "strain")
+"""Fields along lines and at points."""
+_SIGNED = ("stress", "plastic_tensor", "strain")
 _ROUNDED = 1e-9
 """Largest difference of two equal times of the program."""
 
@@ -55,7 +60,8 @@ class NamedPlacesCheck:
         sizes = [np.ptp(run.system.full(name).X, axis=1).max() for name in run.system.names]
         length = _LEAST_LENGTH * float(max(sizes))
         self._least = {"stress": stress_scale, "mises": stress_scale,
-                       "plastic_strain": LEAST_STRAIN, "displacement": length,
+                       "plastic_strain": LEAST_STRAIN, "plastic_tensor": LEAST_STRAIN,
+                       "strain": LEAST_STRAIN, "displacement": length,
                        "pressure": LEAST_STRAIN * stress_scale,
                        "shear": LEAST_STRAIN * stress_scale,
                        "pressure_deformed": LEAST_STRAIN * stress_scale,
@@ -84,22 +90,17 @@ class NamedPlacesCheck:
             self._out.add("line_x", X, line.X, float(np.abs(line.X).max()))
             s = _lengths(line.X)
             self._out.add("line_s", self._field("line_s")[k], s, s[-1])
-            stress, mises, strain = (
-                self._field(f"line_{name}")[k] for name in ("stress", "mises", "plastic_strain")
-            )
-            at = some(X.shape[1], stress, mises, strain)
-            self._fields("line", line.body, line.X[:, at], stress[..., at], mises[..., at],
-                         strain[..., at])  # fmt: skip
+            stored = {name: self._field(f"line_{name}")[k] for name in _FIELDS}
+            at = some(X.shape[1], *stored.values())
+            stored = {name: values[..., at] for name, values in stored.items()}
+            self._fields("line", line.body, line.X[:, at], stored)
 
     def _points(self) -> None:
         for k, point in enumerate(self._places.points.values()):
             X = np.array([self._field(f"point_{a}")[k] for a in AXES[: len(point.X)]])
             self._out.add("point_x", X, point.X[:, 0], float(np.abs(point.X).max()))
-            stress, mises, strain = (
-                self._field(f"point_{name}")[k][..., None]
-                for name in ("stress", "mises", "plastic_strain")
-            )
-            places = self._fields("point", point.body, point.X, stress, mises, strain)
+            stored = {name: self._field(f"point_{name}")[k][..., None] for name in _FIELDS}
+            places = self._fields("point", point.body, point.X, stored)
             for j, stage in enumerate(self._run.view.stages):
                 moved = self._source.fields(point.body, stage).displacement
                 own, scale = places.of(moved)[:, 0], self._scale("displacement", moved)
@@ -107,22 +108,17 @@ class NamedPlacesCheck:
                     name = f"point_displacement_{axis}"
                     self._out.add(name, self._field(name)[k, j], value, scale)
 
-    def _fields(
-        self, kind: str, body: str, X: Array, stress: Array, mises: Array, strain: Array
-    ) -> Located:
+    def _fields(self, kind: str, body: str, X: Array, stored: Mapping[str, Array]) -> Located:
         """Compare fields (stage, ..., n) at places (2, n) of a body."""
         places = Located(self._source.plain(body), X)
         for k, stage in enumerate(self._run.view.stages):
             fields = self._source.fields(body, stage)
-            for name, recorded, nodal in (
-                ("stress", stress[k], fields.stress),
-                ("mises", mises[k], np.maximum(fields.mises, 0.0)),
-                ("plastic_strain", strain[k], flowed(fields)),
-            ):
+            for name, recorded in stored.items():
+                nodal = flowed(fields) if name == "plastic_strain" else getattr(fields, name)
                 own = places.of(nodal)
-                own = own if name == "stress" else np.maximum(own, 0.0)
-                self._out.add(f"{kind}_{name}", recorded, own, self._scale(name, nodal))
-                self._out.absent(f"{kind}_{name}", recorded, places.outside)
+                own = own if name in _SIGNED else np.maximum(own, 0.0)
+                self._out.add(f"{kind}_{name}", recorded[k], own, self._scale(name, nodal))
+                self._out.absent(f"{kind}_{name}", recorded[k], places.outside)
         return places
 
     # -- contact and forces ------------------------------------------------------------------
@@ -256,6 +252,8 @@ class NamedPlacesCheck:
         else:
             body, X = str(number.body), None
         fields = self._source.fields(body, stage)
+        if part and kind == "plastic_strain":
+            kind = "plastic_tensor"
         if X is None and kind in ("mises", "plastic_strain"):
             X, mises, flow = fields.at_points
             values = mises if kind == "mises" else flow
@@ -263,13 +261,27 @@ class NamedPlacesCheck:
             nodal = flowed(fields) if kind == "plastic_strain" else getattr(fields, kind)
             places = None if X is None else Located(self._source.plain(body), X)
             values = nodal if places is None else places.of(nodal)
-            values = values[_PARTS[part]] if part else np.maximum(values, 0.0)
+            values = _part(values, part) if part else np.maximum(values, 0.0)
             X = fields.plain.part.X if X is None else X
         inside = np.ones(X.shape[1], dtype=bool)
         for at, span in zip(X, (number.x, number.y, number.z), strict=False):
             if span is not None and number.line is None:
                 inside &= (at >= span[0]) & (at <= span[1])
         return np.where(inside, values, np.nan), X
+
+
+def _part(values: Array, part: str) -> Array:
+    """Return a component (n,) of a vector or tensor (n_components, n), or an invariant."""
+    if part in _PARTS:
+        return values[_PARTS[part]]
+    xx, yy, zz, xy, *out = values
+    yz, zx = out or (np.zeros_like(xy), np.zeros_like(xy))
+    known = np.isfinite(xx)
+    tensor = np.moveaxis(np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]), -1, 0)
+    low, middle, high = np.linalg.eigvalsh(np.where(known[:, None, None], tensor, 0.0)).T
+    found = {"principal_1": high, "principal_2": middle, "principal_3": low, "tresca": high - low,
+             "hydrostatic": (xx + yy + zz) / 3}[part]  # fmt: skip
+    return np.where(known, found, np.nan)
 
 
 def _lengths(X: Array) -> Array:

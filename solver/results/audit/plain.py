@@ -40,6 +40,9 @@ the whole force: loads may bend and jump."""
 _GAUSS = (0.5 - 0.75**0.5 / 3, 0.5 + 0.75**0.5 / 3)
 _INSIDE = (0.5, 1e-6, 1 - 1e-6)
 """Gauss points of a chord; its middle, and its ends, where neighbours may have other loads."""
+_PARTS = 7
+"""Number of parts of an element along a side, if elements are few, on which a force per volume is
+first looked at."""
 GHOST = 1e-7
 """Share of stiffness that elements keep when they are removed."""
 
@@ -200,21 +203,28 @@ class PlainBody:
             return self.body.law
         return Heated(law=self.body.law, stiff=stiff, strong=strong)
 
-    def stress(self, u: Array, plastic: PlasticState | None, time: float) -> Array:
-        """Return Mandel stress (4, n_points) by Hooke's law [MPa].
+    def strains(self, u: Array, plastic: PlasticState | None, time: float) -> tuple[Array, Array]:
+        """Return the strain and its elastic part (4, n_points), Mandel, in plane stress with zz.
 
         Parameters
         ----------
         u : (n,) displacements [mm]
         plastic : internal variables at the points, None if nothing has yielded
         """
+        inelastic = self.eigenstrain(time)
+        if plastic is not None:
+            inelastic = inelastic + plastic.plastic_strain
+        elastic = self.strain(u).reshape(4, -1) - inelastic
+        if self.body.kinematics == "plane_stress":
+            nu = self.body.material.elasticity.poisson_ratio
+            elastic[2] = -nu / (1 - nu) * (elastic[0] + elastic[1])
+        return elastic + inelastic, elastic
+
+    def stress(self, u: Array, plastic: PlasticState | None, time: float) -> Array:
+        """Return Mandel stress (4, n_points) by Hooke's law [MPa]; see `strains`."""
         elasticity = self.body.material.elasticity
         nu, double_shear = elasticity.poisson_ratio, 2 * elasticity.shear_modulus
-        strain = self.strain(u).reshape(4, -1) - self.eigenstrain(time)
-        if plastic is not None:
-            strain -= plastic.plastic_strain
-        if self.body.kinematics == "plane_stress":
-            strain[2] = -nu / (1 - nu) * (strain[0] + strain[1])
+        _, strain = self.strains(u, plastic, time)
         out = double_shear * strain
         out[:3] += double_shear * nu / (1 - 2 * nu) * strain[:3].sum(axis=0)
         if self.body.kinematics == "plane_stress":
@@ -244,10 +254,17 @@ class PlainBody:
         normal; an edge has many chords.
         """
         total = np.zeros((3, 2))
-        for load in self.body.every_load:
-            own = sum((self._on_boundary(load, b) for b in load.boundaries), np.zeros((3, 2)))
-            total += load_factor(load.amplitude, time) * (own + self._on_volume(load))
+        for load, own in zip(self.body.every_load, self._on_body, strict=True):
+            total += load_factor(load.amplitude, time) * own
         return total
+
+    @cached_property
+    def _on_body(self) -> list[Array]:
+        """The moments (3, 2) of the forces of each load."""
+        return [
+            sum((self._on_boundary(load, b) for b in load.boundaries), self._on_volume(load))
+            for load in self.body.every_load
+        ]
 
     def moments(self, force: Array, x: Array) -> Array:
         """Return the sums (3, 2) of forces (2, n) times 1, x and y, at places (2, n)."""
@@ -291,7 +308,7 @@ class PlainBody:
     def _on_volume(self, load: Load) -> Array:
         """Return the moments (3, 2) of a load's force per volume, integrated over elements.
 
-        Only the cells are those of the solver.
+        Cells are found as in the solver, from smaller ones: it may miss what is narrow.
         """
         if load.body_force(self.points) is None:
             return np.zeros((3, 2))
@@ -301,7 +318,7 @@ class PlainBody:
             return np.broadcast_to(given, (2, x[0].size)).reshape(x.shape) * self._depth(x)
 
         basis, rule = self.part.basis, np.polynomial.legendre.leggauss(6)
-        cells = smooth_cells(basis, force)
+        cells = smooth_cells(basis, force, _PARTS)
         local, x, area = cells.points(rule, rule)
         given, total = force(x) * area, np.zeros((3, 2))
         for k, own in enumerate(basis.element_dofs):

@@ -115,6 +115,13 @@ class ZoneFields:
         return np.full_like(self.plain.part.X, np.nan)
 
     @property
+    def strain(self) -> Array:
+        """Not available: NaN."""
+        return np.full((6, self.plain.part.X.shape[1]), np.nan)
+
+    plastic_tensor = strain
+
+    @property
     def at_points(self) -> tuple[Array, Array, Array]:
         """Positions, von Mises stress and plastic strain of the points."""
         return self.plain.points, self._equivalent, self._points[1]

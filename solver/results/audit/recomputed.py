@@ -22,6 +22,8 @@ class BodyFields(Protocol):
     stress : (n_components, n_nodes) components xx, yy, zz, xy (, yz, zx) at its nodes [MPa]
     mises : (n_nodes,) von Mises stress [MPa]
     accumulated : (n_nodes,) accumulated plastic strain; recovery may make it negative
+    strain, plastic_tensor : (n_components, n_nodes) strain and plastic strain, of states by
+        increments alone
     displacement : (n_axes, n_nodes) [mm]
     at_points : positions (n_axes, n) [mm], von Mises stress (n,) [MPa] and plastic strain (n,) at
         points
@@ -41,6 +43,14 @@ class BodyFields(Protocol):
 
     @property
     def accumulated(self) -> Array:
+        """See above."""
+
+    @property
+    def strain(self) -> Array:
+        """See above."""
+
+    @property
+    def plastic_tensor(self) -> Array:
         """See above."""
 
     @property

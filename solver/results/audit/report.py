@@ -14,7 +14,7 @@ from solver.results.audit.bodies import AuditedBody
 from solver.results.audit.contact_error import contact_error
 from solver.results.audit.figures import LIMITS
 from solver.results.audit.forces import action_reaction, imbalance, left_on, reactions
-from solver.results.audit.links import links_error, turned
+from solver.results.audit.links import least_energy, links_error, turned
 from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.plain import PlainBody
 from solver.results.audit.theory import strain_of
@@ -96,7 +96,7 @@ def audit(
         "audit_increment_error": _largest(*(body.increment_error() for body in bodies)),
         **{name: _largest(0.0, *(pair.figures[name] for pair in pairs)) for name in names},
         "audit_links": _largest(*(links_error(system, converged) for converged in states)),
-        "audit_energy": _energy_error(bodies, loaded, system.links.energy(loaded.state.links)),
+        "audit_energy": _energy_error(system, bodies, loaded),
         "audit_touch_time": loaded.timing.unknown,
         "audit_slip_resolution": loaded.timing.passage,
         "audit_dissipation": least_dissipation,
@@ -130,17 +130,15 @@ def _laws(bodies: Sequence[AuditedBody], released: Sequence[AuditedBody]) -> tup
     return broken, beyond
 
 
-def _energy_error(bodies: Sequence[AuditedBody], loaded: Converged, springs: float) -> float:
-    """Return the error of the energy balance, over the largest term of the balance so far.
-
-    ``springs`` is the energy of the springs of links [N mm].
-    """
-    work = loaded.energy
+def _energy_error(system: System, bodies: Sequence[AuditedBody], loaded: Converged) -> float:
+    """Return the error of the energy balance, over the largest term of the balance so far."""
+    work, springs = loaded.energy, system.links.energy(loaded.state.links)
     terms = np.array([
         sum(body.stored() for body in bodies) + springs, -work.stored, work.plastic, work.friction,
         work.contact, -work.external,
     ])  # fmt: skip
-    level = max(float(np.abs(terms).max()), work.scale)
+    least = least_energy(system, loaded.state.force_scale)
+    level = max(float(np.abs(terms).max()), work.scale, least)
     return abs(float(terms.sum())) / level if level else 0.0
 
 

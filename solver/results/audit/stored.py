@@ -168,7 +168,8 @@ class _Viewed:
             "residual_stress": (view.unloaded, _itself),
             "stress_difference": (view.loaded, self._difference),
         }
-        staged = {"map_stress": _stress, "map_mises": _mises}
+        staged = {"map_stress": _stress, "map_mises": _mises, "map_strain": _strain,
+                  "map_plastic_tensor": _plastic}  # fmt: skip
         names = [*single, *staged, "plastic_strain", "map_plastic_strain"]
         there = {name: values for name in names if (values := self._stored(name)) is not None}
         if not there:
@@ -197,9 +198,11 @@ class _Viewed:
         for name, nodal in staged.items():
             for k, stage in enumerate(view.stages if name in flat else ()):
                 own = sampled(nodal, stage)
-                own = own if nodal is _stress else np.maximum(own, 0.0)
-                recorded = flat[name][k][..., at]
-                self._against(name, recorded, own, bodies, self.stress_scale, stage)
+                own = np.maximum(own, 0.0) if nodal is _mises else own
+                scale = self.stress_scale
+                if nodal in (_strain, _plastic):
+                    scale = self._strain_scale(np.abs(flat[name][k]))
+                self._against(name, flat[name][k][..., at], own, bodies, scale, stage)
         strains = {"plastic_strain": (view.unloaded,), "map_plastic_strain": view.stages}
         for name, stages in strains.items():
             for k, stage in enumerate(stages if name in flat else ()):
@@ -346,6 +349,14 @@ def _stress(fields: BodyFields) -> Array:
 
 def _mises(fields: BodyFields) -> Array:
     return fields.mises
+
+
+def _strain(fields: BodyFields) -> Array:
+    return fields.strain
+
+
+def _plastic(fields: BodyFields) -> Array:
+    return fields.plastic_tensor
 
 
 def _itself(values: Array) -> Array:

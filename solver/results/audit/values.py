@@ -81,6 +81,23 @@ class StateFields:
         """Plastic strain at the nodes."""
         return self.plain.recovered(self._points[1], self._time)
 
+    def _tensor(self, mandel: Array) -> Array:
+        """Return a Mandel tensor (4, n_points) at the nodes, components as of stress."""
+        tensor = mandel.copy()
+        tensor[3] /= SQRT2
+        return self.plain.recovered(self.plain.known(tensor, self._time), self._time)
+
+    @cached_property
+    def strain(self) -> Array:
+        """Strain at the nodes."""
+        return self._tensor(self.plain.strains(self._u, self._plastic, self._time)[0])
+
+    @cached_property
+    def plastic_tensor(self) -> Array:
+        """Plastic strain at the nodes."""
+        none = np.zeros((4, self.plain.points.shape[1]))
+        return self._tensor(none if self._plastic is None else self._plastic.plastic_strain)
+
     @property
     def displacement(self) -> Array:
         """Displacements of the nodes; NaN where all elements are removed."""
@@ -200,6 +217,13 @@ class PassFields:
     def displacement(self) -> Array:
         """Not available: NaN."""
         return np.full((2, self.plain.part.X.shape[1]), np.nan)
+
+    @property
+    def strain(self) -> Array:
+        """Not available: NaN."""
+        return np.full((4, self.plain.part.X.shape[1]), np.nan)
+
+    plastic_tensor = strain
 
     @property
     def at_points(self) -> tuple[Array, Array, Array]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 
 import numpy as np
+from annotated_types import Unit
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.markers import CARETDOWN, CARETLEFT, CARETRIGHT, CARETUP
@@ -79,17 +80,18 @@ def acting(bodies: Sequence[Body], rigid: Sequence[RigidBody]) -> Iterator[Arrow
             yield _travelling(body)
         if body.axle is not None:
             force = body.axle.force
-            text = f"force on the axle of {body.name}: {short_number(np.abs(force.value).max())}"
+            text = f"force on the axle of {body.name}: {short_number(np.abs(force.value).max())} N"
             yield _single(text, body.axle.centre, (0.0, -1.0), _FORCE)
     for each in rigid:
         for axis, way in (("x", (1.0, 0.0)), ("y", (0.0, 1.0)), ("rotation", (0.0, 0.0))):
             motion = getattr(each, axis)
             if motion.value:
                 pushed = isinstance(motion, Pushed)
-                kind = "moved"
+                turns = axis == "rotation"
+                kind, unit = ("turned", "rad") if turns else (f"moved {axis}", "mm")
                 if pushed:
-                    kind = "moment" if axis == "rotation" else "force"
-                text = f"{each.name}: {kind} {axis} {short_number(motion.value)}"
+                    kind, unit = ("moment", "N mm") if turns else (f"force {axis}", "N")
+                text = f"{each.name}: {kind} {short_number(motion.value)} {unit}"
                 to = np.sign(motion.value) * np.array(way)
                 yield _single(text, each.centre, to, _FORCE if pushed else _MOTION)
 
@@ -151,7 +153,7 @@ def _travelling(body: Body) -> Arrows:
 
 def _told(load: Load) -> str:
     """Return the entries of a load that are not zero."""
-    parts = []
+    parts, hints = [], get_type_hints(type(load), include_extras=True)
     for each in fields(load):
         value = getattr(load, each.name)
         if each.name in _NAMES or value is None:
@@ -160,8 +162,15 @@ def _told(load: Load) -> str:
         if callable(value):
             parts.append(f"{own}varies")
         elif isinstance(value, int | float) and value:
-            parts.append(f"{own}{short_number(value)}")
+            unit = _unit_in(hints[each.name])
+            parts.append(f"{own}{short_number(value)}{'' if unit == '1' else f' {unit}'}")
     return f": {', '.join(parts)}" if parts else ""
+
+
+def _unit_in(hint: Any) -> str:
+    """Return the unit that the type of a number declares."""
+    marks = [mark.unit for mark in getattr(hint, "__metadata__", ()) if isinstance(mark, Unit)]
+    return next((unit for unit in (*marks, *map(_unit_in, get_args(hint))) if unit != "1"), "1")
 
 
 def _unit(way: Array) -> Array:

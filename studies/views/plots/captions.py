@@ -55,7 +55,10 @@ def symbol(values: xr.DataArray) -> str:
         return ""
     name = str(values["component"].item())
     words_of = f"{values.name} {values.attrs.get('long_name', '')}"
-    letters = {"strain": r"\varepsilon", "displacement": "u"}
+    letters = {
+        "plastic strain": r"\varepsilon^{\mathrm{p}}", "strain": r"\varepsilon",
+        "displacement": "u",
+    }  # fmt: skip
     letter = next((each for word, each in letters.items() if word in words_of), r"\sigma")
     return f"${_SYMBOLS.get(name, f'{{0}}_{{{{{name}}}}}').format(letter)}$"
 

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from studies.errors import StudyError
 from studies.views.differing import Difference, checked_number
 from studies.views.plots.captions import capitalised, words
+from studies.views.plots.legends import add_head
 
 _BARS = 14
 """Largest number of variables that are drawn."""
@@ -37,7 +38,7 @@ def difference_figure(found: Difference, field: str | None = None) -> Figure:
     bars, pairs = figure.subplots(1, 2, width_ratios=(1.0, 1.0))
     _draw_changes(bars, found)
     _draw_pairs(pairs, found, name)
-    figure.suptitle(f"{found.names[1]} against {found.names[0]}: {found.common} runs in common")
+    add_head(figure, f"{found.names[1]} against {found.names[0]}", f"{found.common} runs in common")
     return figure
 
 

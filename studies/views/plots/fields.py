@@ -24,7 +24,9 @@ ALONG = ("s", "depth", "increment", "fraction")
 """Dimensions along which lines are drawn."""
 _DECAYED = 0.02
 """Depth is shown as far as values exceed this share of the peak."""
-DRAWN = (*AXES, *ALONG)
+OUTLINE = "outline"
+"""Dimension of the outlines of the bodies."""
+DRAWN = (*AXES, *ALONG, OUTLINE)
 """Dimensions within one figure of a run: two axes of a map, or one axis or one of `ALONG`."""
 
 

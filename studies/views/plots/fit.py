@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solver.results.quantities import QUANTITIES
-from studies.views.plots.captions import capitalised, words
+from studies.views.plots.captions import axis_label, label, words, wrapped
+from studies.views.plots.legends import add_head
 
 _PANEL = (4.6, 4.4)
 """Width and height of a line with its differences [in]."""
@@ -30,7 +31,8 @@ def fit_figure(dataset: xr.Dataset) -> Figure:
         rows = dataset.isel(row=np.flatnonzero(dataset["line"] == k))
         _draw(grid[:, k], rows, dataset.isel(lines=k))
     found = [f"{words(n)} {_sure(dataset, n)}" for n in map(str, dataset["parameter"].to_numpy())]
-    sheet.suptitle(f"{dataset.attrs['title']}\n{' · '.join(found)}", fontsize=10)
+    below = wrapped(" · ".join(found), size[0] - 0.4, 8)
+    add_head(sheet, f"Fit {dataset.attrs['title']}", below)
     return sheet
 
 
@@ -46,25 +48,26 @@ def _draw(panels: np.ndarray, rows: xr.Dataset, line: xr.Dataset) -> None:
         x, measured, sigma, fmt="o", color=_MARKS, markersize=3.0, linewidth=0.8, label="measured"
     )
     above.plot(x, fitted, "-" if over else "_", color=_LINE, linewidth=1.5, label="fitted")
-    above.set_ylabel(_named(of))
+    above.set_ylabel(wrapped(label(_declared(of)), _PANEL[1] * 0.7, 10))
     below.axhspan(-1.0, 1.0, color="0.93")
     below.axhline(0.0, color="0.2", linewidth=0.8)
     below.plot(x, (measured - fitted) / sigma, "o", color=_MARKS, markersize=3.0)
-    below.set_ylabel("Difference / σ")
-    below.set_xlabel(_named(over) if over else "Number of the value")
+    below.set_ylabel(r"difference / $\sigma$")
+    across = axis_label(_declared(over)) if over else "number of the value"
+    below.set_xlabel(wrapped(across, _PANEL[0] - 0.8, 10))
     if not over:
         below.set_xticks(x)
     if at := line["line_at"].item():
-        above.set_title(at, fontsize=8)
+        above.set_title(words(at.replace(" = ", " ")), fontsize=8, loc="left", color="0.3")
     above.legend(frameon=False, fontsize=8)
     for axes in (above, below):
         _plain(axes)
 
 
-def _named(name: str) -> str:
-    """Return the name of a variable with its unit."""
-    unit = QUANTITIES[name].units if name in QUANTITIES else ""
-    return capitalised(words(name)) + ("" if unit in {"", "1"} else f" [{unit}]")
+def _declared(name: str) -> xr.DataArray:
+    """Return a variable without values, with its meaning and unit."""
+    known = QUANTITIES[name].attributes if name in QUANTITIES else {"long_name": words(name)}
+    return xr.DataArray(name=name, attrs=known)
 
 
 def _sure(dataset: xr.Dataset, name: str) -> str:

@@ -22,6 +22,7 @@ from studies.views.plots.captions import capitalised, label, setting, symbol, wr
 from studies.views.plots.fields import Window, component_name, is_half, map_axes, usual_field
 from studies.views.plots.mapped import Mapped, is_patch, mapped
 from studies.views.plots.meshed import MappedMesh, mesh_maps, on_mesh
+from studies.views.plots.outlined import clip_of, lines_of, outlines_of, reaching
 from studies.views.plots.over import BELOW, draw_patch, draw_wheel
 
 Box = tuple[float, float, float, float]
@@ -50,8 +51,8 @@ def map_figure(
 ) -> Figure:
     """Return a map of `field` over the bodies, with both halves if one half was computed.
 
-    It is drawn on the mesh if the run keeps its fields, else on the map grid. A principal value has
-    its directions.
+    It is drawn on the mesh if the run keeps its fields, else on the map grid, up to the outlines of
+    the bodies. A principal value has its directions.
 
     Parameters
     ----------
@@ -88,8 +89,14 @@ def _on_grid(run: xr.Dataset, drawn: Mapped) -> Figure:
     patch = is_patch(values, run)
     x, y = values[across], values[up]
     sheet, axes = _sheet(run, values, *(float(np.ptp(each.to_numpy())) for each in (x, y)))
-    mesh = axes.pcolormesh(x, y, values, shading="nearest", rasterized=True, **_colours(drawn))
+    curves = [] if patch else outlines_of(run, across, up)
+    shown = reaching(values, curves) if curves else values
+    mesh = axes.pcolormesh(x, y, shown, shading="nearest", rasterized=True, **_colours(drawn))
     box = (*axes.get_xlim(), *axes.get_ylim())
+    if curves:
+        mesh.set_clip_path(clip_of(curves), axes.transData)
+        _draw_outlines(axes, lines_of(curves, run))
+        _draw_contact(axes, run)
     _mark_edges(axes, run, box)
     axes.set(xlim=box[:2], ylim=box[2:], xlabel=_symbol(run[across]), ylabel=_symbol(run[up]))
     if patch:
@@ -108,8 +115,7 @@ def _on_mesh(run: xr.Dataset, drawn: MappedMesh) -> Figure:
     mesh = axes.tripcolor(
         cells, drawn.values.to_numpy(), shading="gouraud", rasterized=True, **_colours(drawn)
     )
-    outline = drawn.X[:, drawn.edges].transpose(1, 2, 0)
-    axes.add_collection(LineCollection(list(outline), colors="0.15", linewidths=0.6))
+    _draw_outlines(axes, list(drawn.X[:, drawn.edges].transpose(1, 2, 0)))
     if not drawn.deformed:
         _draw_contact(axes, run)
         _mark_edges(axes, run, drawn.box)
@@ -146,6 +152,11 @@ def _mark_edges(axes: Axes, run: xr.Dataset, box: Box) -> None:
             label="edge of contact under load",
         )  # fmt: skip
         axes.legend(loc="upper right", framealpha=0.9, edgecolor="none", fontsize=8)
+
+
+def _draw_outlines(axes: Axes, lines: list[np.ndarray]) -> None:
+    """Draw the outlines (n, 2) of bodies."""
+    axes.add_collection(LineCollection(lines, colors="0.15", linewidths=0.6), autolim=False)
 
 
 def _draw_contact(axes: Axes, run: xr.Dataset) -> None:

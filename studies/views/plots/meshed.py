@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from solver.results.body_fields import BODY_FIELDS
 from solver.results.mesh_fields import NO_NODE, MeshFields
 from solver.results.quantities import QUANTITIES
-from solver.tensors import AXES, components
+from solver.tensors import AXES
 from studies.errors import StudyError, one_of
 from studies.storage.ugrid import keeps, read
 from studies.views.plots.fields import (
@@ -30,10 +31,9 @@ Array = np.ndarray
 
 _AT_THE_END = {"residual_stress": "stress", "plastic_strain": "plastic_strain"}
 """Variables after release, and the fields at the nodes."""
-_STAGED = {"map_stress": "stress", "map_mises": "mises", "map_plastic_strain": "plastic_strain"}
+_STAGED = {f"map_{name}": name for name in BODY_FIELDS}
 """Variables at each stage."""
-_MOVED = "map_displacement"
-MESH_MAPS = (*_AT_THE_END, *_STAGED, _MOVED)
+MESH_MAPS = (*_AT_THE_END, *_STAGED)
 """Variables that are drawn on a mesh where it is kept."""
 _NODE = "node"
 
@@ -140,28 +140,22 @@ def _values(
 ) -> tuple[xr.DataArray, Array | None]:
     """Return the values at the nodes, with their meaning, and the tensor they are taken from."""
     scalars = {name: each for name, each in run.coords.items() if not each.ndim}
-    if field == _MOVED:
-        known = AXES[: len(at["displacement"])]
-        component = component or known[-1]
-        if component not in known:
-            raise StudyError("component", component, one_of(component, known))
-        words = {"long_name": f"displacement along {component}", "units": "mm"}
-        values = at["displacement"][known.index(component)]
-        own = scalars | {"component": component}
-        return xr.DataArray(values, own, _NODE, field, words), None
     name = (_AT_THE_END | _STAGED)[field]
-    tensor = name == "plastic_strain" and component is not None
-    nodal = at["plastic_tensor" if tensor else name]
-    words = QUANTITIES[field].attributes
-    if tensor and not np.isfinite(nodal).any():
-        allowed = "is not kept in the file of this run: leave it out"
-        raise StudyError("component", component, allowed)
-    if tensor:
-        words = words | {"long_name": words["long_name"].removeprefix("equivalent ")}
-    if nodal.ndim == 1:
-        return component_of(xr.DataArray(nodal, scalars, _NODE, field, words), component), None
-    names = list(components(len(nodal)))
-    whole = xr.DataArray(nodal, scalars | {"component": names}, ("component", _NODE), field, words)
+    kind, nodal = BODY_FIELDS[name], at[name]
+    if not np.isfinite(nodal).any():
+        raise StudyError("field", field, "is not kept in the file of this run")
+    attributes = {"long_name": kind.long_name, "units": kind.units}
+    attributes |= QUANTITIES[field].attributes if field in QUANTITIES else {}
+    if not kind.over:
+        return component_of(xr.DataArray(nodal, scalars, _NODE, field, attributes), component), None
+    names = list(kind.parts(len(at["displacement"])))
+    whole = xr.DataArray(
+        nodal, scalars | {"component": names}, ("component", _NODE), field, attributes
+    )
+    if kind.over == "axis":
+        chosen = component_of(whole, component or names[-1])
+        words = f"{kind.long_name} along {component_name(chosen)}"
+        return chosen.assign_attrs(long_name=words), None
     return component_of(whole, component), nodal
 
 

@@ -65,7 +65,8 @@ def sensitivity_figure(
         axes.set_ylabel(capitalised(short_label(dataset[found.attrs["of"]])))
     name = capitalised(found.attrs.get("long_name", words(found.attrs["of"])))
     fit = f" · fit with Q² = {found.attrs['q2']:.3f}" if chaos else ""
-    sheet.suptitle(f"{name}\n{found.attrs['runs']} runs{fit}", fontsize=9)
+    left.set_title(f"{found.attrs['runs']} runs{fit}", loc="left", fontsize=8, color="0.3")
+    sheet.suptitle(name, x=0.01, ha="left", fontsize=11, weight="bold")
     return sheet
 
 

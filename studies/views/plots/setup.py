@@ -47,6 +47,12 @@ _MARGIN, _WORTHWHILE = 0.1, 0.35
 those of the whole for a second panel."""
 _NAMED = 0.4
 """Least length of a line that has its name beside it [in]."""
+_NAME, _OFF = 6.5, 0.125
+"""Size of names [pt], and how far they are from their line [in]."""
+_THIN = 0.6
+"""Width of a body up to which names stand outside [in]."""
+_SHARES = (0.3, 0.7, 0.15, 0.85)
+"""Places along a line, over its length, at which its name may stand besides the middle."""
 _SMALLEST = 1e-6
 """Least side of a part, over the largest coordinate of what there is."""
 _AROUND = 25.0
@@ -202,7 +208,12 @@ def _close(shown: _Subject, view: View) -> Box | None:
     sides = [(_shortest(body.mesh), body) for body in shown.own.bodies]
     (side, (x, y)), _ = min(sides, key=lambda each: each[0][0])
     reach = _AROUND * side
-    return x - reach, x + reach, y - reach, y + reach
+    left, right, bottom, top = _extent(shown)
+    more = 2 * _MARGIN * reach
+    return (
+        max(x - reach, left - more), min(x + reach, right + more),
+        max(y - reach, bottom - more), min(y + reach, top + more),
+    )  # fmt: skip
 
 
 def _shortest(mesh: Mesh) -> tuple[float, tuple[float, float]]:
@@ -241,6 +252,7 @@ def _draw(
 ) -> dict[str, Any]:
     """Draw all in a panel, in which an inch is so many mm; return the entries of the legend."""
     handles: dict[str, Any] = {}
+    taken: list[Box] = []
     colours = {
         side: _PAIRS[k % len(_PAIRS)] for k, pair in enumerate(shown.own.pairs) for side in pair
     }
@@ -258,6 +270,7 @@ def _draw(
                 np.stack([points[:, :-1], points[:, 1:]], axis=2),
                 f"{rigid.name}.{name}",
                 inch,
+                taken,
             )
         if rigid.surfaces:  # else it is a point that moves boundaries by links
             handles[f"{rigid.name}: rigid"] = Line2D([], [], color="k", linewidth=2.0)
@@ -268,6 +281,7 @@ def _draw(
         text = f"contact {'.'.join(slave)} – {'.'.join(master)}"
         handles[text] = Line2D([], [], color=colours[slave], linewidth=2.4)
     for body in shown.own.bodies:
+        thin = float(np.ptp(body.mesh.p, axis=1).min()) < _THIN * inch
         for name in body.mesh.boundaries or {}:
             lines = _polylines(body.mesh, body.mesh.boundaries[name])
             own = colours.get((body.name, name))
@@ -278,7 +292,8 @@ def _draw(
                     linewidths=2.4 if own else 1.1,
                 )
             )
-            _label(axes, outward(body.mesh, body.mesh.boundaries[name])[0], name, inch)
+            ends = outward(body.mesh, body.mesh.boundaries[name])[0]
+            _label(axes, ends, name, inch, taken, outside=thin)
         handles |= draw_supports(axes, body, inch, shown.own.springs.get(body.name, ()))
     for link in shown.links:
         handles |= _draw_link(axes, shown.own.bodies, link)
@@ -336,11 +351,14 @@ def _polylines(mesh: Mesh, facets: Array) -> Array:
     return np.asarray(mesh.doflocs[:, ends])
 
 
-def _label(axes: Axes, ends: Array, name: str, inch: float) -> None:
+def _label(
+    axes: Axes, ends: Array, name: str, inch: float, taken: list[Box], *, outside: bool = False
+) -> None:
     """Write the name of a line, given by the ends of its pieces (2, n, 2), inside its body.
 
-    It stands at the middle of the part of the line that is seen, unless that is too short: names
-    would stand on one another.
+    It stands at the middle of the part of the line that is seen, unless that is too short. Where it
+    would stand on other names, whose boxes are ``taken``, it is moved along the line, or across it.
+    Names of a thin body stand outside of it.
     """
     middle, along = ends.mean(axis=2), ends[:, :, 1] - ends[:, :, 0]
     (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
@@ -348,15 +366,43 @@ def _label(axes: Axes, ends: Array, name: str, inch: float) -> None:
     if np.linalg.norm(along[:, seen], axis=0).sum() < _NAMED * inch:
         return
     here, length = middle[:, seen], np.linalg.norm(along[:, seen], axis=0)
+    way = along[:, seen]
     centre = (here * length).sum(axis=1) / length.sum()
-    k = int(np.linalg.norm(here - centre[:, None], axis=0).argmin())
-    left = np.array([-along[1, seen][k], along[0, seen][k]]) / length[k]
+    first = int(np.linalg.norm(here - centre[:, None], axis=0).argmin())
+    place = np.cumsum(length) - length / 2
+    others = [int(np.abs(place - share * length.sum()).argmin()) for share in _SHARES]
+    best: tuple[float, int, Array, str, Box] | None = None
+    for side in (-1.0, 1.0) if outside else (1.0, -1.0):
+        for k in (first, *others):
+            left = side * np.array([-way[1, k], way[0, k]]) / length[k]
+            ha = "center" if abs(left[0]) < 0.5 else "left" if left[0] > 0 else "right"
+            box = _box_of(name, here[:, k] + _OFF * inch * left, ha, inch)
+            covered = sum(_shared(box, each) for each in taken)
+            if best is None or covered < best[0]:
+                best = covered, k, left, ha, box
+    assert best is not None
+    _, k, left, ha, box = best
+    taken.append(box)
     axes.annotate(
-        name, here[:, k], xytext=9.0 * left, textcoords="offset points", fontsize=6.5, color="0.15",
-        ha="center" if abs(left[0]) < 0.5 else "left" if left[0] > 0 else "right", va="center",
-        annotation_clip=True,
+        name, here[:, k], xytext=tuple(72.0 * _OFF * left), textcoords="offset points",
+        fontsize=_NAME, color="0.15", ha=ha, va="center", annotation_clip=True,
         bbox={"boxstyle": "round,pad=0.15", "facecolor": "w", "edgecolor": "none", "alpha": 0.7},
     )  # fmt: skip
+
+
+def _box_of(name: str, at: Array, ha: str, inch: float) -> Box:
+    """Return the box of a name that stands at a place, in which an inch is so many mm."""
+    width, height = 0.6 * _NAME / 72.0 * len(name) * inch, 1.4 * _NAME / 72.0 * inch
+    x = float(at[0]) - {"left": 0.0, "center": width / 2, "right": width}[ha]
+    y = float(at[1]) - height / 2
+    return x, x + width, y, y + height
+
+
+def _shared(one: Box, other: Box) -> float:
+    """Return the area that two boxes have in common."""
+    across = min(one[1], other[1]) - max(one[0], other[0])
+    up = min(one[3], other[3]) - max(one[2], other[2])
+    return max(across, 0.0) * max(up, 0.0)
 
 
 def _told(body: Body) -> str:

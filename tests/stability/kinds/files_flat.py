@@ -120,7 +120,7 @@ def oblique(number: int, rng: Rng) -> Draw:
         return {"force": Figure(N, tilt), "stuck": Figure(T, tilt), "reaction": Figure(R, EXACT)}
 
     # where it slides from the first there is no load that it bears
-    excused = ("NOT_CONVERGED.*less than friction bears",) if share > 1 and along is on else ()
+    excused = ("NOT_CONVERGED.*less than friction carries",) if share > 1 and along is on else ()
     what = f"oblique {share} of mu {mu}, {state}, {law}, {'at once' if along is on else 'after'}"
     return Draw(what, (tables,), check, excused, limit=share > 1)
 
@@ -177,7 +177,8 @@ def caged(number: int, rng: Rng) -> Draw:
                               key=lambda f: f.value)  # fmt: skip
         return out
 
-    # the mean gaps of coarse vertices are open, and the body stands apart from both plates
+    # the mean gaps of coarse vertices are open: the body stands apart from both plates. Friction
+    # then holds it on two vertices of each, anywhere between the slip of the one and the other
     excused = (COARSE, ADRIFT) if fine > 0.5 * deep else ()
     return Draw(
         f"{'disc' if solid else 'ring'} {state} a/R {deep} h/R {fine:.2g}",

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.collections import QuadMesh
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, QuadMesh
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
@@ -114,6 +116,40 @@ def test_between_the_halves_of_a_map_that_begins_away_from_their_line_nothing_is
     assert both.sel(x=[-5.0, 5.0]).notnull().all()
     near = whole(grid_map(x - 4.5, np.array([0.0, 1.0]))["quantity"])
     assert near["x"].to_numpy().tolist() == [-2.5, -1.5, -0.5, 0.5, 1.5, 2.5]
+
+
+def test_a_map_ends_at_the_outlines_of_the_bodies() -> None:
+    """A square with a hole, on a grid that meets neither its sides nor those of the hole."""
+    square = np.array([[0.0, 4.2, 4.2, 0.0, 0.0], [-4.2, -4.2, 0.0, 0.0, -4.2]])
+    hole = np.array([[1.4, 1.4, 2.6, 2.6, 1.4], [-2.6, -1.4, -1.4, -2.6, -2.6]])
+    points = np.hstack([square, [[np.nan], [np.nan]], hole])
+    run = grid_map(np.arange(6.0), np.arange(-5.0, 1.0), symmetric=True)
+    run = run.assign(outline_x=("outline", points[0]), outline_y=("outline", points[1]))
+    X, Y = np.meshgrid(run["x"], run["y"])
+    inside = (X < 4.2) & (Y > -4.2) & ~((X == 2.0) & (Y == -2.0))
+    unknown = (X == 3.0) & (Y == -3.0)  # of a body, not outside of it
+    run["quantity"] = run["quantity"].where(inside & ~unknown)
+    axes, mesh = mesh_of(map_figure(run, "quantity"))
+    drawn = np.asarray(mesh.get_array().filled(np.nan))[:, 5:]
+    values = run["quantity"].to_numpy()
+    np.testing.assert_array_equal(np.isnan(drawn), unknown)
+    np.testing.assert_array_equal(drawn[inside & ~unknown], values[inside & ~unknown])
+    assert drawn[2, 5] == values[2, 4]  # beyond the side the value of the nearest place
+    canvas = FigureCanvasAgg(axes.figure)
+    canvas.draw()
+    picture_of = np.asarray(canvas.buffer_rgba())[::-1, :, :3]
+    outside = np.round(255 * np.array(to_rgb(axes.get_facecolor())))
+    places = [(4.1, -1.0), (-4.1, -1.0), (4.3, -1.0), (2.0, -2.0), (-2.0, -2.0)]
+    for k, place in enumerate(places):
+        across, up = axes.transData.transform(place).astype(int)
+        assert (picture_of[up, across] == outside).all() == (k > 1)
+    (lines,) = (each for each in axes.collections if isinstance(each, LineCollection))
+    ends = np.vstack(lines.get_segments())
+    assert ends[:, 0].min() == -4.2 and ends[:, 0].max() == 4.2
+    steps = [np.diff(each, axis=0) for each in lines.get_segments()]
+    along = [np.abs(each[:-1, 0]) + np.abs(step[:, 0])
+             for each, step in zip(lines.get_segments(), steps, strict=True)]  # fmt: skip
+    assert min(each.min() for each in along) > 0.0  # the line of symmetry is no border
 
 
 def test_a_window_below_the_surface_shows_that_part_alone() -> None:

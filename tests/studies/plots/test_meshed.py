@@ -13,6 +13,7 @@ from matplotlib.quiver import Quiver
 from solver.results.mesh_fields import MeshFields
 from studies import StudyError
 from studies.storage import ugrid
+from studies.views.plots.captions import symbol
 from studies.views.plots.maps import map_figure
 from studies.views.plots.meshed import mesh_maps, on_mesh
 from studies.views.plots.picture import picture
@@ -37,6 +38,7 @@ def kept(*, symmetric: bool = False, grid: bool = True) -> xr.Dataset:
     end = {
         "displacement": np.stack([nothing, -0.1 * X[0]]), "stress": stress,
         "mises": np.abs(stress[0]), "plastic_strain": 1e-3 * X[0], "plastic_tensor": 1e-4 * stress,
+        "strain": 2e-4 * stress,
     }  # fmt: skip
     begin = {name: 3.0 * values for name, values in end.items()}
     bodies = {"block": ("quad4", QUADS), "pad": ("tri3", 6 + np.array([[0, 1, 2], [0, 2, 3]]))}
@@ -58,9 +60,10 @@ def test_values_are_those_of_the_nodes_on_every_face() -> None:
     assert drawn.box == pytest.approx((0.1, 1.9, -0.9, 0.9))
     begin = on_mesh(kept(), "map_mises", stage="loaded")
     np.testing.assert_array_equal(begin.values, 30 * drawn.X[0])
-    plastic = on_mesh(kept(), "plastic_strain", "xx")
-    np.testing.assert_allclose(plastic.values, 1e-3 * drawn.X[0])
-    assert plastic.values.attrs["long_name"] == "plastic strain after unloading"
+    for name, share, letter in (("plastic_tensor", 1.0, r"^{\mathrm{p}}"), ("strain", 2.0, "")):
+        values = on_mesh(kept(), f"map_{name}", "xx").values
+        np.testing.assert_allclose(values, share * 1e-3 * drawn.X[0])
+        assert symbol(values) == rf"$\varepsilon{letter}_{{xx}}$"
 
 
 def test_both_halves_are_mirrored_with_the_sign_of_shear() -> None:
@@ -132,8 +135,8 @@ def test_a_run_of_an_earlier_version_lacks_the_components_of_plastic_strain() ->
     run = kept()
     run = run.drop_vars([name for name in run if str(name).startswith("mesh_plastic_strain_")])
     assert on_mesh(run, "plastic_strain").values.notnull().all()
-    with pytest.raises(StudyError, match="component = 'xx': is not kept in the file"):
-        on_mesh(run, "plastic_strain", "xx")
+    with pytest.raises(StudyError, match="field = 'map_plastic_tensor': is not kept in the file"):
+        on_mesh(run, "map_plastic_tensor", "xx")
 
 
 def test_maps_on_a_grid_have_invariants_too() -> None:

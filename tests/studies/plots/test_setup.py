@@ -103,10 +103,10 @@ def test_it_shows_what_acts_where_and_in_which_direction(file: Path) -> None:
     np.testing.assert_allclose(motion, [[0.0], [-1.0]])
     known = legend_of(sheet)
     told = (
-        "pressure block.right: 30",
-        "temperature block: rise 50",
+        "pressure block.right: 30 MPa",
+        "temperature block: rise 50 K",
         "contact block.top – ball.face",
-        "ball: moved y \N{MINUS SIGN}0.1",
+        "ball: moved y \N{MINUS SIGN}0.1 mm",
         "held: x, y",
         "line below",
         "point corner",
@@ -186,3 +186,24 @@ def test_a_removal_is_drawn_in_its_region_and_a_panel_is_as_large_as_it_can_be()
     assert "removal plate.skin" in legend_of(sheet)
     assert close.get_position().width == pytest.approx(whole.get_position().width, rel=0.1)
     assert "wall: rigid" not in legend_of(setup_figure(scene_named("bending.toml", beside(DATA))))
+
+
+@pytest.mark.parametrize("name", ["bolt", "expansion"])
+def test_names_of_boundaries_do_not_stand_on_one_another(name: str) -> None:
+    """Also in a sleeve and in a thin plate, whose names would not fit inside."""
+    sheet = setup_figure(scene_named(f"{name}.toml", beside(DATA)))
+    sheet.draw_without_rendering()
+    for axes in sheet.axes:
+        seen = [each for each in axes.texts if axes.viewLim.contains(*each.xy)]
+        boxes = [each.get_window_extent() for each in seen]
+        assert len(boxes) >= 4
+        for k, one in enumerate(boxes):
+            assert not any(one.overlaps(other) for other in boxes[:k]), seen[k]
+
+
+def test_forces_and_motions_have_their_units() -> None:
+    told = legend_of(setup_figure(scene_named("bolt.toml", beside(DATA))))
+    assert "nut: force y \N{MINUS SIGN}20000 N" in told
+    assert "end: moment 6000 N mm" in legend_of(
+        setup_figure(scene_named("bending.toml", beside(DATA)))
+    )

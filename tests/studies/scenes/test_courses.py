@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from solver import ModelError
 from studies.errors import SceneError
 from studies.scenes.description import Description
 from studies.scenes.meshfile import MeshFile
@@ -78,3 +79,32 @@ def test_a_course_of_a_repeated_stage_is_the_same_in_each_cycle_and_wrong_once()
     np.testing.assert_allclose(load.amplitude.value, [0, 0, *([1.0, 0.2] * 4)])
     with pytest.raises(SceneError, match=r"has a mistake:\n.*must be 0\.2"):
         repeated([[0.0, 0.0], [0.5, 1.0], [1.0, 0.2]])
+
+
+def test_courses_and_cycles_that_make_too_many_increments_are_refused_before_they_are_made() -> (
+    None
+):
+    """A course of many times, gone through in many cycles, and steps that are too short."""
+    course = [[float(k), 0.5 + 0.4 * (k % 2)] for k in range(1, 500)]
+    cycles = {"stages": ["pressed", "pulse"], "times": "$often"}
+
+    def repeated(**changes: Any) -> FileScene:
+        content = blocks()
+        content["stages"] += [{"name": "pulse", "increments": 5}]
+        content["loads"][0]["amplitude"] = {"pressed": 0.5, "pulse": course}
+        content["parameters"]["often"] = {"default": 100, "range": [2, 1000]}
+        content["repeat"] = cycles
+        content |= changes
+        return file_scene(Description("blocks.toml", content, {}), built=True)
+
+    scene = repeated()
+    assert scene.program(scene.parameters(often=300)).count == 300 * (2 + 499)
+    told = r"repeat\.times = 1000: makes more than 200000 increments: take fewer cycles"
+    with pytest.raises(ModelError, match=told):
+        scene.parameters(often=1000)
+    with pytest.raises(SceneError, match="loading = '': makes more than 200000"):
+        content = blocks()
+        del content["stages"]
+        content["outputs"]["least"]["stage"] = "loaded"
+        content["loading"] = {"factor": 1e7, "step": 1e-3}
+        file_scene(Description("blocks.toml", content, {}), built=True)
