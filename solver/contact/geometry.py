@@ -71,8 +71,9 @@ class Pairing:
     def parted(self) -> Pairing:
         """The pairing with surfaces that face each other nowhere."""
         none = np.zeros_like(self.area)
-        areas = {"area": none, "deformed": none, "shared": none[1:]}
-        return replace(self, **areas, covered=none, gap=none + np.inf)
+        return replace(
+            self, area=none, deformed=none, shared=none[1:], covered=none, gap=none + np.inf
+        )
 
 
 def _powers(x: Array, edges: Numbers, origin: Array | float = 0.0) -> Array:
@@ -265,7 +266,7 @@ def _integrate(
     return Pairing(
         area=np.where(covered, area, 0.0),
         deformed=np.where(covered, deformed, 0.0),
-        shared=np.bincount(edge, hats[0] * (1 + xi) / 2, rows - 1),
+        shared=np.asarray(np.bincount(edge, hats[0] * (1 + xi) / 2, rows - 1), dtype=float),
         covered=facing / at_vertices(np.ones(len(slave.edges))),
         length=slave.spacing,
         gap=np.where(covered, gap * scale, np.inf),
