@@ -238,12 +238,12 @@ class Increment:
         """Return the state to iterate from: parts that nothing holds stay where they are."""
         if self.guess is None:
             return self.start
-        held = zip(
-            self.system.holds(self.start.time, self.time), self.system.links.rows, strict=True
-        )
-        each = zip(self.start.u, self.guess.u, held, strict=True)
-        u = tuple(new if pair or link is not None else old for old, new, (pair, link) in each)
-        return replace(self.guess, u=u)
+        system, u = self.system, list(self.guess.u)
+        holds = system.holds(self.start.time, self.time)
+        for k, (part, linked) in enumerate(zip(system.parts, system.links.rows, strict=True)):
+            if part.rigid.shape[1] and linked is None and not holds[k]:
+                u[k] = self.start.u[k]
+        return replace(self.guess, u=tuple(u))
 
     def _slide(self, *places: tuple[Vectors, Candidates]) -> Slide | None:
         """Return how a body slides, at the given iterates or at the beginning of the increment.
