@@ -31,27 +31,21 @@ _ALONG = 0.1
 
 def check_freed(system: System, program: Program) -> None:
     """Raise `ModelError` if a load of a program would move a body while nothing holds it."""
-    targets = program.targets
-    times = [program.laps[0].start, *(target.time for target in targets)]
     for number, linked in enumerate(system.links.rows):
         part = system.parts[number]
         if not part.rigid.shape[1] or linked is not None or isinstance(part, Wheel):
             continue
-        pairs = [i.declared for i in system.interfaces if number in (i.slave, i.master)]
-        free = [
-            (before, target)
-            for before, target in zip(times, targets, strict=False)
-            if target.apart or all(pair.absent(target.time) for pair in pairs)
-        ]
-        if not free:
-            continue
         name = part.body.name
         part = system.full(name) if name in system.names else part  # none needs to be condensed
-        least = _LITTLE * max(part.force_level(time) for time in times)
-        for before, target in free:
-            if part.force_level(target.time) <= least:
+        pairs = [i.declared for i in system.interfaces if number in (i.slave, i.master)]
+        targets, least = program.targets, None
+        times = [program.laps[0].start, *(target.time for target in targets)]
+        for before, target in zip(times, targets, strict=False):
+            held = not target.apart and not all(pair.absent(target.time) for pair in pairs)
+            if held or not part.force_level(target.time):
                 continue
             pushed = _pushed(part.during(before, part.start()), target.time)
+            least = least or _LITTLE * max(part.force_level(time) for time in times)
             if np.linalg.norm(pushed) > least:
                 raise ModelError(
                     "supports", getattr(part.body, "supports", {}),
