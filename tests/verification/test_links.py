@@ -30,7 +30,7 @@ from solver import (
     solve,
 )
 from solver.contact.parting import parted
-from solver.mesh import grid, within
+from solver.mesh import grid, mapped, merged, within
 from solver.model.rigid import line
 from studies.scenes.scene import read_scene
 from tests.verification.bodies import E, bent, block, cells, sector, steel
@@ -193,6 +193,23 @@ def test_a_link_that_holds_another_component_than_it_says_fails_its_audit() -> N
     for other in (replace(sprung, components="tangential"), replace(sprung, stiffness=2.2e4)):
         object.__setattr__(found.system.model, "links", (other,))
         assert found.audit().figures["audit_links"] > 1e-2
+
+
+@pytest.mark.parametrize("components", ["normal", "xy"])
+def test_springs_around_a_hole_are_audited_node_by_node(components: str) -> None:
+    """Their forces have no resultant."""
+    angles = np.linspace(0.0, 2 * np.pi, 13)
+    ring = merged(mapped(grid(np.array([5.0, 10.0]), angles),
+                         lambda p: p[0] * np.stack([np.cos(p[1]), np.sin(p[1])])))  # fmt: skip
+    body = Body(name="ring", mesh=ring, material=steel(),
+                loads=(Pressure(boundary="left", value=100.0),))  # fmt: skip
+    sprung = Link(slave=("ring", "right"), components=components, stiffness=2e4)
+    held = Link(slave=("ring", "right"), components="tangential", stiffness=2e4)
+    found = solve(Model(bodies=(body,), links=(sprung, held)))
+    audit = found.audit()
+    assert audit.passed and audit.figures["audit_links"] < 1e-6, audit.violations
+    object.__setattr__(found.system.model, "links", (replace(sprung, stiffness=2.2e4), held))
+    assert found.audit().figures["audit_links"] > 1e-2
 
 
 # -- ties ----------------------------------------------------------------------------------------
