@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,7 @@ from solver import (
 from solver.contact.parting import parted
 from solver.mesh import grid, mapped, merged, within
 from solver.model.rigid import line
+from solver.results.audit import links
 from studies.scenes.scene import read_scene
 from tests.verification.bodies import E, bent, block, cells, sector, steel
 
@@ -477,6 +479,28 @@ def test_a_tie_with_a_slave_of_much_longer_edges_passes() -> None:
     audit = solve(Model(bodies=(lower, upper), links=(tie,))).audit()
     assert audit.passed, audit.violations
     assert 0 < audit.figures["audit_links"] < 3e-4
+
+
+def test_places_of_long_boundaries_are_looked_for_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The distances of all places from all pieces take gigabytes on a thousand edges."""
+    x = np.linspace(0.0, 10.0, 401)
+    ends = np.array([[x[:-1], 0 * x[1:]], [x[1:], 0 * x[1:]]])
+    X = ends.mean(axis=0)
+    master = links._Sampled(X, X**2, np.ones(400), ends, ends**2)
+    places = np.stack([np.linspace(-1.0, 11.0, 450), np.full(450, 0.1)])
+    together = links._facing_few(places, master)
+    monkeypatch.setattr(links, "_PAIRS", 10_000)
+    tracemalloc.start()
+    found = links._facing(places, master)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 2e6
+    for one, other in zip(found, together, strict=True):
+        np.testing.assert_array_equal(one, other)
+    away, moved = found
+    inside = (places[0] >= 0) & (places[0] <= 10)
+    assert away[inside] == pytest.approx(0.1) and np.isinf(away[~inside]).all()
+    np.testing.assert_allclose(moved[0, inside], places[0, inside] ** 2, atol=1e-3)
 
 
 PLATE = RigidBody(name="plate")

@@ -30,6 +30,8 @@ _PIECES = 16
 """Number of pieces of an edge; more where edges of the other side are shorter."""
 _GAUSS = 6
 """Number of Gauss points of an edge, for normals and areas of nodes."""
+_PAIRS = 1_000_000
+"""Number of places times pieces of the other side that are looked at together: 64 MB."""
 _FACING = 0.05
 """Ratio of the distance from the master to the length of the slave; above it a place of the slave
 faces no master."""
@@ -276,6 +278,14 @@ def _facing(X: Array, master: _Sampled) -> tuple[Array, Array]:
 
     The distance is infinite beyond an end of the master.
     """
+    count = max(_PAIRS // master.X.shape[1], 1)
+    each = [_facing_few(X[:, k : k + count], master) for k in range(0, max(X.shape[1], 1), count)]
+    away, moved = zip(*each, strict=True)
+    return np.concatenate(away), np.hstack(moved)
+
+
+def _facing_few(X: Array, master: _Sampled) -> tuple[Array, Array]:
+    """Return what `_facing` does, by the distances of all places from all pieces."""
     begin, end = master.ends
     along = end - begin
     share = (X.T @ along - (begin * along).sum(axis=0)) / (along**2).sum(axis=0)
