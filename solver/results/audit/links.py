@@ -192,7 +192,7 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
     if not size:
         return 0.0
     sprung = np.isfinite(link.stiffness)
-    if link.local or (sprung and link.master is None and not link.distributed):
+    if link.local or (sprung and link.master is None):
         return _misfit_at_nodes(system, k, converged, size)
     axes = [1] if _is_ring(system, link) else list(link.axes)
     jump = (u - sum(others, np.zeros_like(u)))[axes]
