@@ -33,10 +33,11 @@ def check_freed(system: System, program: Program) -> None:
     """Raise `ModelError` if a load of a program would move a body while nothing holds it."""
     for number, linked in enumerate(system.links.rows):
         part = system.parts[number]
-        if not part.rigid.shape[1] or linked is not None or isinstance(part, Wheel):
+        if not part.rigid.shape[1] or linked is not None:
             continue
         name = part.body.name
-        part = system.full(name) if name in system.names else part  # none needs to be condensed
+        if name in system.names and not isinstance(part, Wheel):
+            part = system.full(name)  # nothing needs to be condensed
         pairs = [i.declared for i in system.interfaces if number in (i.slave, i.master)]
         targets, least = program.targets, None
         times = [program.laps[0].start, *(target.time for target in targets)]
@@ -71,7 +72,7 @@ def _pushed(part: Part, time: float) -> Array:
 
 def _ways(part: Part, pushed: Array) -> str:
     """Return the directions in which a body would move, in words."""
-    sizes = np.abs(pushed)
+    sizes = np.abs(pushed[-3:])  # of a rigid body or a hub
     if part.meshed:
         each = pushed.reshape(-1, 2).T
         sizes = np.append(np.abs(each.mean(axis=1)), np.ptp(each, axis=1).max() / 2)
