@@ -19,10 +19,13 @@ from solver import (
     Pushed,
     RigidBody,
     Stage,
+    System,
     solve,
 )
+from solver.loading.freed import check_freed
 from solver.mesh import grid
 from solver.model.rigid import arc
+from solver.scenes.rolling import ROLLING
 
 pytestmark = pytest.mark.solves
 
@@ -171,6 +174,17 @@ def test_a_force_on_a_tool_that_nothing_holds_any_more_is_refused():
         solve(pushed(RISE, Amplitude([1, 2], [1, 0])), stages=(PRESSED, GONE))
     with pytest.raises(ModelError, match=r"'roller' is free .* bodies are separated"):
         solve(pushed(RISE), stages=(PRESSED, replace(GONE, apart=True)))
+
+
+def test_a_load_on_a_lifted_wheel_is_refused():
+    p = ROLLING.parameters(track=10.0, element_size=4.0, advance_step=2.0, press_steps=4)
+    model, program = ROLLING.model(p), ROLLING.program(p)
+    check_freed(System(model), program)
+    wheel = model.body("wheel")
+    heavy = replace(wheel, axle=replace(wheel.axle, force=Amplitude([0, 1], [1e3, 1e3])))
+    bodies = tuple(heavy if body is wheel else body for body in model.bodies)
+    with pytest.raises(ModelError, match=r"'wheel' is free to move along y .* separated"):
+        check_freed(System(replace(model, bodies=bodies)), program)
 
 
 def test_a_presence_below_zero_is_refused():
