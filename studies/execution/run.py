@@ -142,8 +142,8 @@ def run_study(
     limits : limits on time and memory
     priority : among studies that share a scheduler, the one with the higher number goes first
     on_event : called, in this thread, with every event
-    should_stop : called several times a second; if it returns true the work stops, and finished
-        runs stay
+    should_stop : called several times a second, in this process at each increment; if it returns
+        true the work stops, and finished runs stay
 
     Raises
     ------

@@ -66,7 +66,9 @@ def test_an_error_of_the_listener_is_raised_and_frees_the_store(store: Store) ->
         pass
 
 
-@pytest.mark.parametrize("limit", [{"path_seconds": 9.0}, {"memory": "2GB"}])
+@pytest.mark.parametrize(
+    "limit", [{"stall_seconds": 9.0}, {"path_seconds": 9.0}, {"memory": "2GB"}]
+)
 def test_limits_that_end_a_worker_are_refused(store: Store, limit: dict[str, float | str]) -> None:
     with pytest.raises(StudyError, match=f"^{next(iter(limit))}"):
         run_study(fake_study(), store, workers=0, limits=Limits(**limit))  # type: ignore[arg-type]
