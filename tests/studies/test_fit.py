@@ -338,6 +338,13 @@ def test_a_line_is_compared_with_its_own_piece_and_a_little_beyond() -> None:
             {"measured": [{"of": "crater_depth", "values": [1, 2], "sigma": [1, 0]}]},
             "fit.measured[0].sigma", "a number > 0",
         ),
+        *(
+            (
+                {"measured": [{"of": "crater_depth", "values": [1, 2], "sigma": wrong}]},
+                "fit.measured[0].sigma", allowed,
+            )
+            for wrong, allowed in {"some": "a number > 0", "2 N": "a number in mm"}.items()
+        ),
     ],
 )  # fmt: skip
 def test_a_wrong_fit_is_refused_in_one_line(
