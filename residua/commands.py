@@ -61,7 +61,8 @@ def run(options: argparse.Namespace) -> int:
     progress, preparing = Progress(study), Thread(target=prepare)
 
     def hear(event: StudyEvent) -> None:
-        if preparing.ident is None:
+        # The processor time of runs is that of their process, with all of its threads.
+        if not (alone or options.workers == 0) and preparing.ident is None:
             preparing.start()
         progress(event)
 

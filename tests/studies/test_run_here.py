@@ -46,6 +46,16 @@ def test_a_goal_is_searched(store: Store, scene: str) -> None:
         assert found["load_ratio"].values == pytest.approx([0.7, 0.5], rel=0.02)
 
 
+def test_the_report_is_not_prepared_in_the_processor_time_of_runs(
+    study_file: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prepared: list[None] = []
+    monkeypatch.setattr("studies.views.report.prepare", lambda: prepared.append(None))
+    options = ["--out", str(tmp_path / "out"), "--workers", "0"]
+    assert main(["run", str(study_file()), *options]) == 0
+    assert not prepared
+
+
 def test_stopping_keeps_what_is_finished(store: Store) -> None:
     finished: list[str] = []
 
