@@ -171,7 +171,7 @@ class Datasets:
             made.path, made.until = None, now + REST * (now - began)
             raise Busy(LARGE, math.ceil(REST * (now - began))) from None
         finally:
-            for part in self.folder.glob(f"{target.name}.*"):  # of a process that was ended
+            for part in target.parent.glob(f"{target.name}.*"):  # of a process that was ended
                 part.unlink(missing_ok=True)
         made.of, made.path = of, target
         now = time.monotonic()
