@@ -480,6 +480,8 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
         assert inside.fit["measured"][0].get("at") == at
     with pytest.raises(StudyError, match="must be FILE, or FILE@NAME=VALUE"):
         Study.from_toml(file, [tmp_path / "p.csv@stage=loaded,pass"])
+    with pytest.raises(StudyError, match=r"fit\.measured\[0\]\.at\.longest"):
+        Study.from_toml(file, [tmp_path / f"p.csv@longest={'x' * 300}"])  # no name of a file
     with pytest.raises(StudyError, match=r"fit\.measured = None: is missing"):
         Study.from_toml(file)
     for text, allowed in (
