@@ -90,9 +90,10 @@ def on_mesh(
     values, tensor = _values(run, fields.stages[at], field, component)
     if field not in _AT_THE_END:
         values = values.assign_coords({STAGE: at})
-    X = fields.X + deformed * fields.stages[at]["displacement"]
+    moved = fields.stages[at]["displacement"]
+    X = fields.X + (deformed * moved if deformed else 0.0)
     numbers, name = values.to_numpy(), component_name(values)
-    faces, _ = fields.faces
+    faces = _there(fields.faces[0], moved)
     triangles, edges = _triangles(faces), _edges(faces)
     if is_half(run) and (fields.X[0] >= -1e-9 * np.ptp(fields.X[0])).all():
         count, odd = X.shape[1], is_odd(name, AXES[0])
@@ -159,6 +160,12 @@ def _values(
     return component_of(whole, component), nodal
 
 
+def _there(faces: Array, moved: Array) -> Array:
+    """Return the faces of material that is not removed: displacements are known at all nodes."""
+    gone = ~np.isfinite(moved).all(axis=0)
+    return faces[~((faces != NO_NODE) & gone[faces]).any(axis=1)]
+
+
 def _triangles(faces: Array) -> Array:
     """Return triangles (n, 3) of faces (n_faces, 4), of which triangles lack the last node."""
     four = faces[:, 3] != NO_NODE
@@ -195,7 +202,7 @@ def _box(
     if zoom is not None:
         middle = focus(run, zoom)
         return middle - zoom, middle + zoom, -zoom, zoom
-    low, high = X.min(axis=1), X.max(axis=1)
+    low, high = np.nanmin(X, axis=1), np.nanmax(X, axis=1)
     if all(name in run.coords and run[name].size > 1 for name in AXES[:2]):
         x, y = (run[name].to_numpy() for name in AXES[:2])
         left = -float(x.max()) if is_half(run) else float(x.min())

@@ -101,7 +101,7 @@ def picture(
         else:
             _refuse({"deformed": deformed}, f"{field} is no map: leave it out")
             axis = None if over in _own(dataset, field) else over
-            part = _part(dataset, field, selection or {}, axis)
+            part = _part(dataset, field, selection or {}, axis, against)
             figure = line_figure(part, field, component, zoom, over, window, against)
     return resolved(figure, resolution)
 
@@ -157,20 +157,25 @@ def _known(selection: Mapping[str, object], names: list[str]) -> None:
             raise StudyError(name, value, one_of(name, names))
 
 
-def _own(dataset: xr.Dataset, field: str) -> list[str]:
-    """Return the dimensions of a field of which values can be selected, beside the sweep."""
+def _own(dataset: xr.Dataset, *fields: str | None) -> list[str]:
+    """Return the dimensions of fields of which values can be selected, beside the sweep."""
     drawn = {*sweep_coordinates(dataset).values(), *DRAWN, "component"}
-    return [str(name) for name in dataset[field].dims if name not in drawn]
+    known = [name for field in fields if field in dataset for name in dataset[field].dims]
+    return [str(name) for name in dict.fromkeys(known) if name not in drawn]
 
 
 def _part(
-    dataset: xr.Dataset, field: str, selection: Mapping[str, str | float], over: str | None = None
+    dataset: xr.Dataset,
+    field: str,
+    selection: Mapping[str, str | float],
+    over: str | None = None,
+    against: str | None = None,
 ) -> xr.Dataset:
     """Return one of the selected runs, or one for each value of the axis `over`.
 
-    The selection is also applied to the field's own dimensions.
+    The selection is also applied to the own dimensions of the field, and of what it is drawn over.
     """
-    swept, own = sweep_coordinates(dataset), _own(dataset, field)
+    swept, own = sweep_coordinates(dataset), _own(dataset, field, against)
     _known(selection, [*swept, *own])
     chosen = {name: selection[name] for name in swept if name in selection}
     run = one_run(dataset, chosen) if over is None else runs_over(dataset, over, chosen, field)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
 
 from studies import StudyError
+from studies.views.plots.lines import _other
 from studies.views.plots.picture import picture
 from tests.studies.plots.test_curves import swept
 from tests.studies.plots.test_lines import legend_of, lines_of
@@ -65,9 +68,30 @@ def test_a_force_over_a_displacement_is_a_loop(parts: int) -> None:
     (loop,) = (line for line in lines_of(sheet) if line.get_marker() != "o")
     np.testing.assert_allclose(loop.get_ydata(), run["force"].squeeze())
     np.testing.assert_allclose(loop.get_xdata(), run["motion"].squeeze(SWEEP)[-1])
-    assert sheet.axes[0].get_xlabel() == "motion [mm]"
+    assert sheet.axes[0].get_xlabel() == f"motion (part_{parts - 1}) [mm]"
     assert ends_of(sheet)[-1] == "stage_4"
     check_inside(sheet)
+
+
+def test_a_force_of_contact_lies_over_the_motion_of_its_own_body() -> None:
+    run = course(2, 3).assign_coords(contact=["first", "second"])
+    run["force"] = run["force"].expand_dims(contact=run["contact"], axis=3)
+    contacts = [
+        {"name": name, "slave": "block.top", "master": f"part_{k}.cap"}
+        for name, k in (("second", 0), ("first", 1))
+    ]
+    known = run.assign_attrs(scene_file=json.dumps({"contacts": contacts}))
+    motion = run["motion"].squeeze(SWEEP)
+    over = _other(known, run["force"], "motion")
+    np.testing.assert_array_equal(over.squeeze(SWEEP), motion[[1, 0]])
+    assert over.attrs["long_name"] == "motion (part_1, part_0)"
+    sheet = picture(run, "force", against="motion", selection={"part": "part_1"})
+    loops = [line for line in lines_of(sheet) if line.get_marker() != "o"]
+    for loop in loops:
+        np.testing.assert_array_equal(loop.get_xdata(), motion[1])
+    assert len(loops) == 2
+    with pytest.raises(StudyError, match="part = 'one': must be one of"):
+        picture(run, "force", against="motion", selection={"part": "one"})
 
 
 def touching(stages: int, pairs: int = 1, *, released: bool) -> xr.Dataset:
