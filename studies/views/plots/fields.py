@@ -22,6 +22,8 @@ Window = Sequence[float]
 _RESIDUAL, _STRESS = "residual_stress", "map_stress"
 ALONG = ("s", "depth", "increment", "fraction")
 """Dimensions along which lines are drawn."""
+REPEATED = ("cycle", "pass")
+"""Dimensions of numbers that are lines over them where one run is drawn."""
 _DECAYED = 0.02
 """Depth is shown as far as values exceed this share of the peak."""
 OUTLINE = "outline"
@@ -76,11 +78,13 @@ def line_fields(dataset: xr.Dataset) -> list[str]:
 def line_axis(values: xr.DataArray, sweep: Sequence[Hashable] = ()) -> str | None:
     """Return the dimension along which a field is a line, or None: of `ALONG`, or its only axis.
 
-    Axes of the sweep do not count, whatever their names.
+    Without these it is one of `REPEATED` with two values or more. Axes of the sweep do not count,
+    whatever their names.
     """
     axes = map_axes(values, sweep)
     alone = axes if len(axes) == 1 else ()
-    return next((name for name in (*ALONG, *alone) if name in values.dims), None)
+    repeated = () if axes else (name for name in REPEATED if values.sizes.get(name, 1) > 1)
+    return next((name for name in (*ALONG, *alone, *repeated) if name in values.dims), None)
 
 
 def placed(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:

@@ -12,12 +12,14 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from solver.tensors import AXES
 from studies.errors import StudyError, one_of
 from studies.views.picking import one_run, sweep_axes
 from studies.views.plots.captions import DISTANCE, axis_label, label, value_text, words, wrapped
 from studies.views.plots.fields import (
+    REPEATED,
     Window,
     check_field,
     component_of,
@@ -114,6 +116,8 @@ def line_figure(
                     color=colour,
                     label=name,
                     linewidth=1.0 if barred else 1.6,
+                    marker="o" if along in REPEATED else None,
+                    markersize=4.0,
                 )
                 _mark_stages(axes, run, line, at)
     axes.axhline(0.0, color="0.35", linewidth=0.8, zorder=0)
@@ -121,6 +125,9 @@ def line_figure(
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.03 if against else 0.0)
+    if along in REPEATED:
+        axes.margins(x=0.03)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set(xlabel=axis_label(values[at]), ylabel=wrapped(label(values), _SIZE[1] - 1.2, 10))
     if window is not None:
         _show_part(axes, window)

@@ -21,12 +21,10 @@ from studies.views.picking import one_run
 from studies.views.plots.captions import capitalised, label, setting, symbol, wrapped
 from studies.views.plots.fields import Window, component_name, is_half, map_axes, usual_field
 from studies.views.plots.mapped import STAGE, Mapped, is_patch, mapped
-from studies.views.plots.meshed import MappedMesh, mesh_maps, on_mesh
+from studies.views.plots.meshed import Box, MappedMesh, mesh_maps, on_mesh
 from studies.views.plots.outlined import clip_of, lines_of, outlines_of, reaching
 from studies.views.plots.over import BELOW, draw_patch, draw_wheel
 
-Box = tuple[float, float, float, float]
-"""Left, right, bottom, top [mm]."""
 SIGNED = "RdBu_r"
 SEQUENTIAL = "YlOrRd"
 _OUTSIDE = "0.86"
@@ -275,7 +273,8 @@ def entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> 
         loc="left", fontsize=8, color="0.3", pad=5.0,
     )  # fmt: skip
     axes.annotate(
-        f"{capitalised(quantity)} {symbol(values)}".rstrip(), (0.0, 1.0), xycoords=below,
+        f"{wrapped(capitalised(quantity), width, 12)} {symbol(values)}".rstrip(), (0.0, 1.0),
+        xycoords=below,
         xytext=(0.0, 5.0), textcoords="offset points", weight="bold", fontsize=11,
     )  # fmt: skip
 

@@ -16,6 +16,7 @@ from studies.views.plots.fields import (
     check_field,
     component_of,
     labelled_fields,
+    line_axis,
     line_fields,
     map_fields,
     sweep_fields,
@@ -78,7 +79,7 @@ def picture(
     if field in singles:
         _refuse(given, f"{field} has one value a run: leave it out")
         figure = sweep_figure(select(dataset, selection or {}), field)
-    elif field in labelled:
+    elif field in labelled and not (field in lines and (over or _single(dataset, selection or {}))):
         _refuse(given | {"component": None}, f"{field} has one value a run: leave it out")
         figure = sweep_figure(_labelled(dataset, field, component, selection or {}), field)
     elif field in mesh_maps(dataset):
@@ -130,24 +131,45 @@ def _refuse(given: Mapping[str, object], allowed: str) -> None:
             raise StudyError(name, value, allowed)
 
 
+def _single(dataset: xr.Dataset, selection: Mapping[str, str | float]) -> bool:
+    """Whether the selection leaves one run."""
+    swept = sweep_coordinates(dataset)
+    chosen = {name: value for name, value in selection.items() if name in swept}
+    return bool(select(dataset, chosen)["status"].size == 1)
+
+
 def _labelled(
     dataset: xr.Dataset, field: str, component: str | None, selection: Mapping[str, str | float]
 ) -> xr.Dataset:
     """Return the selected part of a study, with `field` at one value of each of its dimensions.
 
-    By default it is the first label or the last number.
+    By default it is the first label or the last number, of each run the last that it has.
     """
     values = component_of(dataset[field], component)
     swept = sweep_coordinates(dataset)
     own = [str(name) for name in values.dims if name not in swept.values()]
     _known(selection, [*swept, *own])
     for name in own:
-        number = values[name].dtype.kind in "fiu"
-        usual = -1 if number else 0
-        at = positions(values[name], selection[name])[0] if name in selection else usual
-        values = values.isel({name: at})
+        if name in selection:
+            values = values.isel({name: positions(values[name], selection[name])[0]})
+        elif values[name].dtype.kind in "fiu":
+            values = _last(values, name)
+        else:
+            values = values.isel({name: 0})
     runs = dataset[["status", "message"]].assign({field: values})
     return select(runs, {name: selection[name] for name in swept if name in selection})
+
+
+def _last(values: xr.DataArray, name: str) -> xr.DataArray:
+    """Return of each run the last value along a dimension: not all have as many cycles."""
+    ends = (
+        values.sizes[name] - 1 - values.notnull().isel({name: slice(None, None, -1)}).argmax(name)
+    )
+    last = ends.where(values.notnull().any(name), values.sizes[name] - 1).astype(int)
+    if (last == values.sizes[name] - 1).all():
+        return values.isel({name: -1})
+    meaning = f"{values.attrs.get('long_name', values.name)}, in the last {name} of each run"
+    return values.isel({name: last}).drop_vars(name).assign_attrs(long_name=meaning)
 
 
 def _known(selection: Mapping[str, object], names: list[str]) -> None:
@@ -159,7 +181,9 @@ def _known(selection: Mapping[str, object], names: list[str]) -> None:
 
 def _own(dataset: xr.Dataset, *fields: str | None) -> list[str]:
     """Return the dimensions of fields of which values can be selected, beside the sweep."""
-    drawn = {*sweep_coordinates(dataset).values(), *DRAWN, "component"}
+    swept = sweep_coordinates(dataset).values()
+    along = {line_axis(dataset[field], [*swept]) for field in fields if field in dataset}
+    drawn = {*swept, *DRAWN, *along, "component"}
     known = [name for field in fields if field in dataset for name in dataset[field].dims]
     return [str(name) for name in dict.fromkeys(known) if name not in drawn]
 

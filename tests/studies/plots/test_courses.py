@@ -94,6 +94,31 @@ def test_a_force_of_contact_lies_over_the_motion_of_its_own_body() -> None:
         picture(run, "force", against="motion", selection={"part": "one"})
 
 
+def cycled() -> xr.Dataset:
+    """A study of two runs with three cycles and with two."""
+    run = course(1).assign_coords(cycle=[1, 2, 3])
+    run["cycle_work"] = ((*SWEEP, "cycle"), np.array([[[[5.0, 3.0, 2.0]]]]), {"units": "N mm"})
+    other = run.assign_coords(friction=[0.2])
+    other["cycle_work"] = other["cycle_work"] * [2.0, 2.0, np.nan]
+    return xr.concat([run, other], "friction", join="outer")
+
+
+def test_a_number_of_cycles_is_a_line_of_one_run_and_the_last_cycle_of_several() -> None:
+    both = cycled()
+    sheet = picture(both, "cycle_work", selection={"friction": 0.1})
+    (line,) = (each for each in lines_of(sheet) if each.get_marker() == "o")
+    assert line.get_xdata().tolist() == [1, 2, 3]
+    assert line.get_ydata().tolist() == [5.0, 3.0, 2.0]
+    sheet = picture(both, "cycle_work", over="friction")
+    assert [line.get_ydata().tolist() for line in lines_of(sheet) if line.get_marker() == "o"] == [
+        [5.0, 3.0, 2.0], [10.0, 6.0],
+    ]  # fmt: skip
+    (dots,) = picture(both, "cycle_work").axes[0].lines
+    assert dots.get_ydata().tolist() == [2.0, 6.0]
+    (dots,) = picture(both, "cycle_work", selection={"cycle": 1}).axes[0].lines
+    assert dots.get_ydata().tolist() == [5.0, 10.0]
+
+
 def touching(stages: int, pairs: int = 1, *, released: bool) -> xr.Dataset:
     """A run with the pressure of pairs along contacts 20 mm long, of which 2 mm touch."""
     run = swept([0.5], [0.1], ["none"])

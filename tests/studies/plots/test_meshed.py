@@ -156,6 +156,12 @@ def test_maps_on_a_grid_have_invariants_too() -> None:
     np.testing.assert_allclose(bars.U, bars.V)
 
 
+def test_a_deformed_body_is_shown_whole() -> None:
+    run = kept(grid=False)
+    assert on_mesh(run, "map_mises").box == pytest.approx((0.0, 2.0, -1.0, 1.0))
+    assert on_mesh(run, "map_mises", deformed=10.0).box == pytest.approx((0.0, 2.0, -3.0, 1.0))
+
+
 def test_removed_material_is_left_out_of_its_stage() -> None:
     run = kept()
     for axis in "xy":
