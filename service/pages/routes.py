@@ -55,6 +55,7 @@ from service.table import Tables, scene_of_study
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
+from studies.errors import SceneError
 from studies.scenes.registry import known_names, known_scenes
 from studies.storage.seal import State, state_of
 from studies.views.table import MESSAGE, RUN, STATUS, varied
@@ -66,6 +67,8 @@ router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
 home = APIRouter(include_in_schema=False)
 
 FOR_GOOD = {"cache-control": "public, max-age=31536000, immutable", "vary": "accept-encoding"}
+USUAL = "punch"
+"""The scene of the form of a new study."""
 LISTED = 25
 """Number of studies on a page."""
 POLLED = ("accepted", "running")
@@ -304,9 +307,10 @@ async def health_page(
 
 
 @router.get("/new")
-def new_page(request: Request, store: TheStore, scene: str = "punch") -> Response:
+def new_page(request: Request, store: TheStore, scene: str = USUAL) -> Response:
     """Show the form of a new study; parameters in the address fill it."""
-    return _form(request, store, scene, _given(request.query_params.multi_items()), {}, None)
+    given = _given(request.query_params.multi_items())
+    return _form(request, store, store.scene_id(scene), given, {}, None)
 
 
 def _given(fields: Iterable[tuple[str, object]]) -> dict[str, list[str]]:
@@ -352,7 +356,14 @@ async def take_scene(
 ) -> Response:
     """Keep a scene file with its meshes, and show the form of its studies."""
     there = [each for each in meshes if each.filename]  # a browser sends one of no name for none
-    found = await post_scene(scene, inspector, keeper, store, caller, request, Response(), there)
+    try:
+        found = await post_scene(
+            scene, inspector, keeper, store, caller, request, Response(), there
+        )
+    except StudyError as error:
+        mistakes = error.listed if isinstance(error, SceneError) else [*map(str, error.each)]
+        refused = {"file": scene.filename or "", "mistakes": mistakes}
+        return await run_in_threadpool(_form, request, store, USUAL, {}, {}, None, refused)
     where = request.url_for("new_page").include_query_params(scene=found.id)
     return RedirectResponse(f"{where.path}?{where.query}", HTTPStatus.SEE_OTHER)
 
@@ -410,7 +421,9 @@ def _form(
     given: dict[str, list[str]],
     wrong: dict[str, str],
     found: Examined | None,
+    refused: Mapping[str, Any] | None = None,
 ) -> Response:
+    """Return the page of the form; ``refused`` is a scene file that was posted, with mistakes."""
     scene = known_scene(store, name)
     content, early = form.study_of(name, scene, given)
     mistakes = {**early, **wrong}
@@ -420,7 +433,7 @@ def _form(
     return page(
         request,
         "new",
-        HTTPStatus.UNPROCESSABLE_ENTITY if wrong else HTTPStatus.OK,
+        HTTPStatus.UNPROCESSABLE_ENTITY if wrong or refused else HTTPStatus.OK,
         scene=scene,
         scene_name=name,
         name=content["name"],
@@ -432,6 +445,7 @@ def _form(
         wrong=mistakes,
         general=[text for key, text in mistakes.items() if key not in own],
         estimate=found.estimate if found else None,
+        refused=refused,
         **_copies(request, content),
     )
 
