@@ -254,6 +254,31 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "contacts[0].active",
         "one of pressed",
     ),
+    "an end of a stage with a take": (
+        put(
+            "outputs",
+            {
+                "f": {
+                    "of": "normal_force",
+                    "contact": "face",
+                    "stage": "pressed",
+                    "take": "minimum",
+                }
+            },
+        ),
+        "outputs.f.take",
+        "must be left out",
+    ),
+    "a motion of a body": (
+        put("outputs", {"f": {"of": "motion.x", "part": "upper", "stage": "pressed"}}),
+        "outputs.f.part",
+        "must be one of",
+    ),
+    "a reaction along a line": (
+        put("outputs", {"f": {"of": "reaction.x", "line": "middle", "stage": "pressed"}}),
+        "outputs.f",
+        "needs one of part",
+    ),
     "output nowhere": (
         without("outputs", "least", "body"),
         "outputs.least",
