@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from studies import StudyError
 from studies.views.plots.lines import _other
 from studies.views.plots.picture import picture
+from studies.views.shown import outline
 from tests.studies.plots.test_curves import swept
 from tests.studies.plots.test_lines import legend_of, lines_of
 from tests.studies.plots.test_many import COUNTS, check_inside
@@ -188,3 +189,11 @@ def test_what_cannot_be_drawn_is_refused() -> None:
             picture(run, "force", **given)
     with pytest.raises(StudyError, match="does not lie over increments"):
         picture(touching(2, released=False), "contact_pressure", against="force")
+
+
+def test_stress_is_the_first_line_and_rounding_the_last() -> None:
+    run = course(1)
+    for name, size, units in (("gap", 1e-15, "mm"), ("mises", 1.0, "MPa"), ("stress", 9.0, "MPa")):
+        run[f"line_{name}"] = ((*SWEEP, "increment"), size * run["force"].data, {"units": units})
+    names = [each["name"] for each in outline(run.squeeze(SWEEP))["lines"]]
+    assert names == ["line_stress", "increment_time", "force", "motion", "line_mises", "line_gap"]
