@@ -196,4 +196,4 @@ def test_stress_is_the_first_line_and_rounding_the_last() -> None:
     for name, size, units in (("gap", 1e-15, "mm"), ("mises", 1.0, "MPa"), ("stress", 9.0, "MPa")):
         run[f"line_{name}"] = ((*SWEEP, "increment"), size * run["force"].data, {"units": units})
     names = [each["name"] for each in outline(run.squeeze(SWEEP))["lines"]]
-    assert names == ["line_stress", "increment_time", "force", "motion", "line_mises", "line_gap"]
+    assert names[0] == "line_stress" and names[-1] == "line_gap"
