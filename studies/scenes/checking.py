@@ -199,8 +199,9 @@ def _contacts(scene: tables.SceneFile) -> Iterator[StudyError]:
 
 def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:
     if bool(scene.stages) == (scene.loading is not None):
-        given = "both" if scene.stages else None
-        yield StudyError("stages", given, "must be given, or loading: one of the two")
+        given = [stage.name for stage in scene.stages]
+        what = "must be left out where loading is given" if given else "must be given, or loading"
+        yield StudyError("stages", given or None, f"{what}: one of the two")
     for k, stage in enumerate(scene.stages):
         for side in stage.remove:
             yield from _one_of(f"stages[{k}].remove", side.partition(".")[0], scene.bodies)
