@@ -98,6 +98,7 @@ def get_asset(version: str, name: str, request: Request) -> Response:
 def studies_page(
     request: Request,
     jobs: TheJobs,
+    store: TheStore,
     status: str = "",
     tag: str = "",
     scene: str = "",
@@ -115,9 +116,11 @@ def studies_page(
     wanted = {"state" if name == "status" else name: value for name, value in which.items()}
     found, total = jobs.page(limit=window.limit, offset=window.offset, **wanted)
     items = [(overview.summary(job), _said(jobs, job)) for job in found]
+    scenes = {each.scene: overview.scene_name(store, each.scene) for each, _ in items}
     return page(
         request,
         "studies",
+        scenes=scenes,
         items=items,
         total=total,
         which=which,
@@ -392,7 +395,7 @@ async def make(
         return _back(request, job.id)
     if "application/json" in request.headers.get("accept", ""):
         costs = None if found is None else dataclasses.asdict(found.estimate)
-        return JSONResponse({"wrong": wrong, "estimate": costs, **_copies(request, content)})
+        return JSONResponse({"wrong": wrong, "estimate": costs, **_copies(request, content, scene)})
     return await run_in_threadpool(_form, request, store, scene_name, given, wrong, found)
 
 
@@ -404,11 +407,11 @@ def known_scene(store: Store, name: str) -> Scene:
     return scene
 
 
-def _copies(request: Request, content: dict[str, Any]) -> dict[str, str]:
+def _copies(request: Request, content: dict[str, Any], scene: Scene) -> dict[str, str]:
     """Return a study as texts to copy."""
     address = str(request.url_for("submit"))
     return {
-        "toml": form.as_toml(content),
+        "toml": form.as_toml(content, scene.name),
         "curl": form.as_curl(content, address),
         "python": form.as_python(content, address.removesuffix("/studies")),
     }
@@ -446,7 +449,7 @@ def _form(
         general=[text for key, text in mistakes.items() if key not in own],
         estimate=found.estimate if found else None,
         refused=refused,
-        **_copies(request, content),
+        **_copies(request, content, scene),
     )
 
 

@@ -18,6 +18,7 @@ import xarray as xr
 from service.guarded import BYTES
 from studies import Store, Study, run_study
 from studies.scenes.scene import read_scene
+from studies.views.summary import summary_of
 from tests.service.servers import Server
 from tests.studies.scenes.conftest import BLOCKS
 
@@ -120,7 +121,10 @@ def test_a_study_names_a_posted_scene_by_its_name_if_no_other_has_it(service: Se
     assert named.status_code == 201, named.text
     same = service.client.post("/studies", json=study | {"scene": one})
     assert (same.status_code, same.json()["id"]) == (200, named.json()["id"])
-    assert service.study(same.json()["id"])["scene"] == one
+    told = service.study(same.json()["id"])
+    assert (told["scene"], told["scene_name"]) == (one, "dovetail")
+    assert f'>dovetail <span class="sub">{one[:8]}…' in service.client.get("/ui").text
+    assert str(summary_of(told, None, [])).startswith(f"by-name: scene dovetail ({one[:8]}…)")
     for address in ("/scenes/{}", "/scenes/{}/draw.png", "/ui/new?scene={}"):
         by_name, by_id = (service.client.get(address.format(each)) for each in ("dovetail", one))
         assert by_name.status_code == 200, by_name.text

@@ -9,7 +9,14 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from studies.errors import StudyError, one_of
-from studies.views.picking import one_run, positions, runs_over, select, sweep_coordinates
+from studies.views.picking import (
+    one_run,
+    positions,
+    runs_over,
+    select,
+    sweep_axes,
+    sweep_coordinates,
+)
 from studies.views.plots.fields import (
     DRAWN,
     Window,
@@ -101,7 +108,10 @@ def picture(
             figure = map_figure(part, field, component, zoom, window, deformed=deformed or 0.0)
         else:
             _refuse({"deformed": deformed}, f"{field} is no map: leave it out")
-            axis = None if over in _own(dataset, field) else over
+            own = _own(dataset, field)
+            axis = None if over in own else over
+            if axis is not None and axis not in (known := sweep_axes(dataset)):
+                raise StudyError("over", axis, one_of(axis, [*known, *own]))
             part = _part(dataset, field, selection or {}, axis, against)
             figure = line_figure(part, field, component, zoom, over, window, against)
     return resolved(figure, resolution)

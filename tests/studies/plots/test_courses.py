@@ -184,9 +184,10 @@ def test_what_cannot_be_drawn_is_refused() -> None:
         ({"zoom": 1.0}, "zoom = 1.0"),
         ({"window": (1.0, 0.0, 0.0, 1.0)}, "window = "),
         ({"over": "stages"}, "over = 'stages'"),
+        ({"over": "pas", "field": "motion"}, "load_ratio, friction, hardening, part"),
     ):
         with pytest.raises(StudyError, match=told):
-            picture(run, "force", **given)
+            picture(run, **{"field": "force", **given})
     with pytest.raises(StudyError, match="does not lie over increments"):
         picture(touching(2, released=False), "contact_pressure", against="force")
 
