@@ -59,7 +59,7 @@ class NoContact(NotConverged):
 
 
 class TooLong(NotConverged):
-    """A search used up the work that it may take."""
+    """A search used up the work that it may take; the message says how to make it easier."""
 
 
 class LimitLoad(NotConverged):

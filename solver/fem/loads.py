@@ -205,10 +205,10 @@ def eigenstrains(part: Nodes) -> Superposed:
             each.append((load, to_mandel(checked(f"{load.name}.eigenstrain", strain, shape, "1"))))
         if stress is not None:
             stress = checked(f"{load.name}.initial_stress", stress, shape, "MPa")
-            compliance = np.linalg.inv(part.body.material.stiffness(4))
             if part.body.kinematics == "plane_stress":
                 _check_plane(stress)
-            each.append((load, -compliance @ to_mandel(stress)))
+            strain = part.body.material.elasticity.strain(to_mandel(stress))
+            each.append((load, -strain))
     return Superposed.of(4 * x.shape[1], each)
 
 

@@ -124,7 +124,7 @@ class Windowed(Discretisation):
         self.active = choose_pins(self.rigid, self.free)
         self._mesh(whole, number)
         self._condense(whole, linear_solver)
-        self._contact = number[region.contact]
+        self._touches = region.contact[kept]
 
     def _mesh(self, whole: Discretisation, number: NDArray[np.int64]) -> None:
         """Take the elements of the window, and what belongs to their points."""
@@ -175,7 +175,7 @@ class Windowed(Discretisation):
     def inverses(self, elastic: Operator, linear_solver: str) -> Operators:
         """Return its inverse stiffnesses, given the elastic operator of the whole body."""
         restricted = Restricted(elastic, self.kept, self.whole.n)
-        return Operators(self, self._contact, linear_solver, restricted)
+        return Operators(self, np.flatnonzero(self._touches), linear_solver, restricted)
 
     def motion(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
@@ -185,12 +185,13 @@ class Windowed(Discretisation):
     def pull_back(
         self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64], gaps: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """See `Part.pull_back`; raises `Singular` if contact has left the window."""
+        """See `Part.pull_back`; raises `Singular` if contact has left the region."""
         del u, gaps
         at = self._number[surface.dofs]
-        if block[:, at < 0].any():
+        touches = (at >= 0) & self._touches[at]
+        if block[:, ~touches].any():
             raise Singular("contact has left the window")
-        return at[at >= 0], block[:, at >= 0]
+        return at[touches], block[:, touches]
 
     # -- the window as a body ------------------------------------------------------------------
 

@@ -372,8 +372,8 @@ class Increment:
     ) -> tuple[float, Vectors, tuple[Response, ...], Vectors]:
         """Return a share of the step, and displacements, responses and residuals after it.
 
-        ``out`` is the norm of the out-of-balance forces before the step, or twice what is allowed
-        if that is more [N].
+        ``out`` is the norm of the out-of-balance forces before the step, or what is allowed over
+        `_LESS` if that is more [N]: a step to what is allowed needs no line search.
         """
         trial: tuple[Vectors, tuple[Response, ...], Vectors]
 

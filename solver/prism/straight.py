@@ -94,7 +94,7 @@ class StraightPrism:
             given=given,
             held=held,
             stress=stress,
-            strain=stress @ np.linalg.inv(C),
+            strain=self._section.elasticity.strain(stress.T).T,
             change=float(np.abs(to_tensor((free - given).T)).max()),
         )
 

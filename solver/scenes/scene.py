@@ -8,7 +8,7 @@ from functools import partial
 from itertools import tee
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
-from solver.errors import LimitLoad
+from solver.errors import LimitLoad, TooLong
 from solver.loading.control import Control
 from solver.loading.outcome import Outcome
 from solver.loading.program import Program, walked
@@ -203,8 +203,11 @@ class Scene:
             mesh=partial(mesh_fields, run.samples.fields, states, run.beside),
         )
 
-    def _message(self, status: Status, messages: tuple[str, ...]) -> str:
-        advice = self.advice.get(status)
+    def _message(
+        self, status: Status, messages: tuple[str, ...], error: Exception | None = None
+    ) -> str:
+        """Return the message of a run; `TooLong` has its own advice, opposite to a finer mesh."""
+        advice = None if isinstance(error, TooLong) else self.advice.get(status)
         return "; ".join((*messages, advice) if advice else messages)
 
     def _labelled(
@@ -214,7 +217,7 @@ class Scene:
         return Record(
             parameters=run.parameters,
             status=status,
-            message=self._message(status, messages),
+            message=self._message(status, messages, run.outcome.error),
             coordinates={**run.view.coordinates, **own},
             fields={
                 q.name: (q.dims, value)

@@ -58,7 +58,7 @@ _FLOWS, _RUNS = 0.1, 1.0
 """A stalled solve counts as a limit load above the first plastic strain, any solve above the
 second. A material that hardens has no limit load: Newton's method has then diverged."""
 _SOLVES = 20_000
-"""Largest number of solves with the stiffness in a search for a pass; one takes 50 to 2100."""
+"""Largest number of solves with the stiffness in a search for a pass; one pass takes 50 to 2100."""
 _PATIENCE, _PROGRESS = 14, 0.7
 """Over this number of steps the residual must drop to this ratio, or the pass is given up."""
 
@@ -73,8 +73,8 @@ class SolveBudget:
         """Count one; raise `TooLong` above the largest number."""
         if self.solves >= self._most:
             raise TooLong(
-                f"no steady pass was found in {self._most} solves with the stiffness; larger "
-                "elements or more hardening make it easier to find, and each solve faster"
+                f"no steady pass was found in {self._most} solves with the stiffness; with larger "
+                "elements, a lighter load or more hardening it is easier to find"
             )
         self.solves += 1
 

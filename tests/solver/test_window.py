@@ -9,6 +9,7 @@ import pytest
 
 from solver.contact.system import System
 from solver.fem.window import Region, Windowed
+from solver.linear.solvers import Singular
 from solver.loading import narrowing
 from solver.loading.control import Control
 from solver.loading.increment import Increment
@@ -45,6 +46,27 @@ def test_a_region_grows_by_its_neighbours_and_their_surface():
     assert around.elements[touched[part.dofs].any(axis=1)].all()
     assert around.contact[touched].all()
     assert around.contact.sum() > touched.sum()
+
+
+def test_contact_leaves_a_window_where_its_region_has_none():
+    """Also on nodes of its elements: the operators of the window do not know forces there."""
+    system = System(PUNCH.model(PRESSED))
+    part, region = corner(system)
+    surface = system.surfaces[1][0]
+    at = np.flatnonzero(np.isin(surface.dofs, part.dofs[region.elements]))
+    contact = np.zeros(part.n, dtype=bool)
+    contact[surface.dofs[at[:-1]]] = True
+    window = Windowed(part, Region(region.elements, contact), "auto")
+    assert np.isin(surface.dofs[at], window.kept).all()
+    for touched, left in ((at[:-1], False), (at, True)):
+        block = np.zeros((1, len(surface.dofs)))
+        block[0, touched] = 1.0
+        if left:
+            with pytest.raises(Singular, match="contact has left the window"):
+                window.pull_back(surface, np.zeros(window.n), block, 1)
+        else:
+            dofs, rows = window.pull_back(surface, np.zeros(window.n), block, 1)
+            assert (window.kept[dofs] == surface.dofs[touched]).all() and rows.all()
 
 
 @pytest.mark.parametrize("element", ["quad8", "quad4", "tri3"])

@@ -58,6 +58,11 @@ def steep(x: float, y: float) -> float:
     return 1.0 if x + 0.31 * y > 0.7 else 0.3 * x
 
 
+def slanting(x: float, y: float) -> float:
+    """Return a number with a kink through opposite corners of cells."""
+    return max(0.0, x + y - 0.75)
+
+
 def refined_by(number: Number, seed: int = 0, **asked: Any) -> Refinement:
     """Refine a function over the unit square; its runs end in random order."""
     entries = {"until": 0.02, "most": 1000, "halvings": 5} | asked
@@ -127,11 +132,7 @@ def test_the_stated_error_is_that_between_the_runs_within_a_factor_of_two(number
 
 
 def test_a_kink_through_corners_of_cells_is_found() -> None:
-    """Along x + y = 0.75 no edge of a small cell misses its middle."""
-
-    def slanting(x: float, y: float) -> float:
-        return max(0.0, x + y - 0.75)
-
+    """No edge of a small cell misses its middle."""
     found = refined_by(slanting)
     largest, _ = errors(found, slanting, 400)
     assert largest < 0.02 * 1.25
@@ -146,7 +147,7 @@ def test_between_two_runs_a_kink_and_a_parabola_leave_what_they_leave() -> None:
     assert between(2.0, 4.0, 4.0, 4.0) == pytest.approx(1.0), "of x^2, whose slope changes by 4"
 
 
-@pytest.mark.parametrize("number", [kinked, bounded, steep])
+@pytest.mark.parametrize("number", [kinked, bounded, steep, slanting])
 def test_the_runs_do_not_depend_on_the_order_in_which_they_end(number: Number) -> None:
     for most in (1000, 60, 31):
         first = refined_by(number, most=most)

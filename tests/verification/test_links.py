@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -30,8 +31,9 @@ from solver import (
     solve,
 )
 from solver.contact.parting import parted
-from solver.mesh import grid, within
+from solver.mesh import grid, mapped, merged, within
 from solver.model.rigid import line
+from solver.results.audit import links
 from studies.scenes.scene import read_scene
 from tests.verification.bodies import E, bent, block, cells, sector, steel
 
@@ -193,6 +195,23 @@ def test_a_link_that_holds_another_component_than_it_says_fails_its_audit() -> N
     for other in (replace(sprung, components="tangential"), replace(sprung, stiffness=2.2e4)):
         object.__setattr__(found.system.model, "links", (other,))
         assert found.audit().figures["audit_links"] > 1e-2
+
+
+@pytest.mark.parametrize("components", ["normal", "xy"])
+def test_springs_around_a_hole_are_audited_node_by_node(components: str) -> None:
+    """Their forces have no resultant."""
+    angles = np.linspace(0.0, 2 * np.pi, 13)
+    ring = merged(mapped(grid(np.array([5.0, 10.0]), angles),
+                         lambda p: p[0] * np.stack([np.cos(p[1]), np.sin(p[1])])))  # fmt: skip
+    body = Body(name="ring", mesh=ring, material=steel(),
+                loads=(Pressure(boundary="left", value=100.0),))  # fmt: skip
+    sprung = Link(slave=("ring", "right"), components=components, stiffness=2e4)
+    held = Link(slave=("ring", "right"), components="tangential", stiffness=2e4)
+    found = solve(Model(bodies=(body,), links=(sprung, held)))
+    audit = found.audit()
+    assert audit.passed and audit.figures["audit_links"] < 1e-6, audit.violations
+    object.__setattr__(found.system.model, "links", (replace(sprung, stiffness=2.2e4), held))
+    assert found.audit().figures["audit_links"] > 1e-2
 
 
 # -- ties ----------------------------------------------------------------------------------------
@@ -460,6 +479,28 @@ def test_a_tie_with_a_slave_of_much_longer_edges_passes() -> None:
     audit = solve(Model(bodies=(lower, upper), links=(tie,))).audit()
     assert audit.passed, audit.violations
     assert 0 < audit.figures["audit_links"] < 3e-4
+
+
+def test_places_of_long_boundaries_are_looked_for_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The distances of all places from all pieces take gigabytes on a thousand edges."""
+    x = np.linspace(0.0, 10.0, 401)
+    ends = np.array([[x[:-1], 0 * x[1:]], [x[1:], 0 * x[1:]]])
+    X = ends.mean(axis=0)
+    master = links._Sampled(X, X**2, np.ones(400), ends, ends**2)
+    places = np.stack([np.linspace(-1.0, 11.0, 450), np.full(450, 0.1)])
+    together = links._facing_few(places, master)
+    monkeypatch.setattr(links, "_PAIRS", 10_000)
+    tracemalloc.start()
+    found = links._facing(places, master)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 2e6
+    for one, other in zip(found, together, strict=True):
+        np.testing.assert_array_equal(one, other)
+    away, moved = found
+    inside = (places[0] >= 0) & (places[0] <= 10)
+    assert away[inside] == pytest.approx(0.1) and np.isinf(away[~inside]).all()
+    np.testing.assert_allclose(moved[0, inside], places[0, inside] ** 2, atol=1e-3)
 
 
 PLATE = RigidBody(name="plate")

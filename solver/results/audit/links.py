@@ -14,7 +14,7 @@ import numpy as np
 from solver.contact.system import LEAST, LEAST_ENERGY
 from solver.fem.rigid import RigidPart
 from solver.fem.surface import edges_of
-from solver.mesh.edges import shape_functions
+from solver.mesh.edges import shape_derivatives, shape_functions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,8 +28,10 @@ if TYPE_CHECKING:
 
 _PIECES = 16
 """Number of pieces of an edge; more where edges of the other side are shorter."""
-_FINER = 8
-"""Number of parts of a piece, for normals and areas of nodes on curved edges."""
+_GAUSS = 6
+"""Number of Gauss points of an edge, for normals and areas of nodes."""
+_PAIRS = 1_000_000
+"""Number of places times pieces of the other side that are looked at together: 64 MB."""
 _FACING = 0.05
 """Ratio of the distance from the master to the length of the slave; above it a place of the slave
 faces no master."""
@@ -189,23 +191,25 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
     size = max(size, LEAST * _moved_by(system, link.slave[0], converged.state.force_scale))
     if not size:
         return 0.0
-    if link.local:
-        return _misfit_along(system, k, converged, size)
+    sprung = np.isfinite(link.stiffness)
+    if link.local or (sprung and link.master is None):
+        return _misfit_at_nodes(system, k, converged, size)
     axes = [1] if _is_ring(system, link) else list(link.axes)
     jump = (u - sum(others, np.zeros_like(u)))[axes]
-    if link.master is None and not link.distributed and np.isinf(link.stiffness):
+    if link.master is None and not link.distributed:
         jump = jump - jump[:, :1] if link.rigid is None else jump
         return float(np.abs(jump).max()) / size
     mean = (jump * area).sum(axis=1)
-    if np.isfinite(link.stiffness):
+    if sprung:
         mean = mean + _forces(system, k, converged, link.slave[0])[0][axes] / link.stiffness
     return float(np.abs(mean).max()) / area.sum() / size
 
 
-def _misfit_along(system: System, k: int, converged: Converged, size: float) -> float:
-    """Return the motion over ``size`` that a link along normals or tangents should prevent.
+def _misfit_at_nodes(system: System, k: int, converged: Converged, size: float) -> float:
+    """Return the motion over ``size`` that springs, or a link along normals, should prevent.
 
-    It is looked for at the nodes, where it is held.
+    It is looked for at the nodes, where it is held, node by node: around a hole the forces of
+    springs may have no resultant.
     """
     link = system.model.links[k]
     name, boundary = link.slave
@@ -213,25 +217,31 @@ def _misfit_along(system: System, k: int, converged: Converged, size: float) -> 
     nodes, local = np.unique(edges, return_inverse=True)
     local = local.reshape(edges.shape)
     X, u = whole.X[:, nodes], system.displacement(name, converged.state).reshape(-1, 2).T[:, nodes]
-    ends = np.linspace(-1.0, 1.0, _PIECES * _FINER + 1)
-    shapes = shape_functions((ends[1:] + ends[:-1]) / 2, edges.shape[1])
-    outline = X[:, local] @ shape_functions(ends, edges.shape[1]).T
-    along = np.diff(outline, axis=2)
+    xi, weights = np.polynomial.legendre.leggauss(_GAUSS)
+    shapes = shape_functions(xi, edges.shape[1])
+    along = X[:, local] @ shape_derivatives(xi, edges.shape[1]).T * weights
     depth = whole.measure(X[:, local] @ shapes.T)
-    area = np.bincount(local.ravel(), ((np.hypot(*along) * depth) @ shapes).ravel())
-    x, y = (np.bincount(local.ravel(), (each @ shapes).ravel()) for each in along)
-    way = np.stack([y, -x] if link.components == "normal" else [x, y]) / np.hypot(x, y)
+    area, x, y = (
+        np.bincount(local.ravel(), (each @ shapes).ravel())
+        for each in (np.hypot(*along) * depth, *along)
+    )
+    ways = np.eye(2)[list(link.axes), :, None] + np.zeros_like(X)
+    if link.local:
+        ways = np.array([[y, -x] if link.components == "normal" else [x, y]]) / np.hypot(x, y)
     if link.rigid is not None:
         across, up, angle = _motion(system, link.rigid, converged)
         centre = system.parts[system.part(link.rigid)].body.centre  # type: ignore[union-attr]
         arm = X - np.reshape(centre, (2, 1))
         u = u - np.array([across - angle * arm[1], up + angle * arm[0]])
-    jump = (way * u).sum(axis=0)
+    jump = (ways * u).sum(axis=1)
     if np.isfinite(link.stiffness):
-        sprung = (area * jump * way).sum(axis=1)
-        force = _forces(system, k, converged, name)[0] / link.stiffness
-        return float(np.abs(sprung + force).max()) / area.sum() / size
-    return float(np.abs(jump if link.rigid else jump - jump[0]).max()) / size
+        own = np.where(system.links.whose == k, converged.state.links, 0.0)
+        part = system.parts[system.part(name)]
+        force = part.on_whole(system.links.on_part(system.part(name), own, part.n))
+        force = force.reshape(-1, 2).T[:, nodes] / link.stiffness
+        off = area * (jump[:, None] * ways).sum(axis=0) + force
+        return float(np.hypot(*off).sum()) / area.sum() / size
+    return float(np.abs(jump if link.rigid else jump - jump[:, :1]).max()) / size
 
 
 def _opposite(slave: _Sampled, master: _Sampled) -> _Sampled:
@@ -268,6 +278,14 @@ def _facing(X: Array, master: _Sampled) -> tuple[Array, Array]:
 
     The distance is infinite beyond an end of the master.
     """
+    count = max(_PAIRS // master.X.shape[1], 1)
+    each = [_facing_few(X[:, k : k + count], master) for k in range(0, max(X.shape[1], 1), count)]
+    away, moved = zip(*each, strict=True)
+    return np.concatenate(away), np.hstack(moved)
+
+
+def _facing_few(X: Array, master: _Sampled) -> tuple[Array, Array]:
+    """Return what `_facing` does, by the distances of all places from all pieces."""
     begin, end = master.ends
     along = end - begin
     share = (X.T @ along - (begin * along).sum(axis=0)) / (along**2).sum(axis=0)
