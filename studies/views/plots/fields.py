@@ -24,6 +24,8 @@ ALONG = ("s", "depth", "increment", "fraction")
 """Dimensions along which lines are drawn."""
 REPEATED = ("cycle", "pass")
 """Dimensions of numbers that are lines over them where one run is drawn."""
+_STRAIGHT = 1e-9
+"""Largest height of a line along x, over its length."""
 _DECAYED = 0.02
 """Depth is shown as far as values exceed this share of the peak."""
 OUTLINE = "outline"
@@ -88,10 +90,20 @@ def line_axis(values: xr.DataArray, sweep: Sequence[Hashable] = ()) -> str | Non
 
 
 def placed(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
-    """Return values, with the distance [mm] from the start of a line or contact as a coordinate."""
-    distance = run.get(f"{str(values.name).partition('_')[0]}_s")
-    there = distance is not None and set(distance.dims) <= set(values.dims)
-    return values.assign_coords({DISTANCE: distance}) if there else values
+    """Return values, with the distance [mm] from the start of a line or contact as a coordinate.
+
+    Along contacts whose slaves are straight along x it is the position x.
+    """
+    kind = str(values.name).partition("_")[0]
+    distance = run.get(f"{kind}_s")
+    if distance is None or not set(distance.dims) <= set(values.dims):
+        return values
+    x, y = (run.get(f"{kind}_{axis}") for axis in AXES[:2])
+    if kind == "contact" and x is not None and y is not None and x.dims == distance.dims:
+        size = np.nanmax(np.ptp(x.to_numpy(), axis=-1), initial=0.0)
+        if np.nanmax(np.ptp(y.to_numpy(), axis=-1), initial=0.0) <= _STRAIGHT * size:
+            distance = x.assign_attrs(long_name="position x along the slave")
+    return values.assign_coords({DISTANCE: distance})
 
 
 def depth_shown(values: xr.DataArray, others: Sequence[Hashable]) -> int:
