@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from studies import StudyError
+from studies.views.plots.fields import placed
 from studies.views.plots.lines import _other
 from studies.views.plots.picture import picture
 from studies.views.shown import outline
@@ -118,6 +119,17 @@ def test_a_number_of_cycles_is_a_line_of_one_run_and_the_last_cycle_of_several()
     assert dots.get_ydata().tolist() == [2.0, 6.0]
     (dots,) = picture(both, "cycle_work", selection={"cycle": 1}).axes[0].lines
     assert dots.get_ydata().tolist() == [5.0, 10.0]
+
+
+def test_contact_lies_over_x_where_its_slave_does() -> None:
+    x = np.linspace(3.0, 1.0, 5)  # the slave begins at its right end
+    run = xr.Dataset(coords={"contact": ["face"]})
+    dims = ("contact", "fraction")
+    run["contact_pressure"] = (dims, np.arange(5.0)[None])
+    run = run.assign(contact_x=(dims, x[None]), contact_s=(dims, 3.0 - x[None]))
+    for y, at in ((np.zeros(5), x), (0.1 * x, 3.0 - x)):
+        of = placed(run["contact_pressure"], run.assign(contact_y=(dims, y[None])))
+        np.testing.assert_array_equal(of["distance"].squeeze(), at)
 
 
 def touching(stages: int, pairs: int = 1, *, released: bool) -> xr.Dataset:
