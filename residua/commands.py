@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
-    from residua.cost import Foreseen, dry_run
+    from residua.cost import ALONE, Foreseen, dry_run
     from residua.progress import Progress
     from studies.definition.fit import NO_FIT
     from studies.definition.study import Study
@@ -54,14 +54,15 @@ def run(options: argparse.Namespace) -> int:
     foreseen = Foreseen.of(study, store)
     if foreseen.warning:
         print(foreseen.warning, file=sys.stderr)
-    workers = options.workers
-    if workers is None and foreseen.short and limits == Limits():
-        workers = 0
+    alone = 0.0
+    if options.workers is None and foreseen.short and limits == Limits():
+        alone = ALONE
         gc.freeze()  # what is loaded stays: who looks for memory to free need not look there
     progress, preparing = Progress(study), Thread(target=prepare)
 
     def hear(event: StudyEvent) -> None:
-        if preparing.ident is None:
+        # The processor time of runs is that of their process, with all of its threads.
+        if not (alone or options.workers == 0) and preparing.ident is None:
             preparing.start()
         progress(event)
 
@@ -71,7 +72,8 @@ def run(options: argparse.Namespace) -> int:
         outcome = run_study(
             study,
             store,
-            workers=workers,
+            workers=options.workers,
+            alone=alone,
             scheduler=access,
             resume=options.resume,
             limits=limits,

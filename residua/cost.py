@@ -16,6 +16,9 @@ _SHORT = 8.0
 """Likely seconds of processor time up to which `residua run` starts no workers: to start them takes
 more than a second, and two would save no more than half of the time."""
 
+ALONE = 60.0
+"""Seconds of processor time after which a study that seemed to be short gets workers after all."""
+
 _UNITS = ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"), (1.0, "seconds"))
 
 

@@ -170,6 +170,9 @@ class Datasets:
             now = time.monotonic()
             made.path, made.until = None, now + REST * (now - began)
             raise Busy(LARGE, math.ceil(REST * (now - began))) from None
+        finally:
+            for part in target.parent.glob(f"{target.name}.*"):  # of a process that was ended
+                part.unlink(missing_ok=True)
         made.of, made.path = of, target
         now = time.monotonic()
         made.until = now + REST * (now - began)

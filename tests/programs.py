@@ -107,6 +107,8 @@ def become(
         code = 0
     except SystemExit as asked:
         code = asked.code
+        if not isinstance(code, int | None):
+            print(code, file=sys.stderr)
     except BaseException:
         traceback.print_exc()
     threading._shutdown()  # type: ignore[attr-defined]

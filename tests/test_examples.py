@@ -29,6 +29,25 @@ def run(file: Path, folder: Path, programs: Programs) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.processes
+@pytest.mark.parametrize(
+    ("program", "code", "told"),
+    [
+        ("print(5)", 0, ""),
+        ("import sys\nsys.exit('why')", 1, "why\n"),
+        ("import sys\nsys.exit(3)", 3, ""),
+        ("import warnings\nwarnings.warn('old', stacklevel=1)", 1, "UserWarning: old\n"),
+    ],
+)
+def test_a_program_ends_as_python_would_end_it(
+    program: str, code: int, told: str, tmp_path: Path, programs: Programs
+) -> None:
+    (tmp_path / "program.py").write_text(program)
+    done = programs.run(tmp_path / "program.py", tmp_path, os.environ, strict=True)
+    assert done.returncode == code and done.stderr.endswith(told)
+    assert done.stdout == ("5\n" if "print" in program else "")
+
+
 @pytest.mark.pages
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_runs(script: Path, tmp_path: Path, programs: Programs) -> None:

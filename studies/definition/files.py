@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -102,7 +103,8 @@ def _with_rows(line: Any, field: str, folder: Path) -> Any:
 def _at_place(text: str, field: str) -> dict[str, Any]:
     """Return the rows of a measured line, and its place, which may be behind the file's name."""
     signs = [k for k in range(len(text) - 1, 0, -1) if text[k] == "@" and "=" in text[k:]]
-    there = (k for k in [len(text), *signs] if Path(text[:k]).is_file())
+    # Path.is_file raises an error for a text that is too long for the name of a file
+    there = (k for k in [len(text), *signs] if os.path.isfile(text[:k]))  # noqa: PTH113
     end = next(there, signs[0] if signs else len(text))  # names and folders may have these signs
     name, places = text[:end], text[end + 1 :]
     if not places:

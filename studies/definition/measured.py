@@ -180,8 +180,10 @@ def _checked(field: str, content: Any, scene: Scene, axes: Collection[str]) -> M
         raise StudyError(f"{field}.values", given.get("values"), "must be one number or more")
     told = "sigma" in given
     raw = given.get("sigma", _USUAL * float(np.abs(values).max()) or 1.0)
-    many = raw if isinstance(raw, list | tuple) else [raw] * len(values)
-    sigma = _numbers(f"{field}.sigma", many, unit)
+    own = in_unit(unit, raw, f"{field}.sigma")
+    if not isinstance(own, list | tuple):
+        own = [own] * len(values) if is_finite(own) else []
+    sigma = _numbers(f"{field}.sigma", own, unit)
     if len(sigma) != len(values) or not (sigma > 0.0).all():
         allowed = "must be a number > 0, or one for each value"
         raise StudyError(f"{field}.sigma", raw, allowed)

@@ -42,13 +42,13 @@ class Limits:
             raise StudyError("memory", self.memory, "must be a size such as 500MB or 2GB")
 
     def check_without_workers(self) -> None:
-        """Refuse limits that need workers, because there are none.
+        """Refuse limits that need workers, because there are none; the usual ones are let pass.
 
         Raises
         ------
         StudyError
             naming the limit
         """
-        for name in ("path_seconds", "memory"):
-            if (value := getattr(self, name)) is not None:
+        for name in ("stall_seconds", "path_seconds", "memory"):
+            if (value := getattr(self, name)) not in (None, getattr(Limits(), name)):
                 raise StudyError(name, value, "must be left out with 0 workers: it ends a worker")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import time
@@ -13,7 +14,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from solver.memory import most_kept
+from solver.memory import most_kept, release
 from solver.scenes import Scene
 from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
@@ -117,6 +118,7 @@ def run_study(
     *,
     scene: Scene | None = None,
     workers: int | None = None,
+    alone: float = 0.0,
     scheduler: Access | str | None = None,
     resume: bool = False,
     since: int = 0,
@@ -134,6 +136,8 @@ def run_study(
     scene : for the content of a study file, the user's own scene in place of a scene's name
     workers : number of worker processes on this machine; by default one per core, or fewer if they
         need more memory than the machine has. 0 computes in this process, which no limit ends
+    alone : processor time [s] of this process after which workers are started; until then it
+        computes itself. They begin with the next loading path
     scheduler : a running dask scheduler to use instead; its workers must see the store under the
         same path
     resume : compute only runs without a stored status; by default failed runs are computed again
@@ -142,8 +146,8 @@ def run_study(
     limits : limits on time and memory
     priority : among studies that share a scheduler, the one with the higher number goes first
     on_event : called, in this thread, with every event
-    should_stop : called several times a second; if it returns true the work stops, and finished
-        runs stay
+    should_stop : called several times a second, in this process at each increment; if it returns
+        true the work stops, and finished runs stay
 
     Raises
     ------
@@ -175,7 +179,8 @@ def run_study(
         return stop_requested
 
     access = Access(scheduler) if isinstance(scheduler, str) else scheduler
-    if here := workers == 0 and access is None:
+    alone = 0.0 if access else math.inf if workers == 0 else alone
+    if alone:
         limits.check_without_workers()
     if access and not store.directory.exists():
         _answering(access)
@@ -196,12 +201,10 @@ def run_study(
         if wanted or (asking and not asking.ended):
             if shutil.disk_usage(store.directory).free < _ROOM:
                 raise StoreFull(str(store.directory))  # before any path is computed in vain
-            if here:
-                work.compute_here(stop)
-            else:
+            if not alone or work.compute_here(stop, alone):
                 work.compute(workers, access, stop)
         if asking:
-            stopped, anew = not asking.ended, bool(work.computed)
+            stopped, anew = work.lacks, bool(work.computed)
             if study.goal:
                 combined = answers(study, store, asking)
             elif study.fit:
@@ -209,7 +212,7 @@ def run_study(
             else:
                 combined = refined(study, store, asking, anew)
         else:
-            stopped = stop_requested and bool(wanted - work.computed)
+            stopped = stop_requested and work.lacks
             combined = result(study, store, complete=not wanted, stopped=stopped)
     return StudyOutcome(
         study_id=study.id,
@@ -284,8 +287,17 @@ class _Work:
         for error in unwritable:
             raise self._of_directory(error)
 
-    def compute_here(self, stop: Callable[[], bool]) -> None:
-        """Run the tasks in this process, one after the other."""
+    @property
+    def lacks(self) -> bool:
+        """Whether runs are left to compute."""
+        return not self.asking.ended if self.asking else bool(self.wanted - self.computed)
+
+    def compute_here(self, stop: Callable[[], bool], seconds: float) -> bool:
+        """Run the tasks in this process, one after the other.
+
+        Return whether some are left after this processor time [s], for workers.
+        """
+        until = time.process_time() + seconds
         failed: list[Exception] = []  # a task takes an error of its reports for its worker's end
 
         def hear(content: Mapping[str, Any]) -> None:
@@ -300,7 +312,7 @@ class _Work:
 
         for task in self._tasks(None, lambda: 1):
             if task is None or stop():
-                return
+                return False
             try:
                 walk(task, hear, leave)
             except (StoreFull, StudyError) as error:
@@ -308,6 +320,10 @@ class _Work:
             for each in failed:
                 raise each
             self._close(task, None)
+            if time.process_time() > until and self.lacks and not stop():
+                release(0)
+                return True
+        return False
 
     def _of_directory(self, error: StoreFull | StudyError) -> StoreFull | StudyError:
         """Return an error with the directory as the user gave it, not with the path of a task."""
@@ -339,7 +355,8 @@ class _Work:
             yield self._left.popleft() if self._left else next(tasks, None)
 
     def _rest(self, path: LoadingPath) -> LoadingPath:
-        cases = tuple(case for case in path.cases if case.id in self.wanted)
+        lacking = (case for case in path.cases if case.id in self.wanted)
+        cases = tuple(case for case in lacking if case.id not in self.computed)
         return LoadingPath(path.id, path.parameters, cases)
 
     def _hear(self, content: Mapping[str, Any]) -> None:

@@ -17,7 +17,7 @@ import pytest
 from service.errors import Busy, Conflict, NotFound, QueueLost
 from service.history import log_of
 from service.job import StudyState, row_of
-from service.jobs import Jobs
+from service.jobs import Jobs, forget
 from service.recovery import open_queue
 from studies import Store, StoreBusy, Study, StudyError
 from studies.storage.database import checksum
@@ -282,6 +282,24 @@ def test_a_queue_without_checksums_gets_them(tmp_path: Path) -> None:
         connection.execute("PRAGMA user_version = 1")
     again = Jobs(jobs.path)
     assert (again.get("a"), again.study("a"), again.runs("a")) == (before, STUDY, ["x", "y"])
+
+
+def test_a_queue_of_before_keeps_turns_of_layouts_until_their_study_is_deleted(
+    tmp_path: Path,
+) -> None:
+    jobs = Jobs(tmp_path / "jobs.sqlite")
+    for name in "ab":
+        jobs.accept(name, STUDY, [name])
+    with closing(sqlite3.connect(jobs.path)) as connection, connection:
+        connection.execute("DROP TABLE layout")
+    jobs = Jobs(jobs.path)
+    for turns in ([0, 0, 1], [2, 2, 3], [4, 4, 5]):
+        assert [jobs.layout_turn("a", layout) for layout in "xxy"] == turns
+    assert jobs.layout_turn("b", "x") == 0
+    with jobs.transaction() as connection:
+        forget(connection, "a")
+    jobs = Jobs(jobs.path)
+    assert [jobs.layout_turn(name, "y") for name in "ab"] == [0, 1]
 
 
 def test_a_damaged_row_of_an_earlier_form_stays_damaged(tmp_path: Path) -> None:

@@ -338,6 +338,13 @@ def test_a_line_is_compared_with_its_own_piece_and_a_little_beyond() -> None:
             {"measured": [{"of": "crater_depth", "values": [1, 2], "sigma": [1, 0]}]},
             "fit.measured[0].sigma", "a number > 0",
         ),
+        *(
+            (
+                {"measured": [{"of": "crater_depth", "values": [1, 2], "sigma": wrong}]},
+                "fit.measured[0].sigma", allowed,
+            )
+            for wrong, allowed in {"some": "a number > 0", "2 N": "a number in mm"}.items()
+        ),
     ],
 )  # fmt: skip
 def test_a_wrong_fit_is_refused_in_one_line(
@@ -473,6 +480,8 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
         assert inside.fit["measured"][0].get("at") == at
     with pytest.raises(StudyError, match="must be FILE, or FILE@NAME=VALUE"):
         Study.from_toml(file, [tmp_path / "p.csv@stage=loaded,pass"])
+    with pytest.raises(StudyError, match=r"fit\.measured\[0\]\.at\.longest"):
+        Study.from_toml(file, [tmp_path / f"p.csv@longest={'x' * 300}"])  # no name of a file
     with pytest.raises(StudyError, match=r"fit\.measured = None: is missing"):
         Study.from_toml(file)
     for text, allowed in (

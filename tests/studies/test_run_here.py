@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from residua.cli import main
+from residua.cost import ALONE
 from studies import Store, StudyEvent, open_study, run_study
 from studies.errors import StudyError
 from studies.execution.limits import Limits
+from studies.execution.run import _Work
 from tests.studies.conftest import fake_study
 
 TROUBLES = ["none", "limit", "raise", "unwritable"]
@@ -42,6 +46,16 @@ def test_a_goal_is_searched(store: Store, scene: str) -> None:
         assert found["load_ratio"].values == pytest.approx([0.7, 0.5], rel=0.02)
 
 
+def test_the_report_is_not_prepared_in_the_processor_time_of_runs(
+    study_file: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prepared: list[None] = []
+    monkeypatch.setattr("studies.views.report.prepare", lambda: prepared.append(None))
+    options = ["--out", str(tmp_path / "out"), "--workers", "0"]
+    assert main(["run", str(study_file()), *options]) == 0
+    assert not prepared
+
+
 def test_stopping_keeps_what_is_finished(store: Store) -> None:
     finished: list[str] = []
 
@@ -66,26 +80,56 @@ def test_an_error_of_the_listener_is_raised_and_frees_the_store(store: Store) ->
         pass
 
 
-@pytest.mark.parametrize("limit", [{"path_seconds": 9.0}, {"memory": "2GB"}])
+@pytest.mark.parametrize("goal", [False, True])
+def test_workers_take_what_is_left_after_some_time(
+    goal: bool, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content: dict[str, Any] = {"name": "late", "scene": "fake", "sweep": {"friction": [0.0, 0.4]}}
+    if goal:
+        content["goal"] = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}
+    by_workers: list[str] = []
+
+    def compute(work: _Work, *_: object) -> None:
+        before = set(work.computed)
+        assert work.lacks and before
+        work.compute_here(lambda: False, math.inf)
+        by_workers.extend(work.computed - before)
+
+    monkeypatch.setattr(_Work, "compute", compute)
+    events: list[StudyEvent] = []
+    outcome = run_study(content, store, alone=1e-9, on_event=events.append)
+    assert by_workers and not outcome.stopped
+    assert set(by_workers) < set(outcome.computed)
+    told = [event.run for event in events if event.kind == "run"]
+    assert sorted(told) == list(outcome.computed), "each run is computed once"
+    progress = [event.progress for event in events]
+    assert progress == sorted(progress) and progress[-1] == 1.0
+    run_study(content, store, alone=1e-9)  # nothing is left: no workers are started
+
+
+@pytest.mark.parametrize(
+    "limit", [{"stall_seconds": 9.0}, {"path_seconds": 9.0}, {"memory": "2GB"}]
+)
 def test_limits_that_end_a_worker_are_refused(store: Store, limit: dict[str, float | str]) -> None:
     with pytest.raises(StudyError, match=f"^{next(iter(limit))}"):
         run_study(fake_study(), store, workers=0, limits=Limits(**limit))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
-    ("seconds", "options", "workers"),
+    ("seconds", "options", "workers", "alone"),
     [
-        (0.1, [], 0),
-        (0.1, ["--workers", "3"], 3),
-        (0.1, ["--memory", "2GB"], None),
-        (60.0, [], None),
-        (60.0, ["--workers", "0"], 0),
+        (0.1, [], None, ALONE),
+        (0.1, ["--workers", "3"], 3, 0.0),
+        (0.1, ["--memory", "2GB"], None, 0.0),
+        (60.0, [], None, 0.0),
+        (60.0, ["--workers", "0"], 0, 0.0),
     ],
 )
 def test_the_command_starts_no_workers_for_a_short_study(
     seconds: float,
     options: list[str],
     workers: int | None,
+    alone: float,
     study_file: Callable[..., Path],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -93,11 +137,11 @@ def test_the_command_starts_no_workers_for_a_short_study(
     asked: list[object] = []
 
     def computed(*arguments: object, **given: object) -> None:
-        asked.append(given["workers"])
+        asked.extend([given["workers"], given["alone"]])
         raise StudyError("study", "fake", "is not computed here")
 
     found = SimpleNamespace(cpu_seconds=(seconds / 2, seconds, 2 * seconds))
     monkeypatch.setattr("residua.cost.estimate", lambda *of: found)
     monkeypatch.setattr("studies.execution.run.run_study", computed)
     assert main(["run", str(study_file()), "--out", str(tmp_path / "out"), *options]) == 2
-    assert asked == [workers]
+    assert asked == [workers, alone]
