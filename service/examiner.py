@@ -7,22 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from service.guarded import Guarded
 from service.settings import Settings
-from solver.scenes import Scene
-from studies import Bounds, Estimate, Store, Study, StudyError, estimate
-from studies.scenes.registry import known_names
+from studies import Bounds, Estimate, Store, Study, estimate
 
 WAITING = 100
 """Number of studies that may wait to be checked."""
 SECONDS = 120
 """Longest time of the check of a study [s]."""
-LISTED = 10
-"""Number of posted scenes of one name that an error lists."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,22 +67,9 @@ class Examiner:
 def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:
     """Return a checked study with its run ids and its cost; called in a separate process."""
     store = Store(directory)
-    study = Study.known(content, partial(_posted, store), store.definition)
+    study = Study.known(content, lambda name: store.scene(store.scene_id(name)), store.definition)
     bounds.check_size(study)
     runs = list(study.checked().run_ids())
     cost = estimate(study, store)
     bounds.check(cost)
     return Examined(study, runs, cost)
-
-
-def _posted(store: Store, name: str) -> Scene | None:
-    """Return a posted scene by its id, or by its name if no other scene has it."""
-    if (scene := store.scene(name)) or name in known_names():
-        return scene
-    found = store.scenes(limit=LISTED + 1, name=name)
-    if len(found) > 1:
-        ids = ", ".join(each.id for each in found[:LISTED])
-        count, more = (f"over {LISTED}", " and more") if len(found) > LISTED else (len(found), "")
-        allowed = f"is the name of {count} posted scenes: give an id, one of {ids}{more}"
-        raise StudyError("scene", name, allowed)
-    return store.scene(found[0].id) if found else None

@@ -16,6 +16,7 @@ from service.job import Job
 from service.jobs import Jobs
 from service.schemas import StudyDetail, StudyRun, StudySummary, Window
 from studies import Store
+from studies.definition.identity import is_id
 from studies.definition.sweep import labels, positions
 from studies.definition.vocabulary import taken
 from studies.storage.seal import state_of
@@ -32,6 +33,14 @@ CHOOSE = ("goal", "refine", "fit")
 def summary(job: Job) -> StudySummary:
     """Return the state of a study."""
     return StudySummary(**_columns(job))
+
+
+def scene_name(store: Store, known: str) -> str:
+    """Return the name of a scene that a study calls by its name or id; empty if it is gone."""
+    if not is_id(known):
+        return known
+    scene = store.scene(known, whole=False)
+    return scene.name if scene else ""
 
 
 @dataclass(slots=True)
@@ -101,6 +110,7 @@ class Details:
 
         return StudyDetail(
             **_columns(job),
+            scene_name=scene_name(self.store, job.scene),
             parameters=study["parameters"],
             sweep=study["sweep"],
             **{name: study.get(name, {}) for name in CHOOSE},

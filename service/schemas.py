@@ -221,6 +221,7 @@ class StudyRun(BaseModel):
 class StudyDetail(StudySummary):
     """A study with its definition and a page of its runs."""
 
+    scene_name: str = Field(description="name of its scene, also of a posted one; else empty")
     parameters: dict[str, Any]
     sweep: Axes
     goal: dict[str, Any] = Field(description="what is searched at each place of the axes")

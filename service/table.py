@@ -101,8 +101,8 @@ class Tables:
 
 
 def scene_of_study(store: Store, name: str) -> Scene | None:
-    """Return a scene by its name or by the id of a posted one; None if it is not known here."""
-    if scene := store.scene(name, whole=False):
+    """Return a scene by its name, or the id of a posted one; None if it is not known here."""
+    if scene := store.scene(store.scene_id(name), whole=False):
         return scene
     return scene_named(name) if name in known_names() else None
 

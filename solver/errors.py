@@ -7,6 +7,12 @@ class SolverError(Exception):
     """Base class of the errors that this package raises."""
 
 
+def plain(value: object) -> object:
+    """Return a value as a message shows it: a number of an array as a plain number."""
+    is_number = hasattr(value, "dtype") and getattr(value, "ndim", 1) == 0
+    return value.item() if is_number else value  # type: ignore[attr-defined]
+
+
 class ModelError(SolverError, ValueError):
     """Bad input; the message says which field, which value and what is allowed.
 
@@ -18,6 +24,7 @@ class ModelError(SolverError, ValueError):
     """
 
     def __init__(self, field: str, value: object, allowed: str) -> None:
+        value = plain(value)
         super().__init__(f"{field} = {value!r}: {allowed}")
         self.field = field
         self.value = value

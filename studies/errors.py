@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Any
 
+from solver.errors import plain
 from studies.units import is_quantity
 
 MOST_MISTAKES, MOST_NAMES, COMPARED = 20, 10, 500
@@ -41,6 +42,7 @@ class StudyError(ValueError):
     ) -> None:
         field = field.encode("utf-8", "backslashreplace").decode()  # JSON may hold lone surrogates
         field, allowed = cut(field, LONGEST_FIELD), cut(allowed, LONGEST_TEXT)
+        value = plain(value)
         self.field, self.value, self.allowed = field, value, allowed
         self.others = tuple(others)
         own = f"{field} = {reprlib.repr(value)}: {allowed}"

@@ -165,10 +165,13 @@ def beside(error: StudyError, scene: Scene) -> dict[str, str]:
     return wrong
 
 
-def as_toml(study: Mapping[str, Any]) -> str:
-    """Return the file of a study."""
+def as_toml(study: Mapping[str, Any], scene_name: str) -> str:
+    """Return the file of a study, with the name of its scene where it calls it by an id."""
     tables = ("parameters", "sweep")
     lines = [f"{key} = {toml_text(value)}" for key, value in study.items() if key not in tables]
+    if study["scene"] != scene_name:
+        at = list(study).index("scene")
+        lines[at] += f"  # {scene_name}"
     for table in tables:
         if study[table]:
             lines += ["", f"[{table}]"]

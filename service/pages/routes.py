@@ -55,6 +55,7 @@ from service.table import Tables, scene_of_study
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
+from studies.errors import SceneError
 from studies.scenes.registry import known_names, known_scenes
 from studies.storage.seal import State, state_of
 from studies.views.table import MESSAGE, RUN, STATUS, varied
@@ -66,6 +67,8 @@ router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
 home = APIRouter(include_in_schema=False)
 
 FOR_GOOD = {"cache-control": "public, max-age=31536000, immutable", "vary": "accept-encoding"}
+USUAL = "punch"
+"""The scene of the form of a new study."""
 LISTED = 25
 """Number of studies on a page."""
 POLLED = ("accepted", "running")
@@ -95,6 +98,7 @@ def get_asset(version: str, name: str, request: Request) -> Response:
 def studies_page(
     request: Request,
     jobs: TheJobs,
+    store: TheStore,
     status: str = "",
     tag: str = "",
     scene: str = "",
@@ -112,9 +116,11 @@ def studies_page(
     wanted = {"state" if name == "status" else name: value for name, value in which.items()}
     found, total = jobs.page(limit=window.limit, offset=window.offset, **wanted)
     items = [(overview.summary(job), _said(jobs, job)) for job in found]
+    scenes = {each.scene: overview.scene_name(store, each.scene) for each, _ in items}
     return page(
         request,
         "studies",
+        scenes=scenes,
         items=items,
         total=total,
         which=which,
@@ -304,9 +310,10 @@ async def health_page(
 
 
 @router.get("/new")
-def new_page(request: Request, store: TheStore, scene: str = "punch") -> Response:
+def new_page(request: Request, store: TheStore, scene: str = USUAL) -> Response:
     """Show the form of a new study; parameters in the address fill it."""
-    return _form(request, store, scene, _given(request.query_params.multi_items()), {}, None)
+    given = _given(request.query_params.multi_items())
+    return _form(request, store, store.scene_id(scene), given, {}, None)
 
 
 def _given(fields: Iterable[tuple[str, object]]) -> dict[str, list[str]]:
@@ -352,7 +359,14 @@ async def take_scene(
 ) -> Response:
     """Keep a scene file with its meshes, and show the form of its studies."""
     there = [each for each in meshes if each.filename]  # a browser sends one of no name for none
-    found = await post_scene(scene, inspector, keeper, store, caller, request, Response(), there)
+    try:
+        found = await post_scene(
+            scene, inspector, keeper, store, caller, request, Response(), there
+        )
+    except StudyError as error:
+        mistakes = error.listed if isinstance(error, SceneError) else [*map(str, error.each)]
+        refused = {"file": scene.filename or "", "mistakes": mistakes}
+        return await run_in_threadpool(_form, request, store, USUAL, {}, {}, None, refused)
     where = request.url_for("new_page").include_query_params(scene=found.id)
     return RedirectResponse(f"{where.path}?{where.query}", HTTPStatus.SEE_OTHER)
 
@@ -381,7 +395,7 @@ async def make(
         return _back(request, job.id)
     if "application/json" in request.headers.get("accept", ""):
         costs = None if found is None else dataclasses.asdict(found.estimate)
-        return JSONResponse({"wrong": wrong, "estimate": costs, **_copies(request, content)})
+        return JSONResponse({"wrong": wrong, "estimate": costs, **_copies(request, content, scene)})
     return await run_in_threadpool(_form, request, store, scene_name, given, wrong, found)
 
 
@@ -393,11 +407,11 @@ def known_scene(store: Store, name: str) -> Scene:
     return scene
 
 
-def _copies(request: Request, content: dict[str, Any]) -> dict[str, str]:
+def _copies(request: Request, content: dict[str, Any], scene: Scene) -> dict[str, str]:
     """Return a study as texts to copy."""
     address = str(request.url_for("submit"))
     return {
-        "toml": form.as_toml(content),
+        "toml": form.as_toml(content, scene.name),
         "curl": form.as_curl(content, address),
         "python": form.as_python(content, address.removesuffix("/studies")),
     }
@@ -410,7 +424,9 @@ def _form(
     given: dict[str, list[str]],
     wrong: dict[str, str],
     found: Examined | None,
+    refused: Mapping[str, Any] | None = None,
 ) -> Response:
+    """Return the page of the form; ``refused`` is a scene file that was posted, with mistakes."""
     scene = known_scene(store, name)
     content, early = form.study_of(name, scene, given)
     mistakes = {**early, **wrong}
@@ -420,7 +436,7 @@ def _form(
     return page(
         request,
         "new",
-        HTTPStatus.UNPROCESSABLE_ENTITY if wrong else HTTPStatus.OK,
+        HTTPStatus.UNPROCESSABLE_ENTITY if wrong or refused else HTTPStatus.OK,
         scene=scene,
         scene_name=name,
         name=content["name"],
@@ -432,7 +448,8 @@ def _form(
         wrong=mistakes,
         general=[text for key, text in mistakes.items() if key not in own],
         estimate=found.estimate if found else None,
-        **_copies(request, content),
+        refused=refused,
+        **_copies(request, content, scene),
     )
 
 

@@ -82,19 +82,23 @@ def get_scene(name: str, store: TheStore) -> dict[str, Any]:
 
     `name` is that of a scene, or the id of a posted one.
     """
-    found = _scene(name, store)
-    posted = name != found.name
-    entry = {"id": name, "name": found.name, "summary": found.summary} if posted else {}
+    found, known = _scene(name, store)
+    posted = known != found.name
+    entry = {"id": known, "name": found.name, "summary": found.summary} if posted else {}
     return scene_schema(found) | entry
 
 
-def _scene(name: str, store: Store) -> Scene:
-    """Return a scene, a posted one without its meshes; raise `NotFound` if there is none."""
-    if kept := store.scene(name, whole=False):
-        return kept
+def _scene(name: str, store: Store) -> tuple[Scene, str]:
+    """Return a scene, a posted one without its meshes, and its name or id.
+
+    Raises `NotFound` if there is none.
+    """
+    known = store.scene_id(name)
+    if kept := store.scene(known, whole=False):
+        return kept, known
     if name not in known_names():
         raise NotFound(f"no scene has this name; there are {', '.join(known_names())}")
-    return scene_named(name)
+    return scene_named(name), name
 
 
 @router.get("/{name}/draw.png", responses={**PICTURE, **REFUSED})
@@ -112,9 +116,9 @@ async def draw_scene(
     Beside the queries named below, every parameter of the scene is one: `?friction=0.3`. `name` is
     that of a scene, or the id of a posted one.
     """
-    await asyncio.to_thread(_scene, name, store)
-    draw = partial(inspector.draw, store.directory, name, query, caller)
-    return await pictures.answer(request, (name, query), draw)
+    _, known = await asyncio.to_thread(_scene, name, store)
+    draw = partial(inspector.draw, store.directory, known, query, caller)
+    return await pictures.answer(request, (known, query), draw)
 
 
 @router.delete("/{name}", status_code=HTTPStatus.NO_CONTENT)

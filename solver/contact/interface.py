@@ -190,10 +190,10 @@ def interface_of(
         reference = pair(slave_surface, at_rest[0], master_surface, at_rest[1], reach)
         if not reference.area.any():
             raise ModelError(
-                "contacts", (contact.slave, contact.master),
-                "these surfaces do not face each other: before loading no normal of the slave "
-                "reaches the outside of the master; check the boundaries and the positions of the "
-                "bodies",
+                "contacts", ".".join(contact.slave),
+                f"this and {'.'.join(contact.master)} do not face each other: before loading no "
+                "normal of the slave reaches the outside of the master; check the boundaries and "
+                "the positions of the bodies",
             )  # fmt: skip
     hot = [part.hot(chain) for part, (_, chain) in zip(both, sides, strict=True)]
     return Interface(

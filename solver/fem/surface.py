@@ -165,8 +165,11 @@ def extract(part: Nodes, boundary: str) -> Surface:
         order.append(following.pop(at))
         at = int(edges[order[-1], 1])
     if len(order) != len(edges):
-        allowed = "a contact surface must be one open chain of edges: name each piece by itself"
-        raise ModelError("boundary", boundary, allowed)
+        allowed = (
+            "a contact surface must be one open chain of edges: name each piece by itself; in a "
+            "mesh file all its lines must be edges of cells"
+        )
+        raise ModelError("boundary", f"{part.body.name}.{boundary}", allowed)
     nodes, local = np.unique(edges[order], return_inverse=True)
     X, chain = part.X[:, nodes], local.reshape(edges.shape)
     if part.period:

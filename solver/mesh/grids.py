@@ -94,7 +94,12 @@ def marked(
     """
     inside = np.flatnonzero(_in_box(mesh.p[:, mesh.t].mean(axis=1), x, y))
     if not len(inside):
-        raise ModelError(f"regions.{name}", {"x": x, "y": y}, "has no element in its box")
+        box = ", ".join(
+            f"{a} = {span[0]:g} to {span[1]:g}"
+            for a, span in zip("xy", (x, y), strict=True)
+            if span
+        )
+        raise ModelError(f"regions.{name}", box, "has no element in its box")
     return replace(mesh, _subdomains={**(mesh.subdomains or {}), name: inside})
 
 

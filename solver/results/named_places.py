@@ -61,6 +61,10 @@ def at_named_places(run: FinishedRun, places: NamedPlaces, times: Sequence[float
     for number in places.numbers:
         k = run.view.stages.index(number.stage)
         before = states[run.view.stages.index(number.minus)] if number.minus else None
+        if number.course:
+            since = None if before is None else before.state.time
+            out |= number.at_increments(out, states[k].state.time, since)
+            continue
         acting = {name: of[k] for name, of in zip(names, results, strict=True)}
         out |= number.values(fields, states[k], places.lines, acting, before)
     return out

@@ -1,4 +1,4 @@
-"""Numbers that a user requests: the extreme value, the integral or the extent of a field."""
+"""Numbers that a user requests: of a field its extreme value, integral or extent; of a course."""
 
 from __future__ import annotations
 
@@ -28,12 +28,24 @@ if TYPE_CHECKING:
 Span = tuple[Coordinate, Coordinate]
 Take = Literal["maximum", "minimum", "integral", "extent"]
 _OF_PAIR = {"pressure": "MPa", "shear": "MPa", "gap": "mm", "slip": "mm"}
+_COURSES = {
+    "motion.x": ("motion_x", "mm"), "motion.y": ("motion_y", "mm"),
+    "motion.rotation": ("motion_rotation", "rad"),
+    "reaction.x": ("reaction_x", "N"), "reaction.y": ("reaction_y", "N"),
+    "normal_force": ("contact_normal_force", "N"),
+    "tangential_force": ("contact_tangential_force", "N"),
+}  # fmt: skip
+"""Variable over increments and unit."""
 _UNITS = {name: field.units for name, field in BODY_FIELDS.items()} | _OF_PAIR
 EXTREME = ("maximum", "minimum")
 FORCES = ("pressure", "shear")
 """Fields of a contact whose integral is a force: over the area, not along the surface."""
 OF_CONTACT = tuple(_OF_PAIR)
 """Fields of a contact of which a number can be requested."""
+OF_PART = tuple(name for name in _COURSES if "." in name)
+"""What is taken of a part, which is a body or a rigid body, at the end of a stage."""
+FORCES_OF_CONTACT = tuple(name for name in _COURSES if "." not in name)
+"""What is taken of a whole contact at the end of a stage."""
 
 
 def of_body(axes: int) -> tuple[str, ...]:
@@ -58,13 +70,15 @@ class RequestedNumber:
     ----------
     name : name of the variable; the position adds ``_x``, ``_y`` (and ``_z``)
     of : the field, one of `of_body` or `OF_CONTACT`. In a body ``mises`` and ``plastic_strain`` are
-        taken at integration points, other fields at nodes
+        taken at integration points, other fields at nodes. Or one of `OF_PART` or
+        `FORCES_OF_CONTACT`, whose number is the value at the end of the stage
     take : ``maximum``, ``minimum``, ``integral`` along a line or contact, of ``pressure`` and
         ``shear`` over its area, which is a force [N]; or ``extent``, the length
-        along which the value is above zero; for ``pressure`` it is the length of contact
+        along which the value is above zero; for ``pressure`` it is the length of contact. No choice
+        where the number is a value at the end of the stage
     stage : name of the state
-    minus : name of a state whose values are taken off; empty for none. Not of a contact
-    body, line, contact : name of the place; exactly one of the three
+    minus : name of a state whose values are taken off; empty for none. Not of a field of a contact
+    body, line, contact, part : name of the place; exactly one of the four
     x, y, z : ranges of a box in the body to which the number is restricted [mm]
     description : meaning in words
     """
@@ -77,30 +91,47 @@ class RequestedNumber:
     body: str | None = None
     line: str | None = None
     contact: str | None = None
+    part: str | None = None
     x: Span | None = None
     y: Span | None = None
     z: Span | None = None
     description: str = ""
 
     @property
-    def is_force(self) -> bool:
-        """Whether it is the resultant of a contact."""
+    def course(self) -> str:
+        """The variable over increments of which it is a value; empty if it is of a field."""
+        return _COURSES[self.of][0] if self.of in _COURSES else ""
+
+    @property
+    def is_resultant(self) -> bool:
+        """Whether it is the resultant of a field of a contact."""
         return self.take == "integral" and self.of in FORCES
+
+    @property
+    def is_force(self) -> bool:
+        """Whether it is the force of a contact, of supports or of motions."""
+        return self.is_resultant or _COURSES.get(self.of, ("", ""))[1] == "N"
 
     @property
     def words(self) -> str:
         """What it is, of which place and when."""
-        places = {"body": self.body, "line": self.line, "contact": self.contact}
+        places = {"body": self.body, "line": self.line, "contact": self.contact, "part": self.part}
         where = next(f"{kind} {name}" for kind, name in places.items() if name is not None)
         what = self.of.replace(".", " ").replace("_", " ")
         when = f"{self.stage} minus {self.minus}" if self.minus else self.stage
+        if self.course:
+            return f"{what} of {where.removeprefix('part ')}, end of stage {when}"
         return f"{self.take} of {what} of {where}, stage {when}"
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
         """The number and, for an extreme value, its position along all axes; a run may have two."""
+        if self.course:
+            units = _COURSES[self.of][1]
+            words = self.description or self.words
+            return (Quantity(name=self.name, long_name=words, units=units),)
         units = _UNITS[self.of.partition(".")[0]]
-        along = "N" if self.is_force else f"{units} mm".removeprefix("1 ")
+        along = "N" if self.is_resultant else f"{units} mm".removeprefix("1 ")
         units = {"extent": "mm", "integral": along}.get(self.take, units)
         number = Quantity(name=self.name, long_name=self.description or self.words, units=units)
         if self.take not in EXTREME:
@@ -140,11 +171,31 @@ class RequestedNumber:
             values, X = self._sought(fields, at, lines, contacts)
             if before is not None:
                 values = values - self._sought(fields, before, lines, contacts)[0]
-            if self.is_force:
+            if self.is_resultant:
                 found = (float(values @ contacts[str(self.contact)].area),)
             else:
                 found = self._found(values, X)
         return dict(zip(self.quantities, found, strict=False))
+
+    def at_increments(self, courses: Values, at: float, before: float | None = None) -> Values:
+        """Return the number as a value of a course, at the last increment that ends at a time.
+
+        Parameters
+        ----------
+        courses : what is stored after each increment
+        at : time at the end of its stage
+        before : time at the end of the stage whose value is taken off, if any
+        """
+        known = {quantity.name: values for quantity, values in courses.items()}
+        names, name = ("part", self.part) if self.contact is None else ("contact", self.contact)
+        row = known[self.course][list(known[names]).index(name)]
+
+        def value(time: float) -> float:
+            ends = np.flatnonzero(np.isclose(known["increment_time"], time, rtol=0.0, atol=1e-9))
+            return float(row[ends[-1]]) if ends.size else np.nan
+
+        found = value(at) if before is None else value(at) - value(before)
+        return {self.quantities[0]: found}
 
     def _found(self, values: Array, X: Array) -> tuple[float, ...]:
         """Return the number from values (n,) at places (n_axes, n), with its position if any."""

@@ -46,6 +46,10 @@ def read_study(
         file which cannot be read; for ``extends``, when files extend one another in a circle
     """
     tables, folder = read_toml(path, "file"), Path(path).parent
+    if "bodies" in tables and "scene" not in tables:
+        name = Path(path).name
+        allowed = f'is a scene file, not a study: a study has the line scene = "{name}"'
+        raise StudyError("file", str(path), allowed)
     if "points" in tables:
         tables["points"] = _with_table(tables["points"], "points", folder)
     if isinstance(sweep := tables.get("sweep"), dict):

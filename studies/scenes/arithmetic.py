@@ -178,7 +178,8 @@ def _read(text: str) -> ast.expr:
     """Return the syntax tree of an expression."""
     bare = _WORD.sub(lambda word: " " * len(word[0]), text)
     if found := _FOREIGN.search(bare):
-        raise ExpressionError(f"cannot be read from {text[found.start() :]!r} on")
+        hint = ": a power is written with ^" if found[0] == "**" else ""
+        raise ExpressionError(f"cannot be read from {text[found.start() :]!r} on{hint}")
     python = _PARAMETER.sub(rf" {_MARK}\1 ", text).replace("^", "**")
     python = _CHOICE.sub(f"{_IF}(", python)
     try:

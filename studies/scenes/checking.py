@@ -14,7 +14,7 @@ from solver.errors import ModelError
 from solver.parameters import Accuracy, is_number
 from solver.results.outputs import Need, outputs
 from solver.results.quantities import QUANTITIES
-from solver.results.requested import of_body
+from solver.results.requested import FORCES_OF_CONTACT, OF_PART, of_body
 from solver.tensors import AXES
 from studies.errors import StudyError, one_of
 from studies.scenes import tables
@@ -199,8 +199,9 @@ def _contacts(scene: tables.SceneFile) -> Iterator[StudyError]:
 
 def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:
     if bool(scene.stages) == (scene.loading is not None):
-        given = "both" if scene.stages else None
-        yield StudyError("stages", given, "must be given, or loading: one of the two")
+        given = [stage.name for stage in scene.stages]
+        what = "must be left out where loading is given" if given else "must be given, or loading"
+        yield StudyError("stages", given or None, f"{what}: one of the two")
     for k, stage in enumerate(scene.stages):
         for side in stage.remove:
             yield from _one_of(f"stages[{k}].remove", side.partition(".")[0], scene.bodies)
@@ -314,8 +315,11 @@ def _outputs(scene: tables.SceneFile) -> Iterator[StudyError]:
             "body": list(scene.bodies),
             "line": list(scene.results.lines),
             "contact": [contact.name for contact in scene.contacts],
+            "part": [*scene.rigid, *(scene.bodies if output.of.startswith("reaction") else ())],
         }
-        fitting = ("body", "line") if output.of in of_body(2) else ("contact",)
+        fitting: tuple[str, ...] = ("contact",)
+        if output.of in (*of_body(2), *OF_PART):
+            fitting = ("part",) if output.of in OF_PART else ("body", "line")
         given = {key: getattr(output, key) for key in places if getattr(output, key) is not None}
         if len(given) != 1 or not set(given) <= set(fitting):
             allowed = f"needs one of {', '.join(fitting)} for {output.of}"
@@ -323,7 +327,11 @@ def _outputs(scene: tables.SceneFile) -> Iterator[StudyError]:
             continue
         ((key, value),) = given.items()
         yield from _one_of(f"{where}.{key}", value, places[key])
-        if key == "contact" and output.minus:
+        if output.of in (*OF_PART, *FORCES_OF_CONTACT):
+            if "take" in output.model_fields_set:
+                allowed = "must be left out: the number is the value at the end of the stage"
+                yield StudyError(f"{where}.take", output.take, allowed)
+        elif key == "contact" and output.minus:
             yield StudyError(f"{where}.minus", output.minus, "needs a body or a line")
         if key == "body" and output.take in ("integral", "extent"):
             yield StudyError(f"{where}.take", output.take, "needs a line or a contact")

@@ -101,6 +101,9 @@ class Description:
         """
         path = Path(path)
         content = toml_of(read_bytes(path, "scene"), "scene", path.name)
+        if "scene" in content and "bodies" not in content:
+            allowed = f"is a study file, not a scene: its scene is {content['scene']}"
+            raise StudyError("scene", path.name, allowed)
         meshes = {}
         for name in file_names(content):
             if (path.parent / name).is_file():  # a missing one is a mistake of the scene file

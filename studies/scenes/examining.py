@@ -19,7 +19,7 @@ from studies.scenes.description import Description
 from studies.scenes.effort import too_long
 from studies.scenes.mending import Where
 from studies.scenes.refusals import dotted
-from studies.scenes.results import view_of
+from studies.scenes.results import places_of, view_of
 from studies.scenes.shipped import is_built_in
 
 if TYPE_CHECKING:
@@ -96,6 +96,21 @@ def _build(builder: Builder, scene: tables.SceneFile) -> None:
             builder.mistakes += _bodies_apart(system)
             builder.attempt("", lambda: check_freed(system, program_of(scene, builder.meshes)))
             builder.attempt("results", lambda: Samples(system, view_of(scene)))
+            if not any(each.field.startswith("results") for each in builder.mistakes):
+                builder.mistakes += _places_outside(system, scene)
+
+
+def _places_outside(system: System, scene: tables.SceneFile) -> Iterator[StudyError]:
+    """Yield the lines and points that have no place in their body."""
+    found = places_of(scene)
+    for kind, places in (("lines", found.lines), ("points", found.points)):
+        for name, place in places.items():
+            known = place.body in system.names
+            if known and not system.sampler(place.body, place.X).inside.any():
+                ends = [[float(f"{x:.6g}") for x in at] for at in place.X.T[[0, -1]]]
+                where = ends if kind == "lines" else ends[0]
+                allowed = f"must meet the body {place.body}: no place of it is inside"
+                yield StudyError(f"results.{kind}.{name}", where, allowed)
 
 
 def _bodies_apart(system: System) -> Iterator[StudyError]:

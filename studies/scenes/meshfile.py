@@ -130,6 +130,8 @@ class MeshFile:
 def _mesh(name: str, data: bytes, arrays: bytes, part: str | None) -> Mesh:
     try:
         points, blocks, sets, nodes = MeshData.unpacked(arrays) if arrays else _read(name, data)
+    except ModelError:
+        raise
     except ValueError as error:
         raise ModelError("mesh", name, f"cannot be read: {error}") from None
     if len(points) > MOST_POINTS:
@@ -198,6 +200,8 @@ def _read(name: str, data: bytes) -> MeshData:
             reason = "its format is not known"
         except MemoryError:
             raise
+        except IndexError:
+            reason = "a cell or a set names a point that is not there"
         except Exception as error:  # a damaged file may raise any
             reason = str(error).replace(str(path), name) or type(error).__name__
     raise ModelError("mesh", name, f"cannot be read: {reason}")

@@ -31,7 +31,13 @@ from solver.model.loads import LOADS, Load
 from solver.parameters import Accuracy, Coordinate, Length, Stress
 from solver.parts import Declared, declared
 from solver.results.outputs import outputs
-from solver.results.requested import OF_CONTACT, RequestedNumber, of_body
+from solver.results.requested import (
+    FORCES_OF_CONTACT,
+    OF_CONTACT,
+    OF_PART,
+    RequestedNumber,
+    of_body,
+)
 from solver.scenes.material_parameters import ContactParameters, MaterialParameters
 from studies.scenes.shape_tables import ArcTable, GradedTable, LineTable, Shape
 from studies.scenes.table import (
@@ -466,7 +472,7 @@ else:
 
 def _requested() -> type[SceneTable]:
     """Return the table of a requested number of plane bodies; its key is the name."""
-    words = (*of_body(2), *OF_CONTACT)
+    words = (*of_body(2), *OF_CONTACT, *OF_PART, *FORCES_OF_CONTACT)
     known = _fields(RequestedNumber) | {"of": (Literal[words], ...)}
     entries = {name: each for name, each in known.items() if name not in ("name", "z")}
     made = create_model("OutputTable", __base__=SceneTable, **entries)

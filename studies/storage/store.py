@@ -41,6 +41,7 @@ from studies.definition.study import Study
 from studies.definition.vocabulary import STOPPED
 from studies.errors import CatalogueDamaged, FileDamaged, StoreFull, StudyError, Unusable
 from studies.scenes.description import Description
+from studies.scenes.registry import known_names
 from studies.scenes.scene import FileScene
 from studies.storage import dataset as layout
 from studies.storage import runfile, seal, shelf
@@ -56,6 +57,8 @@ _BATCH = 500
 _UNFINISHED = 600.0
 """Seconds after which an unfinished file beside a data set counts as abandoned."""
 _LOG = logging.getLogger("studies")
+_LISTED = 10
+"""Number of posted scenes of one name that an error lists."""
 
 Found = TypeVar("Found")
 
@@ -128,6 +131,25 @@ class Store:
             if the index is damaged again after it was made again, or cannot be set aside
         """
         return self._indexed(lambda index: index.page(limit, offset, name))
+
+    def scene_id(self, name: str) -> str:
+        """Return the id of the scene that is stored here under a name; else the name itself.
+
+        Raises
+        ------
+        StudyError
+            if several have it
+        """
+        if not name or is_id(name) or name in known_names():
+            return name
+        found = self.scenes(limit=_LISTED + 1, name=name)
+        if len(found) > 1:
+            ids = ", ".join(each.id for each in found[:_LISTED])
+            more = len(found) > _LISTED
+            count, rest = (f"over {_LISTED}", " and more") if more else (len(found), "")
+            allowed = f"is the name of {count} posted scenes: give an id, one of {ids}{rest}"
+            raise StudyError("scene", name, allowed)
+        return found[0].id if found else name
 
     def scene_files(self) -> list[shelf.Kept]:
         """Return the files of all scenes, the oldest first; errors as `scenes`.

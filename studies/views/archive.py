@@ -41,7 +41,7 @@ SPELT = 12
 COLUMNS = 9
 """Largest number of columns of a part of the table that fit a page, beside those of the place."""
 
-LINES = ("residual_profile", "contact_pressure")
+LINES = ("residual_profile", "line_stress", "contact_pressure")
 """Lines of the chosen run that are drawn, where it has them."""
 
 DECADES = 6

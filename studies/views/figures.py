@@ -29,6 +29,7 @@ FIGURES: Mapping[str, str] = {
     "peak_contact_pressure": "peak contact pressure",
     "max_plastic_strain": "largest plastic strain",
     "audit_plastic_strain": "away from singular points",
+    "shakedown_state": "shakedown state",
     "increments": "increments",
     "cut_increments": "cut",
     "cpu_seconds": "cpu",

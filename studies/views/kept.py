@@ -10,7 +10,7 @@ import xarray as xr
 
 from studies.errors import StudyError
 from studies.storage.ugrid import keeps
-from studies.views.picking import run_file, study_of, sweep_coordinates
+from studies.views.picking import one_run, run_file, study_of, sweep_coordinates
 from studies.views.plots.fields import usual_field
 from studies.views.plots.meshed import MESH_MAPS
 from studies.views.reading import find_study, open_netcdf
@@ -30,8 +30,11 @@ def drawn_from(
         yield dataset, selection
         return
     swept = sweep_coordinates(dataset)
-    with open_netcdf(found) as run:
+    chosen = {name: value for name, value in selection.items() if name in swept}
+    with open_netcdf(found) as own:
         left = {name: value for name, value in selection.items() if name not in swept}
+        of = one_run(dataset, chosen)  # what distinguishes the run stands in the caption
+        run = own.assign_coords({name: of[name] for name in swept if name not in own.coords})
         yield (run, left) if keeps(run) else (dataset, selection)
 
 

@@ -71,7 +71,8 @@ def report(study: Study, store: Store, outcome: StudyOutcome) -> Report:
         if study.fit:
             drawn = _compared(dataset)
         else:
-            drawn = _found(field, dataset) if field else _drawn(dataset)
+            kept = outcome.dataset if study.keep else None
+            drawn = _found(field, dataset) if field else _drawn(dataset, kept)
         files = made.write(_NAME, of, {_TEXT: text.encode(), **drawn})
     return Report(text, files, anew=True)
 
@@ -98,18 +99,24 @@ def _warned(dataset: xr.Dataset) -> str:
     return f"; {int(warned.sum())} with a warning" if warned.any() else ""
 
 
-def _drawn(dataset: xr.Dataset) -> dict[str, bytes]:
+def _drawn(dataset: xr.Dataset, path: Path | None) -> dict[str, bytes]:
     """Draw the residual stress of the run of `one_run`, or the stress if bodies are not unloaded.
 
-    Nothing is drawn if no run succeeded.
+    Nothing is drawn if no run succeeded. With the path of the data set it is drawn on the mesh of
+    the run, which its own file has.
     """
+    from studies.views.kept import drawn_from
     from studies.views.picking import one_run
     from studies.views.plots.fields import usual_field
     from studies.views.plots.maps import map_figure
 
     field = usual_field(dataset)
     try:
-        drawn = map_figure(one_run(dataset), field, "xx")
+        if path is None:
+            drawn = map_figure(one_run(dataset), field, "xx")
+        else:
+            with drawn_from(path, dataset, field, {}) as (run, _):
+                drawn = map_figure(one_run(run), field, "xx")
     except StudyError:
         return {}
     return {f"{field}_xx.png": _png(drawn)}

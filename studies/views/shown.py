@@ -26,6 +26,9 @@ from studies.views.plots.fields import (
 )
 from studies.views.plots.mapped import mapped
 
+_NOTHING = {"MPa": 1e-3, "mm": 1e-9}
+"""Largest value of lines that are only rounding, by unit."""
+
 
 class Shown(NamedTuple):
     """The values of a picture.
@@ -43,18 +46,27 @@ class Shown(NamedTuple):
 def outline(run: xr.Dataset) -> dict[str, list[dict[str, Any]]]:
     """Return the variables of a run that are drawn as maps and as lines, with their labels.
 
-    The usual field of a map comes first. Of lines `along` is the dimension along which they go.
+    The usual field of a map comes first, and stress of lines; what is only rounding comes last. Of
+    lines `along` is the dimension along which they go.
     """
     first, sweep = usual_field(run), run["status"].dims
+    lines = [name for name in line_fields(run) if run[name].notnull().any()]
     maps = sorted(map_fields(run), key=lambda name: name != first)
     return {
         "maps": [_described(run, name) for name in maps if run[name].notnull().any()],
         "lines": [
             _described(run, name) | {"along": line_axis(run[name], sweep)}
-            for name in line_fields(run)
-            if run[name].notnull().any()
+            for name in sorted(lines, key=lambda name: _rank(run[name]))
         ],
     }
+
+
+def _rank(values: xr.DataArray) -> int:
+    """Return the place of a line among others."""
+    if float(abs(values).max()) <= _NOTHING.get(str(values.attrs.get("units", "1")), 0.0):
+        return 2
+    name = str(values.name)
+    return 0 if name.startswith("residual_") or name.endswith("stress") else 1
 
 
 def shown(

@@ -164,7 +164,7 @@ def summary_of(
     """Return the view of a study of a service, from what it tells: its ``GET /studies/{id}``."""
     return Summary(
         name=detail["name"],
-        scene=detail["scene"],
+        scene=_called(detail.get("scene_name", detail["scene"]), detail["scene"]),
         status=detail["status"],
         progress=detail["progress"] / 100.0,
         counts=detail["counts"],
@@ -172,6 +172,11 @@ def summary_of(
         audit=audit,
         failed=failed[:NAMED],
     )
+
+
+def _called(name: str, known: str) -> str:
+    """Return how a scene is called: its name, of a posted one with the beginning of its id."""
+    return name if name == known else f"{name} ({known[:8]}…)".lstrip()
 
 
 def place_of(dataset: xr.Dataset, at: Sequence[SupportsIndex]) -> str:

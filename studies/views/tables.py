@@ -124,13 +124,22 @@ def _figures(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray, xr.DataAr
             continue
         if name == "cut_increments" and not (dataset[name] > 0).any():
             continue
-        values, spoiled = dataset[name], _spoiled(dataset, name)
+        values, spoiled = _in_words(dataset[name]), _spoiled(dataset, name)
         for k in range(values.sizes.get("body", 1)):
             one = {"body": k, "component": 0}
             each = values.isel(one, missing_dims="ignore")
             words = {c: str(each[c].item()) for c in ("body", "component") if c in each.coords}
             text = heading.format(**words).replace("_", " ")
             yield text, each, spoiled.isel(one, missing_dims="ignore")
+
+
+def _in_words(values: xr.DataArray) -> xr.DataArray:
+    """Return a flag by its words, "-" where it has none; other values unchanged."""
+    known = flags(values)
+    if not known:
+        return values
+    words = [known.get(each, "-").replace("_", " ") for each in values.to_numpy().flat]
+    return values.copy(data=np.reshape(np.array(words, dtype=object), values.shape))
 
 
 def _spoiled(dataset: xr.Dataset, name: str) -> xr.DataArray:

@@ -461,3 +461,18 @@ def test_a_message_of_the_command_has_an_end(capsys: pytest.CaptureFixture[str])
     assert complain("x" * 2_000_000, 2) == 2
     told = capsys.readouterr().err
     assert told.startswith("residua: xxx") and len(told) < 101_000
+
+
+def test_a_scene_and_a_study_in_each_others_place_are_told_by_what_they_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene, study = tmp_path / "pin.toml", tmp_path / "pins.toml"
+    scene.write_text('name = "pin"\n[bodies.pin]\n')
+    study.write_text('name = "pins"\nscene = "pin.toml"\n')
+    assert main(["run", str(scene), "--out", str(tmp_path / "out")]) == 2
+    assert (
+        'is a scene file, not a study: a study has the line scene = "pin.toml"'
+        in capsys.readouterr().err
+    )
+    assert main(["scenes", str(study)]) == 2
+    assert "is a study file, not a scene: its scene is pin.toml" in capsys.readouterr().err

@@ -18,6 +18,7 @@ import xarray as xr
 from service.guarded import BYTES
 from studies import Store, Study, run_study
 from studies.scenes.scene import read_scene
+from studies.views.summary import summary_of
 from tests.service.servers import Server
 from tests.studies.scenes.conftest import BLOCKS
 
@@ -72,7 +73,9 @@ def test_a_browser_posts_a_scene_and_gets_the_form_of_its_studies(
     wrong = PIN.replace(b"move =", b"mvoe =").replace(b"supports =", b"sports =")
     answer = service.client.post("/ui/scenes", files={"scene": ("pin.toml", wrong)} | meshes)
     assert answer.status_code == 422
-    assert answer.text.count("<li>") > 1, "each mistake is told"
+    _, _, told = answer.text.partition("pin.toml is not taken:")
+    assert told.count("<li>") > 1 and "mvoe" in told, "each mistake is told"
+    assert 'action="/ui/scenes"' in answer.text, "another file can be posted at once"
     assert service.client.get(f"/ui/new?scene={pin}").status_code == 200
 
 
@@ -118,8 +121,16 @@ def test_a_study_names_a_posted_scene_by_its_name_if_no_other_has_it(service: Se
     assert named.status_code == 201, named.text
     same = service.client.post("/studies", json=study | {"scene": one})
     assert (same.status_code, same.json()["id"]) == (200, named.json()["id"])
-    assert service.study(same.json()["id"])["scene"] == one
+    told = service.study(same.json()["id"])
+    assert (told["scene"], told["scene_name"]) == (one, "dovetail")
+    assert f'>dovetail <span class="sub">{one[:8]}…' in service.client.get("/ui").text
+    assert str(summary_of(told, None, [])).startswith(f"by-name: scene dovetail ({one[:8]}…)")
+    for address in ("/scenes/{}", "/scenes/{}/draw.png", "/ui/new?scene={}"):
+        by_name, by_id = (service.client.get(address.format(each)) for each in ("dovetail", one))
+        assert by_name.status_code == 200, by_name.text
+        assert by_name.content == by_id.content
     other = post(service, first.replace(b"value = 150.0", b"value = 151.0")).json()["id"]
+    assert service.client.get("/scenes/dovetail").status_code == 422
     refused = service.client.post("/estimate", json=study)
     assert refused.status_code == 422
     (mistake,) = refused.json()["errors"]

@@ -394,7 +394,10 @@ def test_a_copied_study_file_says_the_same() -> None:
     said = '\x7f\n"\\é'
     study, wrong = study_of("fake", FAKE, {"name": ["a"], "note": [said], "p.friction": ["0, 0.1"]})
     assert not wrong and study["note"] == said
-    assert {"parameters": {}, **tomllib.loads(as_toml(study))} == study
+    assert "#" not in as_toml(study, "fake")
+    copied = as_toml(study, "posted")  # its name beside an id
+    assert 'scene = "fake"  # posted\n' in copied
+    assert {"parameters": {}, **tomllib.loads(copied)} == study
 
 
 def test_a_study_of_one_run_has_a_table_and_a_page(seen: Seen) -> None:

@@ -201,6 +201,7 @@ def test_the_maps_of_a_study_are_drawn_on_the_mesh_of_the_run_and_numbers_over_a
             run, left = found
             assert left == {"stage": "loaded"}
             assert run.attrs["id"] == next(iter(study.run_ids()))
+            assert run["load_ratio"].item() == 0.2
         for field in ("tension", "line_mises"):
             with drawn_from(where, dataset, field, chosen) as (whole, left):
                 assert whole is dataset and left == chosen

@@ -47,3 +47,15 @@ def test_rounding_beside_numbers_of_its_unit_is_zero() -> None:
     assert "4.6e-11" not in study(moved=[350.0, 4.6e-11])
     assert "4.6e-11" not in study(moved=[350.0, 350.0], other=[4.6e-11, 2.0])
     assert "4.6e-11" in study(moved=[4.6e-11, 1e-11])
+
+
+def test_a_shakedown_state_is_told_by_its_word() -> None:
+    known = {"flag_values": [0, 3], "flag_meanings": "elastic plastic_shakedown"}
+    status = ("a", np.array(["ok", "ok", "limit_load"], dtype=object))
+    state = ("a", [3.0, 0.0, np.nan], known)
+    *_, first, second, third = runs_table(
+        xr.Dataset({"status": status, "shakedown_state": state}, {"a": [1, 2, 3]})
+    ).splitlines()
+    assert first.split() == ["1", "ok", "plastic", "shakedown"]
+    assert second.split() == ["2", "ok", "elastic"]
+    assert third.split() == ["3", "limit_load", "-"]

@@ -8,10 +8,11 @@ const MOST_LINES = 8;
 const GREEK = "σ";
 const DASHES = ["solid", "dash", "dot", "dashdot"];
 const FIRST = { depth: /^residual_profile$/, contact: /pressure$/, line: /^surface_residual$/ };
+const REPEATED = ["increment", "cycle", "pass"];
 const BELONGS = {
   depth: ({ along }) => along === "depth",
-  contact: ({ along }) => along !== "depth" && along !== "increment",
-  history: ({ along }) => along === "increment",
+  contact: ({ along }) => along !== "depth" && !REPEATED.includes(along),
+  history: ({ along }) => REPEATED.includes(along),
   line: () => true,
 };
 const PARTS = ["map", ...Object.keys(BELONGS)];

@@ -197,6 +197,9 @@ class NamedPlacesCheck:
 
     def _number(self, number: RequestedNumber) -> None:
         """Compare an extreme value and its place, an integral or an extent."""
+        if number.course:
+            self._value(number)
+            return
         kind, _, part = number.of.partition(".")
         recorded, share = self._record.scalars[number.name], 1.0
         if number.contact is not None:
@@ -205,7 +208,7 @@ class NamedPlacesCheck:
             )
             values, X, s = _on_slave(found, kind), found.X, found.s
             share = self._share(found, kind)
-            if number.is_force:
+            if number.is_resultant:
                 level = self._run.outcome.points[number.stage].state.force_scale
                 self._out.add(number.name, recorded, found.force(kind), level)
                 return
@@ -241,6 +244,23 @@ class NamedPlacesCheck:
             self._out.add(number.name, recorded, whole, max(most, self._least[kind] * s[-1]), share)
             return
         self._out.add(number.name, recorded, _above_zero(values, s), s[-1], share)
+
+    def _value(self, number: RequestedNumber) -> None:
+        """Compare a value at the end of a stage with the course, which is compared itself."""
+        course, times = self._field(number.course), self._field("increment_time")
+        if number.contact is not None:
+            row = course[self._places.contacts.index(number.contact)]
+        else:
+            row = course[self._source.system.all_names.index(str(number.part))]
+        own = 0.0
+        for stage, sign in ((number.stage, 1.0), (number.minus, -1.0)):
+            if stage:
+                end = self._run.outcome.points[stage].state.time
+                near = np.flatnonzero(np.abs(times - end) < _ROUNDED)
+                own += sign * (row[near[-1]] if len(near) else np.nan)
+        if np.isfinite(own):
+            scale = max(float(np.nanmax(np.abs(row))), self._least["gap"])
+            self._out.add(number.name, self._record.scalars[number.name], own, scale)
 
     def _values(
         self, number: RequestedNumber, stage: str, kind: str, part: str

@@ -75,7 +75,8 @@ def acting(bodies: Sequence[Body], rigid: Sequence[RigidBody]) -> Iterator[Arrow
     """Yield the loads of bodies and the motions of rigid bodies, at load factor 1."""
     for body in bodies:
         for load in body.every_load:
-            yield _of_load(body, load)
+            if not load.removes:
+                yield _of_load(body, load)
         if body.travelling is not None:
             yield _travelling(body)
         if body.axle is not None:
@@ -93,7 +94,20 @@ def acting(bodies: Sequence[Body], rigid: Sequence[RigidBody]) -> Iterator[Arrow
                     kind, unit = ("moment", "N mm") if turns else (f"force {axis}", "N")
                 text = f"{each.name}: {kind} {short_number(motion.value)} {unit}"
                 to = np.sign(motion.value) * np.array(way)
-                yield _single(text, each.centre, to, _FORCE if pushed else _MOTION)
+                yield _single(text, _place_of(each), to, _FORCE if pushed else _MOTION)
+
+
+def _place_of(rigid: RigidBody) -> Array:
+    """Return where the motion of a rigid body is drawn: on its surface, or at its centre there."""
+    centre = np.asarray(rigid.centre, dtype=float)
+    if not rigid.surfaces:
+        return centre
+    points = np.hstack([np.asarray(each.points) for each in rigid.surfaces.values()])
+    size = float(np.ptp(points, axis=1).max())
+    if np.linalg.norm(points - centre[:, None], axis=0).min() < 1e-6 * size:
+        return centre
+    away = np.linalg.norm(points - points.mean(axis=1, keepdims=True), axis=0)
+    return np.asarray(points[:, int(away.argmin())])
 
 
 def _single(text: str, at: Any, way: Any, colour: str) -> Arrows:
@@ -102,11 +116,10 @@ def _single(text: str, at: Any, way: Any, colour: str) -> Arrows:
 
 
 def _of_load(body: Body, load: Load) -> Arrows:
-    where = ", ".join(load.boundaries) or load.removes
+    where = ", ".join(load.boundaries)
     text = f"{words(load.name)} {body.name}{f'.{where}' if where else ''}{_told(load)}"
     if not load.boundaries:
-        cells = body.region(load.removes) if load.removes else slice(None)
-        middle = body.mesh.p[:, body.mesh.t[:, cells]].mean(axis=(1, 2)).reshape(2, 1)
+        middle = body.mesh.p[:, body.mesh.t].mean(axis=(1, 2)).reshape(2, 1)
         force = load.body_force(middle)
         way = np.zeros((2, 1)) if force is None else _unit(force)
         colour = _FIELD if force is None else _FORCE

@@ -77,7 +77,7 @@ def axis_label(coordinate: xr.DataArray) -> str:
     """Return the label of a horizontal axis with its unit: short, with the symbol."""
     name = str(coordinate.name)
     usual = f"${name}$" if name in AXES else coordinate.attrs.get("long_name", words(name))
-    if name == DISTANCE:
+    if name == DISTANCE and "distance" in usual:
         usual = f"{usual.replace('distance s ', 'distance ')} $s$"
     return _measured(_LENGTHS.get(name, usual), coordinate)
 

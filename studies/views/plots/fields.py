@@ -22,6 +22,10 @@ Window = Sequence[float]
 _RESIDUAL, _STRESS = "residual_stress", "map_stress"
 ALONG = ("s", "depth", "increment", "fraction")
 """Dimensions along which lines are drawn."""
+REPEATED = ("cycle", "pass")
+"""Dimensions of numbers that are lines over them where one run is drawn."""
+_STRAIGHT = 1e-9
+"""Largest height of a line along x, over its length."""
 _DECAYED = 0.02
 """Depth is shown as far as values exceed this share of the peak."""
 OUTLINE = "outline"
@@ -76,18 +80,30 @@ def line_fields(dataset: xr.Dataset) -> list[str]:
 def line_axis(values: xr.DataArray, sweep: Sequence[Hashable] = ()) -> str | None:
     """Return the dimension along which a field is a line, or None: of `ALONG`, or its only axis.
 
-    Axes of the sweep do not count, whatever their names.
+    Without these it is one of `REPEATED` with two values or more. Axes of the sweep do not count,
+    whatever their names.
     """
     axes = map_axes(values, sweep)
     alone = axes if len(axes) == 1 else ()
-    return next((name for name in (*ALONG, *alone) if name in values.dims), None)
+    repeated = () if axes else (name for name in REPEATED if values.sizes.get(name, 1) > 1)
+    return next((name for name in (*ALONG, *alone, *repeated) if name in values.dims), None)
 
 
 def placed(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
-    """Return values, with the distance [mm] from the start of a line or contact as a coordinate."""
-    distance = run.get(f"{str(values.name).partition('_')[0]}_s")
-    there = distance is not None and set(distance.dims) <= set(values.dims)
-    return values.assign_coords({DISTANCE: distance}) if there else values
+    """Return values, with the distance [mm] from the start of a line or contact as a coordinate.
+
+    Along contacts whose slaves are straight along x it is the position x.
+    """
+    kind = str(values.name).partition("_")[0]
+    distance = run.get(f"{kind}_s")
+    if distance is None or not set(distance.dims) <= set(values.dims):
+        return values
+    x, y = (run.get(f"{kind}_{axis}") for axis in AXES[:2])
+    if kind == "contact" and x is not None and y is not None and x.dims == distance.dims:
+        size = np.nanmax(np.ptp(x.to_numpy(), axis=-1), initial=0.0)
+        if np.nanmax(np.ptp(y.to_numpy(), axis=-1), initial=0.0) <= _STRAIGHT * size:
+            distance = x.assign_attrs(long_name="position x along the slave")
+    return values.assign_coords({DISTANCE: distance})
 
 
 def depth_shown(values: xr.DataArray, others: Sequence[Hashable]) -> int:

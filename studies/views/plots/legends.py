@@ -14,7 +14,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from studies.views.plots.captions import capitalised, short_label
+from studies.views.plots.captions import capitalised, short_label, wrapped
 
 MOST_LINES = 12
 """Largest number of lines in a legend; more values of a number have a colour bar instead."""
@@ -77,10 +77,12 @@ def add_head(sheet: Figure, name: str, below: str) -> None:
     engine = sheet.get_layout_engine()
     assert isinstance(engine, ConstrainedLayoutEngine)
     width, height = sheet.get_size_inches()
-    head = 0.36 + 0.16 * (below.count("\n") + 1)
+    name = wrapped(name, width - 0.2, 12)
+    title = 0.31 + 0.19 * name.count("\n")
+    head = title + 0.05 + 0.16 * (below.count("\n") + 1)
     height += head
     sheet.set_size_inches(width, height)
     engine.set(rect=(0.0, 0.0, 1.0, 1.0 - head / height))
     left = 0.1 / width
     sheet.text(left, 1.0 - 0.08 / height, name, va="top", fontsize=11, weight="bold")
-    sheet.text(left, 1.0 - 0.31 / height, below, va="top", fontsize=8, color="0.3")
+    sheet.text(left, 1.0 - title / height, below, va="top", fontsize=8, color="0.3")

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from itertools import cycle
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from solver.tensors import AXES
 from studies.errors import StudyError, one_of
 from studies.views.picking import one_run, sweep_axes
 from studies.views.plots.captions import DISTANCE, axis_label, label, value_text, words, wrapped
 from studies.views.plots.fields import (
+    REPEATED,
     Window,
     check_field,
     component_of,
@@ -44,6 +48,8 @@ _SIZE = (8.0, 4.6)
 _LENGTHS = ("s", "depth", *AXES)
 INCREMENT, TIME, AGAINST = "increment", "increment_time", "against"
 """Dimension of courses, the variable of their time, and the coordinate of what they lie over."""
+PART, CONTACT = "part", "contact"
+"""Dimensions of motions and reactions, and of contact pairs."""
 _RELEASED = ("residual_stress", "plastic_strain", "residual_profile", "surface_residual")
 """Variables that only a run has whose bodies are released at the end."""
 _NOTHING, _SHORT, _BESIDE = 1e-3, 0.5, 0.25
@@ -79,7 +85,7 @@ def line_figure(
         the field, of which alone several values are drawn
     window : show only this part: horizontal and vertical range
     against : another variable over the same increments, which is horizontal: a loop of force over
-        displacement
+        displacement. Of several parts it is that which moves most, for each contact of its bodies
 
     Raises
     ------
@@ -110,6 +116,8 @@ def line_figure(
                     color=colour,
                     label=name,
                     linewidth=1.0 if barred else 1.6,
+                    marker="o" if along in REPEATED else None,
+                    markersize=4.0,
                 )
                 _mark_stages(axes, run, line, at)
     axes.axhline(0.0, color="0.35", linewidth=0.8, zorder=0)
@@ -117,8 +125,10 @@ def line_figure(
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.03 if against else 0.0)
-    below = run[against] if against else values[at]
-    axes.set(xlabel=axis_label(below), ylabel=wrapped(label(values), _SIZE[1] - 1.2, 10))
+    if along in REPEATED:
+        axes.margins(x=0.03)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set(xlabel=axis_label(values[at]), ylabel=wrapped(label(values), _SIZE[1] - 1.2, 10))
     if window is not None:
         _show_part(axes, window)
     if barred:
@@ -203,11 +213,39 @@ def _other(run: xr.Dataset, values: xr.DataArray, name: str) -> xr.DataArray:
     other = run[name]
     if not other.notnull().any():
         raise StudyError("against", name, "has no value in the run selected")
-    for each in [each for each in other.dims if each not in values.dims]:
-        ways = np.ptp(other.fillna(0.0).transpose(each, ...).to_numpy(), axis=-1)
-        most = int(ways.reshape(other.sizes[each], -1).max(axis=1).argmax())
-        other = other.isel({each: most}, drop=True)  # of several parts that which moves most
+    if PART in other.dims and CONTACT in values.dims:
+        each_of = [_moved(other, sides) for sides in _sides(run, values[CONTACT])]
+        parts = [str(each[PART].item()) for each in each_of]
+        other = xr.concat([each.drop_vars(PART) for each in each_of], values[CONTACT])
+    else:
+        for each in [each for each in other.dims if each not in values.dims]:
+            other = _moved(other, other[each].to_numpy().tolist(), str(each))
+        parts = [str(other[PART].item())] if PART in other.coords else []
+    long_name = str(other.attrs.get("long_name", words(name)))
+    if parts:
+        long_name = f"{long_name} ({', '.join(dict.fromkeys(parts))})"
+    other = other.assign_attrs(long_name=long_name)
     return other.drop_vars([each for each in other.coords if each not in other.dims])
+
+
+def _moved(other: xr.DataArray, among: Sequence[Any], over: str = PART) -> xr.DataArray:
+    """Return a variable over increments at that one of some values of a dimension that moves most.
+
+    If none of them moves, it is one of all.
+    """
+    ways = np.ptp(other.fillna(0.0).transpose(over, ...).to_numpy(), axis=-1)
+    ways = ways.reshape(other.sizes[over], -1).max(axis=1)
+    own = np.where(np.isin(other[over].to_numpy(), among), ways, 0.0)
+    return other.isel({over: int((own if own.any() else ways).argmax())})
+
+
+def _sides(run: xr.Dataset, contacts: xr.DataArray) -> list[tuple[str, str]]:
+    """Return the bodies of each contact of a run of a scene file."""
+    pairs = json.loads(run.attrs.get("scene_file", "{}")).get("contacts", [])
+    known = {
+        each["name"]: (each["slave"].split(".")[0], each["master"].split(".")[0]) for each in pairs
+    }
+    return [known.get(str(name), ("", "")) for name in contacts.to_numpy()]
 
 
 def _happening(values: xr.DataArray, along: Hashable, others: Sequence[Hashable]) -> xr.DataArray:

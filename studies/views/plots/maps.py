@@ -20,13 +20,11 @@ from studies.errors import StudyError
 from studies.views.picking import one_run
 from studies.views.plots.captions import capitalised, label, setting, symbol, wrapped
 from studies.views.plots.fields import Window, component_name, is_half, map_axes, usual_field
-from studies.views.plots.mapped import Mapped, is_patch, mapped
-from studies.views.plots.meshed import MappedMesh, mesh_maps, on_mesh
+from studies.views.plots.mapped import STAGE, Mapped, is_patch, mapped
+from studies.views.plots.meshed import Box, MappedMesh, mesh_maps, on_mesh
 from studies.views.plots.outlined import clip_of, lines_of, outlines_of, reaching
 from studies.views.plots.over import BELOW, draw_patch, draw_wheel
 
-Box = tuple[float, float, float, float]
-"""Left, right, bottom, top [mm]."""
 SIGNED = "RdBu_r"
 SEQUENTIAL = "YlOrRd"
 _OUTSIDE = "0.86"
@@ -96,7 +94,7 @@ def _on_grid(run: xr.Dataset, drawn: Mapped) -> Figure:
     if curves:
         mesh.set_clip_path(clip_of(curves), axes.transData)
         _draw_outlines(axes, lines_of(curves, run))
-        _draw_contact(axes, run)
+        _draw_contact(axes, run, _stage_of(values))
     _mark_edges(axes, run, box)
     axes.set(xlim=box[:2], ylim=box[2:], xlabel=_symbol(run[across]), ylabel=_symbol(run[up]))
     if patch:
@@ -117,7 +115,7 @@ def _on_mesh(run: xr.Dataset, drawn: MappedMesh) -> Figure:
     )
     _draw_outlines(axes, list(drawn.X[:, drawn.edges].transpose(1, 2, 0)))
     if not drawn.deformed:
-        _draw_contact(axes, run)
+        _draw_contact(axes, run, _stage_of(drawn.values))
         _mark_edges(axes, run, drawn.box)
     _draw_directions(axes, run, drawn, drawn.box)
     axes.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="$x$ [mm]", ylabel="$y$ [mm]")
@@ -159,14 +157,16 @@ def _draw_outlines(axes: Axes, lines: list[np.ndarray]) -> None:
     axes.add_collection(LineCollection(lines, colors="0.15", linewidths=0.6), autolim=False)
 
 
-def _draw_contact(axes: Axes, run: xr.Dataset) -> None:
-    """Draw where bodies touch under load."""
+def _draw_contact(axes: Axes, run: xr.Dataset, stage: str | None) -> None:
+    """Draw where bodies touch at a stage; without one, where they touched under load."""
     names = ("contact_x", "contact_y", "contact_pressure")
     if not all(name in run for name in names) or "fraction" not in run["contact_pressure"].dims:
         return
     x, y, pressure = (run[name] for name in names)
-    pressing = pressure.max([name for name in ("stage",) if name in pressure.dims]) > 0.0
-    label: str | None = "contact under load"
+    if STAGE in pressure.dims:
+        pressure = pressure.max(STAGE) if stage is None else pressure.sel({STAGE: stage})
+    pressing = pressure > 0.0
+    label: str | None = "contact under load" if stage is None else "contact"
     for k in range(run.sizes["contact"]):
         for sign in (-1.0, 1.0) if is_half(run) else (1.0,):
             line = [each.isel(contact=k).where(pressing.isel(contact=k)) for each in (x, y)]
@@ -221,7 +221,7 @@ def _tensor_of(run: xr.Dataset, drawn: Mapped) -> tuple[np.ndarray, np.ndarray, 
 
 
 def _stage_of(values: xr.DataArray) -> str | None:
-    return str(values["stage"].item()) if "stage" in values.coords else None
+    return str(values[STAGE].item()) if STAGE in values.coords else None
 
 
 def _finished(
@@ -273,7 +273,8 @@ def entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> 
         loc="left", fontsize=8, color="0.3", pad=5.0,
     )  # fmt: skip
     axes.annotate(
-        f"{capitalised(quantity)} {symbol(values)}".rstrip(), (0.0, 1.0), xycoords=below,
+        f"{wrapped(capitalised(quantity), width, 12)} {symbol(values)}".rstrip(), (0.0, 1.0),
+        xycoords=below,
         xytext=(0.0, 5.0), textcoords="offset points", weight="bold", fontsize=11,
     )  # fmt: skip
 

@@ -28,6 +28,8 @@ from studies.views.plots.fields import (
 from studies.views.plots.mapped import STAGE, Mapped, limit
 
 Array = np.ndarray
+Box = tuple[float, float, float, float]
+"""Left, right, bottom, top [mm]."""
 
 _AT_THE_END = {"residual_stress": "stress", "plastic_strain": "plastic_strain"}
 """Variables after release, and the fields at the nodes."""
@@ -56,7 +58,7 @@ class MappedMesh(Mapped):
     triangles: Array
     edges: Array
     tensor: Array | None
-    box: tuple[float, float, float, float]
+    box: Box
     deformed: float
 
 
@@ -90,20 +92,24 @@ def on_mesh(
     values, tensor = _values(run, fields.stages[at], field, component)
     if field not in _AT_THE_END:
         values = values.assign_coords({STAGE: at})
-    X = fields.X + deformed * fields.stages[at]["displacement"]
+    moved = fields.stages[at]["displacement"]
+    X = fields.X + (deformed * moved if deformed else 0.0)
+    whole = fields.X
     numbers, name = values.to_numpy(), component_name(values)
-    faces, _ = fields.faces
+    faces = _there(fields.faces[0], moved)
     triangles, edges = _triangles(faces), _edges(faces)
     if is_half(run) and (fields.X[0] >= -1e-9 * np.ptp(fields.X[0])).all():
         count, odd = X.shape[1], is_odd(name, AXES[0])
-        X = np.hstack([X, X * [[-1.0], [1.0]]])
+        X, whole = (np.hstack([each, each * [[-1.0], [1.0]]]) for each in (X, whole))
         numbers = np.concatenate([numbers, -numbers if odd else numbers])
         triangles = np.vstack([triangles, count + triangles])
         kept = edges[(np.abs(fields.X[0][edges]) > 1e-9 * np.ptp(fields.X[0])).any(axis=1)]
         edges = np.vstack([kept, count + kept])
         if tensor is not None:
             tensor = np.hstack([tensor, tensor * [[1.0], [1.0], [1.0], [-1.0]]])
-    box = _box(run, X, zoom, window)
+    box = _box(run, whole, zoom, window)
+    if deformed and zoom is None and window is None:
+        box = _with_moved(box, whole, X)
     low, high = X[:, triangles].min(axis=2), X[:, triangles].max(axis=2)
     shown = (low[0] < box[1]) & (high[0] > box[0]) & (low[1] < box[3]) & (high[1] > box[2])
     if not shown.any() or not box[0] < box[1]:
@@ -159,6 +165,12 @@ def _values(
     return component_of(whole, component), nodal
 
 
+def _there(faces: Array, moved: Array) -> Array:
+    """Return the faces of material that is not removed: displacements are known at all nodes."""
+    gone = ~np.isfinite(moved).all(axis=0)
+    return faces[~((faces != NO_NODE) & gone[faces]).any(axis=1)]
+
+
 def _triangles(faces: Array) -> Array:
     """Return triangles (n, 3) of faces (n_faces, 4), of which triangles lack the last node."""
     four = faces[:, 3] != NO_NODE
@@ -183,9 +195,7 @@ def _areas(X: Array, triangles: Array) -> Array:
     return np.asarray(np.abs(u[0] * v[1] - u[1] * v[0]) / 2.0)
 
 
-def _box(
-    run: xr.Dataset, X: Array, zoom: float | None, window: Window | None
-) -> tuple[float, float, float, float]:
+def _box(run: xr.Dataset, X: Array, zoom: float | None, window: Window | None) -> Box:
     """Return what is shown: by default where the run has its map, else all bodies."""
     if window is not None:
         x0, x1, y0, y1 = window
@@ -202,3 +212,15 @@ def _box(
         low = np.maximum(low, [left, float(y.min())])
         high = np.minimum(high, [float(x.max()), float(y.max())])
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def _with_moved(box: Box, whole: Array, X: Array) -> Box:
+    """Return a box that also contains where the nodes (2, n) within it are moved to."""
+    (x, y), (left, right, bottom, top) = whole, box
+    reach = 1e-9 * max(right - left, top - bottom)
+    inside = (left - reach <= x) & (x <= right + reach) & (bottom - reach <= y) & (y <= top + reach)
+    moved = X[:, inside & np.isfinite(X).all(axis=0)]
+    if not moved.size:
+        return box
+    (x0, y0), (x1, y1) = moved.min(axis=1), moved.max(axis=1)
+    return min(left, float(x0)), max(right, float(x1)), min(bottom, float(y0)), max(top, float(y1))

@@ -9,13 +9,21 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from studies.errors import StudyError, one_of
-from studies.views.picking import one_run, positions, runs_over, select, sweep_coordinates
+from studies.views.picking import (
+    one_run,
+    positions,
+    runs_over,
+    select,
+    sweep_axes,
+    sweep_coordinates,
+)
 from studies.views.plots.fields import (
     DRAWN,
     Window,
     check_field,
     component_of,
     labelled_fields,
+    line_axis,
     line_fields,
     map_fields,
     sweep_fields,
@@ -78,7 +86,7 @@ def picture(
     if field in singles:
         _refuse(given, f"{field} has one value a run: leave it out")
         figure = sweep_figure(select(dataset, selection or {}), field)
-    elif field in labelled:
+    elif field in labelled and not (field in lines and (over or _single(dataset, selection or {}))):
         _refuse(given | {"component": None}, f"{field} has one value a run: leave it out")
         figure = sweep_figure(_labelled(dataset, field, component, selection or {}), field)
     elif field in mesh_maps(dataset):
@@ -100,8 +108,11 @@ def picture(
             figure = map_figure(part, field, component, zoom, window, deformed=deformed or 0.0)
         else:
             _refuse({"deformed": deformed}, f"{field} is no map: leave it out")
-            axis = None if over in _own(dataset, field) else over
-            part = _part(dataset, field, selection or {}, axis)
+            own = _own(dataset, field)
+            axis = None if over in own else over
+            if axis is not None and axis not in (known := sweep_axes(dataset)):
+                raise StudyError("over", axis, one_of(axis, [*known, *own]))
+            part = _part(dataset, field, selection or {}, axis, against)
             figure = line_figure(part, field, component, zoom, over, window, against)
     return resolved(figure, resolution)
 
@@ -130,24 +141,45 @@ def _refuse(given: Mapping[str, object], allowed: str) -> None:
             raise StudyError(name, value, allowed)
 
 
+def _single(dataset: xr.Dataset, selection: Mapping[str, str | float]) -> bool:
+    """Whether the selection leaves one run."""
+    swept = sweep_coordinates(dataset)
+    chosen = {name: value for name, value in selection.items() if name in swept}
+    return bool(select(dataset, chosen)["status"].size == 1)
+
+
 def _labelled(
     dataset: xr.Dataset, field: str, component: str | None, selection: Mapping[str, str | float]
 ) -> xr.Dataset:
     """Return the selected part of a study, with `field` at one value of each of its dimensions.
 
-    By default it is the first label or the last number.
+    By default it is the first label or the last number, of each run the last that it has.
     """
     values = component_of(dataset[field], component)
     swept = sweep_coordinates(dataset)
     own = [str(name) for name in values.dims if name not in swept.values()]
     _known(selection, [*swept, *own])
     for name in own:
-        number = values[name].dtype.kind in "fiu"
-        usual = -1 if number else 0
-        at = positions(values[name], selection[name])[0] if name in selection else usual
-        values = values.isel({name: at})
+        if name in selection:
+            values = values.isel({name: positions(values[name], selection[name])[0]})
+        elif values[name].dtype.kind in "fiu":
+            values = _last(values, name)
+        else:
+            values = values.isel({name: 0})
     runs = dataset[["status", "message"]].assign({field: values})
     return select(runs, {name: selection[name] for name in swept if name in selection})
+
+
+def _last(values: xr.DataArray, name: str) -> xr.DataArray:
+    """Return of each run the last value along a dimension: not all have as many cycles."""
+    ends = (
+        values.sizes[name] - 1 - values.notnull().isel({name: slice(None, None, -1)}).argmax(name)
+    )
+    last = ends.where(values.notnull().any(name), values.sizes[name] - 1).astype(int)
+    if (last == values.sizes[name] - 1).all():
+        return values.isel({name: -1})
+    meaning = f"{values.attrs.get('long_name', values.name)}, in the last {name} of each run"
+    return values.isel({name: last}).drop_vars(name).assign_attrs(long_name=meaning)
 
 
 def _known(selection: Mapping[str, object], names: list[str]) -> None:
@@ -157,20 +189,27 @@ def _known(selection: Mapping[str, object], names: list[str]) -> None:
             raise StudyError(name, value, one_of(name, names))
 
 
-def _own(dataset: xr.Dataset, field: str) -> list[str]:
-    """Return the dimensions of a field of which values can be selected, beside the sweep."""
-    drawn = {*sweep_coordinates(dataset).values(), *DRAWN, "component"}
-    return [str(name) for name in dataset[field].dims if name not in drawn]
+def _own(dataset: xr.Dataset, *fields: str | None) -> list[str]:
+    """Return the dimensions of fields of which values can be selected, beside the sweep."""
+    swept = sweep_coordinates(dataset).values()
+    along = {line_axis(dataset[field], [*swept]) for field in fields if field in dataset}
+    drawn = {*swept, *DRAWN, *along, "component"}
+    known = [name for field in fields if field in dataset for name in dataset[field].dims]
+    return [str(name) for name in dict.fromkeys(known) if name not in drawn]
 
 
 def _part(
-    dataset: xr.Dataset, field: str, selection: Mapping[str, str | float], over: str | None = None
+    dataset: xr.Dataset,
+    field: str,
+    selection: Mapping[str, str | float],
+    over: str | None = None,
+    against: str | None = None,
 ) -> xr.Dataset:
     """Return one of the selected runs, or one for each value of the axis `over`.
 
-    The selection is also applied to the field's own dimensions.
+    The selection is also applied to the own dimensions of the field, and of what it is drawn over.
     """
-    swept, own = sweep_coordinates(dataset), _own(dataset, field)
+    swept, own = sweep_coordinates(dataset), _own(dataset, field, against)
     _known(selection, [*swept, *own])
     chosen = {name: selection[name] for name in swept if name in selection}
     run = one_run(dataset, chosen) if over is None else runs_over(dataset, over, chosen, field)

@@ -51,6 +51,8 @@ _NAME, _OFF = 6.5, 0.125
 """Size of names [pt], and how far they are from their line [in]."""
 _THIN = 0.6
 """Width of a body up to which names stand outside [in]."""
+_STRIPES = 24
+"""Number of stripes of a boundary of several pairs."""
 _SHARES = (0.3, 0.7, 0.15, 0.85)
 """Places along a line, over its length, at which its name may stand besides the middle."""
 _SMALLEST = 1e-6
@@ -253,16 +255,17 @@ def _draw(
     """Draw all in a panel, in which an inch is so many mm; return the entries of the legend."""
     handles: dict[str, Any] = {}
     taken: list[Box] = []
-    colours = {
-        side: _PAIRS[k % len(_PAIRS)] for k, pair in enumerate(shown.own.pairs) for side in pair
-    }
+    colours: dict[tuple[str, str], list[str]] = {}
+    for k, pair in enumerate(shown.own.pairs):
+        for side in pair:
+            colours.setdefault(side, []).append(_PAIRS[k % len(_PAIRS)])
     for number, body in enumerate(shown.own.bodies):
         fill = _FILLS[number % len(_FILLS)]
         _draw_mesh(axes, body.mesh, fill)
         handles[_told(body)] = Patch(facecolor=fill, edgecolor="0.55", linewidth=0.5)
     for rigid in shown.rigid:
         for name, surface in rigid.surfaces.items():
-            colour = colours.get((rigid.name, name), "k")
+            colour = colours.get((rigid.name, name), ["k"])[0]
             axes.plot(*surface.points, color=colour, linewidth=2.0, solid_capstyle="butt")
             points = np.asarray(surface.points)
             _label(
@@ -273,13 +276,15 @@ def _draw(
                 taken,
             )
         if rigid.surfaces:  # else it is a point that moves boundaries by links
-            handles[f"{rigid.name}: rigid"] = Line2D([], [], color="k", linewidth=2.0)
+            of = {colours.get((rigid.name, name), ["k"])[0] for name in rigid.surfaces}
+            colour = of.pop() if len(of) == 1 else "k"
+            handles[f"{rigid.name}: rigid"] = Line2D([], [], color=colour, linewidth=2.0)
     for name, curve in shown.own.curves.items():
         axes.plot(*curve, color="0.25", linewidth=1.6)
         handles[name] = Line2D([], [], color="0.25", linewidth=1.6)
-    for slave, master in shown.own.pairs:
+    for k, (slave, master) in enumerate(shown.own.pairs):
         text = f"contact {'.'.join(slave)} – {'.'.join(master)}"
-        handles[text] = Line2D([], [], color=colours[slave], linewidth=2.4)
+        handles[text] = Line2D([], [], color=_PAIRS[k % len(_PAIRS)], linewidth=2.4)
     for body in shown.own.bodies:
         thin = float(np.ptp(body.mesh.p, axis=1).min()) < _THIN * inch
         for name in body.mesh.boundaries or {}:
@@ -288,12 +293,13 @@ def _draw(
             axes.add_collection(
                 LineCollection(
                     list(lines.transpose(2, 1, 0)),
-                    colors=own or "0.25",
+                    colors=_striped(lines, own) if own else "0.25",
                     linewidths=2.4 if own else 1.1,
                 )
             )
             ends = outward(body.mesh, body.mesh.boundaries[name])[0]
             _label(axes, ends, name, inch, taken, outside=thin)
+        handles |= _draw_removed(axes, body)
         handles |= draw_supports(axes, body, inch, shown.own.springs.get(body.name, ()))
     for link in shown.links:
         handles |= _draw_link(axes, shown.own.bodies, link)
@@ -321,6 +327,31 @@ def _draw_link(axes: Axes, bodies: Sequence[Body], link: Link) -> dict[str, Any]
     ends = " – ".join([*(".".join(side) for side in sides), *([last] if last else [])])
     text = f"{kind} {link.components}: {ends}"
     return {text: Line2D([], [], color=_LINKED, linewidth=2.4)}
+
+
+def _striped(lines: Array, colours: Sequence[str]) -> list[str]:
+    """Return a colour for each facet (2, n, n_facets): in stripes where pairs share a boundary."""
+    at = lines.mean(axis=1)
+    along = at[int(np.ptp(at, axis=1).argmax())]
+    share = (along - along.min()) / (float(np.ptp(along)) or 1.0)
+    return [colours[int(each)] for each in (share * _STRIPES) % len(colours)]
+
+
+def _draw_removed(axes: Axes, body: Body) -> dict[str, Any]:
+    """Hatch the regions of a body that are removed; return their entries of the legend."""
+    handles: dict[str, Any] = {}
+    look: dict[str, Any] = {
+        "facecolor": "none",
+        "edgecolor": "0.35",
+        "linewidth": 0.0,
+        "hatch": "////",
+    }
+    for region in (load.removes for load in body.every_load if load.removes):
+        every = list(_outlines(body.mesh))
+        cells = [every[k] for k in body.region(region)]
+        axes.add_collection(PolyCollection(cells, **look, zorder=0.6))
+        handles[f"removal {body.name}.{region}"] = Patch(**look)
+    return handles
 
 
 def _draw_mesh(axes: Axes, mesh: Mesh, fill: str) -> None:

@@ -45,8 +45,8 @@ _PANEL = (3.4, 3.1)
 """Width and height of a panel [in]."""
 _DENSE, _CONTOURS = 6, 12
 """Least number of values of both quantities for contours; number of contours."""
-_LEGEND = 3.2
-"""Width of the legend and the colour bar [in]."""
+_LEGEND, _BAR = 3.2, 1.6
+"""Width of the legend beside panels, and that of a colour bar: then the legend is below [in]."""
 
 
 def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
@@ -85,13 +85,14 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     up, across, *others = _arrangement(dataset, field)
     columns = others[-1].size if others else 1
     rows = math.prod(each.size for each in others) // columns
-    size = _PANEL[0] * columns + _LEGEND, _PANEL[1] * rows + 1.2
+    style = style_of(dataset, field)
+    beside = _LEGEND if style.flags else _BAR
+    size = _PANEL[0] * columns + beside, _PANEL[1] * rows + 1.2
     sheet = Figure(figsize=size, dpi=130, layout="constrained")
     grid = sheet.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for number, axis in ((across, grid[0, 0].xaxis), (up, grid[0, 0].yaxis)):
         if number.dtype.kind in "iu":
             axis.set_major_locator(MaxNLocator(integer=True))
-    style = style_of(dataset, field)
     overlay = OVERLAYS.get((field, str(up.name), str(across.name)))
     legend: dict[object, Line2D] = {}
     for axes, at in zip(grid.flat, np.ndindex(*(each.size for each in others)), strict=True):
@@ -111,7 +112,10 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
         colours = ScalarMappable(style.norm, style.colours)
         sheet.colorbar(colours, ax=grid, label=short_label(dataset[field]), shrink=0.8)
     if legend:
-        sheet.legend(handles=list(legend.values()), loc="outside right center", frameon=False)
+        sheet.legend(
+            handles=list(legend.values()), frameon=False,
+            loc="outside right center" if style.flags else "outside lower left",
+        )  # fmt: skip
     for axes in grid[-1]:
         axes.set_xlabel(capitalised(short_label(across)))
     for axes in grid[:, 0]:

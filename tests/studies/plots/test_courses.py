@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
 
 from studies import StudyError
+from studies.views.plots.fields import placed
+from studies.views.plots.lines import _other
 from studies.views.plots.picture import picture
+from studies.views.shown import outline
 from tests.studies.plots.test_curves import swept
 from tests.studies.plots.test_lines import legend_of, lines_of
 from tests.studies.plots.test_many import COUNTS, check_inside
@@ -65,9 +70,66 @@ def test_a_force_over_a_displacement_is_a_loop(parts: int) -> None:
     (loop,) = (line for line in lines_of(sheet) if line.get_marker() != "o")
     np.testing.assert_allclose(loop.get_ydata(), run["force"].squeeze())
     np.testing.assert_allclose(loop.get_xdata(), run["motion"].squeeze(SWEEP)[-1])
-    assert sheet.axes[0].get_xlabel() == "motion [mm]"
+    assert sheet.axes[0].get_xlabel() == f"motion (part_{parts - 1}) [mm]"
     assert ends_of(sheet)[-1] == "stage_4"
     check_inside(sheet)
+
+
+def test_a_force_of_contact_lies_over_the_motion_of_its_own_body() -> None:
+    run = course(2, 3).assign_coords(contact=["first", "second"])
+    run["force"] = run["force"].expand_dims(contact=run["contact"], axis=3)
+    contacts = [
+        {"name": name, "slave": "block.top", "master": f"part_{k}.cap"}
+        for name, k in (("second", 0), ("first", 1))
+    ]
+    known = run.assign_attrs(scene_file=json.dumps({"contacts": contacts}))
+    motion = run["motion"].squeeze(SWEEP)
+    over = _other(known, run["force"], "motion")
+    np.testing.assert_array_equal(over.squeeze(SWEEP), motion[[1, 0]])
+    assert over.attrs["long_name"] == "motion (part_1, part_0)"
+    sheet = picture(run, "force", against="motion", selection={"part": "part_1"})
+    loops = [line for line in lines_of(sheet) if line.get_marker() != "o"]
+    for loop in loops:
+        np.testing.assert_array_equal(loop.get_xdata(), motion[1])
+    assert len(loops) == 2
+    with pytest.raises(StudyError, match="part = 'one': must be one of"):
+        picture(run, "force", against="motion", selection={"part": "one"})
+
+
+def cycled() -> xr.Dataset:
+    """A study of two runs with three cycles and with two."""
+    run = course(1).assign_coords(cycle=[1, 2, 3])
+    run["cycle_work"] = ((*SWEEP, "cycle"), np.array([[[[5.0, 3.0, 2.0]]]]), {"units": "N mm"})
+    other = run.assign_coords(friction=[0.2])
+    other["cycle_work"] = other["cycle_work"] * [2.0, 2.0, np.nan]
+    return xr.concat([run, other], "friction", join="outer")
+
+
+def test_a_number_of_cycles_is_a_line_of_one_run_and_the_last_cycle_of_several() -> None:
+    both = cycled()
+    sheet = picture(both, "cycle_work", selection={"friction": 0.1})
+    (line,) = (each for each in lines_of(sheet) if each.get_marker() == "o")
+    assert line.get_xdata().tolist() == [1, 2, 3]
+    assert line.get_ydata().tolist() == [5.0, 3.0, 2.0]
+    sheet = picture(both, "cycle_work", over="friction")
+    assert [line.get_ydata().tolist() for line in lines_of(sheet) if line.get_marker() == "o"] == [
+        [5.0, 3.0, 2.0], [10.0, 6.0],
+    ]  # fmt: skip
+    (dots,) = picture(both, "cycle_work").axes[0].lines
+    assert dots.get_ydata().tolist() == [2.0, 6.0]
+    (dots,) = picture(both, "cycle_work", selection={"cycle": 1}).axes[0].lines
+    assert dots.get_ydata().tolist() == [5.0, 10.0]
+
+
+def test_contact_lies_over_x_where_its_slave_does() -> None:
+    x = np.linspace(3.0, 1.0, 5)  # the slave begins at its right end
+    run = xr.Dataset(coords={"contact": ["face"]})
+    dims = ("contact", "fraction")
+    run["contact_pressure"] = (dims, np.arange(5.0)[None])
+    run = run.assign(contact_x=(dims, x[None]), contact_s=(dims, 3.0 - x[None]))
+    for y, at in ((np.zeros(5), x), (0.1 * x, 3.0 - x)):
+        of = placed(run["contact_pressure"], run.assign(contact_y=(dims, y[None])))
+        np.testing.assert_array_equal(of["distance"].squeeze(), at)
 
 
 def touching(stages: int, pairs: int = 1, *, released: bool) -> xr.Dataset:
@@ -134,8 +196,17 @@ def test_what_cannot_be_drawn_is_refused() -> None:
         ({"zoom": 1.0}, "zoom = 1.0"),
         ({"window": (1.0, 0.0, 0.0, 1.0)}, "window = "),
         ({"over": "stages"}, "over = 'stages'"),
+        ({"over": "pas", "field": "motion"}, "load_ratio, friction, hardening, part"),
     ):
         with pytest.raises(StudyError, match=told):
-            picture(run, "force", **given)
+            picture(run, **{"field": "force", **given})
     with pytest.raises(StudyError, match="does not lie over increments"):
         picture(touching(2, released=False), "contact_pressure", against="force")
+
+
+def test_stress_is_the_first_line_and_rounding_the_last() -> None:
+    run = course(1)
+    for name, size, units in (("gap", 1e-15, "mm"), ("mises", 1.0, "MPa"), ("stress", 9.0, "MPa")):
+        run[f"line_{name}"] = ((*SWEEP, "increment"), size * run["force"].data, {"units": units})
+    names = [each["name"] for each in outline(run.squeeze(SWEEP))["lines"]]
+    assert names[0] == "line_stress" and names[-1] == "line_gap"

@@ -154,3 +154,46 @@ def test_maps_on_a_grid_have_invariants_too() -> None:
         if isinstance(each, Quiver)
     )
     np.testing.assert_allclose(bars.U, bars.V)
+
+
+def test_a_deformed_body_is_shown_whole() -> None:
+    run = kept(grid=False)
+    assert on_mesh(run, "map_mises").box == pytest.approx((0.0, 2.0, -1.0, 1.0))
+    assert on_mesh(run, "map_mises", deformed=10.0).box == pytest.approx((0.0, 2.0, -3.0, 1.0))
+
+
+def test_removed_material_is_left_out_of_its_stage() -> None:
+    run = kept()
+    for axis in "xy":
+        moved = run[f"mesh_displacement_{axis}"]
+        moved[{"time": 1, "mesh_node": [2, 5]}] = np.nan  # the right square
+    assert on_mesh(run, "map_mises", stage="loaded").triangles.shape == (6, 3)
+    for deformed in (0.0, 0.5):
+        left = on_mesh(run, "map_mises", stage="unloaded", deformed=deformed)
+        assert left.triangles.shape == (4, 3)
+        assert not {2, 5} & {*left.triangles.ravel().tolist()}
+        assert np.isfinite(left.box).all()
+        assert len(left.edges) == 4 + 4
+
+
+def test_contact_is_marked_where_pairs_press_at_the_stage() -> None:
+    pressure = np.zeros((2, 2, 3))
+    pressure[0, 0] = 1.0  # the first of two pairs, in the first of two stages
+    run = kept().assign(
+        contact_x=(("contact", "fraction"), np.tile([0.2, 0.5, 0.8], (2, 1))),
+        contact_y=(("contact", "fraction"), np.zeros((2, 3))),
+        contact_pressure=(("contact", "stage", "fraction"), pressure),
+    )
+    run = run.assign_coords(stage=["loaded", "unloaded"])
+
+    def marks(field: str, stage: str | None = None) -> list[str]:
+        (axes, *_) = map_figure(run, field, stage=stage).axes
+        return [
+            str(line.get_label())
+            for line in axes.lines
+            if len(np.atleast_1d(line.get_xdata())) == 3
+        ]
+
+    assert marks("map_mises", "loaded") == ["contact"]
+    assert marks("map_mises", "unloaded") == []
+    assert marks("residual_stress") == ["contact under load"]

@@ -11,6 +11,7 @@ import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.quiver import Quiver
 
 from residua.cli import main
@@ -181,8 +182,9 @@ def test_a_removal_is_drawn_in_its_region_and_a_panel_is_as_large_as_it_can_be()
     sheet = setup_figure(scene_named("expansion.toml", beside(DATA)))
     sheet.draw_without_rendering()
     whole, close = sheet.axes
-    (dot,) = (line for line in close.lines if line.get_marker() == "o")
-    assert dot.get_xdata()[0] == pytest.approx(3.1)  # the skin is from 3.0 to 3.2
+    (skin,) = (each for each in close.collections if each.get_hatch())
+    reach = np.vstack([each.vertices for each in skin.get_paths()])[:, 0]
+    assert (reach.min(), reach.max()) == pytest.approx((3.0, 3.2))
     assert "removal plate.skin" in legend_of(sheet)
     assert close.get_position().width == pytest.approx(whole.get_position().width, rel=0.1)
     assert "wall: rigid" not in legend_of(setup_figure(scene_named("bending.toml", beside(DATA))))
@@ -207,3 +209,35 @@ def test_forces_and_motions_have_their_units() -> None:
     assert "end: moment 6000 N mm" in legend_of(
         setup_figure(scene_named("bending.toml", beside(DATA)))
     )
+
+
+def test_pairs_on_one_boundary_have_their_own_colours_and_removed_regions_are_hatched(
+    tmp_path: Path,
+) -> None:
+    again = SCENE[SCENE.index("[rigid.ball]") : SCENE.index("[[loads]]")]
+    other = again.replace("ball", "roll").replace('name = "face"', 'name = "other"')
+    stages = '[[stages]]\nname = "on"\n[[stages]]\nname = "off"\nremove = ["block.skin"]\n'
+    text = SCENE.replace("[loading]\nfactor = 1.0\nstep = 0.1\n", other + stages)
+    text += "[bodies.block.regions]\nskin = { y = [1.0, 2.0], x = [1.0, 2.0] }\n"
+    (tmp_path / "block.toml").write_text(text)
+    sheet = setup_figure(beside(tmp_path)("block.toml"))
+    (legend,) = sheet.legends
+    colours = {
+        text.get_text(): to_hex(line.get_color())
+        for text, line in zip(legend.get_texts(), legend.legend_handles, strict=True)
+        if isinstance(line, Line2D)
+    }
+    one, two = colours["ball: rigid"], colours["roll: rigid"]
+    assert one != two
+    assert colours["contact block.top – ball.face"] == one
+    assert colours["contact block.top – roll.face"] == two
+    axes = sheet.axes[0]
+    drawn = [
+        {*map(to_hex, each.get_color())}
+        for each in axes.collections
+        if isinstance(each, LineCollection)
+    ]
+    assert {one, two} in drawn
+    (skin,) = (each for each in axes.collections if each.get_hatch())
+    assert len(skin.get_paths()) == 2 * 2
+    assert "removal block.skin" in [text.get_text() for text in legend.get_texts()]

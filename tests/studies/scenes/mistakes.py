@@ -254,6 +254,46 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "contacts[0].active",
         "one of pressed",
     ),
+    "a line outside of its body": (
+        put("results", "lines", "middle", {"body": "lower", "start": [9.0, 0.0], "end": [9, -2]}),
+        "results.lines.middle",
+        "must meet the body lower",
+    ),
+    "a point outside of its body": (
+        put("results", "points", {"p": {"body": "upper", "at": [2.0, -1.0]}}),
+        "results.points.p",
+        "must meet the body upper",
+    ),
+    "a power as in Python": (
+        put("loads", 0, "value", "$wide**2"),
+        "loads[0].value",
+        "a power is written with ^",
+    ),
+    "an end of a stage with a take": (
+        put(
+            "outputs",
+            {
+                "f": {
+                    "of": "normal_force",
+                    "contact": "face",
+                    "stage": "pressed",
+                    "take": "minimum",
+                }
+            },
+        ),
+        "outputs.f.take",
+        "must be left out",
+    ),
+    "a motion of a body": (
+        put("outputs", {"f": {"of": "motion.x", "part": "upper", "stage": "pressed"}}),
+        "outputs.f.part",
+        "must be one of",
+    ),
+    "a reaction along a line": (
+        put("outputs", {"f": {"of": "reaction.x", "line": "middle", "stage": "pressed"}}),
+        "outputs.f",
+        "needs one of part",
+    ),
     "output nowhere": (
         without("outputs", "least", "body"),
         "outputs.least",

@@ -12,7 +12,7 @@ from studies.errors import SceneError
 from studies.scenes.description import Description
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.scene import FileScene, file_scene
-from tests.studies.scenes.conftest import blocks
+from tests.studies.scenes.conftest import blocks, built
 
 CSV = {"pulse.csv": MeshFile("pulse.csv", b"time, half, factor\n0,0.25,0.5\n2,0.5,1\n10,0.1,0.2\n")}
 
@@ -34,6 +34,41 @@ def test_the_force_follows_the_course_and_an_increment_ends_at_each_of_its_knots
     time, force = record.fields["increment_time"][1], record.fields["contact_normal_force"][1][0]
     np.testing.assert_allclose(time, [0, 0.5, 1, 1.2, 1.4, 1.6, 1.8, 2])
     np.testing.assert_allclose(force / 600.0, [0, 0.25, 0.5, 1, 0.8, 0.6, 0.4, 0.2], rtol=1e-9)
+
+
+@pytest.mark.solves
+def test_outputs_take_values_at_the_ends_of_stages() -> None:
+    """A block of 4 mm under 150 MPa, of which half is left, and under a plate pushed by 60 N."""
+    content = blocks()
+    content["stages"] += [{"name": "eased", "increments": 1}]
+    content["loads"][0]["amplitude"] = {"pressed": 1.0, "eased": 0.5}
+    content["rigid"] = {"plate": {"centre": [2.0, 2.0], "y": {"pushed": -60.0}, "x": {"moved": 0}}}
+    content["rigid"]["plate"]["rotation"] = {"moved": 0.0}
+    content["links"] = [{"slave": "upper.top", "rigid": "plate", "components": "y"}]
+    wanted = {
+        "pressed": {"of": "normal_force", "contact": "face", "stage": "pressed"},
+        "less": {"of": "normal_force", "contact": "face", "stage": "eased", "minus": "pressed"},
+        "shear": {"of": "tangential_force", "contact": "face", "stage": "pressed"},
+        "held": {"of": "reaction.y", "part": "lower", "stage": "eased"},
+        "moved": {"of": "motion.y", "part": "plate", "stage": "pressed"},
+        "turned": {"of": "motion.rotation", "part": "plate", "stage": "eased"},
+    }
+    content["outputs"] |= wanted
+    scene = built(content)
+    (*_, record) = scene.path(scene.parameters(), [0.0], lambda done: None)
+    assert record.status.name == "OK", record.message
+    found = record.scalars
+    assert found["pressed"] == pytest.approx(660.0, rel=1e-9)
+    assert found["less"] == pytest.approx(-300.0, rel=1e-9)
+    assert found["held"] == pytest.approx(360.0, rel=1e-9)
+    assert found["turned"] == pytest.approx(0.0, abs=1e-12)
+    motion, shear = (record.fields[n][1] for n in ("motion_y", "contact_tangential_force"))
+    assert found["moved"] == motion[2, 2] < -1e-4
+    assert found["shear"] == shear[0, 2]
+    assert found["audit_stored"] < 1e-9
+    units = {each.name: each.units for each in scene.quantities}
+    assert [units[n] for n in ("pressed", "moved", "turned")] == ["N", "mm", "rad"]
+    assert "pressed_x" not in units and "least_x" in units
 
 
 @pytest.mark.parametrize(

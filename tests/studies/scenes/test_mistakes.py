@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import re
 import tomllib
 from collections.abc import Iterator
 from functools import cache
@@ -12,8 +13,10 @@ from typing import Any
 
 import pytest
 
+from solver.results.quantities import QUANTITIES
 from studies import Study
 from studies.errors import SceneError, StudyError, one_of
+from studies.scenes.checking import RESERVED
 from studies.scenes.description import Description
 from studies.scenes.refusals import dotted
 from studies.scenes.scene import file_scene
@@ -176,3 +179,10 @@ def test_of_thousands_of_names_ten_are_told() -> None:
     assert "name9 and 6491 more; did you mean name3?" in told
     assert len(one_of("y", names[::-1])) < 500
     assert len(str(StudyError("z" * 100_000, "w" * 100_000, "must be " + "v" * 100_000))) < 2500
+
+
+def test_names_that_the_documentation_lists_as_taken_are_refused() -> None:
+    text = (Path(__file__).parents[3] / "docs" / "scene-files.md").read_text()
+    _, _, listed = text.partition("name of a variable or dimension of a data set:")
+    names = {*re.findall(r"`(\w+)`", listed.partition(", nor a longer one")[0])}
+    assert {"force", "depth", "s", "stage", "status"} < names < {*QUANTITIES, *RESERVED}
