@@ -13,7 +13,7 @@ from copy import deepcopy
 from dataclasses import replace
 from functools import partial
 from itertools import takewhile
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -21,13 +21,15 @@ from studies.definition.cases import Case, LoadingPath
 from studies.definition.fit import Fit, Fitting, standings
 from studies.definition.goal import Goal, PathLimit, Search
 from studies.definition.line import Line, Read
-from studies.definition.neighbours import Neighbours
 from studies.definition.place import Place
 from studies.definition.refine import Refinement
 from studies.definition.study import Study
 from studies.definition.sweep import owners
 from studies.storage import runfile
 from studies.storage.store import Store
+
+if TYPE_CHECKING:
+    from studies.definition.neighbours import Neighbours
 
 
 class Asked(NamedTuple):
@@ -86,6 +88,8 @@ class Asking:
         self._neighbours: Neighbours | None = None
         self._after: dict[int, list[int]] = {}
         if isinstance(study.asks, Goal) and study.asks.halves:
+            from studies.definition.neighbours import Neighbours  # loads scipy
+
             self._neighbours = Neighbours([place.fixed for place in self.places])
             for number, before in enumerate(self._neighbours.before):
                 for each in before:

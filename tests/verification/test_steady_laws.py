@@ -263,7 +263,9 @@ WORDS = {
 }
 
 
-@pytest.mark.parametrize(("word", "load"), zip(WORDS, cycle(["contact", "hertz"]), strict=False))
+@pytest.mark.parametrize(
+    ("word", "load"), list(zip(WORDS, cycle(["contact", "hertz"]), strict=False))
+)
 def test_every_word_rolls_and_its_audit_agrees(word, load):
     p = RollingParameters(
         element_size=3.0, growth=1.5, traction=0.2, load=load, passes=2, yield_stress=YIELD,
