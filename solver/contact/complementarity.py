@@ -215,11 +215,16 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
         found = _active_sets(problem, status, on)
         if found is not None:
             return ContactSolution(found.forces, found.rigid, found.status, True)
+        touching = (status != OPEN).any()
         # friction along surfaces that lean may bear all of the load, without any pressure
-        before, bound = bound, lines.least(N) if (status != OPEN).any() else _LESS * bound
-        if np.abs(bound - before).max() <= 1e-12 * before.max():
+        before, bound = bound, lines.least(N) if touching else _LESS * bound
+        settled = np.abs(bound - before).max() <= 1e-12 * before.max()
+        if settled or not touching:
             F = np.where(np.resize(status, len(F)) == OPEN, 0.0, F)
-            return ContactSolution(F, q, status, True) if _holds(problem, F, q) else None
+            if _holds(problem, F, q):
+                return ContactSolution(F, q, status, True)
+        if settled:
+            return None
     return None
 
 
