@@ -104,6 +104,12 @@ class Candidates(OnParts):
         """For each interface, the slice of its candidates in the arrays of all."""
         return _places(self.vertices)
 
+    @property
+    def stays(self) -> tuple[bool, ...]:
+        """For each part, whether neither pairs nor links hold it: it stays where it is."""
+        each = zip(self.holds, self.links.rows, strict=True)
+        return tuple(not held and rows is None for held, rows in each)
+
     def smooth(self) -> Candidates:
         """Return the same candidates without friction."""
         return replace(self, lines=BoundLines.none(self.n))
@@ -278,7 +284,6 @@ def find_candidates(
         for before, share in zip(start.contacts, shares, strict=True)
     )
     pushes = tuple(np.zeros(part.n) for part in system.parts)
-    holds = [False] * len(system.parts)
     n = sum(len(v) for v in vertices)
     frictional = any(interface.rough for interface in system.interfaces)
     m = (2 * n if frictional else n) + len(system.links)
@@ -307,7 +312,6 @@ def find_candidates(
             if frictional:
                 block[tangent] = pairing.tangent[side][at]
             pieces[number].append(ContactRows(*part.pull_back(surface, u[number], block, n)))
-            holds[number] |= left is None
             if left is not None and left.any():
                 rows = left[:1] @ pairing.normal[side], left[1:] @ pairing.tangent[side]
                 dofs, both = part.pull_back(surface, u[number], np.vstack(rows), 1)
@@ -338,7 +342,7 @@ def find_candidates(
         beyond=float(beyond),
         leaving=leaving,
         pushes=pushes,
-        holds=tuple(holds),
+        holds=system.holds(start.time, time),
         links=system.links,
     )
 

@@ -48,6 +48,8 @@ class Pairing:
     ----------
     area, deformed : (n,) integral of the hat over the part that faces the master, over the
         reference and over the current area [mm2]
+    shared : (n - 1,) integral of the product of the two hats of each edge, over the part that
+        faces the master [mm2]
     covered : (n,) share of the hat that faces the master
     length : (n,) mean length of the edges at the vertex [mm]
     gap : (n,) mean gap under the hat, negative where the bodies overlap [mm]; inf where
@@ -58,6 +60,7 @@ class Pairing:
 
     area: Array
     deformed: Array
+    shared: Array
     covered: Array
     length: Array
     gap: Array
@@ -68,7 +71,9 @@ class Pairing:
     def parted(self) -> Pairing:
         """The pairing with surfaces that face each other nowhere."""
         none = np.zeros_like(self.area)
-        return replace(self, area=none, deformed=none, covered=none, gap=none + np.inf)
+        return replace(
+            self, area=none, deformed=none, shared=none[1:], covered=none, gap=none + np.inf
+        )
 
 
 def _powers(x: Array, edges: Numbers, origin: Array | float = 0.0) -> Array:
@@ -246,8 +251,7 @@ def _integrate(
         return np.asarray(np.bincount(vertex.ravel(), values.ravel(), rows), dtype=float)
 
     area, deformed, gap, facing = map(summed, (hats, deformed_hats, hats * distance, bare))
-    full = at_vertices(slave.lengths * slave.depth(slave.X[:, slave.edges[:, :2]]).mean(axis=1) / 2)
-    covered = area > _MIN_COVERED * full
+    covered = area > _MIN_COVERED * slave.hats
     scale = np.where(covered, 1 / np.where(covered, area, 1.0), 0.0)
     means = hats * scale[vertex]
     along = (means * ways[:, :, None]).transpose(0, 2, 3, 1)  # way, vertex, point, axis
@@ -262,6 +266,7 @@ def _integrate(
     return Pairing(
         area=np.where(covered, area, 0.0),
         deformed=np.where(covered, deformed, 0.0),
+        shared=np.asarray(np.bincount(edge, hats[0] * (1 + xi) / 2, rows - 1), dtype=float),
         covered=facing / at_vertices(np.ones(len(slave.edges))),
         length=slave.spacing,
         gap=np.where(covered, gap * scale, np.inf),

@@ -12,30 +12,29 @@ if TYPE_CHECKING:
     from solver.contact.state import State
     from solver.contact.system import System
 
+    Array = NDArray[np.float64]
 
-def contact_pressure(
-    system: System, state: State, interface: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+
+def contact_pressure(system: System, state: State, interface: int) -> tuple[Array, Array]:
     """Return pressure and shear on the slave's vertices (n,) [MPa]: means under each hat.
 
-    The multiplier field is piecewise linear. Its means under the hats have the same resultant as
-    its values at the vertices, without the oscillation of these next to a sharp corner.
+    The multiplier field is piecewise linear where the master faces the slave, and zero elsewhere.
+    Its means under the hats have the same resultant as its values at the vertices, without the
+    oscillation of these next to a sharp corner, and without their growth where the master ends
+    under a hat: force over a small covered area. The sum of means times areas of the whole hats is
+    the contact force.
 
     Forces are divided by the area before loading, as the small strains of the slave imply.
     """
     contact, chain = state.contacts[interface], system.interfaces[interface].slave_surface
-    pairing = system.pairing(state, interface)
-    safe = np.where(pairing.area > 0, pairing.area, 1.0)
-    x = chain.X[:, chain.vertices]
-    edge = chain.lengths
-    measure = chain.depth(x)
-    # consistent mass of the hats on each edge, the depth varying linearly along it
-    left = edge / 12 * (3 * measure[:-1] + measure[1:])
-    right = edge / 12 * (measure[:-1] + 3 * measure[1:])
-    cross = edge / 12 * (measure[:-1] + measure[1:])
-    mass = np.diag(np.append(left, 0) + np.append(0, right))
-    mass += np.diag(cross, 1) + np.diag(cross, -1)
-    total = mass.sum(axis=1)
-    smooth = mass / np.where(total > 0, total, 1.0)[:, None]
-    pressure, shear = contact.normal / safe, contact.tangential / safe
-    return smooth @ pressure, smooth @ shear
+    pairing, full = system.pairing(state, interface), chain.hats
+
+    def mean(force: Array) -> Array:
+        area = pairing.area
+        each = np.divide(force, area, out=np.zeros_like(force), where=area > 0)
+        # hats sum to one: what one of two neighbours gains in the integrals the other loses
+        gained = pairing.shared * np.diff(each)
+        integral = force + np.append(gained, 0.0) - np.append(0.0, gained)
+        return np.divide(integral, full, out=np.zeros_like(force), where=full > 0)
+
+    return mean(contact.normal), mean(contact.tangential)

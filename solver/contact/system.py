@@ -218,6 +218,19 @@ class System:
         unchanged = all(one is other for one, other in zip(parts, self.parts, strict=True))
         return self if unchanged else self.within(parts)
 
+    def holds(self, before: float, time: float) -> tuple[bool, ...]:
+        """Return for each part whether a pair may hold its rigid motions between two times.
+
+        A pair that leaves, or is absent, holds nothing.
+        """
+        held = {
+            number
+            for interface in self.interfaces
+            if interface.declared.left(before, time) is None
+            for number in (interface.slave, interface.master)
+        }
+        return tuple(number in held for number, _ in enumerate(self.parts))
+
     def within(self, parts: tuple[Part, ...]) -> System:
         """Return the system with the last windows in the place of some of its parts."""
         small = copy(self)

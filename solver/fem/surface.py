@@ -73,13 +73,24 @@ class Surface:
     @cached_property
     def areas(self) -> NDArray[np.float64]:
         """Area (n_nodes,) of each node: the integral of its shape function [mm2]."""
-        xi, weights = np.polynomial.legendre.leggauss(4)
-        count = self.edges.shape[1]
-        N, xe = shape_functions(xi, count), self.X[:, self.edges]
-        along = np.linalg.norm(xe @ shape_derivatives(xi, count).T, axis=0)
-        each = (along * self.depth(xe @ N.T) * weights) @ N
+        each = self._integrated(self.edges.shape[1])
         areas = np.bincount(self.edges.ravel(), each.ravel(), len(self.nodes))
         return np.asarray(areas, dtype=float)
+
+    @cached_property
+    def hats(self) -> NDArray[np.float64]:
+        """Area (n_edges + 1,) of each vertex: the integral of its linear hat [mm2]."""
+        start, end = self._integrated(2).T
+        return np.append(start, 0.0) + np.append(0.0, end)
+
+    def _integrated(self, functions: int) -> NDArray[np.float64]:
+        """Return the integrals (n_edges, functions) of shape functions of this number [mm2]."""
+        xi, weights = np.polynomial.legendre.leggauss(4)
+        count = self.edges.shape[1]
+        xe = self.X[:, self.edges]
+        along = np.linalg.norm(xe @ shape_derivatives(xi, count).T, axis=0)
+        weights = along * self.depth(xe @ shape_functions(xi, count).T) * weights
+        return np.asarray(weights @ shape_functions(xi, functions))
 
     @cached_property
     def normals(self) -> NDArray[np.float64]:

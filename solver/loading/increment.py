@@ -36,7 +36,16 @@ from solver.loading.flow import SoftestStep, collapses, is_mechanism, softer
 from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Yielded
 from solver.loading.slide import Slide, slide
-from solver.loading.step import NewtonStep, largest, newton_step, norm, on_parts, rounding, unheld
+from solver.loading.step import (
+    NewtonStep,
+    largest,
+    newton_step,
+    norm,
+    on_parts,
+    out_of_balance,
+    rounding,
+    unheld,
+)
 from solver.loading.timing import timing
 
 if TYPE_CHECKING:
@@ -156,7 +165,7 @@ class Increment:
 
     def _iterate(self) -> Balanced:
         tolerances = self.tolerances
-        origin = self.system.moved(self.guess or self.start, self.time)
+        origin = self.system.moved(self._guessed(), self.time)
         u, contacts, links = origin.u, origin.contacts, origin.links
         responses = self._respond(u)
         residuals = self._residuals(u, responses)
@@ -224,6 +233,17 @@ class Increment:
             self._slide()
             or (self._judged(softest, u, responses, contacts, links) if flows else None),
         )
+
+    def _guessed(self) -> State:
+        """Return the state to iterate from: parts that nothing holds stay where they are."""
+        if self.guess is None:
+            return self.start
+        system, u = self.system, list(self.guess.u)
+        holds = system.holds(self.start.time, self.time)
+        for k, (part, linked) in enumerate(zip(system.parts, system.links.rows, strict=True)):
+            if part.rigid.shape[1] and linked is None and not holds[k]:
+                u[k] = self.start.u[k]
+        return replace(self.guess, u=tuple(u))
 
     def _slide(self, *places: tuple[Vectors, Candidates]) -> Slide | None:
         """Return how a body slides, at the given iterates or at the beginning of the increment.
@@ -302,9 +322,8 @@ class Increment:
         self, residuals: Vectors, candidates: Candidates, forces: NDArray[np.float64]
     ) -> float:
         """Return the norm of the out-of-balance forces of all parts under contact forces [N]."""
-        inner = on_parts(self.system, candidates, forces)
-        each = zip(self.system.parts, residuals, inner, strict=True)
-        return norm([(r + c)[part.free] for part, r, c in each])
+        left = out_of_balance(self.system, residuals, candidates, forces)
+        return norm([r[part.free] for part, r in zip(self.system.parts, left, strict=True)])
 
     def _ends(
         self, u: Vectors, candidates: Candidates, scale: float, error: float, violation: float

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from solver.contact.candidates import Candidates
     from solver.contact.system import System
     from solver.fem.operators import Operator
+    from solver.fem.part import Part
 
     Vectors = tuple[NDArray[np.float64], ...]
 
@@ -40,13 +41,33 @@ class NewtonStep:
         forces: NDArray[np.float64],
     ) -> float:
         """Return minus the derivative of the energy along the step under given contact forces."""
-        terms = zip(self.u, residual, on_parts(system, candidates, forces), strict=True)
-        return sum(float(du @ (r + c)) for du, r, c in terms)
+        left = out_of_balance(system, residual, candidates, forces)
+        return sum(float(du @ r) for du, r in zip(self.u, left, strict=True))
 
 
 def on_parts(system: System, candidates: Candidates, forces: NDArray[np.float64]) -> Vectors:
     """Return the nodal forces that contact forces exert on each part [N]."""
     return tuple(candidates.all_on_part(i, forces) for i, _ in enumerate(system.parts))
+
+
+def out_of_balance(
+    system: System, residuals: Vectors, candidates: Candidates, forces: NDArray[np.float64]
+) -> Vectors:
+    """Return the out-of-balance forces of all parts under contact forces [N].
+
+    A part that nothing holds stays where it is: what would move it does not count.
+    """
+    inner = on_parts(system, candidates, forces)
+    each = zip(system.parts, residuals, inner, candidates.stays, strict=True)
+    return tuple(_without_resultant(part, r + c) if stays else r + c for part, r, c, stays in each)
+
+
+def _without_resultant(part: Part, force: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return nodal forces (n,) that do no work on the rigid motions of a part."""
+    Q, _ = np.linalg.qr(part.rigid[part.free])
+    out = force.copy()
+    out[part.free] -= Q @ (Q.T @ force[part.free])
+    return out
 
 
 def newton_step(
@@ -66,18 +87,14 @@ def newton_step(
     """
     # sum all large forces before solving: the rest is small, and the rounding of the factor, about
     # 1e-16 (size of the body / smallest element)^2, is relative to this rest
-    held = on_parts(system, candidates, candidates.forces)
-    balanced = [r + c for r, c in zip(residuals, held, strict=True)]
+    balanced = out_of_balance(system, residuals, candidates, candidates.forces)
     W = candidates.compliance(operators)
     motion = candidates.motion - W @ candidates.forces
     begun = [operator.begin(r) for operator, r in zip(operators, balanced, strict=True)]
     for i, part in enumerate(begun):
         motion += candidates.of_part(i, part.kept)
-    each = zip(system.parts, candidates.holds, candidates.links.rows, strict=True)
-    floating = [
-        part.rigid if held or linked is not None else part.rigid[:, :0]
-        for part, held, linked in each
-    ]
+    each = zip(system.parts, candidates.stays, strict=True)
+    floating = [part.rigid[:, :0] if stays else part.rigid for part, stays in each]
     links, last = len(candidates.links), np.arange(len(W))[candidates.linked]
     W[last, last] += candidates.links.compliance
     motion[last] -= candidates.links.compliance * candidates.forces[last]

@@ -16,6 +16,7 @@ import numpy as np
 from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.loading.bearing import excess_shear
 from solver.loading.cycle import Cycle
+from solver.loading.freed import check_freed
 from solver.loading.outcome import Outcome, PathEnded, Settled, Tally
 from solver.loading.program import shared
 from solver.loading.refinement import HALVINGS
@@ -97,8 +98,13 @@ class Walker:
         which it may depend. Any two programs then share with each other no more increments than one
         of them shares with `largest`. Where a program left it the state is kept, for the two that
         went furthest: one that lies between others goes on from there.
+
+        Raises
+        ------
+        ModelError
+            if a load of a program would move a body that nothing holds
         """
-        ahead = _with_next(iter(programs), largest)
+        ahead = _with_next(map(self._checked, programs), largest)
         first_pair = next(ahead, None)
         if first_pair is None:
             return
@@ -140,6 +146,10 @@ class Walker:
                 error=walk.error or self._never_facing(walk.point),
                 settled=settled,
             )
+
+    def _checked(self, program: Program) -> Program:
+        check_freed(self._system, program)
+        return program
 
     def _never_facing(self, point: Point) -> NotConverged | None:
         """Return the error if the surfaces of a pair have never faced each other, else None."""

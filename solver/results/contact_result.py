@@ -35,7 +35,8 @@ class ContactResult:
         on the choice of the slave. With small sliding it equals ``pressure`` [MPa]
     gap : (n,) distance of the surfaces; NaN where no master faces the slave [mm]
     slip : (n,) slip of the slave on the master along s [mm]
-    depth : (n,) depth across the plane: thickness, or 2 pi r [mm]
+    area : (n,) integral of the hat of each vertex, whether a master faces it or not: the sum of
+        pressure times area is the normal force [mm2]
     closed : (n,) whether the bodies touch
     sticking : (n,) whether they touch without slip; nowhere without friction
     """
@@ -47,7 +48,7 @@ class ContactResult:
     pressure_deformed: Array
     gap: Array
     slip: Array
-    depth: Array
+    area: Array
     closed: NDArray[np.bool_]
     sticking: NDArray[np.bool_]
 
@@ -91,7 +92,7 @@ def contact_result(system: System, at: Converged, pair: int = 0) -> ContactResul
         pressure_deformed=shrunk * pressure,
         gap=gap,
         slip=np.where(np.isfinite(gap), interface.slip(pairing, state.u), np.nan),
-        depth=np.broadcast_to(chain.depth(X), pressure.shape),
+        area=chain.hats,
         closed=closed,
         sticking=closed & (contact.status == STICK) & interface.rough,
     )

@@ -169,11 +169,12 @@ class RequestedNumber:
             found: tuple[float, ...] = (contacts[self.contact].length,)
         else:
             values, X = self._sought(fields, at, lines, contacts)
-            if self.is_resultant:
-                values = values * contacts[str(self.contact)].depth
             if before is not None:
                 values = values - self._sought(fields, before, lines, contacts)[0]
-            found = self._found(values, X)
+            if self.is_resultant:
+                found = (float(values @ contacts[str(self.contact)].area),)
+            else:
+                found = self._found(values, X)
         return dict(zip(self.quantities, found, strict=False))
 
     def at_increments(self, courses: Values, at: float, before: float | None = None) -> Values:

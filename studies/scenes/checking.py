@@ -205,6 +205,9 @@ def _stages(scene: tables.SceneFile) -> Iterator[StudyError]:
     for k, stage in enumerate(scene.stages):
         for side in stage.remove:
             yield from _one_of(f"stages[{k}].remove", side.partition(".")[0], scene.bodies)
+    if scene.stages and scene.stages[0].release:
+        allowed = "must be false in the first stage: it ends all loads, and none has acted before"
+        yield StudyError("stages[0].release", True, allowed)
     if scene.repeat is None:
         return
     repeated, names = list(scene.repeat.stages), [stage.name for stage in scene.stages]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from studies.errors import SceneError, StudyError
 from studies.scenes import tables
-from studies.scenes.building import Builder
+from studies.scenes.building import Builder, program_of
 from studies.scenes.checking import (
     contradictions,
     failed_checks,
@@ -86,6 +86,7 @@ def _without_stand_ins(
 def _build(builder: Builder, scene: tables.SceneFile) -> None:
     """Build model, system and samples; the builder collects the mistakes."""
     from solver.contact.system import System
+    from solver.loading.freed import check_freed
     from solver.results.samples import Samples
 
     model = builder.model()
@@ -93,6 +94,7 @@ def _build(builder: Builder, scene: tables.SceneFile) -> None:
         system = builder.attempt("", lambda: System(model))
         if system:
             builder.mistakes += _bodies_apart(system)
+            builder.attempt("", lambda: check_freed(system, program_of(scene, builder.meshes)))
             builder.attempt("results", lambda: Samples(system, view_of(scene)))
             if not any(each.field.startswith("results") for each in builder.mistakes):
                 builder.mistakes += _places_outside(system, scene)

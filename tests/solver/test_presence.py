@@ -16,12 +16,16 @@ from solver import (
     ModelError,
     Moved,
     Pressure,
+    Pushed,
     RigidBody,
     Stage,
+    System,
     solve,
 )
+from solver.loading.freed import check_freed
 from solver.mesh import grid
 from solver.model.rigid import arc
+from solver.scenes.rolling import ROLLING
 
 pytestmark = pytest.mark.solves
 
@@ -106,6 +110,81 @@ def test_a_tool_passes_through_before_it_comes_and_its_forces_follow_the_surface
     for stage in ("press", "gone"):
         check = found.audit(stage)
         assert check.passed, check.violations
+
+
+PRESSED, GONE = Stage(name="pressed", steps=3, target=1.0), Stage(name="gone", steps=3, target=2.0)
+ELASTIC, FORCE = Material(youngs_modulus=5e4, poisson_ratio=0.3), 5000.0
+
+
+def pushed(force, presence=None):
+    """An elastic block, and a roller that a force pushes on it, by its factors over time."""
+    x = np.linspace(0.0, 6.0, 13)
+    block = Body(name="block", mesh=grid(x, x - 6.0), material=ELASTIC,
+                 supports={"left": "x", "bottom": "xy"})  # fmt: skip
+    around = arc((2.0, 8.0), 8.0, (-np.pi / 2 - 0.2, -np.pi / 2 + 0.4), 48)
+    roller = RigidBody(name="roller", surfaces={"face": around}, centre=(2.0, 8.0),
+                       y=Pushed(value=-FORCE, amplitude=force))  # fmt: skip
+    pair = ContactPair(slave=("block", "top"), master=("roller", "face"), friction=0.2,
+                       sliding="finite", presence=presence)  # fmt: skip
+    return Model(bodies=(block,), rigid=(roller,), contacts=(pair,))
+
+
+FALLS = Amplitude([0, 1, 2], [0, 1, 0]), Amplitude([0, 1, 1.2, 1.6, 2], [0, 1, 1.1, 0.3, 0])
+
+
+@pytest.mark.parametrize("falls", FALLS)
+def test_a_tool_that_a_force_pushes_stays_where_it_is_while_its_pair_leaves(falls):
+    """However its force falls: forces of the pair are given, and nothing else holds the tool."""
+    stages = (PRESSED, GONE)
+    found = solve(pushed(falls, Amplitude([1, 2], [1, 0])), stages=stages)
+    assert found.reaction("roller", "pressed")[1] == pytest.approx(-FORCE, rel=1e-6)
+    before, after = (found.motion("roller", stage) for stage in ("pressed", "gone"))
+    assert before.y < -0.003
+    assert after == before
+    force = np.array([increment.contact[0][0] for increment in found.history])[-4:]
+    np.testing.assert_allclose(force, force[0] * np.array([1, 2 / 3, 1 / 3, 0]), atol=1e-9)
+    assert np.abs(found.stress("block", "pressed")).max() > 300.0
+    assert np.abs(found.stress("block", "gone")).max() < 1e-6
+    for stage in ("pressed", "gone"):
+        check = found.audit(stage)
+        assert check.passed, check.violations
+
+
+def test_a_body_of_elements_stays_where_it_is_while_its_pair_leaves():
+    """Its pressure falls later than the forces of the pair, which follow turned surfaces."""
+    x = np.linspace(0.0, 4.0, 5)
+    falls = Amplitude([0, 1, 1.5, 2], [0, 1, 0.8, 0])
+    upper = Body(name="upper", mesh=grid(x, x / 2), material=PLATE, supports={"left": "x"},
+                 loads=(Pressure(boundary="top", value=280.0, amplitude=falls),))  # fmt: skip
+    lower = Body(name="lower", mesh=grid(2 * x, x / 2 - 2), material=PLATE,
+                 supports={"bottom": "xy"})  # fmt: skip
+    pair = ContactPair(slave=("upper", "bottom"), master=("lower", "top"), friction=0.1,
+                       sliding="finite", presence=Amplitude([1, 2], [1, 0]))  # fmt: skip
+    found = solve(Model(bodies=(upper, lower), contacts=(pair,)), stages=(PRESSED, GONE))
+    way = [found.at("upper", [[2.0], [1.0]], stage)["displacement"][1, 0]
+           for stage in ("pressed", "gone")]  # fmt: skip
+    assert -0.01 < way[0] < way[1] < 0.0
+    check = found.audit("gone")
+    assert check.passed, check.violations
+
+
+def test_a_force_on_a_tool_that_nothing_holds_any_more_is_refused():
+    allowed = r"'roller' is free to move along y at load factor 2, .* between block.top and roller"
+    with pytest.raises(ModelError, match=allowed):
+        solve(pushed(RISE, Amplitude([1, 2], [1, 0])), stages=(PRESSED, GONE))
+    with pytest.raises(ModelError, match=r"'roller' is free .* bodies are separated"):
+        solve(pushed(RISE), stages=(PRESSED, replace(GONE, apart=True)))
+
+
+def test_a_load_on_a_lifted_wheel_is_refused():
+    p = ROLLING.parameters(track=10.0, element_size=4.0, advance_step=2.0, press_steps=4)
+    model, program = ROLLING.model(p), ROLLING.program(p)
+    check_freed(System(model), program)
+    wheel = model.body("wheel")
+    heavy = replace(wheel, axle=replace(wheel.axle, force=Amplitude([0, 1], [1e3, 1e3])))
+    bodies = tuple(heavy if body is wheel else body for body in model.bodies)
+    with pytest.raises(ModelError, match=r"'wheel' is free to move along y .* separated"):
+        check_freed(System(replace(model, bodies=bodies)), program)
 
 
 def test_a_presence_below_zero_is_refused():

@@ -17,7 +17,7 @@ def points(x, closed, sticking):
     return ContactResult(
         s=s,
         X=np.stack([s, none]),
-        depth=none,
+        area=none,
         pressure=np.array(closed, dtype=float),
         shear=none,
         pressure_deformed=none,

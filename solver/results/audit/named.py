@@ -208,7 +208,10 @@ class NamedPlacesCheck:
             )
             values, X, s = _on_slave(found, kind), found.X, found.s
             share = self._share(found, kind)
-            values = values * found.depth if number.is_resultant else values
+            if number.is_resultant:
+                level = self._run.outcome.points[number.stage].state.force_scale
+                self._out.add(number.name, recorded, found.force(kind), level)
+                return
             if kind in ("pressure", "shear") and np.isnan(values[found.closed]).any():
                 return
             if (kind, number.take) == ("pressure", "extent"):
@@ -222,7 +225,7 @@ class NamedPlacesCheck:
             if number.minus:
                 values = values - self._values(number, number.minus, kind, part)[0]
             s = _lengths(X)
-        scale = self._scale(kind, values)  # of a force, force per length
+        scale = self._scale(kind, values)
         if not np.isfinite(values).any():
             return
         if number.take in ("maximum", "minimum"):

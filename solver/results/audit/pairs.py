@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from solver.contact.pressure import contact_pressure
 from solver.contact.system import LEAST
 from solver.model.friction import ContactPlaces, lines_of
 from solver.results.audit.surfaces import Surfaces
@@ -36,6 +37,9 @@ vertices across it, with which Hertz's pressure has an error of 4 %."""
 _LITTLE = 0.01
 """Ratio of the force of a pair to the force level; below it the resolution of its contact does not
 count."""
+_CUT = 0.9
+"""Share of a hat that must face the master; below it the pressure at the vertex, which is a mean
+under the whole hat, is too low by more than a tenth."""
 STILL = 1e-3
 """Ratio of the least slip to the elastic approach in the friction work that is the scale of wrong
 slip."""
@@ -80,7 +84,11 @@ def _closed(state: State, number: int) -> NDArray[np.bool_]:
 
 
 def _words(pair: ContactPair) -> str:
-    return f"{'.'.join(pair.slave)} and {'.'.join(pair.master)}"
+    return " and ".join(_names(pair))
+
+
+def _names(pair: ContactPair) -> tuple[str, str]:
+    return ".".join(pair.slave), ".".join(pair.master)
 
 
 class AuditedPair:
@@ -180,15 +188,35 @@ class AuditedPair:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A message if the error of small sliding is smaller than that, but matters."""
-        left_out = self.left_out
+        """Messages if small sliding errs less than that, but it matters; and of a cut peak."""
+        left_out, cut = self.left_out, self._cut_peak
         if not left_out or self.outside:
-            return ()
+            return cut
         far = self.surfaces.curved and left_out.length > _LEFT_OUT.length
-        return (self._describe(left_out),) if far or left_out.off > _LEFT_OUT.off else ()
+        return (*(self._describe(left_out),) * (far or left_out.off > _LEFT_OUT.off), *cut)
+
+    @property
+    def _cut_peak(self) -> tuple[str, ...]:
+        """A message if the largest pressure is where the master ends under the slave."""
+        slave = self.surfaces.slave
+        cut = self._closed & (self.touching.area < _CUT * slave.hats)
+        if not cut.any():
+            return ()
+        pressure, _ = contact_pressure(self._system, self._state, self._number)
+        beside = cut | np.append(cut[1:], False) | np.append(False, cut[:-1])
+        at = int(np.where(beside, pressure, -np.inf).argmax())
+        if pressure[at] < pressure.max():
+            return ()
+        x, y = slave.X[:, slave.vertices[at]]
+        own, other = _names(self._pair)
+        return (
+            f"{own} has its largest pressure at ({x:z.4g}, {y:z.4g}), where it goes on beyond the "
+            f"end of {other}: pressure there is a mean over an edge that is covered in part, and "
+            "too low. Exchange slave and master of this pair, or use smaller elements there",
+        )
 
     def _describe(self, left_out: LeftOut) -> str:
-        slave, master = (".".join(side) for side in (self._pair.slave, self._pair.master))
+        slave, master = _names(self._pair)
         return (
             f"{slave} moved {left_out.way:.2g} mm along {master}, mostly at ({left_out.x:z.4g}, "
             f"{left_out.y:z.4g}): {left_out.sides:.2g} sides of an element, "

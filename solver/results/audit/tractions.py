@@ -90,10 +90,10 @@ class Tractions:
         whole = (share > 1 - _WHOLE) | (share < _WHOLE)
         return whole & np.append(whole[1:], True) & np.append(True, whole[:-1])
 
-    @property
-    def depth(self) -> Array:
-        """Depth across the plane at the vertices [mm]."""
-        return self._depth(self.X)
+    def force(self, kind: str) -> float:
+        """Return the sum of the contact forces of ``pressure`` or ``shear`` [N]."""
+        forces = self._contact.normal if kind == "pressure" else -self._contact.tangential
+        return float(forces.sum())
 
     def _depth(self, x: Array) -> Array:
         """Return the depth at positions x (2, ...) [mm]: thickness, or 2 pi r."""
@@ -102,12 +102,12 @@ class Tractions:
         name = self._surfaces.pair.slave[0]
         return np.full(x.shape[1:], self._model.body(name).thickness)
 
-    def _hats(self, x: Array, *, straight: bool = False) -> Array:
+    def _hats(self, x: Array) -> Array:
         """Return the integrals (n, n) of products of two hats, for nodes at x (2, n_nodes) [mm2].
 
-        Their sum over one index is the area of a hat. ``straight`` uses the chords of the edges.
+        Their sum over one index is the area of a hat.
         """
-        edges = self._chain.edges[:, :2] if straight else self._chain.edges
+        edges = self._chain.edges
         k, at = edges.shape[1], x[:, edges]
         place = at @ shape_functions(_XI, k).T
         along = np.hypot(*(at @ shape_derivatives(_XI, k).T))
@@ -130,11 +130,10 @@ class Tractions:
 
         ``moved`` uses the area in the deformed positions, if sliding is finite.
         """
-        hats = self._hats(self._chain.X, straight=True)
-        total = hats.sum(axis=1)
+        hats = self._hats(self._chain.X)
         area = self._area
         each = np.divide(force, area, out=np.zeros_like(force), where=area > 0)
-        mean = np.divide(hats @ each, total, out=np.zeros_like(force), where=total > 0)
+        mean = np.divide(hats @ each, area, out=np.zeros_like(force), where=area > 0)
         if not (moved and self._surfaces.finite):
             return np.asarray(mean)
         now = self._hats(self._moved).sum(axis=1)

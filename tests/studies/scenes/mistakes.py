@@ -389,6 +389,18 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "supports",
         "body 'upper' can move freely|body 'lower' can move freely",
     ),
+    "load on a body that nothing holds any more": (
+        lambda t: (
+            t["contacts"][0].update(active=["pressed"]) or t["stages"].append({"name": "gone"})
+        ),
+        "supports",
+        "body 'upper' is free to move along y at 1 of stage gone",
+    ),
+    "loads released before they act": (
+        put("stages", 0, "release", True),
+        "stages[0].release",
+        "none has acted before",
+    ),
     "bodies apart": (
         put("bodies", "upper", "move", [0.0, 0.5]),
         "bodies.upper",

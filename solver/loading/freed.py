@@ -1,0 +1,80 @@
+"""Refuse loads on bodies that nothing holds, before anything is computed.
+
+Where all contact pairs of a body are absent, or the bodies are separated, and neither supports nor
+links hold it, a load may not move it: no equilibrium exists.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.fem.wheel import Wheel
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.system import System
+    from solver.fem.part import Part
+    from solver.loading.program import Program
+    from solver.model.model import ContactPair
+
+    Array = NDArray[np.float64]
+
+_LITTLE = 1e-6
+"""Ratio of a resultant to the largest load on its body; below it the resultant is rounding."""
+_ALONG = 0.1
+"""Ratio of the motion in one direction to the largest, above which the direction is named."""
+
+
+def check_freed(system: System, program: Program) -> None:
+    """Raise `ModelError` if a load of a program would move a body while nothing holds it."""
+    for number, linked in enumerate(system.links.rows):
+        part = system.parts[number]
+        if not part.rigid.shape[1] or linked is not None:
+            continue
+        name = part.body.name
+        if name in system.names and not isinstance(part, Wheel):
+            part = system.full(name)  # nothing needs to be condensed
+        pairs = [i.declared for i in system.interfaces if number in (i.slave, i.master)]
+        targets, least = program.targets, None
+        times = [program.laps[0].start, *(target.time for target in targets)]
+        for before, target in zip(times, targets, strict=False):
+            held = not target.apart and not all(pair.absent(target.time) for pair in pairs)
+            if held or not part.force_level(target.time):
+                continue
+            pushed = _pushed(part.during(before, part.start()), target.time)
+            least = least or _LITTLE * max(part.force_level(time) for time in times)
+            if np.linalg.norm(pushed) > least:
+                raise ModelError(
+                    "supports", getattr(part.body, "supports", {}),
+                    f"body {name!r} is free to move {_ways(part, pushed)} at "
+                    f"{program.place(target.time)}, where its load pushes it: no support or link "
+                    f"holds it, and {'bodies are separated' if target.apart else _gone(pairs)}. "
+                    "Let the load end by then, or hold the body",
+                )  # fmt: skip
+
+
+def _gone(pairs: list[ContactPair]) -> str:
+    each = [f"{'.'.join(pair.slave)} and {'.'.join(pair.master)}" for pair in pairs]
+    return f"there is no contact between {', or between '.join(each)}"
+
+
+def _pushed(part: Part, time: float) -> Array:
+    """Return the share (n,) of the nodal forces that works on a part's rigid motions [N]."""
+    Q, _ = np.linalg.qr(part.rigid[part.free])
+    out = np.zeros(part.n)
+    out[part.free] = Q @ (Q.T @ part.external(time)[part.free])
+    return out
+
+
+def _ways(part: Part, pushed: Array) -> str:
+    """Return the directions in which a body would move, in words."""
+    sizes = np.abs(pushed[-3:])  # of a rigid body or a hub
+    if part.meshed:
+        each = pushed.reshape(-1, 2).T
+        sizes = np.append(np.abs(each.mean(axis=1)), np.ptp(each, axis=1).max() / 2)
+    ways = zip(("along x", "along y", "in rotation"), sizes, strict=True)
+    return " and ".join(way for way, size in ways if size > _ALONG * sizes.max())
