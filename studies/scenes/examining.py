@@ -94,7 +94,8 @@ def _build(builder: Builder, scene: tables.SceneFile) -> None:
         system = builder.attempt("", lambda: System(model))
         if system:
             builder.mistakes += _bodies_apart(system)
-            builder.attempt("", lambda: check_freed(system, program_of(scene, builder.meshes)))
+            if not builder.mistakes:  # such as a program of too many increments
+                builder.attempt("", lambda: check_freed(system, program_of(scene, builder.meshes)))
             builder.attempt("results", lambda: Samples(system, view_of(scene)))
             if not any(each.field.startswith("results") for each in builder.mistakes):
                 builder.mistakes += _places_outside(system, scene)
