@@ -156,7 +156,8 @@ def test_a_path_that_kills_its_worker_is_blamed_alone(store: Store, tmp_path: Pa
     begun = [mark.name.split("-")[-1] for mark in sorted(tmp_path.glob("0.0-*"))]
     # the last messages of a process that kills itself may be lost: then two more workers die
     assert len(begun) in (5, 7), "the fatal path at least twice, the others once"
-    assert begun[0] == begun[1] and begun[-2] == begun[-1], "one worker has the paths of a bundle"
+    # of the later ones too, but Dask may close a worker that has just been started
+    assert begun[0] == begun[1], "one worker has the paths of a bundle"
     progress = [progress for _, progress in ends]
     assert progress == sorted(progress) and progress[-1] == pytest.approx(1.0)
 
