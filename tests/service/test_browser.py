@@ -294,11 +294,7 @@ def test_a_study_of_points_is_watched_to_its_end_and_its_runs_are_marks(
 
 
 def test_a_study_is_made_by_the_form(context: Any, service: Server) -> None:
-    empty = '<svg xmlns="http://www.w3.org/2000/svg"/>'  # the fake scene has no bodies to draw
     with opened(context, base(service) + "/ui/new?scene=fake") as page:
-        page.route(
-            "**/draw.png*", lambda asked: asked.fulfill(content_type="image/svg+xml", body=empty)
-        )
         page.fill("[name=name]", "by-form")
         page.fill("[name='p.friction']", "0, 0.3")
         page.fill("[name='p.load_ratio']", "much")

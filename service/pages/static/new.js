@@ -51,8 +51,8 @@ function costs(estimate) {
 }
 
 // The picture depends on the parameters alone; one with a mistake is not asked for.
-function draw() {
-  const fields = [...new FormData(form)].filter(([name, value]) => name === "scene" || (name.startsWith("p.") && value));
+function draw(checked) {
+  const fields = [...checked].filter(([name, value]) => name === "scene" || (name.startsWith("p.") && value));
   const address = `${figure.dataset.address}?${new URLSearchParams(fields)}`;
   if (drawn !== address) {
     picture.src = sheet.href = drawn = address;
@@ -74,9 +74,10 @@ picture.addEventListener("error", () => said("none"));
 async function check() {
   asked?.abort();
   asked = new AbortController();
+  const sent = new FormData(form); // one may type on before the answer comes
   try {
     const answer = await fetch(form.action, {
-      method: "POST", body: new URLSearchParams(new FormData(form)), headers: { accept: "application/json" }, signal: asked.signal,
+      method: "POST", body: new URLSearchParams(sent), headers: { accept: "application/json" }, signal: asked.signal,
     });
     if (!answer.ok || answer.redirected) {
       costs(null);
@@ -86,7 +87,7 @@ async function check() {
     const found = await answer.json();
     told(found.wrong);
     costs(found.estimate);
-    if (found.estimate) draw();
+    if (found.estimate) draw(sent);
     else said(sheet.hidden ? "wait" : "before");
     [found.toml, found.curl, found.python].forEach((each, k) => (copies[k].textContent = each));
   } catch (error) {
