@@ -107,8 +107,7 @@ class Candidates(OnParts):
     @property
     def stays(self) -> tuple[bool, ...]:
         """For each part, whether neither pairs nor links hold it: it stays where it is."""
-        each = zip(self.holds, self.links.rows, strict=True)
-        return tuple(not held and rows is None for held, rows in each)
+        return self.links.loose(self.holds)
 
     def smooth(self) -> Candidates:
         """Return the same candidates without friction."""

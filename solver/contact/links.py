@@ -69,6 +69,11 @@ class Links(OnParts):
         """Whether springs resist any motion."""
         return bool(self.compliance.any())
 
+    def loose(self, paired: Sequence[bool]) -> tuple[bool, ...]:
+        """Return for each part whether nothing holds it, no link and none of the pairs given."""
+        each = zip(self.rows, paired, strict=True)
+        return tuple(rows is None and not held for rows, held in each)
+
     def off(self, u: Sequence[Array], forces: Array) -> Array:
         """Return how far the conditions (c,) are not met by unknowns and forces [mm]."""
         out = self.compliance * forces

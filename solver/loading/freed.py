@@ -12,6 +12,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.fem.wheel import Wheel
+from solver.loading.step import moving
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,7 +46,8 @@ def check_freed(system: System, program: Program) -> None:
             held = not target.apart and not all(pair.absent(target.time) for pair in pairs)
             if held or not part.force_level(target.time):
                 continue
-            pushed = _pushed(part.during(before, part.start()), target.time)
+            own = part.during(before, part.start())
+            pushed = moving(own, own.external(target.time))
             least = least or _LITTLE * max(part.force_level(time) for time in times)
             if np.linalg.norm(pushed) > least:
                 raise ModelError(
@@ -60,14 +62,6 @@ def check_freed(system: System, program: Program) -> None:
 def _gone(pairs: list[ContactPair]) -> str:
     each = [f"{'.'.join(pair.slave)} and {'.'.join(pair.master)}" for pair in pairs]
     return f"there is no contact between {', or between '.join(each)}"
-
-
-def _pushed(part: Part, time: float) -> Array:
-    """Return the share (n,) of the nodal forces that works on a part's rigid motions [N]."""
-    Q, _ = np.linalg.qr(part.rigid[part.free])
-    out = np.zeros(part.n)
-    out[part.free] = Q @ (Q.T @ part.external(time)[part.free])
-    return out
 
 
 def _ways(part: Part, pushed: Array) -> str:

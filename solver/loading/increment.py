@@ -239,9 +239,9 @@ class Increment:
         if self.guess is None:
             return self.start
         system, u = self.system, list(self.guess.u)
-        holds = system.holds(self.start.time, self.time)
-        for k, (part, linked) in enumerate(zip(system.parts, system.links.rows, strict=True)):
-            if part.rigid.shape[1] and linked is None and not holds[k]:
+        stays = system.links.loose(system.holds(self.start.time, self.time))
+        for k, part in enumerate(system.parts):
+            if stays[k] and part.rigid.shape[1]:
                 u[k] = self.start.u[k]
         return replace(self.guess, u=tuple(u))
 

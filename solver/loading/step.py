@@ -59,14 +59,14 @@ def out_of_balance(
     """
     inner = on_parts(system, candidates, forces)
     each = zip(system.parts, residuals, inner, candidates.stays, strict=True)
-    return tuple(_without_resultant(part, r + c) if stays else r + c for part, r, c, stays in each)
+    return tuple(r + c - moving(part, r + c) if stays else r + c for part, r, c, stays in each)
 
 
-def _without_resultant(part: Part, force: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return nodal forces (n,) that do no work on the rigid motions of a part."""
+def moving(part: Part, force: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the share (n,) of nodal forces that works on the rigid motions of a part [N]."""
     Q, _ = np.linalg.qr(part.rigid[part.free])
-    out = force.copy()
-    out[part.free] -= Q @ (Q.T @ force[part.free])
+    out = np.zeros(part.n)
+    out[part.free] = Q @ (Q.T @ force[part.free])
     return out
 
 
