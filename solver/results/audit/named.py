@@ -11,7 +11,8 @@ from solver.results.audit.compared import AREA, LEAST_STRAIN, LIMIT, MEASURED, C
 from solver.results.audit.links import linked
 from solver.results.audit.plain import load_factor
 from solver.results.audit.sources import between
-from solver.results.audit.values import Located, flowed
+from solver.results.audit.values import Located, at_nodes
+from solver.results.body_fields import BODY_FIELDS, STORED
 from solver.tensors import AXES, components
 
 if TYPE_CHECKING:
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
 _LEAST_LENGTH = 1e-9
 """Least scale of displacement, gap and slip, over the size of the bodies."""
 _PARTS = {name: k for names in (components(6), AXES) for k, name in enumerate(names)}
-_FIELDS = ("stress", "mises", "plastic_strain", "plastic_tensor", "strain")
-"""Fields along lines and at points."""
-_SIGNED = ("stress", "plastic_tensor", "strain")
 _ROUNDED = 1e-9
 """Largest difference of two equal times of the program."""
 
@@ -90,7 +88,7 @@ class NamedPlacesCheck:
             self._out.add("line_x", X, line.X, float(np.abs(line.X).max()))
             s = _lengths(line.X)
             self._out.add("line_s", self._field("line_s")[k], s, s[-1])
-            stored = {name: self._field(f"line_{name}")[k] for name in _FIELDS}
+            stored = {name: self._field(f"line_{name}")[k] for name in STORED}
             at = some(X.shape[1], *stored.values())
             stored = {name: values[..., at] for name, values in stored.items()}
             self._fields("line", line.body, line.X[:, at], stored)
@@ -99,7 +97,7 @@ class NamedPlacesCheck:
         for k, point in enumerate(self._places.points.values()):
             X = np.array([self._field(f"point_{a}")[k] for a in AXES[: len(point.X)]])
             self._out.add("point_x", X, point.X[:, 0], float(np.abs(point.X).max()))
-            stored = {name: self._field(f"point_{name}")[k][..., None] for name in _FIELDS}
+            stored = {name: self._field(f"point_{name}")[k][..., None] for name in STORED}
             places = self._fields("point", point.body, point.X, stored)
             for j, stage in enumerate(self._run.view.stages):
                 moved = self._source.fields(point.body, stage).displacement
@@ -114,9 +112,9 @@ class NamedPlacesCheck:
         for k, stage in enumerate(self._run.view.stages):
             fields = self._source.fields(body, stage)
             for name, recorded in stored.items():
-                nodal = flowed(fields) if name == "plastic_strain" else getattr(fields, name)
+                nodal = at_nodes(fields, name)
                 own = places.of(nodal)
-                own = own if name in _SIGNED else np.maximum(own, 0.0)
+                own = own if BODY_FIELDS[name].over else np.maximum(own, 0.0)
                 self._out.add(f"{kind}_{name}", recorded[k], own, self._scale(name, nodal))
                 self._out.absent(f"{kind}_{name}", recorded[k], places.outside)
         return places
@@ -278,7 +276,7 @@ class NamedPlacesCheck:
             X, mises, flow = fields.at_points
             values = mises if kind == "mises" else flow
         else:
-            nodal = flowed(fields) if kind == "plastic_strain" else getattr(fields, kind)
+            nodal = at_nodes(fields, kind)
             places = None if X is None else Located(self._source.plain(body), X)
             values = nodal if places is None else places.of(nodal)
             values = _part(values, part) if part else np.maximum(values, 0.0)

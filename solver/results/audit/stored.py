@@ -20,15 +20,14 @@ from solver.results.audit.compared import LEAST_STRAIN, LIMIT, MEASURED, STEADY,
 from solver.results.audit.figures import AUDIT
 from solver.results.audit.named import NamedPlacesCheck
 from solver.results.audit.sources import OfStates, along, between
-from solver.results.audit.values import Located, flowed
+from solver.results.audit.values import Located, at_nodes, flowed
+from solver.results.body_fields import BODY_FIELDS, STORED
 from solver.tensors import AXES, components
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
-    from solver.results.audit.recomputed import BodyFields, Recomputed
+    from solver.results.audit.recomputed import Recomputed
     from solver.results.named_places import NamedPlaces
     from solver.results.record import Record
     from solver.results.run import FinishedRun
@@ -168,9 +167,9 @@ class _Viewed:
             "residual_stress": (view.unloaded, _itself),
             "stress_difference": (view.loaded, self._difference),
         }
-        staged = {"map_stress": _stress, "map_mises": _mises, "map_strain": _strain,
-                  "map_plastic_tensor": _plastic}  # fmt: skip
-        names = [*single, *staged, "plastic_strain", "map_plastic_strain"]
+        staged = {f"map_{field}": (field, view.stages) for field in STORED}
+        staged["plastic_strain"] = "plastic_strain", (view.unloaded,)
+        names = [*single, *staged]
         there = {name: values for name in names if (values := self._stored(name)) is not None}
         if not there:
             return
@@ -180,12 +179,12 @@ class _Viewed:
         places = {name: Located(self._source.plain(name), X) for name in view.surfaces}
         bodies = tuple(places.values())
 
-        def sampled(of: Callable[[BodyFields], Array], stage: str) -> Array:
-            """Return values (..., n), each of the first body that contains the place."""
+        def sampled(field: str, stage: str) -> Array:
+            """Return a field (..., n), each value of the first body that contains the place."""
             out = np.full(len(at), np.nan)
             unsure = np.zeros(len(at), dtype=bool)
             for name, where in places.items():
-                here = where.of(of(self._source.fields(name, stage)))
+                here = where.of(at_nodes(self._source.fields(name, stage), field))
                 here = np.where(unsure, np.nan, here)
                 out = np.where(np.isnan(out), here, out)
                 unsure |= ~where.inside & ~where.outside
@@ -193,22 +192,19 @@ class _Viewed:
 
         for name, (stage, of) in single.items():
             if name in flat:
-                own = of(sampled(_stress, stage))
+                own = of(sampled("stress", stage))
                 self._against(name, flat[name][..., at], own, bodies, self.stress_scale, stage)
-        for name, nodal in staged.items():
-            for k, stage in enumerate(view.stages if name in flat else ()):
-                own = sampled(nodal, stage)
-                own = np.maximum(own, 0.0) if nodal is _mises else own
-                scale = self.stress_scale
-                if nodal in (_strain, _plastic):
-                    scale = self._strain_scale(np.abs(flat[name][k]))
-                self._against(name, flat[name][k][..., at], own, bodies, scale, stage)
-        strains = {"plastic_strain": (view.unloaded,), "map_plastic_strain": view.stages}
-        for name, stages in strains.items():
+        for name, (field, stages) in staged.items():
+            declared = BODY_FIELDS[field]
             for k, stage in enumerate(stages if name in flat else ()):
-                own = np.maximum(sampled(flowed, stage), 0.0)
+                own = sampled(field, stage)
+                own = own if declared.over else np.maximum(own, 0.0)
                 values = flat[name] if name == "plastic_strain" else flat[name][k]
-                self._against(name, values[at], own, bodies, self._strain_scale(values))
+                strains = declared.units == "1"
+                scale = self._strain_scale(np.abs(values)) if strains else self.stress_scale
+                # equivalent plastic strain is exact in all stages
+                judged = "" if field == "plastic_strain" else stage
+                self._against(name, values[..., at], own, bodies, scale, judged)
 
     def _difference(self, stress: Array) -> Array:
         """Return the difference of the principal stresses in the plane of the map (n,)."""
@@ -341,22 +337,6 @@ class _Viewed:
             there = stress[component, off <= off.min() + 1e-9 * np.abs(places).max()]
             near = np.nanmin(np.abs(there - own[component]))
             self._out.add(f"{name}_{axes[0]}", near, 0.0, self.stress_scale)
-
-
-def _stress(fields: BodyFields) -> Array:
-    return fields.stress
-
-
-def _mises(fields: BodyFields) -> Array:
-    return fields.mises
-
-
-def _strain(fields: BodyFields) -> Array:
-    return fields.strain
-
-
-def _plastic(fields: BodyFields) -> Array:
-    return fields.plastic_tensor
 
 
 def _itself(values: Array) -> Array:

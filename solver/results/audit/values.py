@@ -47,6 +47,12 @@ def flowed(fields: BodyFields) -> Array:
     return np.maximum(fields.accumulated, 0.0)
 
 
+def at_nodes(fields: BodyFields, name: str) -> Array:
+    """Return the field of this name in `BODY_FIELDS` at the nodes."""
+    found: Array = flowed(fields) if name == "plastic_strain" else getattr(fields, name)
+    return found
+
+
 class StateFields:
     """`BodyFields` of a body from its displacements (n,), its internal variables and its loads."""
 
