@@ -14,9 +14,9 @@ from anyio.to_thread import run_sync
 
 from service.job import Job
 from service.jobs import Jobs
+from service.scenes import scene_name
 from service.schemas import StudyDetail, StudyRun, StudySummary, Window
 from studies import Store
-from studies.definition.identity import is_id
 from studies.definition.sweep import labels, positions
 from studies.definition.vocabulary import taken
 from studies.storage.seal import state_of
@@ -33,14 +33,6 @@ CHOOSE = ("goal", "refine", "fit")
 def summary(job: Job) -> StudySummary:
     """Return the state of a study."""
     return StudySummary(**_columns(job))
-
-
-def scene_name(store: Store, known: str) -> str:
-    """Return the name of a scene that a study calls by its name or id; empty if it is gone."""
-    if not is_id(known):
-        return known
-    scene = store.scene(known, whole=False)
-    return scene.name if scene else ""
 
 
 @dataclass(slots=True)

@@ -18,12 +18,12 @@ import numpy as np
 from service.job import Job
 from service.jobs import Jobs
 from service.overview import PENDING, chooses, searched_at
+from service.scenes import scene_of
 from solver.scenes import Scene
 from studies import Store
 from studies.definition.parameters import parameters_of
 from studies.definition.sweep import labels, linked_values
 from studies.definition.vocabulary import STATUSES, taken
-from studies.scenes.registry import known_names, scene_named
 from studies.storage.dataset import axis_attributes
 from studies.storage.seal import state_of
 from studies.views.figures import group_of
@@ -64,7 +64,7 @@ class Tables:
 
     def _made(self, job: Job) -> RunTable:
         study, runs = self.jobs.study(job.id), self.jobs.runs(job.id)
-        scene = scene_of_study(self.store, job.scene)
+        scene = scene_of(self.store, job.scene)
         axes = {name: labels(name, axis) for name, axis in study["sweep"].items()}
         asks, allow = chooses(study), study.get("allow", [])
         outcome, said = (np.full(len(runs), text, dtype=object) for text in (PENDING, ""))
@@ -98,13 +98,6 @@ class Tables:
             column_of(MESSAGE, said, "run"),
         ]
         return RunTable(axes=axes, columns={each.name: each for each in columns})
-
-
-def scene_of_study(store: Store, name: str) -> Scene | None:
-    """Return a scene by its name, or the id of a posted one; None if it is not known here."""
-    if scene := store.scene(store.scene_id(name), whole=False):
-        return scene
-    return scene_named(name) if name in known_names() else None
 
 
 def _asked(

@@ -50,8 +50,9 @@ from service.pages.run import audited, numbers_shown, parameters_shown
 from service.routes.health import health
 from service.routes.numbers import outlined
 from service.routes.scenes import post_scene
+from service.scenes import known_scene, scene_name, scene_of
 from service.schemas import ContentId, StudyFilter, Window
-from service.table import Tables, scene_of_study
+from service.table import Tables
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
@@ -116,7 +117,7 @@ def studies_page(
     wanted = {"state" if name == "status" else name: value for name, value in which.items()}
     found, total = jobs.page(limit=window.limit, offset=window.offset, **wanted)
     items = [(overview.summary(job), _said(jobs, job)) for job in found]
-    scenes = {each.scene: overview.scene_name(store, each.scene) for each, _ in items}
+    scenes = {each.scene: scene_name(store, each.scene) for each, _ in items}
     return page(
         request,
         "studies",
@@ -177,7 +178,7 @@ def _study(
     request: Request, study: Mapping[str, Any], tables: Tables, found: Found | None
 ) -> Response:
     table = tables.get(study["id"])
-    scene = scene_of_study(tables.store, study["scene"])
+    scene = scene_of(tables.store, study["scene"])
     query = dict(request.query_params)
     numbers = [each.name for each in chosen.usual(table)]
     number = query.get("number", "")
@@ -265,9 +266,9 @@ def _run(
 def _scene_of_run(store: Store, name: str) -> Scene | None:
     """Return the scene of a run, which has the name of its scene, not the id of a posted one."""
     if name in known_names():
-        return scene_of_study(store, name)
+        return scene_of(store, name)
     posted = store.scenes(limit=2, name=name)
-    return scene_of_study(store, posted[0].id) if len(posted) == 1 else None
+    return scene_of(store, posted[0].id) if len(posted) == 1 else None
 
 
 @router.get("/compare")
@@ -397,14 +398,6 @@ async def make(
         costs = None if found is None else dataclasses.asdict(found.estimate)
         return JSONResponse({"wrong": wrong, "estimate": costs, **_copies(request, content, scene)})
     return await run_in_threadpool(_form, request, store, scene_name, given, wrong, found)
-
-
-def known_scene(store: Store, name: str) -> Scene:
-    """Return a scene of the service; raise `NotFound` if there is none of this name."""
-    scene = scene_of_study(store, name)
-    if scene is None:
-        raise NotFound(f"no scene has this name; there are {', '.join(known_names())}")
-    return scene
 
 
 def _copies(request: Request, content: dict[str, Any], scene: Scene) -> dict[str, str]:

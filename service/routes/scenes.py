@@ -10,12 +10,12 @@ from typing import Annotated, Any
 from fastapi import APIRouter, File, Query, Request, Response, UploadFile
 
 from service.dependencies import TheInspector, TheKeeper, TheName, ThePictures, TheStore
-from service.errors import REFUSED, NotFound
+from service.errors import REFUSED
 from service.maps import PICTURE
+from service.scenes import known_scene
 from service.schemas import ContentId, KeptScene, SceneSummary, SketchQuery, Window
-from solver.scenes import Scene
-from studies import Store, StudyError, scene_schema
-from studies.scenes.registry import known_names, known_scenes, scene_named
+from studies import StudyError, scene_schema
+from studies.scenes.registry import known_scenes
 from studies.scenes.scene import FileScene
 
 router = APIRouter(prefix="/scenes", tags=["scenes"])
@@ -82,23 +82,11 @@ def get_scene(name: str, store: TheStore) -> dict[str, Any]:
 
     `name` is that of a scene, or the id of a posted one.
     """
-    found, known = _scene(name, store)
+    known = store.scene_id(name)
+    found = known_scene(store, known)
     posted = known != found.name
     entry = {"id": known, "name": found.name, "summary": found.summary} if posted else {}
     return scene_schema(found) | entry
-
-
-def _scene(name: str, store: Store) -> tuple[Scene, str]:
-    """Return a scene, a posted one without its meshes, and its name or id.
-
-    Raises `NotFound` if there is none.
-    """
-    known = store.scene_id(name)
-    if kept := store.scene(known, whole=False):
-        return kept, known
-    if name not in known_names():
-        raise NotFound(f"no scene has this name; there are {', '.join(known_names())}")
-    return scene_named(name), name
 
 
 @router.get("/{name}/draw.png", responses={**PICTURE, **REFUSED})
@@ -116,7 +104,8 @@ async def draw_scene(
     Beside the queries named below, every parameter of the scene is one: `?friction=0.3`. `name` is
     that of a scene, or the id of a posted one.
     """
-    _, known = await asyncio.to_thread(_scene, name, store)
+    known = await asyncio.to_thread(store.scene_id, name)
+    await asyncio.to_thread(known_scene, store, known)
     draw = partial(inspector.draw, store.directory, known, query, caller)
     return await pictures.answer(request, (known, query), draw)
 
