@@ -17,14 +17,17 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from studies.definition.spaced import rounded
 
 Point = tuple[float, ...]
 """A value for each axis that is a number."""
-
+Known = Mapping[Point, tuple[float, ...]]
+"""The numbers of runs, by where they are."""
+Misses = Sequence[tuple[float, ...]]
+"""Of each axis, the largest miss of each number on the edges along it."""
 
 KINK = 0.5
 """Part of a miss in the middle of an edge that may be left once the middle is known, where nothing
@@ -91,6 +94,49 @@ class Cell(NamedTuple):
             Cell(tuple(low for low, _ in box), tuple(high for _, high in box), self.branch, halved)
             for box in itertools.product(*ends)
         ]
+
+    @property
+    def points(self) -> list[Point]:
+        """Where it has runs: at corners, middles of edges, and the first at their centre."""
+        own = [*self.corners, *(edge.middle for edge in self.edges)]
+        return own if any(self.halved) else list(dict.fromkeys([*own, self.centre]))
+
+    def misses(self, known: Known) -> Misses:
+        """Return by how much the ends of the edges miss what is known in their middles."""
+        count = len(known[self.low])
+        most = [[0.0] * count for _ in self.low]
+        for axis, low, high, mid in self.edges:
+            share = (mid[axis] - low[axis]) / (high[axis] - low[axis])
+            for k, (a, b, m) in enumerate(zip(known[low], known[high], known[mid], strict=True)):
+                most[axis][k] = max(most[axis][k], abs(m - a - (b - a) * share))
+        return [tuple(each) for each in most]
+
+    def twists(self, known: Known) -> tuple[float, ...]:
+        """Return by how much each number at the centre may be off without a miss on any edge.
+
+        A kink through two opposite corners of a face leaves no miss on its edges: all that tells
+        is that its corners are in no plane.
+        """
+        most = [0.0] * len(known[self.low])
+        for (a, b), corner in itertools.product(
+            itertools.combinations(range(len(self.low)), 2), self.corners
+        ):
+            if corner[a] != self.low[a] or corner[b] != self.low[b]:
+                continue
+            one, other = ((*corner[:axis], self.high[axis], *corner[axis + 1 :]) for axis in (a, b))
+            both = (*one[:b], self.high[b], *one[b + 1 :])
+            corners = zip(*(known[at] for at in (corner, one, other, both)), strict=True)
+            for k, (p, q, r, s) in enumerate(corners):
+                most[k] = max(most[k], abs(p - q - r + s) / 4.0)
+        return tuple(most)
+
+    def off(self, known: Known, at: Point, there: tuple[float, ...]) -> tuple[float, ...]:
+        """Return by how much its runs miss the numbers of another run in it."""
+        parts = weights(self.low, self.high, at).items()
+        return tuple(
+            abs(number - sum(weight * known[each][k] for each, weight in parts))
+            for k, number in enumerate(there)
+        )
 
 
 def middle(low: float, high: float) -> float | None:

@@ -30,7 +30,7 @@ import numpy as np
 
 from solver.parameters import is_number
 from solver.scenes import Scene
-from studies.definition.cells import KINK, Cell, Point, between, weights
+from studies.definition.cells import KINK, Cell, Known, Misses, Point, between
 from studies.definition.line import Read
 from studies.definition.parameters import in_unit, parameters_of
 from studies.definition.place import Chooser
@@ -94,7 +94,7 @@ class Refine:
     def first(self, branches: int) -> int:
         """Return the number of runs of the first round."""
         cells = self.cells(branches)
-        return len({(cell.branch, point) for cell in cells for point in points_of(cell)})
+        return len({(cell.branch, point) for cell in cells for point in cell.points})
 
 
 class Wanted(NamedTuple):
@@ -142,10 +142,6 @@ class _Halving(NamedTuple):
 def _unread(row: Mapping[str, Any]) -> Read:
     """Give no variable of a run: what its row has is enough."""
     return lambda name: None
-
-
-Misses = Sequence[tuple[float, ...]]
-"""Of each axis, the largest miss of each number on the edges along it."""
 
 
 @dataclass(slots=True)
@@ -289,7 +285,7 @@ class Refinement(Chooser):
     def _open(self, cell: Cell, points: Sequence[Point] = ()) -> None:
         """Ask for some runs of a cell: by default those that it must have."""
         stage, lacks = _round(cell), 0
-        for wanted in (Wanted(cell.branch, point) for point in points or points_of(cell)):
+        for wanted in (Wanted(cell.branch, point) for point in points or cell.points):
             self.asked[wanted] = min(self.asked.get(wanted, stage), stage)
             if wanted not in self.rows:
                 self._waits.setdefault(wanted, []).append(cell)
@@ -313,7 +309,7 @@ class Refinement(Chooser):
         """Settle a cell whose runs are known, or keep it to be divided."""
         del self._lacks[cell]
         self._rounds -= Counter([_round(cell)])
-        known = {at: self.number(Wanted(cell.branch, at)) for at in points_of(cell)}
+        known = {at: self.number(Wanted(cell.branch, at)) for at in cell.points}
         there = {at: each for at, each in known.items() if each is not None}
         every, left = set(range(len(cell.low))), ()
         if not there:
@@ -325,20 +321,20 @@ class Refinement(Chooser):
             }
             miss, axes = math.inf, changes or every
         else:
-            misses = _misses(cell, there)
+            misses = cell.misses(there)
             ratios = [self._ratio(each) for each in misses]
             worst = sorted(every, key=lambda axis: -ratios[axis])
             free = [k for k in worst if ratios[k] > 1.0 and cell.divisible(k, self.refine.halvings)]
             miss, axes = max(ratios), set(free[:1]) or {k for k in worst if ratios[k] > 1.0}
             left = tuple(KINK * sum(each) for each in zip(*misses, strict=True))
-            twist = self._ratio(_twists(cell, there))
+            twist = self._ratio(cell.twists(there))
             if axes and not free and twist > 1.0:
                 axes = self._across(cell)  # a slanting kink is resolved along any axis
             if not axes:
                 centre = Wanted(cell.branch, cell.centre)
                 if centre in self.rows:
                     number = self.number(centre)
-                    missed = _off(cell, there, centre.point, number) if number else None
+                    missed = cell.off(there, centre.point, number) if number else None
                     miss = self._ratio(missed) if missed else math.inf
                     axes = self._across(cell) if miss > 1.0 else axes
                 elif twist > 1.0:
@@ -377,11 +373,11 @@ class Refinement(Chooser):
             if not left:
                 self._settle(RefinedCell(cell, state))
                 continue
-            known = {at: self._numbers[Wanted(cell.branch, at)] or () for at in points_of(cell)}
+            known = {at: self._numbers[Wanted(cell.branch, at)] or () for at in cell.points}
             along, turns = self._left(cell, known, lines)
             misses = [tuple(float(sum(each)) for each in zip(*along, strict=True))]
             if Wanted(cell.branch, cell.centre) not in self.rows:
-                misses.append(tuple(map(min, zip(_twists(cell, known), turns, strict=True))))
+                misses.append(tuple(map(min, zip(cell.twists(known), turns, strict=True))))
             axes: set[int] = set()
             if self._ratio(misses[0]) > 1.0:
                 worst = sorted(range(len(along)), key=lambda axis: -self._ratio(along[axis]))
@@ -391,7 +387,7 @@ class Refinement(Chooser):
                 number = self.number(Wanted(cell.branch, at))
                 if at in known or number is None:
                     continue
-                misses.append(_off(cell, known, at, number))
+                misses.append(cell.off(known, at, number))
                 if self._ratio(misses[-1]) > 1.0:
                     ends = zip(cell.low, at, cell.high, strict=True)
                     axes |= {k for k, (low, x, high) in enumerate(ends) if low < x < high}
@@ -413,7 +409,7 @@ class Refinement(Chooser):
         return {line: sorted(values) for line, values in found.items()}
 
     def _left(
-        self, cell: Cell, known: Mapping[Point, tuple[float, ...]], lines: Mapping[Any, list[float]]
+        self, cell: Cell, known: Known, lines: Mapping[Any, list[float]]
     ) -> tuple[Misses, tuple[float, ...]]:
         """Return of each axis the largest error of each number that is left on the edges along it.
 
@@ -477,7 +473,7 @@ class Refinement(Chooser):
             for cell, axes, _, left in sorted(
                 self._halvings.pop(stage), key=lambda each: each.order
             ):
-                parts = {each: points_of(each) for each in cell.parts(axes)} if axes else {}
+                parts = {each: each.points for each in cell.parts(axes)} if axes else {}
                 asks = parts or {cell: [cell.centre]}
                 new = {Wanted(cell.branch, at) for points in asks.values() for at in points}
                 more = sum(each not in self.asked for each in new)
@@ -497,12 +493,6 @@ class Refinement(Chooser):
         return len(self.asked) + sum((each + 1) * (2**n - 1) * cells[k] for k, n in rounds.items())
 
 
-def points_of(cell: Cell) -> list[Point]:
-    """Return where a cell has runs: at corners, middles of edges, and the first at their centre."""
-    own = [*cell.corners, *(edge.middle for edge in cell.edges)]
-    return own if any(cell.halved) else list(dict.fromkeys([*own, cell.centre]))
-
-
 def _round(cell: Cell) -> int:
     """Return the round in which a cell asks for its runs, from 0 on."""
     return sum(cell.halved)
@@ -513,53 +503,11 @@ def _volume(cell: Cell) -> float:
     return 0.5 ** sum(cell.halved)
 
 
-def _misses(cell: Cell, known: Mapping[Point, tuple[float, ...]]) -> Misses:
-    """Return by how much the ends of the edges miss what is known in their middles."""
-    count = len(known[cell.low])
-    most = [[0.0] * count for _ in cell.low]
-    for axis, low, high, mid in cell.edges:
-        share = (mid[axis] - low[axis]) / (high[axis] - low[axis])
-        for k, (a, b, m) in enumerate(zip(known[low], known[high], known[mid], strict=True)):
-            most[axis][k] = max(most[axis][k], abs(m - a - (b - a) * share))
-    return [tuple(each) for each in most]
-
-
-def _twists(cell: Cell, known: Mapping[Point, tuple[float, ...]]) -> tuple[float, ...]:
-    """Return by how much each number at the centre may be off without a miss on any edge.
-
-    A kink through two opposite corners of a face leaves no miss on its edges: all that tells is
-    that its corners are in no plane.
-    """
-    most = [0.0] * len(known[cell.low])
-    for (a, b), corner in itertools.product(
-        itertools.combinations(range(len(cell.low)), 2), cell.corners
-    ):
-        if corner[a] != cell.low[a] or corner[b] != cell.low[b]:
-            continue
-        one, other = ((*corner[:axis], cell.high[axis], *corner[axis + 1 :]) for axis in (a, b))
-        both = (*one[:b], cell.high[b], *one[b + 1 :])
-        corners = zip(*(known[at] for at in (corner, one, other, both)), strict=True)
-        for k, (p, q, r, s) in enumerate(corners):
-            most[k] = max(most[k], abs(p - q - r + s) / 4.0)
-    return tuple(most)
-
-
 def _beyond(line: Sequence[float], at: float, step: float) -> float | None:
     """Return the run of a line beyond another one, about a step away; None if there is none."""
     k = bisect_left(line, at + step)
     near = [each for each in line[max(k - 1, 0) : k + 1] if (each - at) * step > 0.0]
     return min(near, key=lambda each: abs(math.log((each - at) / step)), default=None)
-
-
-def _off(
-    cell: Cell, known: Mapping[Point, tuple[float, ...]], at: Point, there: tuple[float, ...]
-) -> tuple[float, ...]:
-    """Return by how much the runs of a cell miss the numbers of another run in it."""
-    parts = weights(cell.low, cell.high, at).items()
-    return tuple(
-        abs(number - sum(weight * known[each][k] for each, weight in parts))
-        for k, number in enumerate(there)
-    )
 
 
 def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
