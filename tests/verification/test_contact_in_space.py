@@ -74,17 +74,18 @@ def test_hertz_holds_whichever_side_is_the_slave_and_however_it_is_divided(
     assert found.audit("loaded").figures["audit_contact_resolution"] < 0.06
 
 
-CLAIMED = ((9, 0.02), (5, 0.10), (3, 0.13))
-"""Vertices across a contact, and the largest error of the peak of Hertz with so many."""
+CLAIMED = ((9, 0.01, 0.02), (5, 0.04, 0.1), (3, 0.1, 0.2))
+"""Vertices across a contact, and the largest error of the peak of Hertz with so many: in line and
+in point contact. Of three the outer two may hardly touch."""
 
 
-def check_claims(found: Solution, vertices: int, exact: float) -> None:
+def check_claims(found: Solution, vertices: int, exact: float, *, point: bool) -> None:
     """Check that a contact with so many vertices is as right as the pages say, or fails."""
     audit = found.audit("loaded")
     assert audit.passed == (vertices >= 3)
     if audit.passed:
         error = abs(float(found.contact().pressure.max()) / exact - 1.0)
-        assert error < next(claim for least, claim in CLAIMED if vertices >= least)
+        assert error < next(claims[point] for least, *claims in CLAIMED if vertices >= least)
         assert error < audit.figures["audit_error_contact"]
     else:
         assert [text.split()[0] for text in audit.violations] == ["audit_contact_resolution"]
@@ -93,10 +94,11 @@ def check_claims(found: Solution, vertices: int, exact: float) -> None:
 @pytest.mark.parametrize("size", [0.1, 0.2, 0.3, 0.475, 0.5, 0.7, 1.0])
 def test_of_line_contact_what_passes_is_as_right_as_it_claims(size: float) -> None:
     found = pressed("plane", 60, size)
-    check_claims(found, int((found.loaded.state.contacts[0].normal > 0).sum()), PEAK)
+    touching = int((found.loaded.state.contacts[0].normal > 0).sum())
+    check_claims(found, touching, PEAK, point=False)
 
 
-@pytest.mark.parametrize("size", [0.11, 0.18, 0.24, 0.3, 0.45, 0.55])
+@pytest.mark.parametrize("size", [0.11, 0.2, 0.24, 0.3, 0.455, 0.55])
 def test_of_point_contact_what_passes_is_as_right_as_it_claims(size: float) -> None:
     """The vertex on the axis is seen once, the others stand for both sides."""
     fine = np.arange(0.0, 1.2, size)
@@ -109,7 +111,8 @@ def test_of_point_contact_what_passes_is_as_right_as_it_claims(size: float) -> N
     pair = ContactPair(slave=("space", "top"), master=("ball", "cap"))
     found = solve(Model(bodies=(space,), rigid=(ball,), contacts=(pair,)), stages=ONCE)
     touching = int((found.loaded.state.contacts[0].normal > 0).sum())
-    check_claims(found, 2 * touching - 1, 2 * MODULUS * HALF_WIDTH / (np.pi * RADIUS))
+    exact = 2 * MODULUS * HALF_WIDTH / (np.pi * RADIUS)
+    check_claims(found, 2 * touching - 1, exact, point=True)
 
 
 @pytest.mark.parametrize("half", ["ball", "plate"])
