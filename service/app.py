@@ -34,7 +34,7 @@ from service.overview import Details
 from service.pages import routes as pages
 from service.pool import Pool
 from service.probe import Probe
-from service.processes import Starter, find_modules_at_home
+from service.processes import Starter, find_modules_at_home, share_arenas
 from service.recovery import Mender, open_queue
 from service.retention import Keeper
 from service.routes.manual import ASSETS
@@ -181,6 +181,7 @@ def serve(
     except StudyError as error:
         refuse(str(error))
     find_modules_at_home()
+    share_arenas()
     remove_left()
     logs.configure(settings.log_format)
     try:
