@@ -41,8 +41,8 @@ NOTES = 200
 class Jobs(Database):
     """The queue in the file ``path``; safe to use from many threads and processes.
 
-    Methods raise `QueueLost` if the file is missing or damaged, `StoreFull` if the disk is full, and
-    `NotFound` if the study they are asked for is not there.
+    Methods raise `QueueLost` if the file is missing or damaged, `StoreFull` if the disk is full,
+    and `NotFound` if the study they are asked for is not there.
 
     Parameters
     ----------
