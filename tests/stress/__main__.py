@@ -22,6 +22,7 @@ from tests.stress.mixtures import mixed, scenes
 from tests.stress.polling import pollers
 from tests.stress.sizes import large_study, last_page
 from tests.stress.times import clock, retention
+from tests.stress.views import page_views
 
 SCENARIOS: Mapping[str, Callable[[Server], list[Figure]]] = {
     "large-study": large_study,
@@ -34,6 +35,7 @@ SCENARIOS: Mapping[str, Callable[[Server], list[Figure]]] = {
     "mixed": mixed,
     "clock": clock,
     "retention": retention,
+    "page-views": page_views,
     "description": description,
     "pollers": pollers,
 }
