@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import psutil
@@ -35,6 +35,18 @@ class Figure:
         bound = "" if self.most is None else f"   (at most {self.most:g})"
         mark = "ok  " if self.good else "FAIL"
         return f"  {mark} {self.what}: {self.value:.3g} {self.unit}{bound}"
+
+
+def table(found: Mapping[str, Sequence[Figure]]) -> str:
+    """Return the figures of all scenarios in aligned columns, those not allowed marked."""
+    rows = [("scenario", "figure", "measured", "at most", "")]
+    for name, figures in found.items():
+        for each in figures:
+            most = "" if each.most is None else f"{each.most:g}"
+            value = f"{each.value:.3g} {each.unit}".strip()
+            rows.append((name, each.what, value, most, "" if each.good else "FAIL"))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
 
 
 def quantile(values: Sequence[float], share: float) -> float:
