@@ -111,13 +111,21 @@ class Jobs(Database):
             tell(connection, job)
             return job, True
 
+    def rows(self, query: str, *values: Any) -> list[Any]:
+        """Return what a query finds."""
+        with self.transaction("BEGIN") as connection:
+            return connection.execute(query, values).fetchall()
+
     def told(self, job_id: str) -> list[tuple[str, str]]:
         """Return what happened to a job: times and words, the oldest first."""
-        found = self._rows("SELECT at, words FROM told WHERE job = ? ORDER BY rowid", job_id)
+        found = self.rows("SELECT at, words FROM told WHERE job = ? ORDER BY rowid", job_id)
         return [tuple(row) for row in found]
 
     def layout_turn(self, job_id: str, digest: str) -> int:
         """Return how many other layouts the data set of a job had before the one of a digest."""
+        same = "SELECT turn FROM layout WHERE job = ? AND digest = ?"
+        if known := self.rows(same, job_id, digest):  # also on a full disk
+            return int(known[0]["turn"])
         with self.transaction() as connection:
             found = connection.execute(
                 "INSERT INTO layout VALUES (?, ?, 0) ON CONFLICT (job) DO UPDATE SET"
@@ -140,7 +148,7 @@ class Jobs(Database):
     def runs(self, job_id: str, limit: int = -1, offset: int = 0) -> list[str]:
         """Return the ids of a job's runs in the order of its cases, or one page of them."""
         page = "SELECT run FROM run WHERE job = ? AND position >= ? ORDER BY position LIMIT ?"
-        return [row["run"] for row in self._rows(page, job_id, offset, limit)]
+        return [row["run"] for row in self.rows(page, job_id, offset, limit)]
 
     def asked(self, job_id: str, runs: Collection[str], stage: str) -> None:
         """Add runs that a study has asked for, and write how far it is."""
@@ -158,7 +166,7 @@ class Jobs(Database):
     def searches(self) -> dict[str, str]:
         """Return, by id, the scene of each waiting or running job that chooses its runs."""
         choosing = "SELECT id, scene FROM job WHERE state IN (?, ?) AND stage <> ''"
-        return dict(map(tuple, self._rows(choosing, StudyState.RUNNING, StudyState.ACCEPTED)))
+        return dict(self.rows(choosing, StudyState.RUNNING, StudyState.ACCEPTED))
 
     def page(self, *, limit: int, offset: int, **which: Any) -> tuple[list[Job], int]:
         """Return a page of jobs, the latest first, and the number of all; filters: `wanted`."""
@@ -173,21 +181,21 @@ class Jobs(Database):
 
     def ended(self) -> list[Job]:
         """Return the jobs that have ended, the oldest end first."""
-        rows = self._rows(
+        rows = self.rows(
             f"SELECT {ALL} FROM job WHERE finished IS NOT NULL ORDER BY finished, turn"
         )
         return [job for job in map(job_of, rows) if job and job.state.final]
 
     def states(self) -> dict[str, int]:
         """Return the number of jobs by state, without states that no job has."""
-        return dict(map(tuple, self._rows("SELECT state, COUNT(*) FROM job GROUP BY state")))
+        return dict(self.rows("SELECT state, COUNT(*) FROM job GROUP BY state"))
 
     def promised(self, but: str) -> float:
         """Return what all studies but one will still write before they end [bytes].
 
         About half of a study are its runs; its data set is written at the end.
         """
-        [(total,)] = self._rows(
+        [(total,)] = self.rows(
             "SELECT TOTAL(bytes * (1 - progress / 200)) FROM job WHERE state IN (?, ?) AND id <> ?",
             StudyState.ACCEPTED, StudyState.RUNNING, but,
         )  # fmt: skip
@@ -234,7 +242,7 @@ class Jobs(Database):
     def waiting(self) -> dict[str, str]:
         """Return, by id, the reason for which running jobs wait, without those that do not."""
         waiting = "SELECT id, message FROM job WHERE state = ? AND message != ''"
-        return dict(map(tuple, self._rows(waiting, StudyState.RUNNING)))
+        return dict(self.rows(waiting, StudyState.RUNNING))
 
     def finish(
         self,
@@ -302,11 +310,6 @@ class Jobs(Database):
             connection.row_factory = sqlite3.Row
             connection.text_factory = lambda text: text.decode(errors="replace")
             yield connection
-
-    def _rows(self, query: str, *values: Any) -> list[sqlite3.Row]:
-        """Return what a query finds."""
-        with self.transaction("BEGIN") as connection:
-            return connection.execute(query, values).fetchall()
 
     def _study(self, connection: sqlite3.Connection, job_id: str) -> dict[str, Any]:
         row = connection.execute("SELECT study FROM job WHERE id = ?", (job_id,)).fetchone()

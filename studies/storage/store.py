@@ -95,8 +95,9 @@ class Store:
         return self.directory / "studies" / _checked(study_id)
 
     def study_ids(self) -> list[str]:
-        """Return the names of the folders that have the definition of a study, in order."""
-        return sorted(path.parent.name for path in self.directory.glob(f"studies/*/{_STUDY}"))
+        """Return the ids of the studies whose definition is here, in order."""
+        there = (path.parent.name for path in self.directory.glob(f"studies/*/{_STUDY}"))
+        return sorted(filter(is_id, there))
 
     def dataset_path(self, study_id: str) -> Path:
         """Return the path of the combined data set of a study."""
