@@ -230,7 +230,7 @@ def test_one_who_read_another_layout_gets_an_error_in_place_of_values(running: R
 def test_a_data_set_that_takes_too_long_to_make_is_told_with_what_to_do(
     running: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tried: list[object] = []
+    tried, whole = list[object](), datasets.combined
 
     def combined(*given: Any) -> None:
         tried.append(given)
@@ -246,5 +246,15 @@ def test_a_data_set_that_takes_too_long_to_make_is_told_with_what_to_do(
         assert answer.status_code == 503 and "table.csv" in answer.json()["detail"]
         assert int(answer.headers["retry-after"]) >= 90
     assert len(tried) == 1, "it is not tried again at once"
-    assert not list(running.app.state.datasets.folder.glob("*.part"))
-    running.app.state.datasets.made.clear()
+    held = running.app.state.datasets
+    assert not list(held.folder.glob("*.part"))
+    held.made.clear()
+    with monkeypatch.context() as small:
+        small.setattr(datasets, "combined", whole)
+        before = running.dataset()
+    offered = held.made[running.study.id]
+    offered.of, offered.until = None, 0.0  # as when runs were added long after
+    again = running.dataset()
+    assert len(tried) == 2 and offered.until > time.monotonic()
+    assert (again.status_code, again.content) == (200, before.content), "the one before stays"
+    held.made.clear()
