@@ -105,7 +105,7 @@ class Datasets:
     async def current(self, job: Job) -> Path:
         """Return the path of that of `ended`, or before the first end of one of the runs there are.
 
-        Raise `NotFound` if the study chooses its runs and has not ended, `Busy` if it is being made.
+        Raise `NotFound` if the study chooses its runs and has not ended, `Busy` if it is made now.
         """
         try:
             return await asyncio.to_thread(self.ended, job)
