@@ -326,13 +326,10 @@ class Store:
         FileDiffers
             if the file differs from the record; then there is no file
         """
-        if isinstance(outcome, str):
-            run = layout.broken_content(case.scene, case, outcome)
-        else:
+        if not isinstance(outcome, str):
             outcome = outcome.with_one_mesh()
-            run = layout.run_content(case.scene, case, outcome, keep)
         path = self.run_path(case.id)
-        content = runfile.sealed(run)
+        content = runfile.sealed(layout.run_content(case.scene, case, outcome, keep))
         with self._writable():
             path.parent.mkdir(parents=True, exist_ok=True)
             with appearing(path) as part:
