@@ -193,11 +193,8 @@ def _told(folder: Path) -> str:
         arrays = _arrays(scene.description)
         kept = {"id": scene.id, "name": scene.name, "summary": scene.summary}
         answer = {"scene": kept, "content": scene.description.content, "arrays": arrays}
-    except SceneError as error:
-        listed = [_fields_of(each) for each in error.mistakes]
-        answer = {"mistakes": listed, "count": error.count}
     except StudyError as error:
-        answer = {"mistakes": [_fields_of(error)], "count": 1}
+        answer = {"mistakes": [_fields_of(each) for each in error.each], "count": error.count}
     return json.dumps(answer).replace(f"{folder}/", "")
 
 

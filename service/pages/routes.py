@@ -56,7 +56,6 @@ from service.table import Tables
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
-from studies.errors import SceneError
 from studies.scenes.registry import known_names, known_scenes
 from studies.storage.seal import State, state_of
 from studies.views.table import MESSAGE, RUN, STATUS, varied
@@ -365,8 +364,7 @@ async def take_scene(
             scene, inspector, keeper, store, caller, request, Response(), there
         )
     except StudyError as error:
-        mistakes = error.listed if isinstance(error, SceneError) else [*map(str, error.each)]
-        refused = {"file": scene.filename or "", "mistakes": mistakes}
+        refused = {"file": scene.filename or "", "mistakes": error.listed}
         return await run_in_threadpool(_form, request, store, USUAL, {}, {}, None, refused)
     where = request.url_for("new_page").include_query_params(scene=found.id)
     return RedirectResponse(f"{where.path}?{where.query}", HTTPStatus.SEE_OTHER)
