@@ -83,18 +83,13 @@ class Process:
 
     Attributes
     ----------
-    process : its id and its end
+    process : its end
     stdin, stdout : what it reads, and what it writes
     """
 
     process: BaseProcess
     stdin: asyncio.WriteTransport
     stdout: asyncio.StreamReader
-
-    @property
-    def pid(self) -> int | None:
-        """Its id."""
-        return self.process.pid
 
     @property
     def returncode(self) -> int | None:

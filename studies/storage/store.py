@@ -124,13 +124,7 @@ class Store:
             return None
 
     def scenes(self, limit: int, offset: int = 0, name: str | None = None) -> list[shelf.Entry]:
-        """Return a page of the scenes that are stored here, or of those of a name, newest first.
-
-        Raises
-        ------
-        CatalogueDamaged
-            if the index is damaged again after it was made again, or cannot be set aside
-        """
+        """Return a page of the scenes that are stored here, or of those of a name, newest first."""
         return self._indexed(lambda index: index.page(limit, offset, name))
 
     def scene_id(self, name: str) -> str:
@@ -153,14 +147,14 @@ class Store:
         return found[0].id if found else name
 
     def scene_files(self) -> list[shelf.Kept]:
-        """Return the files of all scenes, the oldest first; errors as `scenes`.
-
-        Scenes that this version does not allow are among them.
-        """
+        """Return the files of all scenes, the oldest first, also of those not allowed here."""
         return self._indexed(shelf.Index.files)
 
     def _indexed(self, ask: Callable[[shelf.Index], Found]) -> Found:
-        """Return what is asked of the index of scenes, which follows the files first."""
+        """Return what is asked of the index of scenes, which follows the files first.
+
+        Raise `CatalogueDamaged` if it is damaged again after it was made again.
+        """
         index = shelf.Index(self.directory, self._lists)
 
         def asked() -> Found:
@@ -463,19 +457,14 @@ class Store:
         With `tidy`, unfinished files of killed writers are deleted. A store whose caller has the
         lock (`held`) does nothing here.
 
-        Raises
-        ------
-        StoreBusy
-            if another process has the lock
-        StudyError
-            if the directory is not writable
+        Raise `StoreBusy` if another process has the lock.
         """
         if self.held:
             yield
             return
         held = self._locked()
         try:
-            self.remove_claims()
+            shutil.rmtree(self.directory / "claims", ignore_errors=True)  # of those that shared it
             patterns = ("*/**/*.part", "catalogue*.part") if tidy else ()  # not those of keys
             for part in filter(_left, chain.from_iterable(map(self.directory.glob, patterns))):
                 part.unlink(missing_ok=True)
@@ -488,12 +477,7 @@ class Store:
     def sharing(self) -> Iterator[None]:
         """Lock the directory against those who are its only writer, together with others.
 
-        Raises
-        ------
-        StoreBusy
-            if a process that does not share has the lock
-        StudyError
-            if the directory is not writable
+        Raise `StoreBusy` if a process that does not share has the lock.
         """
         held = self._locked(shared=True)
         try:
@@ -510,10 +494,6 @@ class Store:
             busy = "computes here; wait until it has ended, or name another directory"
             return lock(self.directory / ".lock", busy, shared=shared)
 
-    def remove_claims(self) -> None:
-        """Delete what processes that shared the directory, and have ended, have claimed."""
-        shutil.rmtree(self.directory / "claims", ignore_errors=True)
-
     @contextmanager
     def _writable(self) -> Iterator[None]:
         """Raise `Unusable`, with the directory as it was given, if it is not writable."""
@@ -523,11 +503,6 @@ class Store:
         except OSError as error:
             allowed = f"must be a directory to write in ({error.strerror})"
             raise Unusable("directory", str(self.directory), allowed) from None
-
-    def clear(self, path: Path) -> None:
-        """Set a directory aside that has the name of a file."""
-        if path.is_dir():
-            self.put_aside(path, "it is a directory", "a file takes its place")
 
 
 def _left(part: Path) -> bool:
