@@ -81,7 +81,6 @@ class Datasets:
         self.made: OrderedDict[str, _Offered] = OrderedDict()
         self.folders = ExitStack()
         self.folder: Path | None = None
-        self.layouts: dict[str, tuple[str, int]] = {}
 
     def ended(self, job: Job) -> Path:
         """Return the path of the data set that the last end of a study left, checked.
@@ -116,13 +115,12 @@ class Datasets:
 
     async def tiles(self, job: Job) -> Tiles:
         """Return the current data set of a study as a Zarr store; errors as `current`."""
-        path = await self.current(job)
-        found = await asyncio.to_thread(Tiles, path)
-        layout, turn = self.layouts.get(job.id, ("", 0))
-        if layout != found.layout:
-            turn = await asyncio.to_thread(self.jobs.layout_turn, job.id, found.layout)
-        self.layouts[job.id] = found.layout, turn
-        return await asyncio.to_thread(Tiles, path, turn) if turn else found
+        return await asyncio.to_thread(self._tiles, job.id, await self.current(job))
+
+    def _tiles(self, study_id: str, path: Path) -> Tiles:
+        found = Tiles(path)
+        turn = self.jobs.layout_turn(study_id, found.layout)
+        return Tiles(path, turn) if turn else found
 
     async def _partial(self, job: Job) -> Path:
         """Return the path of the data set of a study as it is now, or was a little before."""

@@ -45,15 +45,12 @@ from studies.scenes.registry import known_names
 from studies.scenes.scene import FileScene
 from studies.storage import dataset as layout
 from studies.storage import runfile, seal, shelf
-from studies.storage.catalogue import Catalogue, Row
+from studies.storage.catalogue import BATCH, Catalogue, Row
 from studies.storage.lock import lock
 from studies.storage.readback import verified
 from studies.storage.room import needs_room
 
 _STUDY = "study.json"
-_BATCH = 500
-"""Number of runs that are verified before their rows are written."""
-
 _UNFINISHED = 600.0
 """Seconds after which an unfinished file beside a data set counts as abandoned."""
 _LOG = logging.getLogger("studies")
@@ -110,9 +107,8 @@ class Store:
 
         One that is not ``whole`` has no meshes, so that it takes little time and memory.
         """
-        read = shelf.kept if whole else shelf.described
         try:
-            return read(self.directory, scene_id) if is_id(scene_id) else None
+            return shelf.stored(self.directory, scene_id, whole) if is_id(scene_id) else None
         except FileDamaged as error:
             self.set_aside(error, "post the scene again")
             return None
@@ -447,7 +443,7 @@ class Store:
         }
         self.catalogue.remove(known.keys() - there.keys())
         changed = iter([run_id for run_id, state in there.items() if known.get(run_id) != state])
-        while batch := list(islice(changed, _BATCH)):
+        while batch := list(islice(changed, BATCH)):
             self._sound(batch)
 
     @contextmanager
