@@ -8,7 +8,7 @@ from collections import Counter
 from tests.service.servers import Server, fake_study
 from tests.stress.measure import Figure, megabytes, process_of, quantile
 
-VIEWS, RUNS = 1000, 400
+VIEWS, RUNS = 1000, 200
 
 
 def page_views(server: Server, count: int = VIEWS, runs: int = RUNS) -> list[Figure]:
