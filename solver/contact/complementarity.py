@@ -32,6 +32,8 @@ _ACCURATE = 1e-6
 _CONSISTENT = 1e-12
 """Relative residual of a least-squares solution up to which it counts as rounding. Without a
 solution it is larger: the part of the load that contact cannot balance, even with tiny friction."""
+_FIRST = 1e3
+"""Weight of the balance of forces over gaps in a least-squares solution."""
 _KNOWN = 1e-8
 
 
@@ -103,7 +105,7 @@ def _forces(
     size = len(rows)
     S = np.zeros((size + k, size + k))
     S[:size, :size] = problem.W[rows] @ P
-    S[:size, size:] = problem.A[rows]
+    S[:size, size:] = problem.turned[rows]
     S[size:, :size] = problem.A.T @ P
     rhs = -np.concatenate([problem.offset[rows], problem.balance])
     rhs -= np.concatenate([problem.W[rows] @ known, problem.A.T @ known])
@@ -119,24 +121,26 @@ def _forces(
     if not free:
         _, _, solution, info = linalg.lapack.dgesv(S, rhs)
         free = bool(info) or not _solves(S, solution, rhs)
-        if free and (not size or np.linalg.matrix_rank(problem.A[rows]) == k):
+        if free and (not size or np.linalg.matrix_rank(problem.turned[rows]) == k):
             return None
     if free:
-        solution = linalg.lstsq(S, rhs)[0]
-        if not _solves(S, solution, rhs, _CONSISTENT):
+        # the rounding of positions may contradict a body that slips on all points: gaps bear it
+        forces = np.arange(size + k) >= size
+        first = np.where(forces, _FIRST, 1.0)
+        solution = linalg.lstsq(first[:, None] * S, first * rhs)[0]
+        least = _CONSISTENT * np.abs(rhs).max(initial=0.0)
+        allowed = np.where(forces, least, max(least, _TOLERANCE * problem.scales[1]))
+        if (np.abs(S @ solution - rhs) > allowed).any():
             return None
     solution *= weight
     return P @ solution[:size] + known, solution[size:]
 
 
 def _solves(
-    S: NDArray[np.float64],
-    solution: NDArray[np.float64],
-    rhs: NDArray[np.float64],
-    tolerance: float = _ACCURATE,
+    S: NDArray[np.float64], solution: NDArray[np.float64], rhs: NDArray[np.float64]
 ) -> bool:
     miss = np.abs(S @ solution - rhs).max(initial=0.0)
-    return bool(miss <= tolerance * np.abs(rhs).max(initial=0.0))
+    return bool(miss <= _ACCURATE * np.abs(rhs).max(initial=0.0))
 
 
 def _active_sets(
@@ -165,7 +169,7 @@ def _active_sets(
         if found is None:
             return None
         F, q = found
-        motion = problem.offset + problem.W @ F + problem.A @ q
+        motion = problem.offset + problem.W @ F + problem.turned @ q
         N, gap = F[:n], motion[:n]
         closed = status != OPEN
         new = np.where(closed & (N < -tiny_force), OPEN, status)
@@ -235,7 +239,7 @@ def _holds(problem: ContactProblem, F: NDArray[np.float64], q: NDArray[np.float6
     every rotation that keeps its open points open is a solution.
     """
     n, (force, length) = problem.n, problem.scales
-    motion = problem.offset + problem.W @ F + problem.A @ q
+    motion = problem.offset + problem.W @ F + problem.turned @ q
     N, met = F[:n], np.minimum(F[:n] / force, motion[:n] / length)
     off = np.concatenate([met, (problem.A.T @ F + problem.balance) / force])
     if problem.frictional:
