@@ -303,7 +303,7 @@ def ring_on_two_points(lean, rounding=0.0):
     return ContactProblem(
         W=2e-4 * np.kron(np.eye(4), near),
         offset=np.concatenate([
-            np.full(4, -1e-6) + rounding * np.array([1, -1, 1, -1]),
+            np.full(4, -1e-6) + rounding * np.array([1, -1, -1, 1]),
             7e-6 * np.array([1, -1, 1, -1]),
         ]),
         lines=lines(4, 0.3),
