@@ -72,15 +72,18 @@ def change_of(
     alone = BoundLines(lines.slope, np.zeros_like(lines.level))
     changed = replace(problem, offset=offset, balance=0 * problem.balance)
     nothing_moves = np.zeros_like(offset), np.zeros_like(solution.rigid)
-    return _forces(changed, solution.status, piece, alone) or nothing_moves
+    found = _forces(changed, solution.status, piece, alone)
+    return nothing_moves if found is None or found[2].any() else found[:2]
 
 
 def _forces(
     problem: ContactProblem, status: NDArray[np.int64], piece: NDArray[np.int64], bound: BoundLines
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
     """Return forces and rigid motions of given statuses, or None for a singular system.
 
     Where a point slips, ``piece`` says which line of the ``bound`` its tangential force is on.
+    The third array is the rest (k,) of the load that these points cannot balance, as a motion that
+    none of them resists, or zero.
     """
     n, k, rough = problem.n, len(problem.balance), problem.lines.rough
     closed = np.flatnonzero(status != OPEN)
@@ -88,7 +91,7 @@ def _forces(
     if problem.frictional:
         stick = stick[rough[stick]]
     if not len(closed) and not k:
-        return np.zeros(len(problem.offset)), np.zeros(0)
+        return np.zeros(len(problem.offset)), np.zeros(0), np.zeros(0)
     # columns of F: a normal force, together with the share of friction proportional to it where
     # the point slips; the constant share of friction is known
     P = np.zeros((len(problem.offset), len(closed) + len(stick)))
@@ -117,7 +120,7 @@ def _forces(
     rhs *= weight
     # fewer conditions than rigid motions: the body can rotate about its only contact point. A
     # factorisation of the singular matrix would rotate it by rounding; least squares does not
-    free = 0 < size < k
+    free, rest = 0 < size < k, np.zeros(k)
     if not free:
         _, _, solution, info = linalg.lapack.dgesv(S, rhs)
         free = bool(info) or not _solves(S, solution, rhs)
@@ -130,10 +133,13 @@ def _forces(
         solution = linalg.lstsq(first[:, None] * S, first * rhs)[0]
         least = _CONSISTENT * np.abs(rhs).max(initial=0.0)
         allowed = np.where(forces, least, max(least, _TOLERANCE * problem.scales[1]))
-        if (np.abs(S @ solution - rhs) > allowed).any():
-            return None
+        miss = S @ solution - rhs
+        if (np.abs(miss) > allowed).any():
+            rest = miss[size:] * weight[size:]
+            if not rest.any():
+                return None
     solution *= weight
-    return P @ solution[:size] + known, solution[size:]
+    return P @ solution[:size] + known, solution[size:], rest
 
 
 def _solves(
@@ -168,8 +174,14 @@ def _active_sets(
         found = _forces(problem, status, piece, lines)
         if found is None:
             return None
-        F, q = found
+        F, q, rest = found
         motion = problem.offset + problem.W @ F + problem.turned @ q
+        if rest.any():
+            stopped = _stopped(status, motion, problem.turned @ rest)
+            if stopped is None:
+                return None
+            status, piece = stopped, np.where(stopped > STICK, piece, 0)
+            continue
         N, gap = F[:n], motion[:n]
         closed = status != OPEN
         new = np.where(closed & (N < -tiny_force), OPEN, status)
@@ -191,6 +203,28 @@ def _active_sets(
             return ContactSolution(F, q, status, False)
         status, piece = new, onto
     return None
+
+
+def _stopped(
+    status: NDArray[np.int64], motion: NDArray[np.float64], rate: NDArray[np.float64]
+) -> NDArray[np.int64] | None:
+    """Return the statuses once a body has moved until one more point closes or sticks.
+
+    ``rate`` is that of ``motion``, gaps and slips. None if it moves for ever.
+    """
+    n = len(status)
+    ways = np.zeros_like(motion)
+    ways[:n][status == OPEN] = 1.0
+    if len(motion) > n:
+        ways[n:][status == FORWARD], ways[n:][status == BACKWARD] = 1.0, -1.0
+    nears = ways * rate < 0
+    if not nears.any():
+        return None
+    time = np.full(len(motion), np.inf)
+    time[nears] = -motion[nears] / rate[nears]
+    out = status.copy()
+    out[np.argmin(time) % n] = STICK
+    return out
 
 
 def _lag_bound(problem: ContactProblem) -> ContactSolution | None:

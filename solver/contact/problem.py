@@ -9,7 +9,7 @@ motions q of bodies held by contact alone. With ``F = (N, T)`` (without friction
     s = min_k (slope_k N + level_k),  the lines of a law of friction (`solver.model.friction`)
 
 G is A, but for normals that lean under a hat: forces act along the slave's, gaps change along the
-master's. Without the difference a ring that rests on two vertices could turn without opening either.
+master's. Without this a ring that rests on two vertices could turn without opening either.
 """
 
 from __future__ import annotations

@@ -336,3 +336,34 @@ def test_a_ring_that_turns_rests_on_both_points_again():
     assert found.rigid[2] == pytest.approx(-2e-6, rel=1e-6)
     blind = solve_contact(replace(turned, G=None), found.status)
     assert blind is None or abs(blind.rigid[2] + 2e-6) > 1e-6
+
+
+@pytest.mark.parametrize("push", [1e-6, -1e-6, 1e-4])
+def test_a_ring_that_slips_on_all_points_is_pushed_until_one_sticks(push):
+    problem = ring_on_two_points(0.025)
+    problem = replace(problem, balance=problem.balance + np.array([push, 0, 0, 0]))
+    start = np.array([FORWARD, BACKWARD, FORWARD, BACKWARD])
+    found = solve_contact(problem, start)
+    assert found is not None
+    assert not found.pivoted
+    assert (found.status == STICK).any()
+    assert np.sign(found.rigid[0]) == np.sign(push)
+    assert natural_residual(problem, found) < 1e-8
+
+
+@pytest.mark.parametrize("aside", [1e-9, -0.3])
+def test_a_body_tilts_about_its_only_point_until_the_next_one_closes(aside):
+    x, none = np.array([-1.0, -0.5, 0.0, 0.5, 1.0]), np.zeros(5)
+    gap = np.concatenate([np.ones(5), none])
+    problem = ContactProblem(
+        W=1e-3 * np.eye(10),
+        offset=np.concatenate([0.02 * x**2, none]),
+        lines=lines(5, 0.3),
+        A=np.stack([gap, np.concatenate([x, none]), np.concatenate([none, np.ones(5)])], axis=1),
+        balance=np.array([-1.0, -aside, 0.0]),
+    )
+    found = solve_contact(problem, np.array([OPEN, OPEN, STICK, OPEN, OPEN]))
+    assert found is not None
+    assert not found.pivoted
+    assert (found.forces[:5] > 0).sum() == 2
+    assert natural_residual(problem, found) < 1e-8
