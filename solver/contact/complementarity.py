@@ -49,7 +49,11 @@ def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactS
     if _at_rest(problem):
         nothing = np.zeros_like(problem.offset), np.zeros_like(problem.balance)
         return ContactSolution(*nothing, np.full_like(start, OPEN), False)
-    return _active_sets(problem, start, np.zeros(problem.n, dtype=int)) or _lag_bound(problem)
+    found = _active_sets(problem, start, np.zeros(problem.n, dtype=int)) or _lag_bound(problem)
+    if found is None and problem.G is not None:
+        # pivoting needs symmetry: without the lean of normals it may find a way on
+        return solve_contact(replace(problem, G=None), start)
+    return found
 
 
 def _at_rest(problem: ContactProblem) -> bool:
