@@ -4,6 +4,9 @@ STAMP := .venv/installed
 COMPILED := .venv/compiled
 KERNELS := solver/prism/influence.py solver/steady/sweep.py
 
+# Python keeps what it has compiled, whatever the caller says: tests and studies start many processes.
+export PYTHONDONTWRITEBYTECODE :=
+
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:

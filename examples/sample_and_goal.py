@@ -8,7 +8,9 @@ import numpy as np
 
 from studies import Store, open_study, run_study
 
-COARSE = {"smallest_element": 0.02, "growth": 2.0, "hardening": "isotropic"}
+COARSE = {
+    "accuracy": "draft", "smallest_element": 0.02, "growth": 2.0, "hardening": "isotropic",
+}  # fmt: skip
 
 # Eight points fill three ranges. With num = 16 the first eight would be the same, and be kept.
 SAMPLE = {

@@ -9,13 +9,18 @@ from matplotlib.figure import Figure
 from studies import Store, Study, open_study, run_study
 
 # The content of a study file as a dictionary. The scene is a punch pressed on a half-plane;
-# parameters that are not given have the scene's default (`residua scenes punch` lists them). The
-# mesh is coarse, so that the example takes seconds.
+# parameters that are not given have the scene's default (`residua scenes punch` lists them). Mesh
+# and increments are coarse, so that the example takes seconds.
 STUDY = Study.from_dict(
     {
         "name": "friction-and-load",
         "scene": "punch",
-        "parameters": {"smallest_element": 0.02, "growth": 2.0, "hardening": "isotropic"},
+        "parameters": {
+            "accuracy": "draft",
+            "smallest_element": 0.02,
+            "growth": 2.0,
+            "hardening": "isotropic",
+        },
         "sweep": {"load_ratio": [0.5, 0.7, 0.9], "friction": [0.0, 0.3]},
     }
 )

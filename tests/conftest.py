@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.marks import allowed, of_folder
-from tests.order import Order, place
+from tests.order import Order, place, turned
 from tests.programs import Programs
 
 if TYPE_CHECKING:
@@ -48,10 +48,20 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+@pytest.hookimpl
+def pytest_collection(session: pytest.Session) -> None:
+    """Let each test process begin with other files: what one has compiled the others only load."""
+    config = session.config
+    of_worker = getattr(config, "workerinput", None)
+    if of_worker and config.args_source is config.ArgsSource.TESTPATHS:
+        number = int(of_worker["workerid"].removeprefix("gw"))
+        config.args = [str(each) for each in turned(number / of_worker["workercount"])]
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put files in their place; add the marks of folders before tests are selected by marks."""
-    items.sort(key=lambda item: place(item.path))
+    items.sort(key=lambda item: (place(item.path), item.path.parts))
     for item in items:
         for mark in of_folder(item.path):
             item.add_marker(mark)

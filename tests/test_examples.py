@@ -63,7 +63,8 @@ def test_the_cells_of_a_notebook_run_after_make_run(
 ) -> None:
     """They run on a coarse and small form of the study that `make run` computes."""
     study = (ROOT / "data/studies/punch.toml").read_text()
-    study = study.replace("[parameters]", "[parameters]\nsmallest_element = 0.1\ngrowth = 3.0")
+    coarse = '[parameters]\naccuracy = "draft"\nsmallest_element = 0.1\ngrowth = 3.0'
+    study = study.replace("[parameters]", coarse)
     study = study.replace("[0.0, 0.1, 0.2, 0.3, 0.4]", "[0.0, 0.2]")
     study = study.replace('["none", "isotropic", "kinematic"]', '["isotropic", "kinematic"]')
     (tmp_path / "punch.toml").write_text(study)

@@ -14,7 +14,7 @@ import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -177,9 +177,13 @@ def _own_file(module: str) -> Path | None:
 def _module_digest(name: str) -> str:
     """Return the digest of a module's source without comments; empty for one of the solver's."""
     file = _own_file(name)
-    if file is None:
-        return ""
-    tree = ast.parse(file.read_bytes())
+    return "" if file is None else _code_digest(file.read_bytes())
+
+
+@lru_cache(maxsize=100)
+def _code_digest(source: bytes) -> str:
+    """Return the digest of what workers run of a source; it is asked for again with every run."""
+    tree = ast.parse(source)
     tree.body = [each for each in tree.body if not only_as_script(each)]
     return digests_of([ast.unparse(tree).encode()])[0]
 

@@ -40,7 +40,7 @@ class Case:
 
 def plan(quick: bool) -> tuple[Case, tuple[Case, ...]]:
     """Return the reference, and the cases."""
-    h, parts = (1.0, 16) if quick else (0.25, 32)
+    h, parts = (1.0, 4) if quick else (0.25, 32)
     return Case("reference", "finest", graded_by(h), parts), tuple(_cases(quick))
 
 
@@ -51,7 +51,7 @@ def graded_by(h: float) -> dict[str, float]:
 
 def _cases(quick: bool) -> Iterator[Case]:
     for h in (4.0, 2.0) if quick else (4.0, 2.0, 1.0, 0.5):
-        yield Case("mesh", f"{h:g} mm", graded_by(h), size=h)
+        yield Case("mesh", f"{h:g} mm", graded_by(h), 4 if quick else 16, h)
     if quick:
         return
     yield Case("default", "default")

@@ -27,11 +27,13 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 @pytest.fixture(scope="package")
 def lively(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """One running service with a worker of its own for all tests that leave the service running.
+    """One running service with a worker of its own for all tests that leave a service running.
 
-    They may take down what it starts, which it starts again.
+    They may take down what it starts, which it starts again, and may stop or kill the service if
+    they start it again. It does not wait for studies that hang.
     """
-    server = Server(tmp_path_factory.mktemp("lively")).start()
+    settings = {"RESIDUA_GRACE_SECONDS": "1"}
+    server = Server(tmp_path_factory.mktemp("lively"), settings=settings).start()
     yield server
     server.close()
 

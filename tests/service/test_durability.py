@@ -31,9 +31,9 @@ from tests.service.servers import (
 )
 
 
-def long_study(name: str) -> dict[str, Any]:
+def long_study(name: str, seconds: float = 0.2) -> dict[str, Any]:
     """Return a study of twelve runs in six paths that takes some seconds."""
-    study = fake_study(name, seconds=0.2)
+    study = fake_study(name, seconds=seconds)
     study["sweep"]["friction"] = [i / 10 for i in range(6)]
     return study
 
@@ -76,23 +76,24 @@ def alive(processes: list[psutil.Process]) -> list[psutil.Process]:
     ]
 
 
-def test_studies_outlive_a_service_that_is_stopped(mortal: Server) -> None:
-    mortal.start()
-    first, second = (mortal.post(long_study("first")), mortal.post(fake_study("second")))
-    wait_until(lambda: len(stored(mortal)) >= 3)
-    with mortal.client.stream("GET", f"/studies/{first}/events") as stream:
+def test_studies_outlive_a_service_that_is_stopped(lively: Server) -> None:
+    others, computed = stored(lively), len(lively.computed())
+    first = lively.post(long_study("first"))
+    second = lively.post(fake_study("second", seconds=0.01))
+    wait_until(lambda: len(stored(lively) - others) >= 3)
+    with lively.client.stream("GET", f"/studies/{first}/events") as stream:
         next(stream.iter_lines())
-        mortal.stop()
-    at_stop = stored(mortal)
+        lively.stop()
+    at_stop = stored(lively) - others
     assert 3 <= len(at_stop) < 12
-    mortal.start()
+    lively.start()
     for study_id, runs in ((first, 12), (second, 4)):
-        study = mortal.finished(study_id)
+        study = lively.finished(study_id)
         assert (study["status"], study["counts"]) == ("successful", {"ok": runs})
-    assert len(stored(mortal)) == 16
-    assert repeated(mortal, at_stop) == []
-    assert len(mortal.computed()) <= 16 + mortal.workers
-    path = mortal.data / "studies" / first / "dataset.nc"
+    assert len(stored(lively) - others) == 16
+    assert repeated(lively, at_stop) == []
+    assert len(lively.computed()) - computed <= 16 + lively.workers
+    path = lively.data / "studies" / first / "dataset.nc"
     with open_netcdf(path) as dataset:
         assert bool(dataset["max_plastic_strain"].notnull().all())
 
@@ -145,33 +146,33 @@ def refinement(name: str) -> dict[str, Any]:
 
 
 def test_studies_that_choose_outlive_a_service_that_is_killed_and_a_caller_who_stops_them(
-    mortal: Server,
+    lively: Server,
 ) -> None:
-    mortal.start()
-    refined_id = mortal.post(refinement("refined"))
-    study_id = mortal.post(search("search"))
-    wait_until(lambda: 2 <= len(mortal.study(refined_id)["runs"]))
-    assert mortal.study(refined_id)["stage"].startswith("round 1, run ")
-    family = children(mortal)
-    mortal.kill()
+    others = stored(lively)
+    refined_id = lively.post(refinement("refined"))
+    study_id = lively.post(search("search"))
+    wait_until(lambda: 2 <= len(lively.study(refined_id)["runs"]))
+    assert lively.study(refined_id)["stage"].startswith("round 1, run ")
+    family = children(lively)
+    lively.kill()
     wait_until(lambda: not alive(family))
-    mortal.start()
-    refined = mortal.finished(refined_id)
+    lively.start()
+    refined = lively.finished(refined_id)
     assert (refined["status"], refined["stage"]) == ("successful", "ended")
-    wait_until(lambda: mortal.study(study_id)["stage"].startswith("2 of 6"))
-    assert 0.0 < mortal.study(study_id)["progress"] < 100.0
-    assert mortal.client.delete(f"/studies/{study_id}").json()["status"] == "dismissed"
-    assert mortal.client.post(f"/studies/{study_id}/retry").status_code == 202
-    found = mortal.finished(study_id)
+    wait_until(lambda: lively.study(study_id)["stage"].startswith("2 of 6"))
+    assert 0.0 < lively.study(study_id)["progress"] < 100.0
+    assert lively.client.delete(f"/studies/{study_id}").json()["status"] == "dismissed"
+    assert lively.client.post(f"/studies/{study_id}/retry").status_code == 202
+    found = lively.finished(study_id)
     assert (found["status"], found["stage"]) == ("successful", "6 of 6 searches ended")
     chosen = {run["id"] for each in (refined, found) for run in each["runs"]}
-    assert {path.stem for path in stored(mortal)} == chosen
-    assert repeated(mortal, stored(mortal)) == []
+    assert {path.stem for path in stored(lively) - others} == chosen
+    assert repeated(lively, stored(lively) - others) == []
 
 
 def test_the_death_of_a_study_leaves_the_service_alive_and_is_made_good(lively: Server) -> None:
     others = stored(lively)
-    study_id = lively.post(long_study("wounded"))
+    study_id = lively.post(long_study("wounded", seconds=0.15))
     wait_until(lambda: len(stored(lively) - others) >= 3)
     before = stored(lively) - others
     for child in children(lively):
@@ -243,19 +244,20 @@ def test_a_copy_of_the_directory_is_restored_with_studies_that_ran_and_waited(
         elsewhere.close()
 
 
-def test_a_study_that_hangs_keeps_neither_a_stopped_nor_a_killed_service(mortal: Server) -> None:
-    mortal.settings = {"RESIDUA_GRACE_SECONDS": "1"}
-    mortal.start()
-    study_id = mortal.post(fake_study("hangs", behaviour="hang"))
-    wait_until(mortal.computed)
-    mortal.stop()
-    mortal.start()
-    wait_until(lambda: len(mortal.computed()) >= 2)
-    orphans = children(mortal)
-    mortal.kill()
-    mortal.start()
+def test_a_study_that_hangs_keeps_neither_a_stopped_nor_a_killed_service(lively: Server) -> None:
+    def begun() -> int:
+        return sum('"behaviour": "hang"' in line for line in lively.computed())
+
+    study_id = lively.post(fake_study("hangs", behaviour="hang"))
+    wait_until(begun)
+    lively.stop()
+    lively.start()
+    wait_until(lambda: begun() >= 2)
+    orphans = children(lively)
+    lively.kill()
+    lively.start()
     wait_until(lambda: not alive(orphans))
-    assert mortal.client.delete(f"/studies/{study_id}").json()["status"] == "dismissed"
+    assert lively.client.delete(f"/studies/{study_id}").json()["status"] == "dismissed"
 
 
 def test_a_study_of_another_solver_fails_with_advice(mortal: Server) -> None:

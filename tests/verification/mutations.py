@@ -31,7 +31,7 @@ Fault = Callable[[Patch], None]
 
 PUNCH: dict[str, Any] = {
     "smallest_element": 0.04, "growth": 2.0, "friction": 0.3, "load_ratio": 0.8571,
-    "load_step": 0.1, "hardening": "isotropic",
+    "load_step": 0.2, "hardening": "isotropic",
 }  # fmt: skip
 ROLLING: dict[str, Any] = {
     "element_size": 3.0, "advance_step": 3.0, "growth": 1.5, "track": 12.0, "traction": 0.5,

@@ -20,7 +20,7 @@ from tests.stability.kinds.looked_at import looked_at
 from tests.stability.kinds.punch_oracle import law
 from tests.stability.trial import Figure, Scene, tells
 
-COUNT = 18
+COUNT = 15
 SEED = 1882
 LOADS = (0.5, 1.0, 2.0, 4.0, 10.0)
 TRACTIONS = (-0.99, -0.75, 0.0, 0.75, 0.99)
