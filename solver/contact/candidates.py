@@ -51,6 +51,7 @@ class Candidates(OnParts):
     status : (n,) of the current iterate, as in `solver.contact.problem`
     unsure : (n,) the possible error of ``uncounted`` [mm]; inf if the time of touch is not known
     rows : one per part, None for a part without contact surface
+    turned : one per part, the derivatives (n, n_rigid) of gaps by its rigid motions
     covered : for each interface, the share of each candidate's hat function that faces the master
     gaps, slips : for each interface, gap and slip of all its vertices [mm]; the gap is inf where no
         master faces them, the slip 0 without friction
@@ -70,6 +71,7 @@ class Candidates(OnParts):
     status: NDArray[np.int64]
     unsure: NDArray[np.float64]
     rows: tuple[ContactRows | None, ...]
+    turned: tuple[NDArray[np.float64], ...]
     covered: tuple[NDArray[np.float64], ...]
     gaps: tuple[NDArray[np.float64], ...]
     slips: tuple[NDArray[np.float64], ...]
@@ -103,6 +105,16 @@ class Candidates(OnParts):
     def places(self) -> list[slice]:
         """For each interface, the slice of its candidates in the arrays of all."""
         return _places(self.vertices)
+
+    def motions(self, part: int, rigid: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the gaps and slips that rigid motions (n, k) of a part cause [mm].
+
+        Rows are directions of forces; gaps change as the bodies turn.
+        """
+        moved = self.of_part(part, rigid)
+        if moved.size:
+            moved[: self.n] = self.turned[part]
+        return moved
 
     @property
     def stays(self) -> tuple[bool, ...]:
@@ -240,8 +252,9 @@ def no_candidates(
     status = empty.astype(int)
     lines = BoundLines.none(0)
     pushes = tuple(np.zeros(part.n) for part in system.parts)
+    turned = tuple(np.zeros((0, part.rigid.shape[1])) for part in system.parts)
     return Candidates(
-        none, lines, off, empty, links, status, empty, rows, covered, gaps, slips, np.inf,
+        none, lines, off, empty, links, status, empty, rows, turned, covered, gaps, slips, np.inf,
         leaving=(None,) * len(none), pushes=pushes, holds=(False,) * len(pushes),
         links=system.links,
     )  # fmt: skip
@@ -293,6 +306,7 @@ def find_candidates(
     unsure = np.zeros(n)
     pieces = [_below(m, rows) for rows in system.links.rows]
     slips: list[NDArray[np.float64]] = []
+    turned = [np.zeros((n, part.rigid.shape[1])) for part in system.parts]
     for pair, (interface, pairing, at, before, normal) in enumerate(
         zip(system.interfaces, pairings, vertices, start.contacts, _places(vertices), strict=True)
     ):
@@ -311,6 +325,10 @@ def find_candidates(
             if frictional:
                 block[tangent] = pairing.tangent[side][at]
             pieces[number].append(ContactRows(*part.pull_back(surface, u[number], block, n)))
+            if part.rigid.shape[1]:
+                closing = pairing.closing[side][at]
+                dofs, closing = part.pull_back(surface, u[number], closing, len(at))
+                turned[number][normal] += closing @ part.rigid[dofs]
             if left is not None and left.any():
                 rows = left[:1] @ pairing.normal[side], left[1:] @ pairing.tangent[side]
                 dofs, both = part.pull_back(surface, u[number], np.vstack(rows), 1)
@@ -335,6 +353,7 @@ def find_candidates(
         status=gather("status").astype(np.int64),
         unsure=unsure,
         rows=tuple(joined(p) for p in pieces),
+        turned=tuple(turned),
         covered=tuple(p.covered[v] for p, v in zip(pairings, vertices, strict=True)),
         gaps=tuple(p.gap for p in pairings),
         slips=tuple(slips),

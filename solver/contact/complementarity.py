@@ -32,6 +32,8 @@ _ACCURATE = 1e-6
 _CONSISTENT = 1e-12
 """Relative residual of a least-squares solution up to which it counts as rounding. Without a
 solution it is larger: the part of the load that contact cannot balance, even with tiny friction."""
+_FIRST = 1e3
+"""Weight of the balance of forces over gaps in a least-squares solution."""
 _KNOWN = 1e-8
 
 
@@ -47,7 +49,11 @@ def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactS
     if _at_rest(problem):
         nothing = np.zeros_like(problem.offset), np.zeros_like(problem.balance)
         return ContactSolution(*nothing, np.full_like(start, OPEN), False)
-    return _active_sets(problem, start, np.zeros(problem.n, dtype=int)) or _lag_bound(problem)
+    found = _active_sets(problem, start, np.zeros(problem.n, dtype=int)) or _lag_bound(problem)
+    if found is None and problem.G is not None:
+        # pivoting needs symmetry: without the lean of normals it may find a way on
+        return solve_contact(replace(problem, G=None), start)
+    return found
 
 
 def _at_rest(problem: ContactProblem) -> bool:
@@ -70,15 +76,18 @@ def change_of(
     alone = BoundLines(lines.slope, np.zeros_like(lines.level))
     changed = replace(problem, offset=offset, balance=0 * problem.balance)
     nothing_moves = np.zeros_like(offset), np.zeros_like(solution.rigid)
-    return _forces(changed, solution.status, piece, alone) or nothing_moves
+    found = _forces(changed, solution.status, piece, alone)
+    return nothing_moves if found is None or found[2].any() else found[:2]
 
 
 def _forces(
     problem: ContactProblem, status: NDArray[np.int64], piece: NDArray[np.int64], bound: BoundLines
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
     """Return forces and rigid motions of given statuses, or None for a singular system.
 
     Where a point slips, ``piece`` says which line of the ``bound`` its tangential force is on.
+    The third array is the rest (k,) of the load that these points cannot balance, as a motion that
+    none of them resists, or zero.
     """
     n, k, rough = problem.n, len(problem.balance), problem.lines.rough
     closed = np.flatnonzero(status != OPEN)
@@ -86,7 +95,7 @@ def _forces(
     if problem.frictional:
         stick = stick[rough[stick]]
     if not len(closed) and not k:
-        return np.zeros(len(problem.offset)), np.zeros(0)
+        return np.zeros(len(problem.offset)), np.zeros(0), np.zeros(0)
     # columns of F: a normal force, together with the share of friction proportional to it where
     # the point slips; the constant share of friction is known
     P = np.zeros((len(problem.offset), len(closed) + len(stick)))
@@ -103,7 +112,7 @@ def _forces(
     size = len(rows)
     S = np.zeros((size + k, size + k))
     S[:size, :size] = problem.W[rows] @ P
-    S[:size, size:] = problem.A[rows]
+    S[:size, size:] = problem.turned[rows]
     S[size:, :size] = problem.A.T @ P
     rhs = -np.concatenate([problem.offset[rows], problem.balance])
     rhs -= np.concatenate([problem.W[rows] @ known, problem.A.T @ known])
@@ -115,28 +124,33 @@ def _forces(
     rhs *= weight
     # fewer conditions than rigid motions: the body can rotate about its only contact point. A
     # factorisation of the singular matrix would rotate it by rounding; least squares does not
-    free = 0 < size < k
+    free, rest = 0 < size < k, np.zeros(k)
     if not free:
         _, _, solution, info = linalg.lapack.dgesv(S, rhs)
         free = bool(info) or not _solves(S, solution, rhs)
-        if free and (not size or np.linalg.matrix_rank(problem.A[rows]) == k):
+        if free and (not size or np.linalg.matrix_rank(problem.turned[rows]) == k):
             return None
     if free:
-        solution = linalg.lstsq(S, rhs)[0]
-        if not _solves(S, solution, rhs, _CONSISTENT):
-            return None
+        # the rounding of positions may contradict a body that slips on all points: gaps bear it
+        forces = np.arange(size + k) >= size
+        first = np.where(forces, _FIRST, 1.0)
+        solution = linalg.lstsq(first[:, None] * S, first * rhs)[0]
+        least = _CONSISTENT * np.abs(rhs).max(initial=0.0)
+        allowed = np.where(forces, least, max(least, _TOLERANCE * problem.scales[1]))
+        miss = S @ solution - rhs
+        if (np.abs(miss) > allowed).any():
+            rest = miss[size:] * weight[size:]
+            if not rest.any():
+                return None
     solution *= weight
-    return P @ solution[:size] + known, solution[size:]
+    return P @ solution[:size] + known, solution[size:], rest
 
 
 def _solves(
-    S: NDArray[np.float64],
-    solution: NDArray[np.float64],
-    rhs: NDArray[np.float64],
-    tolerance: float = _ACCURATE,
+    S: NDArray[np.float64], solution: NDArray[np.float64], rhs: NDArray[np.float64]
 ) -> bool:
     miss = np.abs(S @ solution - rhs).max(initial=0.0)
-    return bool(miss <= tolerance * np.abs(rhs).max(initial=0.0))
+    return bool(miss <= _ACCURATE * np.abs(rhs).max(initial=0.0))
 
 
 def _active_sets(
@@ -164,8 +178,14 @@ def _active_sets(
         found = _forces(problem, status, piece, lines)
         if found is None:
             return None
-        F, q = found
-        motion = problem.offset + problem.W @ F + problem.A @ q
+        F, q, rest = found
+        motion = problem.offset + problem.W @ F + problem.turned @ q
+        if rest.any():
+            stopped = _stopped(status, motion, problem.turned @ rest)
+            if stopped is None:
+                return None
+            status, piece = stopped, np.where(stopped > STICK, piece, 0)
+            continue
         N, gap = F[:n], motion[:n]
         closed = status != OPEN
         new = np.where(closed & (N < -tiny_force), OPEN, status)
@@ -187,6 +207,28 @@ def _active_sets(
             return ContactSolution(F, q, status, False)
         status, piece = new, onto
     return None
+
+
+def _stopped(
+    status: NDArray[np.int64], motion: NDArray[np.float64], rate: NDArray[np.float64]
+) -> NDArray[np.int64] | None:
+    """Return the statuses once a body has moved until one more point closes or sticks.
+
+    ``rate`` is that of ``motion``, gaps and slips. None if it moves for ever.
+    """
+    n = len(status)
+    ways = np.zeros_like(motion)
+    ways[:n][status == OPEN] = 1.0
+    if len(motion) > n:
+        ways[n:][status == FORWARD], ways[n:][status == BACKWARD] = 1.0, -1.0
+    nears = ways * rate < 0
+    if not nears.any():
+        return None
+    time = np.full(len(motion), np.inf)
+    time[nears] = -motion[nears] / rate[nears]
+    out = status.copy()
+    out[np.argmin(time) % n] = STICK
+    return out
 
 
 def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
@@ -235,7 +277,7 @@ def _holds(problem: ContactProblem, F: NDArray[np.float64], q: NDArray[np.float6
     every rotation that keeps its open points open is a solution.
     """
     n, (force, length) = problem.n, problem.scales
-    motion = problem.offset + problem.W @ F + problem.A @ q
+    motion = problem.offset + problem.W @ F + problem.turned @ q
     N, met = F[:n], np.minimum(F[:n] / force, motion[:n] / length)
     off = np.concatenate([met, (problem.A.T @ F + problem.balance) / force])
     if problem.frictional:

@@ -54,8 +54,11 @@ class Pairing:
     length : (n,) mean length of the edges at the vertex [mm]
     gap : (n,) mean gap under the hat, negative where the bodies overlap [mm]; inf where
         no master faces the vertex
-    normal, tangent : pairs ``(slave, master)`` of (n, 2 n_nodes) derivative rows of gap and
-        of slip (slave relative to master along the surface) on the surfaces' unknowns
+    normal, tangent : pairs ``(slave, master)`` of (n, 2 n_nodes) rows of gap and of slip (slave
+        relative to master along the surface) on the surfaces' unknowns, along the slave's normals,
+        as the forces act
+    closing : the same rows of the gap along the master's normals: its derivative. Under a hat that
+        is wider than the contact normals lean: a round body that rotates changes its gaps
     """
 
     area: Array
@@ -66,6 +69,7 @@ class Pairing:
     gap: Array
     normal: tuple[Array, Array]
     tangent: tuple[Array, Array]
+    closing: tuple[Array, Array]
 
     @property
     def parted(self) -> Pairing:
@@ -226,7 +230,12 @@ def pair(
     at = at.ravel()
     point, n = on_slave(edge, at)
     eta, distance = _project_on_master(xm, master.edges[partner], point, n)
-    ways = np.eye(2)[..., None] + 0 * n if tied else np.stack([n, [n[1], -n[0]]])
+    if tied:
+        ways = np.eye(2)[..., None] + 0 * n
+    else:
+        x, y = _value(_slopes(_powers(xm, master.edges[partner])), eta)
+        facing_master = np.stack([-y, x]) / (n[1] * x - n[0] * y)
+        ways = np.stack([n, [n[1], -n[0]], facing_master])
     return _integrate(slave, xs, master, edge, partner, at, eta, ways, distance, weight)
 
 
@@ -242,8 +251,8 @@ def _integrate(
     distance: Array,
     weight: Array,
 ) -> Pairing:
-    """Sum the integration points into rows, one per slave vertex, along two ways (2, 2, n)."""
-    rows, vertex = len(slave.edges) + 1, np.stack([edge, edge + 1])
+    """Sum the integration points into rows, one per slave vertex, along ways (2 or 3, 2, n)."""
+    count, rows, vertex = len(ways), len(slave.edges) + 1, np.stack([edge, edge + 1])
     bare = np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight
     hats, deformed_hats = (bare * _area_per_xi(slave, x, edge, xi) for x in (slave.X, xs))
 
@@ -255,14 +264,14 @@ def _integrate(
     scale = np.where(covered, 1 / np.where(covered, area, 1.0), 0.0)
     means = hats * scale[vertex]
     along = (means * ways[:, :, None]).transpose(0, 2, 3, 1)  # way, vertex, point, axis
-    first = (np.arange(2)[:, None, None] * rows + vertex)[..., None, None]
+    first = (np.arange(count)[:, None, None] * rows + vertex)[..., None, None]
     sides = []
     for surface, own, at, sign in ((slave, edge, xi, -1.0), (master, partner, eta, 1.0)):
         N, size = sign * shape_functions(at, surface.edges.shape[1]), len(surface.nodes)
         place = 2 * (first * size + surface.edges[own][..., None]) + np.arange(2)
         value = along[..., None, :] * N[..., None]
-        each = np.bincount(place.ravel(), value.ravel(), 4 * rows * size)
-        sides.append(each.reshape(2, rows, 2 * size))
+        each = np.bincount(place.ravel(), value.ravel(), 2 * count * rows * size)
+        sides.append(each.reshape(count, rows, 2 * size))
     return Pairing(
         area=np.where(covered, area, 0.0),
         deformed=np.where(covered, deformed, 0.0),
@@ -272,6 +281,7 @@ def _integrate(
         gap=np.where(covered, gap * scale, np.inf),
         normal=(sides[0][0], sides[1][0]),
         tangent=(sides[0][1], sides[1][1]),
+        closing=(sides[0][-1], sides[1][-1]),
     )
 
 

@@ -121,7 +121,8 @@ class Interface:
                 block @ motion.T.ravel()
                 for block, motion in zip(self.reference.normal, motions, strict=True)
             )
-            return replace(self.reference, gap=self.reference.gap + change)
+            known = self.reference
+            return replace(known, gap=known.gap + change, closing=known.normal)
         return pair(self.slave_surface, motions[0], self.master_surface, motions[1], self.reach)
 
 

@@ -142,6 +142,7 @@ def eliminated(
         W=W[:m, :m] - (change[:, :m] + change[:, :m].T) / 2,
         offset=offset[:m] - change[:, m],
         A=A[:m] @ loose,
+        G=problem.turned[:m] @ loose,
         balance=loose.T @ problem.balance,
     )
 

@@ -3,10 +3,13 @@
 Unknowns are the normal forces N >= 0 and tangential forces T at n points and the free rigid
 motions q of bodies held by contact alone. With ``F = (N, T)`` (without friction ``F = N``)::
 
-    (gap, slip) = offset + W F + A q        0 = balance + A' F
+    (gap, slip) = offset + W F + G q        0 = balance + A' F
     N >= 0, gap >= 0, N gap = 0
     |T| <= s,  slip = 0 where |T| < s,  T = -s sign(slip) where |T| = s
     s = min_k (slope_k N + level_k),  the lines of a law of friction (`solver.model.friction`)
+
+G is A, but for normals that lean under a hat: forces act along the slave's, gaps change along the
+master's. Without this a ring that rests on two vertices could turn without opening either.
 """
 
 from __future__ import annotations
@@ -34,8 +37,9 @@ class ContactProblem:
     W : (m, m) compliance of the contact points [mm/N], m = 2n with friction, n without
     offset : (m,) gap and slip at zero force [mm]
     lines : the friction bound at each point, the least of lines of tangential over normal force [N]
-    A : (m, k) gap and slip of the free rigid motions
+    A : (m, k) motions along the forces of the free rigid motions
     balance : (k,) resultants of all other forces on those motions [N]
+    G : (m, k) gap and slip of the free rigid motions; A if absent
     """
 
     W: NDArray[np.float64]
@@ -43,6 +47,12 @@ class ContactProblem:
     lines: BoundLines
     A: NDArray[np.float64]
     balance: NDArray[np.float64]
+    G: NDArray[np.float64] | None = None
+
+    @property
+    def turned(self) -> NDArray[np.float64]:
+        """G, or A if absent."""
+        return self.A if self.G is None else self.G
 
     @property
     def n(self) -> int:

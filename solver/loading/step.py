@@ -103,6 +103,7 @@ def newton_step(
         offset=motion,
         lines=candidates.lines,
         A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
+        G=np.hstack([candidates.motions(i, R) for i, R in enumerate(floating)]),
         balance=np.concatenate(
             [
                 R.T @ (r + pushed)

@@ -15,14 +15,16 @@ ELEMENTS = ["quad8", "quad4"]
 
 
 def two_surfaces(
-    element="quad8", bend=0.0, gap=0.0, state="plane_strain", thickness=1.0, width=6.0
+    element="quad8", bend=0.0, gap=0.0, state="plane_strain", thickness=1.0, width=6.0, below=None
 ):
-    """A body of width 6 above a body of the given width, both bent to y = bend x²."""
-
-    def arc(p):
-        return np.stack([p[0], p[1] + bend * p[0] ** 2])
+    """A body of width 6 above one of the given width, bent to y = bend x², or ``below`` x²."""
 
     def body(name, x, y, held):
+        own = bend if name == "upper" or below is None else below
+
+        def arc(p):
+            return np.stack([p[0], p[1] + own * p[0] ** 2])
+
         return Body(
             name=name,
             mesh=mapped(grid(x, y), arc),
@@ -110,11 +112,34 @@ def test_gap_rows_match_central_differences_on_curved_surfaces():
     assert worst < 5e-4  # measured 5e-5
 
 
+def test_gaps_of_a_bow_on_a_plane_change_as_it_turns_and_shifts():
+    """Its normals lean under a hat: along them, as forces act, it would turn at no gap's cost."""
+    system, interface = two_surfaces(bend=0.05, below=0.0)
+    (number, _, surface), _ = interface.sides
+    x, y = surface.X
+
+    def gap(motion):
+        u = at_rest(system)
+        u[number][surface.dofs] = motion.T.ravel()
+        return interface.pairing(u).gap
+
+    pairing = interface.pairing(at_rest(system))
+    inner, step = slice(1, 3), 1e-5  # where the gap is small against the radius of 10
+    for motion in (np.stack([-(y - 10.0), x]), np.stack([np.ones_like(x), 0 * x])):
+        change = (gap(step * motion) - gap(-step * motion))[inner] / (2 * step)
+        by_work, found = (
+            (rows[0] @ motion.T.ravel())[inner] for rows in (pairing.normal, pairing.closing)
+        )
+        scale = np.abs(motion).max()
+        assert np.abs(found - change).max() < 0.01 * scale  # the lean, 0.2, squared or more
+        assert np.abs(by_work - change).max() > 0.05 * scale
+
+
 @pytest.mark.parametrize("bend", [0.0, 0.05])
 def test_a_common_translation_changes_neither_gap_nor_slip(bend):
     system, interface = two_surfaces(bend=bend)
     pairing = interface.pairing(at_rest(system))
-    for rows in (pairing.normal, pairing.tangent):
+    for rows in (pairing.normal, pairing.tangent, pairing.closing):
         for axis in (0, 1):
             total = sum(block[:, axis::2].sum(axis=1) for block in rows)
             assert np.abs(total).max() < 1e-12

@@ -56,7 +56,7 @@ def lines(n, friction, cohesion=None, limit=np.inf):
 def natural_residual(problem, solution):
     """Largest violation of the contact conditions and of the balance, relative."""
     n, F = problem.n, solution.forces
-    motion = problem.offset + problem.W @ F + problem.A @ solution.rigid
+    motion = problem.offset + problem.W @ F + problem.turned @ solution.rigid
     stiffness = 1 / np.diag(problem.W)
     N = F[:n]
     worst = [np.abs(N - np.maximum(0.0, N - stiffness[:n] * motion[:n])).max()]
@@ -284,4 +284,86 @@ def test_a_ring_between_plates_is_held_where_friction_alone_could_bear_the_load(
     found = solve_contact(problem, np.full(n, OPEN))
     assert found is not None
     assert found.forces[:6].sum() == pytest.approx(0.2115, rel=0.01)
+    assert natural_residual(problem, found) < 1e-8
+
+
+def ring_on_two_points(lean, rounding=0.0):
+    """A ring between plates, on two points of each, that spread: all slip, and it may shift.
+
+    Its points lean by an angle; the plates' gaps do not change as it shifts, but as it turns.
+    """
+    c, s, one, none = np.cos(lean), np.sin(lean), np.ones(2), np.zeros(2)
+    way = np.array([-s, s])
+    columns = [(way, -c * one, none, c * one), (-way, c * one, none, none),
+               (-c * one, -way, one, way), (c * one, way, one, none)]  # fmt: skip
+    A = np.vstack([np.stack(own, axis=1) for own in columns])  # ring: x, y, rotation; plate: y
+    G = A.copy()
+    G[:4] = np.array([[0.0, -1, -s, 1], [0, -1, s, 1], [0, 1, -s, 0], [0, 1, s, 0]]) / c
+    near = np.full((2, 2), 0.9) + 0.1 * np.eye(2)
+    return ContactProblem(
+        W=2e-4 * np.kron(np.eye(4), near),
+        offset=np.concatenate([
+            np.full(4, -1e-6) + rounding * np.array([1, -1, -1, 1]),
+            7e-6 * np.array([1, -1, 1, -1]),
+        ]),
+        lines=lines(4, 0.3),
+        A=A,
+        balance=np.array([0.0, 0.0, 0.0, -7.5e-3]),
+        G=G,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("rounding", [0.0, 2e-17, -2e-17])
+def test_a_ring_that_slips_on_all_points_is_held_whatever_its_positions_round_to(rounding):
+    """Nothing resists a shift: what rounding leaves of its balance must not move it."""
+    problem = ring_on_two_points(0.025, rounding)
+    start = np.array([FORWARD, BACKWARD, FORWARD, BACKWARD])
+    found = solve_contact(problem, start)
+    assert found is not None
+    assert not found.pivoted
+    assert np.array_equal(found.status, start)
+    assert np.abs(problem.balance + problem.A.T @ found.forces).max() < 1e-12 * 7.5e-3
+    assert natural_residual(problem, found) < 1e-8
+    assert np.abs(found.rigid[0]) < 1e-9
+
+
+def test_a_ring_that_turns_rests_on_both_points_again():
+    """The gaps tell how far it has turned; along forces they tell nothing of a turn."""
+    problem = ring_on_two_points(0.025)
+    turned = replace(problem, offset=problem.offset + problem.turned @ np.array([0, 0, 2e-6, 0]))
+    found = solve_contact(turned, np.array([FORWARD, BACKWARD, FORWARD, BACKWARD]))
+    assert found is not None
+    assert found.rigid[2] == pytest.approx(-2e-6, rel=1e-6)
+    blind = solve_contact(replace(turned, G=None), found.status)
+    assert blind is None or abs(blind.rigid[2] + 2e-6) > 1e-6
+
+
+@pytest.mark.parametrize("push", [1e-6, -1e-6, 1e-4])
+def test_a_ring_that_slips_on_all_points_is_pushed_until_one_sticks(push):
+    problem = ring_on_two_points(0.025)
+    problem = replace(problem, balance=problem.balance + np.array([push, 0, 0, 0]))
+    start = np.array([FORWARD, BACKWARD, FORWARD, BACKWARD])
+    found = solve_contact(problem, start)
+    assert found is not None
+    assert not found.pivoted
+    assert (found.status == STICK).any()
+    assert np.sign(found.rigid[0]) == np.sign(push)
+    assert natural_residual(problem, found) < 1e-8
+
+
+@pytest.mark.parametrize("aside", [1e-9, -0.3])
+def test_a_body_tilts_about_its_only_point_until_the_next_one_closes(aside):
+    x, none = np.array([-1.0, -0.5, 0.0, 0.5, 1.0]), np.zeros(5)
+    gap = np.concatenate([np.ones(5), none])
+    problem = ContactProblem(
+        W=1e-3 * np.eye(10),
+        offset=np.concatenate([0.02 * x**2, none]),
+        lines=lines(5, 0.3),
+        A=np.stack([gap, np.concatenate([x, none]), np.concatenate([none, np.ones(5)])], axis=1),
+        balance=np.array([-1.0, -aside, 0.0]),
+    )
+    found = solve_contact(problem, np.array([OPEN, OPEN, STICK, OPEN, OPEN]))
+    assert found is not None
+    assert not found.pivoted
+    assert (found.forces[:5] > 0).sum() == 2
     assert natural_residual(problem, found) < 1e-8

@@ -22,8 +22,6 @@ resultant by so many squares of that, at most."""
 PEAK = 0.05
 """Miss of the peak of Hertz in a contact that passes its audit."""
 
-ADRIFT = "NOT_CONVERGED.*(held by contact alone|no contact forces|contact violation)"
-"""Several bodies in a row that contact alone holds and that stand apart may not find each other."""
 COARSE = "AUDIT_FAILED.*audit_contact_resolution"
 LATE = "AUDIT_FAILED.*audit_touch_time"
 """A block that tips lifts off at its back, and touches again when it is dragged back."""
