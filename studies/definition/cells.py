@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from studies.definition.spaced import rounded
@@ -29,6 +29,8 @@ Known = Mapping[Point, tuple[float, ...]]
 Misses = Sequence[tuple[float, ...]]
 """Of each axis, the largest miss of each number on the edges along it."""
 
+ERROR = "cell_error_"
+"""Beginning of the name of an error that is left in the cells, in the data set."""
 KINK = 0.5
 """Part of a miss in the middle of an edge that may be left once the middle is known, where nothing
 is known beyond the edge. The error in a cell is the sum of these over its axes."""
@@ -51,12 +53,14 @@ class Cell(NamedTuple):
     low, high : corners with the smallest and the largest values
     branch : number of the combination of values on the other axes
     halved : how often it was halved along each axis
+    bare : axes along whose edges it asks for no runs in the middle
     """
 
     low: Point
     high: Point
     branch: int
     halved: tuple[int, ...]
+    bare: tuple[int, ...] = ()
 
     @property
     def corners(self) -> list[Point]:
@@ -65,8 +69,8 @@ class Cell(NamedTuple):
 
     @property
     def edges(self) -> list[Edge]:
-        """The edges that have a middle."""
-        return list(edges(self.low, self.high))
+        """The edges in whose middle it asks for a run."""
+        return [each for each in edges(self.low, self.high) if each.axis not in self.bare]
 
     @property
     def centre(self) -> Point:
@@ -82,6 +86,12 @@ class Cell(NamedTuple):
     def divisible(self, axis: int, most: int) -> bool:
         """Whether it can be halved along an axis, and was halved fewer times than ``most``."""
         return self.halved[axis] < most and middle(self.low[axis], self.high[axis]) is not None
+
+    def bared(self, most: int, axes: Collection[int] = ()) -> Cell:
+        """Return it without middles of edges along some axes, and along those not `divisible`."""
+        every = range(len(self.low))
+        bare = tuple(k for k in every if k in axes or not self.divisible(k, most))
+        return self._replace(bare=bare)
 
     def parts(self, axes: Sequence[int]) -> list[Cell]:
         """Return the cells into which halving along some axes divides it."""
@@ -132,7 +142,7 @@ class Cell(NamedTuple):
 
     def off(self, known: Known, at: Point, there: tuple[float, ...]) -> tuple[float, ...]:
         """Return by how much its runs miss the numbers of another run in it."""
-        parts = weights(self.low, self.high, at).items()
+        parts = weights(self.low, self.high, at, known).items()
         return tuple(
             abs(number - sum(weight * known[each][k] for each, weight in parts))
             for k, number in enumerate(there)
@@ -160,8 +170,11 @@ def edges(low: Point, high: Point) -> Iterator[Edge]:
             yield Edge(axis, start, end, at)
 
 
-def weights(low: Point, high: Point, at: Point) -> dict[Point, float]:
-    """Return the weights of the runs of a box in the value at a point in it; their sum is 1."""
+def weights(low: Point, high: Point, at: Point, runs: Container[Point]) -> dict[Point, float]:
+    """Return the weights of the runs of a box in the value at a point in it; their sum is 1.
+
+    Edges without a run in the middle, among all ``runs``, are straight.
+    """
     share = [(x - a) / (b - a) for x, a, b in zip(at, low, high, strict=True)]
     found: dict[Point, float] = {}
 
@@ -175,6 +188,8 @@ def weights(low: Point, high: Point, at: Point) -> dict[Point, float]:
     for corner in itertools.product(*zip(low, high, strict=True)):
         add(corner, product(corner))
     for axis, first, last, mid in edges(low, high):
+        if mid not in runs:
+            continue
         a, m, b, x = low[axis], mid[axis], high[axis], at[axis]
         fading = (x - a) / (m - a) if x <= m else (b - x) / (b - m)
         weight = fading * product(mid, leave=axis)

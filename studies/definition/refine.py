@@ -4,10 +4,14 @@ The values of the axes that are numbers divide their ranges into cells; each com
 on the other axes is a branch, which has cells of its own. In the first round the runs at the
 corners of all cells, at the middles of their edges and at their centres are computed. A cell is
 halved along the axis on whose edges a run in the middle missed most what the two ends predict, if
-by more than is allowed; a cell of the sweep along all axes if the run at its centre did so. Where
-some runs of a cell failed and others did not, it is halved along the axes on whose edges this
-changes. The parts ask for the runs at the middles of their edges, and so on. A cell is halved along
-an axis only so often: kinks, jumps and edges of regions of failed runs are resolved to this size.
+by more than is allowed; a cell of the sweep along all axes if the run at its centre did so. The
+parts ask for the runs at the middles of their edges, and so on. A cell is halved along an axis only
+so often: kinks, jumps and edges of regions of failed runs are resolved to this size.
+
+Where some runs of a cell failed and others did not, it is halved along the axes on whose edges this
+changes. Along these its parts are bare at first: they ask for runs at their corners alone. If all of
+these failed, no more is asked for. If none failed, the part asks for the middles too; or, if it is
+as small as is allowed, only where the slopes around it tell that it misses more than is allowed.
 
 What becomes of a cell depends on its own runs, and on the range of the numbers in the first round.
 It is therefore divided as soon as its runs are known, if even the most runs that others may ask for
@@ -30,7 +34,7 @@ import numpy as np
 
 from solver.parameters import is_number
 from solver.scenes import Scene
-from studies.definition.cells import KINK, Cell, Known, Misses, Point, between
+from studies.definition.cells import KINK, Cell, Known, Misses, Point, between, edges
 from studies.definition.line import Read
 from studies.definition.parameters import in_unit, parameters_of
 from studies.definition.place import Chooser
@@ -119,17 +123,18 @@ class RefinedCell(NamedTuple):
 
 
 class _Halving(NamedTuple):
-    """A cell to be divided along some axes.
+    """A cell to be divided.
 
     Attributes
     ----------
-    cell, axes, left : the cell, the axes, and the errors that are left if it is not divided;
-        without axes it asks for the run at its centre
+    cell : the cell
+    asks : the runs that each of its parts asks for; or the cell itself, for more runs
     miss : how far it missed what is allowed
+    left : the errors that are left if it is not divided
     """
 
     cell: Cell
-    axes: list[int]
+    asks: Mapping[Cell, Sequence[Point]]
     miss: float
     left: tuple[float, ...]
 
@@ -223,7 +228,11 @@ class Refinement(Chooser):
         """The cells that are not divided, those included of which something is still open."""
         halvings = itertools.chain(*self._halvings.values())
         halved = (RefinedCell(each.cell, OPEN, each.left) for each in halvings)
-        every = [*self.settled, *halved, *(RefinedCell(cell, OPEN) for cell in self._lacks)]
+        settled = (
+            each._replace(state=OPEN) if any(map(math.isnan, each.left)) else each
+            for each in self.settled
+        )
+        every = [*settled, *halved, *(RefinedCell(cell, OPEN) for cell in self._lacks)]
         return sorted(every, key=lambda each: (each.cell.branch, each.cell))
 
     def sets(self, wanted: Wanted) -> dict[str, Any]:
@@ -315,9 +324,18 @@ class Refinement(Chooser):
         if not there:
             self._settle(RefinedCell(cell, FAILED))
             return
+        if cell.bare and len(there) == len(known):
+            least, left = cell.bared(self.refine.halvings), (math.nan,) * len(self.refine.of)
+            if cell == least:
+                self._settle(RefinedCell(cell, SETTLED, left))  # its neighbours tell the error
+            else:
+                self._keep(_Halving(cell, {least: least.points}, math.inf, left))
+            return
         if len(there) < len(known):
             changes = {
-                each.axis for each in cell.edges if 0 < sum(at in there for at in each[1:]) < 3
+                axis
+                for axis, *runs in edges(cell.low, cell.high)
+                if len({at in there for at in runs if at in known}) > 1
             }
             miss, axes = math.inf, changes or every
         else:
@@ -338,13 +356,9 @@ class Refinement(Chooser):
                     miss = self._ratio(missed) if missed else math.inf
                     axes = self._across(cell) if miss > 1.0 else axes
                 elif twist > 1.0:
-                    self._halve(_Halving(cell, [], twist, left))
+                    self._keep(_Halving(cell, {cell: [cell.centre]}, twist, left))
                     return
-        can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
-        if can:
-            self._halve(_Halving(cell, can, miss, left))
-        else:
-            self._settle(RefinedCell(cell, SMALLEST if axes else SETTLED, left))
+        self._halve(cell, axes, miss, left)
 
     def _across(self, cell: Cell) -> set[int]:
         """Return the axes along which a cell is halved that misses the run at its centre."""
@@ -358,8 +372,19 @@ class Refinement(Chooser):
         self.settled.append(found)
         self._share += _volume(found.cell)
 
-    def _halve(self, halving: _Halving) -> None:
-        """Keep a cell to be divided."""
+    def _halve(self, cell: Cell, axes: set[int], miss: float, left: tuple[float, ...]) -> None:
+        """Keep a cell to be divided along those of some axes along which it can be."""
+        can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
+        parts = cell.parts(can)
+        if not left:  # some of its runs failed: what is failed needs no runs between
+            parts = [each.bared(self.refine.halvings, can) for each in parts]
+        if can:
+            self._keep(_Halving(cell, {each: each.points for each in parts}, miss, left))
+        else:
+            self._settle(RefinedCell(cell, SMALLEST if axes else SETTLED, left))
+
+    def _keep(self, halving: _Halving) -> None:
+        """Keep a cell to be divided as soon as the runs that are left allow it."""
         self._halvings.setdefault(_round(halving.cell), []).append(halving)
 
     def _look_around(self) -> None:
@@ -370,10 +395,15 @@ class Refinement(Chooser):
         settled, self.settled, self._share = self.settled, [], 0.0
         lines = self._lines()
         for (cell, state, left), places in zip(settled, self._inside(settled), strict=True):
-            if not left:
+            numbers = {at: self.number(Wanted(cell.branch, at)) for at in places}
+            known = {at: each for at, each in numbers.items() if each is not None}
+            changes = [at for at in places if (at in known) != bool(left)]
+            if changes and state in (SETTLED, FAILED):
+                self._halve(cell, _within(cell, changes), math.inf, ())
+                continue
+            if changes or not left:
                 self._settle(RefinedCell(cell, state))
                 continue
-            known = {at: self._numbers[Wanted(cell.branch, at)] or () for at in cell.points}
             along, turns = self._left(cell, known, lines)
             misses = [tuple(float(sum(each)) for each in zip(*along, strict=True))]
             if Wanted(cell.branch, cell.centre) not in self.rows:
@@ -383,21 +413,18 @@ class Refinement(Chooser):
                 worst = sorted(range(len(along)), key=lambda axis: -self._ratio(along[axis]))
                 can = [each for each in worst if cell.divisible(each, self.refine.halvings)]
                 axes = set((can or worst)[:1])
-            for at in places:
-                number = self.number(Wanted(cell.branch, at))
-                if at in known or number is None:
-                    continue
-                misses.append(cell.off(known, at, number))
+            for at in known.keys() - {*cell.corners, *(each.middle for each in cell.edges)}:
+                misses.append(cell.off(known, at, known[at]))
                 if self._ratio(misses[-1]) > 1.0:
-                    ends = zip(cell.low, at, cell.high, strict=True)
-                    axes |= {k for k, (low, x, high) in enumerate(ends) if low < x < high}
+                    axes |= _within(cell, [at])
             most = tuple(map(max, zip(*misses, strict=True)))
-            can = [axis for axis in sorted(axes) if cell.divisible(axis, self.refine.halvings)]
-            if can and state == SETTLED:
-                self._halve(_Halving(cell, can, self._ratio(most), most))
+            miss, whole = self._ratio(most), cell._replace(bare=())
+            if state != SETTLED:
+                self._settle(RefinedCell(cell, state, most))
+            elif cell.bare and miss > 1.0:
+                self._keep(_Halving(cell, {whole: whole.points}, miss, most))
             else:
-                small = axes and state == SETTLED
-                self._settle(RefinedCell(cell, SMALLEST if small else state, most))
+                self._halve(cell, axes, miss, most)
 
     def _lines(self) -> dict[Any, list[float]]:
         """Return where runs with numbers are on each line along an axis, in increasing order."""
@@ -414,27 +441,37 @@ class Refinement(Chooser):
         """Return of each axis the largest error of each number that is left on the edges along it.
 
         Beyond the first and the last run of a line the slope is taken to change as it does inside.
+        It is infinite along an axis where all lines end with their edges, without a third run.
         The second result is the largest error of each number that kinks at corners may leave: a
         quarter of what a change of slope at a corner makes along an edge.
         """
-        found = [(0.0,) * len(self.refine.of) for _ in cell.low]
-        turns = found[0]
-        for axis, low, high, mid in cell.edges:
+        found: list[tuple[float, ...]] = [(0.0,) * len(self.refine.of) for _ in cell.low]
+        turns, untold = found[0], set(range(len(found)))
+        every = list(edges(cell.low, cell.high))
+        for axis, low, high, mid in every:
             sides = mid[:axis], mid[axis + 1 :]
             line = lines[cell.branch, axis, *sides]
-            x0, x1, x2 = (each[axis] for each in (low, mid, high))
-            first, last = _beyond(line, x0, x0 - x1), _beyond(line, x2, x2 - x1)
-            xs = [each for each in (first, x0, x1, x2, last) if each is not None]
+            own = [each[axis] for each in (low, mid, high) if each in known]
+            first, last, beyond = own[1] - own[0], own[-1] - own[-2], 4 - len(own)
+            below = _beyond(line, own[0], -first, beyond)
+            above = _beyond(line, own[-1], last, beyond)
+            xs = [*below[::-1], *own, *above]
+            if len(xs) == 2:
+                continue
+            untold -= {axis}
             runs = (Wanted(cell.branch, (*sides[0], x, *sides[1])) for x in xs)
             slopes = np.diff([self._numbers[each] or () for each in runs], axis=0).T / np.diff(xs)
+            lacks = (0, 0), (beyond - len(below), beyond - len(above))
             errors, corners = [], []
-            for jumps in np.diff(slopes).tolist():
-                before, at, after = jumps[0], jumps[first is not None], jumps[-1]
-                halves = between(x1 - x0, before, at, after), between(x2 - x1, after, at, before)
-                errors.append(max(halves))
-                corners.append(max(abs(before - at), abs(after - at)) * (x2 - x0) / 4.0)
+            for jumps in np.pad(np.diff(slopes), lacks, mode="edge"):
+                ends = between(first, *jumps[-3:]), between(last, *jumps[2::-1])
+                errors.append(max(ends))
+                inner = np.diff(jumps[beyond - 1 : len(jumps) + 1 - beyond])
+                corners.append(max(abs(inner)) * (own[-1] - own[0]) / 4.0)
             found[axis] = tuple(map(max, zip(found[axis], errors, strict=True)))
             turns = tuple(map(max, zip(turns, corners, strict=True)))
+        for axis in untold & {each.axis for each in every}:
+            found[axis] = (math.inf,) * len(self.refine.of)
         return found, turns
 
     def _inside(self, found: Sequence[RefinedCell]) -> Iterator[list[Point]]:
@@ -470,11 +507,9 @@ class Refinement(Chooser):
             ):
                 return
             full = False
-            for cell, axes, _, left in sorted(
+            for cell, asks, _, left in sorted(
                 self._halvings.pop(stage), key=lambda each: each.order
             ):
-                parts = {each: each.points for each in cell.parts(axes)} if axes else {}
-                asks = parts or {cell: [cell.centre]}
                 new = {Wanted(cell.branch, at) for points in asks.values() for at in points}
                 more = sum(each not in self.asked for each in new)
                 full = full or len(self.asked) + more > self.refine.most
@@ -485,12 +520,19 @@ class Refinement(Chooser):
                     self._open(part, points)
 
     def _at_most(self, stage: int) -> int:
-        """Return the most runs, if all cells up to a round are divided: those not yet known too."""
+        """Return the most runs, if all cells up to a round are divided: those not yet known too.
+
+        A halving asks for the middles of the new edges, and each cell may ask for its centre; one
+        that is bare for the middles that it left out.
+        """
         axes = len(self.refine.axes)
         each = axes * 2**axes if axes == 1 else 2**axes + (axes - 1) * 2 ** (axes - 2)
+        bare = axes * 2 ** (axes - 1)
         cells = self._rounds + Counter({k: len(some) for k, some in self._halvings.items()})
         rounds = {k: stage + axes - k for k in cells if k <= stage}
-        return len(self.asked) + sum((each + 1) * (2**n - 1) * cells[k] for k, n in rounds.items())
+        return len(self.asked) + sum(
+            ((each + 1) * (2**n - 1) + bare) * cells[k] for k, n in rounds.items()
+        )
 
 
 def _round(cell: Cell) -> int:
@@ -498,16 +540,28 @@ def _round(cell: Cell) -> int:
     return sum(cell.halved)
 
 
+def _within(cell: Cell, points: Sequence[Point]) -> set[int]:
+    """Return the axes along which points are between the ends of a cell."""
+    ends = (zip(cell.low, at, cell.high, strict=True) for at in points)
+    return {k for each in ends for k, (low, x, high) in enumerate(each) if low < x < high}
+
+
 def _volume(cell: Cell) -> float:
     """Return the size of a cell as a share of its cell of the sweep."""
     return 0.5 ** sum(cell.halved)
 
 
-def _beyond(line: Sequence[float], at: float, step: float) -> float | None:
-    """Return the run of a line beyond another one, about a step away; None if there is none."""
-    k = bisect_left(line, at + step)
-    near = [each for each in line[max(k - 1, 0) : k + 1] if (each - at) * step > 0.0]
-    return min(near, key=lambda each: abs(math.log((each - at) / step)), default=None)
+def _beyond(line: Sequence[float], at: float, step: float, count: int) -> list[float]:
+    """Return runs of a line beyond another one, each about a step further, as far as there are."""
+    found: list[float] = []
+    for _ in range(count):
+        k = bisect_left(line, at + step)
+        near = [each for each in line[max(k - 1, 0) : k + 1] if (each - at) * step > 0.0]
+        if not near:
+            break
+        at = min(near, key=lambda each: abs(math.log((each - at) / step)))
+        found.append(at)
+    return found
 
 
 def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from studies.definition.cases import Case
+from studies.definition.cells import ERROR
 from studies.definition.identity import canonical
 from studies.definition.refine import Refinement, Wanted
 from studies.definition.study import Study
@@ -67,10 +68,11 @@ def _beside(
     over = [each for each in layout.usual_dimensions(scene) if each not in swept] + ["point"]
     for k, number in enumerate(refine.of):
         name = number.name
-        left = [each.left[k] if each.left else np.nan for each in cells]
+        left = np.array([each.left[k] if each.left else np.nan for each in cells])
+        left[np.isinf(left)] = np.nan  # no runs around the cell tell it
         unit = layout.attributes_of(number.of, scene).get("units", "")
         if not number.whole:
             numbers = [np.nan if each is None else each[k] for each in map(program.number, order)]
             add(name, over, numbers, f"what is refined of {number.of}", unit)
-        add(f"cell_error_{name}", "cell", left, f"error of {name} that is left in the cell", unit)
+        add(f"{ERROR}{name}", "cell", left, f"error of {name} that is left in the cell", unit)
     return RunContent(variables, {"refine": canonical(study.refine)})

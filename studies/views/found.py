@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from studies.definition.cells import ERROR
 from studies.views.columns import or_none, unit_text, value_text
 from studies.views.fits import fit_rows, measures
 from studies.views.picking import sweep_axes, sweep_coordinates
 from studies.views.tables import run_cells
-
-_ERROR = "cell_error_"
 
 Mark = Mapping[str, tuple[Any, Any, Any]]
 """A place by parameter: value, and lower and upper end of what is known of it, or None."""
@@ -127,10 +126,10 @@ def _refined(dataset: xr.Dataset, refine: Mapping[str, Any]) -> Found:
     """Return the errors that a refinement has left in its cells."""
     count = Counter(dataset["cell_state"].to_numpy().astype(str).tolist())
     states = ", ".join(f"{number} {state}" for state, number in count.most_common())
-    numbers = [n.removeprefix(_ERROR) for n in map(str, dataset.data_vars) if _ERROR in n]
+    numbers = [n.removeprefix(ERROR) for n in map(str, dataset.data_vars) if ERROR in n]
     rows = []
     for name in numbers:
-        left, values = dataset[f"{_ERROR}{name}"].max().item(), dataset[name]
+        left, values = dataset[f"{ERROR}{name}"].max().item(), dataset[name]
         width = values.max().item() - values.min().item()
         unit = unit_text(values.attrs.get("units"))
         share = 100.0 * left / width if width > 0.0 else np.nan

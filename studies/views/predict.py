@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from studies.definition.cells import KINK, edges, weights
+from studies.definition.cells import ERROR, KINK, edges, weights
 from studies.definition.points import POINT
 from studies.definition.quantity import RunNumber
 from studies.definition.vocabulary import OK
@@ -168,8 +168,10 @@ def _in_cells(dataset: xr.Dataset, between: _Between, names: Sequence[str]) -> x
             inside &= dataset[f"cell_{name}"].to_numpy().astype(str) == str(at)
     known = between.known(names)
     columns = [runs[name].to_numpy() for name in place]
-    where = {tuple(column[k] for column in columns): k for k in np.flatnonzero(known)}
-    for number in sorted(np.flatnonzero(inside), key=lambda k: size[k]):
+    where = {each: k for k, each in enumerate(zip(*columns, strict=True))}
+    left = next(each for name, each in dataset.data_vars.items() if str(name).startswith(ERROR))
+    told = inside & left.notnull().to_numpy()
+    for number in sorted(np.flatnonzero(told), key=lambda k: size[k]):
         low, high = (
             tuple(
                 dataset[f"cell_{name}_{end}"].to_numpy()[number].astype(column.dtype).item()
@@ -177,8 +179,8 @@ def _in_cells(dataset: xr.Dataset, between: _Between, names: Sequence[str]) -> x
             )
             for end in ("low", "high")
         )
-        parts = weights(low, high, tuple(place.values()))
-        if parts.keys() <= where.keys():
+        parts = weights(low, high, tuple(place.values()), where)
+        if all(at in where and known[where[at]] for at in parts):
             break
     else:
         state = dataset["cell_state"].to_numpy()[inside]
@@ -190,15 +192,19 @@ def _in_cells(dataset: xr.Dataset, between: _Between, names: Sequence[str]) -> x
         values = {at: each.isel({_RUN: where[at]}) for at in parts}
         terms = [weight * values[at] for at, weight in parts.items()]
         inner: xr.DataArray = sum(terms[1:], start=terms[0])
-        if f"cell_error_{name}" in dataset:
-            error = xr.zeros_like(inner) + dataset[f"cell_error_{name}"].item(number)
+        if f"{ERROR}{name}" in dataset:
+            error = xr.zeros_like(inner) + dataset[f"{ERROR}{name}"].item(number)
         else:
             worst: dict[int, Any] = {}
             for axis, first, last, mid in edges(low, high):
                 share = (mid[axis] - first[axis]) / (last[axis] - first[axis])
-                miss = abs(values[mid] - values[first] * (1.0 - share) - values[last] * share)
-                worst[axis] = np.maximum(worst.get(axis, 0.0), miss)
-            error = xr.zeros_like(inner) + KINK * sum(worst.values())
+                if mid in values:
+                    line = values[first] * (1.0 - share) + values[last] * share
+                    left = KINK * abs(values[mid] - line)
+                else:
+                    left = abs(values[last] - values[first])
+                worst[axis] = np.maximum(worst.get(axis, 0.0), left)
+            error = xr.zeros_like(inner) + sum(worst.values())
         found[name] = inner.assign_attrs(each.attrs)
         found[f"{name}_error"] = error.assign_attrs(_error_of(each))
     return xr.Dataset(found)

@@ -48,6 +48,16 @@ def bounded(x: float, y: float) -> float | None:
     return None if x + 0.3 * y > 0.81 else math.exp(-3.0 * x) + 0.2 * y
 
 
+def bitten(x: float, y: float) -> float | None:
+    """Return a smooth number, which is not known in a disk."""
+    return None if math.hypot(x - 0.7, y - 0.6) < 0.33 else math.exp(-3.0 * x) + 0.2 * y
+
+
+def split(x: float, y: float) -> float | None:
+    """Return a smooth number, which is not known in a band that ends."""
+    return None if abs(y - 0.45 - 0.1 * x) < 0.06 and x > 0.3 else x * x + y
+
+
 def power(x: float, y: float) -> float:
     """Return a number that changes in one corner only."""
     return float(x**6 * (1.0 + y))
@@ -92,7 +102,8 @@ def errors(found: Refinement, number: Number, points: int) -> tuple[float, int]:
         if not cell.left:
             refused += 1
             continue
-        parts = weights(cell.cell.low, cell.cell.high, tuple(point))
+        runs = {each.point for each in found.asked}
+        parts = weights(cell.cell.low, cell.cell.high, tuple(point), runs)
         assert sum(parts.values()) == pytest.approx(1.0)
         numbers = {at: found.number(Wanted(0, at)) for at in parts}
         value = sum(parts[at] * each[0] for at, each in numbers.items() if each)
@@ -168,6 +179,37 @@ def test_jumps_and_failed_regions_are_resolved_to_the_smallest_cell_and_no_furth
     _, refused = errors(found, bounded, 400)
     assert 0 < refused < 400 * 0.125 * 2.0, "only along the edge of the failed region"
     assert states["failed"] > 0
+
+
+@pytest.mark.parametrize(("number", "times"), [(bitten, 3.5), (split, 6.0), (bounded, 5.0)])
+def test_a_failed_region_is_refused_as_in_a_grid_that_takes_many_times_the_runs(
+    number: Number, times: float
+) -> None:
+    found = refined_by(number)
+    _, refused = errors(found, number, 400)
+    intervals = 2**5
+    assert (intervals + 1) ** 2 > times * len(found.asked)
+    at = np.linspace(0.0, 1.0, intervals + 1)
+    failed = np.array([[number(x, y) is None for y in at] for x in at])
+    of_the_grid = 0
+    for x, y in np.random.default_rng(1).random((400, 2)).tolist():
+        i, j = int(x * intervals), int(y * intervals)
+        of_the_grid += number(x, y) is not None and failed[i : i + 2, j : j + 2].any()
+    assert refused <= of_the_grid + 1
+
+
+@pytest.mark.parametrize("number", [bitten, split, bounded])
+@pytest.mark.parametrize("halvings", [2, 3, 5])
+def test_no_cell_with_an_error_has_a_failed_run(number: Number, halvings: int) -> None:
+    """Neither of its own, nor one that a cell beside it asked for."""
+    found = refined_by(number, halvings=halvings)
+    failed = [each.point for each in found.asked if found.number(each) is None]
+    for each in found.settled:
+        inside = sum(each.cell.holds(0, point) for point in failed)
+        every = sum(each.cell.holds(0, wanted.point) for wanted in found.asked)
+        assert bool(each.left) == (inside == 0)
+        assert (each.state == "failed") == (inside == every)
+        assert all(map(math.isfinite, each.left))
 
 
 def test_the_largest_number_of_runs_ends_it_where_it_missed_most() -> None:
