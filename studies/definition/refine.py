@@ -9,9 +9,9 @@ parts ask for the runs at the middles of their edges, and so on. A cell is halve
 so often: kinks, jumps and edges of regions of failed runs are resolved to this size.
 
 Where some runs of a cell failed and others did not, it is halved along the axes on whose edges this
-changes. Along these its parts are bare at first: they ask for runs at their corners alone. If all of
-these failed, no more is asked for. If none failed, the part asks for the middles too; or, if it is
-as small as is allowed, only where the slopes around it tell that it misses more than is allowed.
+changes. Its parts are bare at first: along these axes they ask for no runs in the middles of their
+edges. A part whose runs failed asks for no more. One whose runs did not asks for the middles too;
+if it is as small as is allowed, only where the slopes around it tell that it misses more.
 
 What becomes of a cell depends on its own runs, and on the range of the numbers in the first round.
 It is therefore divided as soon as its runs are known, if even the most runs that others may ask for
@@ -320,7 +320,8 @@ class Refinement(Chooser):
         self._rounds -= Counter([_round(cell)])
         known = {at: self.number(Wanted(cell.branch, at)) for at in cell.points}
         there = {at: each for at, each in known.items() if each is not None}
-        every, left = set(range(len(cell.low))), ()
+        every: set[int] = set(range(len(cell.low)))
+        left: tuple[float, ...] = ()
         if not there:
             self._settle(RefinedCell(cell, FAILED))
             return

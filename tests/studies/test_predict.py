@@ -17,7 +17,7 @@ from studies.views.gaussian import Gaussian, in_hull
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import SWITCHED
 from tests.studies.test_goal import search_here
-from tests.studies.test_refine import AXES, OF, study
+from tests.studies.test_refine import AXES, OF, bitten, refined_by, study
 
 
 def smooth(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -165,6 +165,52 @@ def test_a_refinement_is_predicted_in_its_cells_and_the_run_of_a_place_is_exact(
         assert again.value == pytest.approx(exact)
         with pytest.raises(StudyError, match="of = 'residual_stress': must be one of"):
             answer(dataset, asked, store, "residual_stress", at)
+
+
+def test_beside_failed_runs_a_cell_tells_a_number_or_no_error() -> None:
+    """Also one without runs in the middles of its edges."""
+    found = refined_by(bitten, halvings=4)
+    x, y = np.array([each.point for each in found.asked]).T
+    numbers = [found.number(each) for each in found.asked]
+    status = np.array(["ok" if each else "limit_load" for each in numbers], dtype=object)
+    dataset = xr.Dataset(
+        {
+            "status": ("point", status),
+            OF: ("point", np.array([each[0] if each else np.nan for each in numbers])),
+            "other": ("point", np.where(status == "ok", 2.0 * x, np.nan)),
+            f"cell_error_{OF}": (
+                "cell", [each.left[0] if each.left else np.nan for each in found.cells],
+            ),
+            "cell_state": ("cell", np.array([each.state for each in found.cells], dtype=object)),
+        }
+        | {
+            f"cell_{name}_{end}": ("cell", [getattr(each.cell, end)[k] for each in found.cells])
+            for k, name in enumerate("xy")
+            for end in ("low", "high")
+        },
+        coords={
+            "point": ("point", np.arange(len(x)), {"sets": "x y"}),
+            "x": ("point", x),
+            "y": ("point", y),
+        },
+    )  # fmt: skip
+    bare = 0
+    for cell, _, left in found.cells:
+        at = {n: 0.7 * a + 0.3 * b for n, a, b in zip("xy", cell.low, cell.high, strict=True)}
+        if not left:
+            with pytest.raises(StudyError, match="is across failed runs"):
+                predict(dataset, OF, **at)
+            continue
+        told = predict(dataset, [OF, "other"], **at)
+        assert told["other"].item() == pytest.approx(2.0 * at["x"])
+        assert told[f"{OF}_error"].item() == left[0]
+        exact = bitten(**at)
+        assert exact is not None
+        assert told[OF].item() == pytest.approx(exact, abs=0.025)
+        if cell.bare == (0, 1):
+            bare += 1
+            assert told["other_error"].item() == pytest.approx(2.0 * (cell.high[0] - cell.low[0]))
+    assert bare > 4
 
 
 def test_a_grid_is_predicted_by_a_process(store: Store) -> None:
