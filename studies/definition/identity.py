@@ -137,7 +137,7 @@ def written(scene: Scene) -> list[list[str]]:
 def loaded(scene: Scene) -> dict[str, str]:
     """Return the digests of the modules by whose names a scene goes to another process."""
     names = {each.__module__ for each in _functions(scene)} - {"__main__"}
-    return {name: found for name in sorted(names) if (found := _module_digest(name))}
+    return {name: found for name in names if (found := _module_digest(name))}
 
 
 def _read(scene: Scene) -> list[list[str]]:
