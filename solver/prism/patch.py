@@ -48,6 +48,8 @@ _PRESSED = 0.5
 For a ball in contact over a radius a it is 0.5 at the edge (K.L. Johnson, 1985, section 4.2)."""
 UPSTREAM = (1.5, -2.0, 0.5)
 """Weights of the slip at a station, at the one before and at the second before."""
+_MOTIONS = ("height", "creepage", "lateral_creepage", "spin")
+"""Rigid motions of a wheel."""
 _SLIDES = 1.0
 """Creepage at which all of a contact slips."""
 
@@ -204,21 +206,30 @@ class RollingPatch:
             found = self._solve(u, start)
         status = found.status
         _check_rim(status)
-        rigid = self._given.copy()
-        rigid[self._free] = found.rigid
-        return PatchContact(
+
+        def near(other: Array) -> PatchContact:
+            values, rigid = found.along(self._offset(other - u))
+            moved = self._moved(found.rigid + rigid)
+            return replace(contact, traction=self._global(found.values + values), **moved)
+
+        contact = PatchContact(
             grid=self.grid,
             traction=self._global(found.values),
             gap=found.effects[..., NORMAL],
             slip=found.effects[..., TANGENTS],
             status=status,
             along=lambda change: self._global(found.along(self._offset(change))[0]),
-            height=float(rigid[0]),
-            creepage=float(rigid[1]),
-            lateral_creepage=float(rigid[2]),
-            spin=float(rigid[3]),
+            near=near,
             steps=found.steps,
+            **self._moved(found.rigid),
         )
+        return contact
+
+    def _moved(self, free: Array) -> dict[str, float]:
+        """Return height and creepages by name, from the rigid motions (k,) that are free."""
+        rigid = self._given.copy()
+        rigid[self._free] = free
+        return dict(zip(_MOTIONS, rigid.tolist(), strict=True))
 
     def _solve(self, u: Array, start: PatchContact | None) -> ConeSolution:
         """Solve the frictional problem of a surface with these displacements (n, m, 3)."""

@@ -7,17 +7,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.materials import Elasticity
-from solver.memory import kept
+from solver.memory import kept, remembered
 from solver.mesh.section_mesh import MeshedRail, SectionMesh, ZonedMesh
 from solver.mesh.zone import Zone, rail_mesh
-from solver.prism.patch import RollingPatch
+from solver.prism.patch import RollingLoad, RollingPatch
 from solver.prism.section import Section
 from solver.prism.straight import check_elastic
 from solver.scenes.initial_stress import settled
@@ -294,15 +293,16 @@ class RolledRail:
         return stressed_track(own, p.rail_stress, p.thermal_strain)
 
     def load(self, track: PrismTrack, number: int) -> RollingPatch:
-        """See `RolledPrism`; wheels of other passes share the influences of tractions."""
+        """See `RolledPrism`; all wheels on a rail share the influences of tractions."""
         p, last = self._passes[number], self._made
         if last is not None and last[:2] == (track, p):
             return last[2]
         wheel = wheel_of(p)
-        if last is not None and last[0] is track:
-            make = last[2].with_wheel(wheel).with_load
-        else:
-            make = partial(RollingPatch, track.grid, track.compliance, wheel)
-        made = make(friction=p.friction, force=p.load, **p.motion)
+        load = RollingLoad(friction=p.friction, force=p.load, **p.motion)
+        made = remembered(
+            (RollingPatch, track, wheel.elasticity),
+            lambda: RollingPatch(track.grid, track.compliance, wheel, **load),
+        )
+        made = made.with_wheel(wheel).with_load(**load)
         self._made = track, p, made
         return made
