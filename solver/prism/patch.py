@@ -48,8 +48,6 @@ _PRESSED = 0.5
 For a ball in contact over a radius a it is 0.5 at the edge (K.L. Johnson, 1985, section 4.2)."""
 UPSTREAM = (1.5, -2.0, 0.5)
 """Weights of the slip at a station, at the one before and at the second before."""
-_MOTIONS = ("height", "creepage", "lateral_creepage", "spin")
-"""Rigid motions of a wheel."""
 _SLIDES = 1.0
 """Creepage at which all of a contact slips."""
 
@@ -209,9 +207,13 @@ class RollingPatch:
 
         def near(other: Array) -> PatchContact:
             values, rigid = found.along(self._offset(other - u))
-            moved = self._moved(found.rigid + rigid)
-            return replace(contact, traction=self._global(found.values + values), **moved)
+            height, creepage, lateral, _ = self._moved(found.rigid + rigid)
+            return replace(
+                contact, traction=self._global(found.values + values), height=height,
+                creepage=creepage, lateral_creepage=lateral,
+            )  # fmt: skip
 
+        height, creepage, lateral, spin = self._moved(found.rigid)
         contact = PatchContact(
             grid=self.grid,
             traction=self._global(found.values),
@@ -220,16 +222,19 @@ class RollingPatch:
             status=status,
             along=lambda change: self._global(found.along(self._offset(change))[0]),
             near=near,
+            height=height,
+            creepage=creepage,
+            lateral_creepage=lateral,
+            spin=spin,
             steps=found.steps,
-            **self._moved(found.rigid),
         )
         return contact
 
-    def _moved(self, free: Array) -> dict[str, float]:
-        """Return height and creepages by name, from the rigid motions (k,) that are free."""
+    def _moved(self, free: Array) -> list[float]:
+        """Return height, creepages and spin, from the rigid motions (k,) that are free."""
         rigid = self._given.copy()
         rigid[self._free] = free
-        return dict(zip(_MOTIONS, rigid.tolist(), strict=True))
+        return rigid.tolist()
 
     def _solve(self, u: Array, start: PatchContact | None) -> ConeSolution:
         """Solve the frictional problem of a surface with these displacements (n, m, 3)."""

@@ -16,7 +16,7 @@ from solver.materials import Elasticity
 from solver.memory import kept, remembered
 from solver.mesh.section_mesh import MeshedRail, SectionMesh, ZonedMesh
 from solver.mesh.zone import Zone, rail_mesh
-from solver.prism.patch import RollingLoad, RollingPatch
+from solver.prism.patch import RollingPatch
 from solver.prism.section import Section
 from solver.prism.straight import check_elastic
 from solver.scenes.initial_stress import settled
@@ -298,7 +298,7 @@ class RolledRail:
         if last is not None and last[:2] == (track, p):
             return last[2]
         wheel = wheel_of(p)
-        load = RollingLoad(friction=p.friction, force=p.load, **p.motion)
+        load = {"friction": p.friction, "force": p.load, **p.motion}
         made = remembered(
             (RollingPatch, track, wheel.elasticity),
             lambda: RollingPatch(track.grid, track.compliance, wheel, **load),
