@@ -56,6 +56,12 @@ def is_quantity(value: object) -> bool:
     return isinstance(value, str) and _matched(value) is not None
 
 
+def words_of(text: str) -> set[str]:
+    """Return the words in the unit of a quantity: N and mm of ``3 N mm``."""
+    match = _matched(text)
+    return set(re.findall(r"[A-Za-zµ°%]+", match["unit"] + match["more"])) if match else set()
+
+
 def _matched(text: str) -> re.Match[str] | None:
     return _QUANTITY.fullmatch(text.translate(_PLAIN)) if len(text) <= LONGEST else None
 

@@ -38,6 +38,7 @@ FIRST = (
             "verification/test_track_ends.py",
             "studies/test_own_parts.py",
             "verification/test_contact_in_time.py",
+            "studies/plots/test_many.py",
             "verification/test_coarser.py",
             "studies/test_kill.py",
             "stability/test_scenes.py",

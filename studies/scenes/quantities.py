@@ -17,7 +17,7 @@ from studies.scenes.mending import Where
 from studies.scenes.refusals import dotted
 from studies.scenes.table import SceneTable, unit_in
 from studies.scenes.tables import SceneFile
-from studies.units import UnitError, converted, is_quantity, number_in
+from studies.units import COHERENT, UnitError, converted, is_quantity, number_in, words_of
 
 Visit: TypeAlias = Callable[[Where, str, str], Any]
 """Place, text and unit of an entry -> its new value."""
@@ -27,16 +27,26 @@ Options: TypeAlias = Sequence[tuple[Any, str | None]]
 
 def in_own_units(content: Mapping[str, Any]) -> Any:
     """Return a scene file with numbers in place of those with a unit, if it can be converted."""
-    return _visited((), content, [(SceneFile, None)], _converted)
+    named = _named(content)
+
+    def convert(where: Where, text: str, unit: str) -> Any:
+        del where
+        try:
+            return _number(text, unit, named)
+        except UnitError:
+            return text
+
+    return _visited((), content, [(SceneFile, None)], convert)
 
 
 def wrong_units(content: Mapping[str, Any]) -> dict[Where, StudyError]:
     """Return the mistakes of numbers whose unit is not one of their entry, by place."""
     found: dict[Where, StudyError] = {}
+    named = _named(content)
 
     def check(where: Where, text: str, unit: str) -> None:
         try:
-            converted(text, unit)
+            _number(text, unit, named)
         except UnitError as error:
             allowed = f"must be {number_in(unit)}; {error}"
             found[where] = StudyError(dotted(where), text, allowed)
@@ -45,12 +55,17 @@ def wrong_units(content: Mapping[str, Any]) -> dict[Where, StudyError]:
     return found
 
 
-def _converted(where: Where, text: str, unit: str) -> Any:
-    del where
-    try:
-        return converted(text, unit)
-    except UnitError:
-        return text
+def _named(content: Mapping[str, Any]) -> set[str]:
+    """Return the names of parameters and of derived numbers."""
+    tables = (content.get(key) for key in ("parameters", "derived"))
+    return {str(name) for table in tables if isinstance(table, Mapping) for name in table}
+
+
+def _number(text: str, unit: str, named: set[str]) -> float:
+    """Return the number of a quantity; where any unit may stand, no name may be taken for one."""
+    if unit == COHERENT and (both := sorted(words_of(text) & named)):
+        raise UnitError(f"{both[0]} is the name of a number too: write ${both[0]} if it is meant")
+    return converted(text, unit)
 
 
 def _visited(where: Where, value: Any, options: Options, visit: Visit) -> Any:

@@ -187,6 +187,17 @@ def test_a_derived_number_has_a_unit_of_the_project(text: str, why: str) -> None
         built(content)
 
 
+@pytest.mark.parametrize("text", ["3/h", "3 N h", "2 /h"])
+def test_a_unit_that_is_the_name_of_a_parameter_is_refused(text: str) -> None:
+    content = blocks()
+    content["parameters"]["h"] = {"default": 2.0, "unit": "mm", "description": "height"}
+    content["derived"]["side"] = text
+    with pytest.raises(SceneError, match=rf"derived\.side = '{text}'.*write \$h if it is meant"):
+        built(content)
+    content["derived"]["side"] = "1 in"
+    assert Description("blocks.toml", content, {}).content["derived"]["side"] == 25.4
+
+
 PUNCH = scene_named("punch")
 
 

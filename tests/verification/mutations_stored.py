@@ -543,6 +543,8 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "stress in GPa": _pressed(at_nodes_times("stress", 1e-3), "stored"),
     "plastic strain in percent": _pressed(at_nodes_times("plastic_strain", 100.0), "stored"),
+    "strain doubled": _file(at_nodes_times("strain", 2.0), "stored"),
+    "components of plastic strain doubled": _file(at_nodes_times("plastic_tensor", 2.0), "stored"),
     "nodal values of the next node": _pressed(
         instead(solver.contact.system, "recovery", next_node), "stored"
     ),

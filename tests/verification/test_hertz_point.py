@@ -8,6 +8,12 @@ import pytest
 from solver import Body, ContactPair, Material, Model, Solution, solve
 from solver.loading.control import PathControl
 from solver.mesh import graded, grid, mapped
+from solver.results.contact import (
+    CONTACT_PRESSURE,
+    CONTACT_PRESSURE_DEFORMED,
+    CONTACT_X,
+    contacts,
+)
 from tests.verification.closed_forms import plane_strain_modulus
 
 RADIUS = 10.0
@@ -109,5 +115,10 @@ def test_pressure_and_stress_of_a_deep_contact_mean_the_same() -> None:
     below = solution.at("space", [[0.0], [0.0]], "loaded")["stress"][1, 0]
     assert -below == pytest.approx(pole, rel=0.01)
     assert pole == pytest.approx(2 * MODULUS / (np.pi * RADIUS), rel=0.01)
-    shared = solution.contact().pressure_deformed[x[0].argmin()]
+    shared = acting.pressure_deformed[x[0].argmin()]
     assert shared > 1.04 * pole
+    stored = contacts([[acting]], ["c"], samples=11)
+    at = stored[CONTACT_X][0].argmin()
+    for variable, value in ((CONTACT_PRESSURE, pole), (CONTACT_PRESSURE_DEFORMED, shared)):
+        (values,) = (found for key, found in stored.items() if key.name == variable.name)
+        assert values[0, 0, at] == pytest.approx(value, rel=1e-9)

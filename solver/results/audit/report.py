@@ -28,7 +28,15 @@ if TYPE_CHECKING:
     from solver.contact.system import System
     from solver.fem.discretisation import Discretisation
 
-_SURFACE_SHEAR = 1.1
+_TOLD = {
+    "audit_surface_shear": (
+        1.1, "surface shear reaches {:.2f} of the shear yield stress: refine the mesh"
+    ),
+    "audit_error_contact": (
+        0.1, "contact pressure has an estimated error of {:.0%}: use smaller elements there"
+    ),
+}  # fmt: skip
+"""Figures that a warning tells: above which value, and its text."""
 _REACTIONS, _TRAVELLING = 1e-5, 5e-3  # elements integrate a Hertz pressure with its steep ends
 _ENERGY, _TURNING = 1e-5, 0.02  # with finite sliding contact normals rotate within an increment
 _FORCE = 1e-6  # of the force level
@@ -261,6 +269,8 @@ def _beyond(figures: Mapping[str, float], limits: Mapping[str, float]) -> tuple[
 
 def warnings(figures: Mapping[str, float]) -> tuple[str, ...]:
     """Return the warnings that follow from figures."""
-    shear = figures.get("audit_surface_shear", 0.0)
-    message = f"surface shear reaches {shear:.2f} of the shear yield stress: refine the mesh"
-    return (message,) if shear > _SURFACE_SHEAR else ()
+    return tuple(
+        text.format(figures[name])
+        for name, (limit, text) in _TOLD.items()
+        if figures.get(name, 0.0) > limit
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -13,23 +15,32 @@ from studies.views.plots.legends import add_head
 
 _PANEL = (4.6, 4.4)
 """Width and height of a line with its differences [in]."""
+_ABREAST = 4
+"""Largest number of lines beside one another."""
 _LINE, _MARKS = "#D55E00", "0.35"
 
 
 def fit_figure(dataset: xr.Dataset) -> Figure:
-    """Return a column for each measured line: it and the run with the values found, differences.
+    """Return two panels for each measured line: it and the run with the values found, differences.
 
     Parameters
     ----------
     dataset : data set of a fit
     """
-    lines = range(dataset.sizes["lines"])
-    size = _PANEL[0] * len(lines), _PANEL[1] + 0.7
+    count = dataset.sizes["lines"]
+    abreast = min(count, _ABREAST)
+    rows = math.ceil(count / abreast)
+    size = _PANEL[0] * abreast, _PANEL[1] * rows + 0.7
     sheet = Figure(figsize=size, dpi=130, layout="constrained")
-    grid = sheet.subplots(2, len(lines), squeeze=False, height_ratios=(3, 1), sharex="col")
-    for k in lines:
-        rows = dataset.isel(row=np.flatnonzero(dataset["line"] == k))
-        _draw(grid[:, k], rows, dataset.isel(lines=k))
+    grid = sheet.subplots(2 * rows, abreast, squeeze=False, height_ratios=(3, 1) * rows)
+    pairs = np.reshape(grid, (rows, 2, abreast)).swapaxes(1, 2).reshape(-1, 2)
+    for k, panels in enumerate(pairs):
+        if k < count:
+            own = dataset.isel(row=np.flatnonzero(dataset["line"] == k))
+            _draw(panels, own, dataset.isel(lines=k))
+        else:
+            for axes in panels:
+                axes.set_axis_off()
     found = [f"{words(n)} {_sure(dataset, n)}" for n in map(str, dataset["parameter"].to_numpy())]
     below = wrapped(" · ".join(found), size[0] - 0.4, 8)
     add_head(sheet, f"Fit {dataset.attrs['title']}", below)
@@ -39,6 +50,8 @@ def fit_figure(dataset: xr.Dataset) -> Figure:
 def _draw(panels: np.ndarray, rows: xr.Dataset, line: xr.Dataset) -> None:
     """Draw a measured line and its differences."""
     above, below = panels
+    above.sharex(below)
+    above.tick_params(labelbottom=False)
     over, of = line["line_over"].item(), line["line_of"].item()
     x = rows["place"].to_numpy() if over else np.arange(rows.sizes["row"])
     measured, sigma, fitted = (

@@ -37,7 +37,9 @@ if TYPE_CHECKING:
     Box = tuple[float, float, float, float]
 
 _PANEL, _LEGEND = (4.4, 5.4), 3.3
-"""Largest width and height of a panel; width of the legend [in]."""
+"""Largest width and height of a panel; width of a column of the legend [in]."""
+_LINES = 40
+"""Lines of text in a column of the legend, about."""
 _FILLS = ("#dfe8f3", "#f6ead7", "#e2efdd", "#f1dfe9", "#e8e8e8")
 _PAIRS = ("#d62728", "#1f77b4", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2")
 _RESULTS = "#7b3fa0"
@@ -138,15 +140,26 @@ def setup_figure(
         frame = Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, edgecolor="k", linewidth=0.9)
         panels[0].add_patch(frame)
         panels[1].set_title("the frame on the left", loc="left", fontsize=8, color="0.3")
+    columns, tall = _columns(list(handles))
+    sheet.set_size_inches(size[0] + (columns - 1) * _LEGEND, max(size[1], tall))
     sheet.legend(
         handles=list(handles.values()), labels=list(handles), loc="outside right upper",
-        frameon=False, fontsize=8, labelspacing=0.55,
+        frameon=False, fontsize=8, labelspacing=0.55, ncols=columns,
     )  # fmt: skip
     lines = [scene.summary, _own(scene, given)]
     below = "\n".join(wrapped(line, max(shapes[0][0], 3.0), 8) for line in lines if line)
     panels[0].set_title(below, loc="left", fontsize=8, color="0.3")
     sheet.suptitle(capitalised(words(scene.name)), x=0.01, ha="left", fontsize=11, weight="bold")
     return sheet
+
+
+def _columns(labels: Sequence[str]) -> tuple[int, float]:
+    """Return the number of columns of a legend with these labels, and its height [in]."""
+    lines = [label.count("\n") + 1 for label in labels]
+    columns = math.ceil(sum(lines) / _LINES)
+    rows = math.ceil(len(lines) / columns)
+    most = max(sum(lines[first : first + rows]) for first in range(0, len(lines), rows))
+    return columns, 0.5 + 0.14 * most + 0.07 * rows
 
 
 def _own(scene: Scene, given: Mapping[str, Any]) -> str:

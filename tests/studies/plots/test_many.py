@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,12 +12,21 @@ from matplotlib.collections import PathCollection
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
+from solver.scenes.scene import Scene
 from studies import StudyError
+from studies.scenes.description import Description
+from studies.scenes.scene import file_scene
+from studies.views.differing import Change, Difference
+from studies.views.plots.differing import difference_figure
+from studies.views.plots.fit import fit_figure
 from studies.views.plots.picture import picture
+from studies.views.plots.sensitivity import sensitivity_figure
+from studies.views.plots.setup import setup_figure
 from tests.studies.plots.test_curves import swept
 from tests.studies.plots.test_lines import legend_of, lines_of
 from tests.studies.plots.test_maps import grid_map
 from tests.studies.rolled import data_set
+from tests.studies.test_sensitivity import OF, as_dataset
 
 COUNTS = (1, 2, 5, 13, 40)
 
@@ -39,14 +49,14 @@ def told_apart(sheet: Figure) -> set[tuple[object, str]]:
     return {(to_rgba(line.get_color()), line.get_linestyle()) for line in lines_of(sheet)}
 
 
-def check_inside(sheet: Figure) -> None:
-    """Check that nothing is cut, and that the axes are what is seen."""
+def check_inside(sheet: Figure, share: float = 0.5) -> None:
+    """Check that nothing is cut, and that the first axes have a share of the page."""
     sheet.draw_without_rendering()
     ink, size = sheet.get_tightbbox(), sheet.get_size_inches()
     assert min(ink.x0, ink.y0) >= 0.0
     assert (ink.x1 <= size[0], ink.y1 <= size[1]) == (True, True)
-    assert sheet.axes[0].bbox.width > 0.5 * sheet.bbox.width
-    assert sheet.axes[0].bbox.height > 0.5 * sheet.bbox.height
+    assert sheet.axes[0].bbox.width > share * sheet.bbox.width
+    assert sheet.axes[0].bbox.height > share * sheet.bbox.height
 
 
 @pytest.mark.parametrize("count", COUNTS)
@@ -158,3 +168,96 @@ def test_a_map_is_that_of_the_last_stage(count: int) -> None:
     run["map_stress"] = (("stage", "y", "x"), values, {"units": "MPa"})
     (mesh,) = picture(run, "map_stress").axes[0].collections
     assert np.unique(mesh.get_array().compressed()) == [count]
+
+
+def stack(count: int) -> Scene:
+    """A scene of blocks on one another, with as many contact pairs."""
+    tables: dict[str, Any] = {
+        "name": "stack", "kinematics": "plane_strain",
+        "materials": {"steel": {"youngs_modulus": 2e5, "poisson_ratio": 0.3}},
+        "bodies": {
+            f"block_{k}": {
+                "material": "steel",
+                "shape": {"kind": "rectangle", "x": [0, 4], "y": [k, k + 1], "size": 1.0},
+            }
+            for k in range(count + 1)
+        },
+        "contacts": [
+            {"name": f"face_{k}", "slave": f"block_{k + 1}.bottom", "master": f"block_{k}.top"}
+            for k in range(count)
+        ],
+        "stages": [{"name": "on", "increments": 1}],
+    }  # fmt: skip
+    tables["bodies"]["block_0"]["supports"] = {"bottom": "xy"}
+    return file_scene(Description("stack.toml", tables, {}))
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_the_legend_of_a_scene_names_every_pair(count: int) -> None:
+    sheet = setup_figure(stack(count))
+    check_inside(sheet, share=0.0)
+    (legend,) = sheet.legends
+    ink, size = legend.get_window_extent(), sheet.bbox
+    assert (ink.x0 >= size.x0, ink.y0 >= size.y0) == (True, True)
+    named = [text.get_text() for text in legend.get_texts()]
+    assert sum(name.startswith("contact ") for name in named) == count
+
+
+def fitted(lines: int) -> xr.Dataset:
+    """A fit of one parameter to measured lines of three values."""
+    line, x = np.repeat(np.arange(lines), 3), np.tile([0.0, 1.0, 2.0], lines)
+    along = {name: ("row", values) for name, values in (
+        ("line", line), ("place", x), ("measured", x + line), ("measured_sigma", 0 * x + 1.0),
+        ("fitted", x + line + 0.1),
+    )}  # fmt: skip
+    told = {"of": "contact_pressure", "over": "s", "at": "stage = loaded", "unit": "MPa"}
+    of_lines = {f"line_{name}": ("lines", [word] * lines) for name, word in told.items()}
+    found = {"parameter": ("parameter", ["friction"]), "friction": 0.3, "friction_sigma": 0.01}
+    return xr.Dataset(along | of_lines | found, attrs={"title": "of many"})
+
+
+def indices(count: int) -> tuple[xr.Dataset, xr.Dataset]:
+    """Runs over parameters, and indices of sensitivity to them."""
+    random = np.random.default_rng(count)
+    dataset = as_dataset(random.random((9, count)), random.random(9))
+    columns = {kind: random.random(count) for kind in ("first", "total")}
+    effect = np.sort(random.random((count, 5)), axis=1)
+    found = {name: ("parameter", values) for name, values in columns.items()} | {
+        name: (("parameter", "share"), values)
+        for name, values in (("effect", effect), ("place", effect))
+    }
+    names = [f"p{k}" for k in range(count)]
+    told = {"method": "chaos", "of": OF, "runs": 9, "q2": 0.9}
+    return dataset, xr.Dataset(found, coords={"parameter": names}, attrs=told)
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_each_measured_line_and_each_parameter_has_its_panels(count: int) -> None:
+    """Beside one another as many as a page has room for."""
+    for sheet, shown in (
+        (fit_figure(fitted(count)), 2 * count),
+        (sensitivity_figure(*indices(count)), 2 + count),
+    ):
+        drawn = [axes for axes in sheet.get_axes() if axes.axison]
+        assert len(drawn) == shown
+        assert all(axes.has_data() for axes in drawn)
+        assert sheet.get_size_inches()[0] < 20.0
+        if count == 5:  # more than one row; to lay out forty panels takes seconds
+            check_inside(sheet, share=0.0)
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_the_variables_that_changed_most_have_bars(count: int) -> None:
+    names = [f"largest_residual_stress_{k}" for k in range(count)]
+    both = {name: (np.arange(3.0), np.arange(3.0) + 1.0) for name in names}
+    changes = [
+        Change(name, "MPa", 1.0, 10.0**-k, 1.0, 2.0, {}, {}, 3) for k, name in enumerate(names)
+    ]
+    sheet = difference_figure(
+        Difference(names=("before", "after"), common=3, only=([], []), statuses=[],
+                   changes=changes, unlike={}, unknown={}, pairs=both)
+    )  # fmt: skip
+    bars = sheet.axes[0]
+    assert len(bars.patches) == min(count, 14)
+    assert (f"of {count} variables" in bars.get_xlabel()) == (count > 14)
+    check_inside(sheet, share=0.0)
