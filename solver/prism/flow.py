@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.prism.state import PrismState
-from solver.steady.flow import INFLOW, allowed_inflow, sweep_of
+from solver.steady.flow import allowed_inflow, sweep_of
 from solver.steady.load import Given
 from solver.steady.passing import passing
 
@@ -100,8 +100,6 @@ class PrismFlow(_Swept):
         added, most = self._added, allowed_inflow(self._law, self.most_added)
         if added[:, 0].max() > most:
             return "ahead"
-        # next to the rim nothing yields, however much is added elsewhere
-        most = min(most, INFLOW * self._law.yield_stress / self._law.elasticity.youngs_modulus)
         return "around" if added[self._rim].max(initial=0.0) > most else ""
 
     def left(self) -> tuple[PlasticState, PrismState]:

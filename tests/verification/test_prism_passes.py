@@ -272,8 +272,6 @@ def test_the_error_of_the_length_falls_when_it_doubles() -> None:
 
 
 def test_a_zone_that_is_too_small_is_told() -> None:
-    """At its rim much less may yield than inside: elastic points beyond would be above yield."""
-    for depth, peak in ((5.0, 1360.0), (10.0, 1200.0)):
-        small = block(zone_depth=depth)
-        with pytest.raises(WindowTooSmall, match="around"):
-            rolled(small, PERFECT, ellipse(small, peak))
+    small = block(zone_depth=5.0)
+    with pytest.raises(WindowTooSmall, match="around"):
+        rolled(small, PERFECT, ellipse(small, 1360.0))
