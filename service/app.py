@@ -31,10 +31,11 @@ from service.maps import Pictures
 from service.methods import head_is_get
 from service.metrics import Metrics
 from service.overview import Details
+from service.pages import new
 from service.pages import routes as pages
 from service.pool import Pool
 from service.probe import Probe
-from service.processes import Starter, find_modules_at_home
+from service.processes import Starter, find_modules_at_home, share_arenas
 from service.recovery import Mender, open_queue
 from service.retention import Keeper
 from service.routes.manual import ASSETS
@@ -146,7 +147,8 @@ def assembled(settings: Settings, store: Store, jobs: Jobs, held: int | None) ->
         needs_key = settings.keys_required and "health" not in router.tags
         app.include_router(router, dependencies=[Security(BEARER)] if needs_key else [])
     app.include_router(pages.home)
-    app.include_router(pages.router)
+    app.include_router(new.router)
+    app.include_router(pages.router)  # its last route is for all other paths
     app.mount("/docs", ASSETS, name="docs")
     return app
 
@@ -181,6 +183,7 @@ def serve(
     except StudyError as error:
         refuse(str(error))
     find_modules_at_home()
+    share_arenas()
     remove_left()
     logs.configure(settings.log_format)
     try:

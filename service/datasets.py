@@ -55,7 +55,8 @@ AGAIN = "the data set was lost or damaged, and is made again from the runs: ask 
 class _Offered:
     """A data set: of which state of the catalogue, where it is, and until when it stays.
 
-    It is nowhere if it could not be made; then it is tried again after this time.
+    It is nowhere if none could be made; then it is tried again after this time. If one of more runs
+    cannot be made, the one before stays.
     """
 
     of: State | None = None
@@ -80,17 +81,11 @@ class Datasets:
         self.made: OrderedDict[str, _Offered] = OrderedDict()
         self.folders = ExitStack()
         self.folder: Path | None = None
-        self.layouts: dict[str, tuple[str, int]] = {}
 
     def ended(self, job: Job) -> Path:
         """Return the path of the data set that the last end of a study left, checked.
 
-        Raises
-        ------
-        NotFound
-            if there is none yet, or it was damaged where nothing is computed
-        Busy
-            if it was lost or damaged, and is made again
+        Raise `NotFound` if there is none yet, `Busy` if it was lost or damaged, and is made again.
         """
         try:
             return self.store.dataset(job.id)
@@ -109,12 +104,7 @@ class Datasets:
     async def current(self, job: Job) -> Path:
         """Return the path of that of `ended`, or before the first end of one of the runs there are.
 
-        Raises
-        ------
-        NotFound
-            if the study chooses its runs, and has not ended
-        Busy
-            if it is being made
+        Raise `NotFound` if the study chooses its runs and has not ended, `Busy` if it is made now.
         """
         try:
             return await asyncio.to_thread(self.ended, job)
@@ -125,13 +115,12 @@ class Datasets:
 
     async def tiles(self, job: Job) -> Tiles:
         """Return the current data set of a study as a Zarr store; errors as `current`."""
-        path = await self.current(job)
-        found = await asyncio.to_thread(Tiles, path)
-        layout, turn = self.layouts.get(job.id, ("", 0))
-        if layout != found.layout:
-            turn = await asyncio.to_thread(self.jobs.layout_turn, job.id, found.layout)
-        self.layouts[job.id] = found.layout, turn
-        return await asyncio.to_thread(Tiles, path, turn) if turn else found
+        return await asyncio.to_thread(self._tiles, job.id, await self.current(job))
+
+    def _tiles(self, study_id: str, path: Path) -> Tiles:
+        found = Tiles(path)
+        turn = self.jobs.layout_turn(study_id, found.layout)
+        return Tiles(path, turn) if turn else found
 
     async def _partial(self, job: Job) -> Path:
         """Return the path of the data set of a study as it is now, or was a little before."""
@@ -158,8 +147,7 @@ class Datasets:
             raise Busy(LARGE, math.ceil(made.until - began))
         if self.folder is None:
             self.folder = self.folders.enter_context(scratch())
-        made.number += 1
-        target = self.folder / f"{study_id}-{made.number}.nc"
+        target = self.folder / f"{study_id}-{made.number + 1}.nc"
         given = content, self.store.directory.resolve(), self.store.aside, target
         try:
             async with self.process.turn():
@@ -167,15 +155,15 @@ class Datasets:
         except StoreFull:  # not the data directory
             raise OSError(errno.ENOSPC, "no room is left for temporary files") from None
         except Beyond:
-            now = time.monotonic()
-            made.path, made.until = None, now + REST * (now - began)
-            raise Busy(LARGE, math.ceil(REST * (now - began))) from None
+            made.until = rested(began)
+            if made.path is None:
+                raise Busy(LARGE, math.ceil(made.until - time.monotonic())) from None
+            return made.path
         finally:
             for part in target.parent.glob(f"{target.name}.*"):  # of a process that was ended
                 part.unlink(missing_ok=True)
-        made.of, made.path = of, target
-        now = time.monotonic()
-        made.until = now + REST * (now - began)
+        made.of, made.path, made.number = of, target, made.number + 1
+        made.until = rested(began)
         self._forget(study_id, made.number - 2)  # the one before may still be sent
         self._keep_few(study_id)
         return target
@@ -200,6 +188,12 @@ class Datasets:
         self.folder = None
         self.made.clear()
         self.folders.close()
+
+
+def rested(began: float) -> float:
+    """Return until when a data set stays that was begun at a time, and has just been made."""
+    now = time.monotonic()
+    return now + REST * (now - began)
 
 
 def combined(content: dict[str, Any], directory: Path, aside: Path | None, target: Path) -> None:

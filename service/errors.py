@@ -25,7 +25,6 @@ from studies.errors import (
     MOST_MISTAKES,
     CatalogueDamaged,
     FileDamaged,
-    SceneError,
     StoreBusy,
     StoreFull,
     Unusable,
@@ -192,18 +191,11 @@ def validation_errors(exc: RequestValidationError) -> list[dict[str, Any]]:
     return errors
 
 
-def on_scene_error(request: Request, exc: SceneError) -> Problem:
-    """Answer a scene file with all its mistakes."""
-    errors = [mistake(each.field, each.value, each.allowed) for each in exc.mistakes]
-    texts = [f"{each['field']}: {each['allowed']}" for each in errors]
-    texts += exc.listed[len(errors) :]
-    return problem(request, status_of(exc), "; ".join(texts), errors)
-
-
 def on_field_error(request: Request, exc: StudyError) -> Problem:
     """Answer an error that names its field, or several."""
     errors = [mistake(each.field, each.value, each.allowed) for each in exc.each]
-    texts = (f"{error['field']}: {error['allowed']}" for error in errors)
+    texts = [f"{error['field']}: {error['allowed']}" for error in errors]
+    texts += exc.listed[len(errors) :]
     return problem(request, status_of(exc), "; ".join(texts), errors)
 
 
@@ -271,7 +263,6 @@ def on_unexpected(request: Request, exc: Exception) -> Problem:
 HANDLERS: dict[type[Exception], Callable[[Request, Any], Response]] = {
     **dict.fromkeys(STATUS, on_plain_error),
     StudyError: on_field_error,
-    SceneError: on_scene_error,
     Unusable: on_unusable,
     RequestValidationError: on_validation_error,
     OSError: on_system_error,

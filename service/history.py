@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from service.job import Job
 from service.jobs import Jobs
-from service.table import BATCH
 from studies import Store
 
 
@@ -19,11 +18,10 @@ def log_of(job: Job, jobs: Jobs, store: Store) -> str:
         begun = [(job.submitted, "accepted"), (job.started, "running")]
         ended = [(job.finished, f"{job.state}: {job.message}".removesuffix(": "))]
         lines = [(at, words) for at, words in begun + ended if at]
-    runs = jobs.runs(job.id)
-    for first in range(0, len(runs), BATCH):
-        for row in store.catalogue.rows(runs[first : first + BATCH]).values():
+    for run_id, row in store.catalogue.each(jobs.runs(job.id)):
+        if row:
             seconds = "" if row["cpu_seconds"] is None else f", {row['cpu_seconds']:.3g} s of CPU"
-            words = f"run {row['id']}: {row['status']}{seconds}"
+            words = f"run {run_id}: {row['status']}{seconds}"
             said = f"{words}: {row['message']}" if row["message"] else words
             lines.append((str(row["created"]), said))
     told = ((at, " ".join(words.split())) for at, words in sorted(lines, key=lambda each: each[0]))

@@ -68,7 +68,7 @@ class Inspector:
 
         Raises
         ------
-        StudyError, SceneError
+        StudyError
             with all its mistakes
         Busy
             if too many others wait, the budget is used, or the process was killed
@@ -102,19 +102,11 @@ class Inspector:
         return KeptScene(**found["scene"]), Description(_FILE, found["content"], given)
 
     async def draw(self, directory: Path, name: str, query: SketchQuery, caller: str) -> bytes:
-        """Return the picture of a scene of a store before loading, as PNG.
-
-        Raises
-        ------
-        StudyError
-            if a parameter or the part is refused
-        Busy
-            if too many others wait, the budget is used, or the process was killed
-        """
+        """Return the picture of a scene of a store before loading, as PNG; errors as `inspect`."""
         return await self._charged(caller, name, drawn, directory, name, query)
 
     async def picture(self, directory: Path, content: Mapping[str, Any], caller: str) -> bytes:
-        """Return the scene of the first run of a study, as PNG; errors as `draw`."""
+        """Return the scene of the first run of a study, as PNG; errors as `inspect`."""
         return await self._charged(caller, content.get("name"), pictured, directory, dict(content))
 
     async def _charged(
@@ -193,11 +185,8 @@ def _told(folder: Path) -> str:
         arrays = _arrays(scene.description)
         kept = {"id": scene.id, "name": scene.name, "summary": scene.summary}
         answer = {"scene": kept, "content": scene.description.content, "arrays": arrays}
-    except SceneError as error:
-        listed = [_fields_of(each) for each in error.mistakes]
-        answer = {"mistakes": listed, "count": error.count}
     except StudyError as error:
-        answer = {"mistakes": [_fields_of(error)], "count": 1}
+        answer = {"mistakes": [_fields_of(each) for each in error.each], "count": error.count}
     return json.dumps(answer).replace(f"{folder}/", "")
 
 

@@ -41,7 +41,8 @@ NOTES = 200
 class Jobs(Database):
     """The queue in the file ``path``; safe to use from many threads and processes.
 
-    Methods raise `QueueLost` if the file is missing or damaged, `StoreFull` if the disk is full.
+    Methods raise `QueueLost` if the file is missing or damaged, `StoreFull` if the disk is full,
+    and `NotFound` if the study they are asked for is not there.
 
     Parameters
     ----------
@@ -79,12 +80,7 @@ class Jobs(Database):
         ``runs`` are the ids of its runs in the order of its cases. They are stored, because a
         changed solver would give other ids, and the study would not find its runs. Those of a study
         that chooses them are not known yet: they are at most ``most``, and its ``stage`` tells how
-        far it is. ``size`` is what it will write [bytes].
-
-        Raises
-        ------
-        Busy
-            If the queue has its largest length.
+        far it is. ``size`` is what it will write [bytes]. Raise `Busy` if too many wait.
         """
         with self.transaction() as connection:
             with suppress(NotFound, Conflict):
@@ -115,16 +111,21 @@ class Jobs(Database):
             tell(connection, job)
             return job, True
 
+    def rows(self, query: str, *values: Any) -> list[Any]:
+        """Return what a query finds."""
+        with self.transaction("BEGIN") as connection:
+            return connection.execute(query, values).fetchall()
+
     def told(self, job_id: str) -> list[tuple[str, str]]:
         """Return what happened to a job: times and words, the oldest first."""
-        with self.transaction("BEGIN") as connection:
-            found = connection.execute(
-                "SELECT at, words FROM told WHERE job = ? ORDER BY rowid", (job_id,)
-            )
-            return [tuple(row) for row in found]
+        found = self.rows("SELECT at, words FROM told WHERE job = ? ORDER BY rowid", job_id)
+        return [tuple(row) for row in found]
 
     def layout_turn(self, job_id: str, digest: str) -> int:
         """Return how many other layouts the data set of a job had before the one of a digest."""
+        same = "SELECT turn FROM layout WHERE job = ? AND digest = ?"
+        if known := self.rows(same, job_id, digest):  # also on a full disk
+            return int(known[0]["turn"])
         with self.transaction() as connection:
             found = connection.execute(
                 "INSERT INTO layout VALUES (?, ?, 0) ON CONFLICT (job) DO UPDATE SET"
@@ -135,13 +136,7 @@ class Jobs(Database):
             return int(found.fetchone()["turn"])
 
     def get(self, job_id: str) -> Job:
-        """Return one job.
-
-        Raises
-        ------
-        NotFound
-            If no study with this id was accepted.
-        """
+        """Return one job."""
         with self.transaction("BEGIN") as connection:
             return self.read(connection, job_id)
 
@@ -152,12 +147,8 @@ class Jobs(Database):
 
     def runs(self, job_id: str, limit: int = -1, offset: int = 0) -> list[str]:
         """Return the ids of a job's runs in the order of its cases, or one page of them."""
-        with self.transaction("BEGIN") as connection:
-            rows = connection.execute(
-                "SELECT run FROM run WHERE job = ? AND position >= ? ORDER BY position LIMIT ?",
-                (job_id, offset, limit),
-            )
-            return [row["run"] for row in rows]
+        page = "SELECT run FROM run WHERE job = ? AND position >= ? ORDER BY position LIMIT ?"
+        return [row["run"] for row in self.rows(page, job_id, offset, limit)]
 
     def asked(self, job_id: str, runs: Collection[str], stage: str) -> None:
         """Add runs that a study has asked for, and write how far it is."""
@@ -174,12 +165,8 @@ class Jobs(Database):
 
     def searches(self) -> dict[str, str]:
         """Return, by id, the scene of each waiting or running job that chooses its runs."""
-        with self.transaction("BEGIN") as connection:
-            rows = connection.execute(
-                "SELECT id, scene FROM job WHERE state IN (?, ?) AND stage <> ''",
-                (StudyState.RUNNING, StudyState.ACCEPTED),
-            )
-            return dict(rows.fetchall())
+        choosing = "SELECT id, scene FROM job WHERE state IN (?, ?) AND stage <> ''"
+        return dict(self.rows(choosing, StudyState.RUNNING, StudyState.ACCEPTED))
 
     def page(self, *, limit: int, offset: int, **which: Any) -> tuple[list[Job], int]:
         """Return a page of jobs, the latest first, and the number of all; filters: `wanted`."""
@@ -194,29 +181,24 @@ class Jobs(Database):
 
     def ended(self) -> list[Job]:
         """Return the jobs that have ended, the oldest end first."""
-        with self.transaction("BEGIN") as connection:
-            rows = connection.execute(
-                f"SELECT {ALL} FROM job WHERE finished IS NOT NULL ORDER BY finished, turn"
-            )
-            return [job for job in map(job_of, rows) if job and job.state.final]
+        rows = self.rows(
+            f"SELECT {ALL} FROM job WHERE finished IS NOT NULL ORDER BY finished, turn"
+        )
+        return [job for job in map(job_of, rows) if job and job.state.final]
 
     def states(self) -> dict[str, int]:
         """Return the number of jobs by state, without states that no job has."""
-        with self.transaction("BEGIN") as connection:
-            counted = connection.execute("SELECT state, COUNT(*) FROM job GROUP BY state")
-            return dict(counted.fetchall())
+        return dict(self.rows("SELECT state, COUNT(*) FROM job GROUP BY state"))
 
     def promised(self, but: str) -> float:
         """Return what all studies but one will still write before they end [bytes].
 
         About half of a study are its runs; its data set is written at the end.
         """
-        with self.transaction("BEGIN") as connection:
-            (total,) = connection.execute(
-                "SELECT TOTAL(bytes * (1 - progress / 200)) FROM job"
-                " WHERE state IN (?, ?) AND id <> ?",
-                (StudyState.ACCEPTED, StudyState.RUNNING, but),
-            ).fetchone()
+        [(total,)] = self.rows(
+            "SELECT TOTAL(bytes * (1 - progress / 200)) FROM job WHERE state IN (?, ?) AND id <> ?",
+            StudyState.ACCEPTED, StudyState.RUNNING, but,
+        )  # fmt: skip
         return float(total)
 
     def take(self, busy: Collection[str] = (), largest: int = sys.maxsize) -> Job | None:
@@ -259,12 +241,8 @@ class Jobs(Database):
 
     def waiting(self) -> dict[str, str]:
         """Return, by id, the reason for which running jobs wait, without those that do not."""
-        with self.transaction("BEGIN") as connection:
-            rows = connection.execute(
-                "SELECT id, message FROM job WHERE state = ? AND message != ''",
-                (StudyState.RUNNING,),
-            )
-            return {row["id"]: row["message"] for row in rows}
+        waiting = "SELECT id, message FROM job WHERE state = ? AND message != ''"
+        return dict(self.rows(waiting, StudyState.RUNNING))
 
     def finish(
         self,
@@ -292,13 +270,7 @@ class Jobs(Database):
         """Request that the work on a job stops; a repeated request has no further effect.
 
         A study that was successful before its retry becomes successful again: its data set exists.
-
-        Raises
-        ------
-        NotFound
-            If the job is unknown.
-        Conflict
-            If it has ended already.
+        Raise `Conflict` if it has ended already.
         """
         with self.transaction() as connection:
             job = self.read(connection, job_id)
@@ -312,16 +284,9 @@ class Jobs(Database):
             return put(connection, job, state=state, message="", progress=progress, finished=now())
 
     def retry(self, job_id: str, failed: bool = True) -> Job:
-        """Put a job that has ended back into the queue, in the last place.
+        """Put a job that has ended back into the queue, in the last place; else raise `Conflict`.
 
         Without ``failed`` only its missing runs are computed, and its data set is made again.
-
-        Raises
-        ------
-        NotFound
-            If the job is unknown.
-        Conflict
-            If it is waiting or running.
         """
         with self.transaction() as connection:
             job = self.read(connection, job_id)

@@ -43,6 +43,7 @@ class Pictures:
 
     Matplotlib shares fonts and the text cache among figures, so two cannot be drawn at once; and
     the netCDF library ends the process if two threads read files. So all reading is `alone`.
+    Methods raise `Busy` if too many others wait.
 
     Parameters
     ----------
@@ -59,15 +60,7 @@ class Pictures:
         self.underway: dict[str, asyncio.Task[bytes]] = {}
 
     async def get(self, tag: str, draw: Draw) -> bytes:
-        """Return the picture with this tag; it is drawn unless it is kept or being drawn.
-
-        Raises
-        ------
-        Busy
-            If too many others wait.
-        StudyError
-            If there is nothing to draw, as `draw` tells.
-        """
+        """Return the picture with this tag; it is drawn unless it is kept or being drawn."""
         if tag in self.kept:
             self.kept.move_to_end(tag)
             return self.kept[tag]
@@ -78,13 +71,7 @@ class Pictures:
         return await asyncio.shield(self.underway[tag])
 
     async def alone(self, read: Callable[..., Read], *arguments: Any) -> Read:
-        """Return what ``read`` returns, called in a thread while no other one reads or draws.
-
-        Raises
-        ------
-        Busy
-            If too many others wait.
-        """
+        """Return what ``read`` returns, called in a thread while no other one reads or draws."""
         if self.present > WAITING:
             raise Busy(f"{WAITING} readings of runs wait already")
         self.present += 1

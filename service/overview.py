@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 from anyio.to_thread import run_sync
 
 from service.job import Job
@@ -28,6 +29,8 @@ PENDING = "pending"
 """Status of a run that is not in the catalogue."""
 CHOOSE = ("goal", "refine", "fit")
 """Entries of studies that choose their runs."""
+WORDS: dict[str, Any] = {"note": "", "tags": [], "keep": "", "allow": []}
+"""Other entries of studies, and what one has that has no such entry."""
 
 
 def summary(job: Job) -> StudySummary:
@@ -106,7 +109,7 @@ class Details:
             parameters=study["parameters"],
             sweep=study["sweep"],
             **{name: study.get(name, {}) for name in CHOOSE},
-            **{"note": "", "tags": [], "keep": "", "allow": [], **_own_words(study)},
+            **{name: study.get(name, usual) for name, usual in WORDS.items()},
             counts=counts,
             runs=[
                 StudyRun(
@@ -127,11 +130,8 @@ def chooses(study: Mapping[str, Any]) -> bool:
 
 def point(axes: dict[str, list[Any]], position: int) -> dict[str, Any]:
     """Return the values on the axes of the run at ``position``; the last axis runs fastest."""
-    values = {}
-    for name, axis in reversed(axes.items()):
-        position, index = divmod(position, len(axis))
-        values[name] = axis[index]
-    return dict(reversed(values.items()))
+    index = np.unravel_index(position, [*map(len, axes.values())]) if axes else ()
+    return {name: axis[at] for (name, axis), at in zip(axes.items(), index, strict=True)}
 
 
 def searched_at(study: Mapping[str, Any], parameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -149,10 +149,6 @@ def searched_at(study: Mapping[str, Any], parameters: Mapping[str, Any]) -> dict
     names = [*study["sweep"], *([goal["parameter"]] if goal else []), *fit.get("ranges", ())]
     places = {name: labelled.get(name, parameters.get(name)) for name in names}
     return {name: place for name, place in places.items() if place is not None}
-
-
-def _own_words(study: dict[str, Any]) -> dict[str, Any]:
-    return {name: study[name] for name in ("note", "tags", "keep", "allow") if name in study}
 
 
 def _columns(job: Job) -> dict[str, Any]:

@@ -12,7 +12,6 @@ from service.errors import Conflict, NotFound, QueueLost
 from service.job import StudyState, verdict
 from service.jobs import Jobs
 from studies import FileDamaged, Store
-from studies.definition.identity import is_id
 from studies.definition.vocabulary import MISSING
 from studies.storage.database import Database
 from studies.storage.seal import State, state_of
@@ -57,7 +56,7 @@ def _adopt(jobs: Jobs, store: Store) -> None:
         try:
             jobs.get(study_id)
         except NotFound:
-            if is_id(study_id) and store.dataset_path(study_id).exists():
+            if store.dataset_path(study_id).exists():
                 add(study_id, jobs, store, begun=False)
 
 

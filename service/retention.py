@@ -26,7 +26,6 @@ from service.job import Job, StudyState
 from service.jobs import Jobs, forget, put
 from studies import FileDamaged, Store
 from studies.scenes.description import Description
-from studies.storage.seal import content_of
 
 log = logging.getLogger(__name__)
 
@@ -94,10 +93,7 @@ class Keeper:
     def accept(self, found: Examined, priority: int) -> tuple[Job, bool]:
         """Store a study, and put it into the queue; its scene is not deleted in between.
 
-        Raises
-        ------
-        NoRoom, Busy
-            as `check_room` and `Jobs.accept`; then nothing of the study stays
+        If it does not fit on the disk, or too many wait (`NoRoom`, `Busy`), nothing of it stays.
         """
         study, size = found.study, found.estimate.bytes
         directory = self.store.study_directory(study.id)
@@ -128,10 +124,7 @@ class Keeper:
     def keep_scene(self, scene_id: str, description: Description, owner: str) -> bool:
         """Store a posted scene for a key; return whether it is new.
 
-        Raises
-        ------
-        Conflict
-            If all posted scenes, or those of the key, would take more than is allowed.
+        Raise `Conflict` if all posted scenes, or those of the key, would take more than is allowed.
         """
         with self._one:
             if self.store.scene(scene_id, whole=False) is None:
@@ -149,12 +142,7 @@ class Keeper:
     def delete_scene(self, scene_id: str) -> None:
         """Delete a posted scene, also one that this version does not allow.
 
-        Raises
-        ------
-        NotFound
-            If there is none of this id.
-        Conflict
-            If a study, of the queue or of the command line, names it.
+        Raise `Conflict` if a study, of the queue or of the command line, names it.
         """
         if not (self.store.directory / "scenes" / scene_id).is_dir():
             raise NotFound(f"no posted scene has the id {scene_id}")
@@ -165,28 +153,15 @@ class Keeper:
 
     def _users(self) -> dict[str, str]:
         """Return a study for each scene that is named, in the queue or by the command line."""
-        found: dict[str, str] = {}
-        for study_id in self.store.study_ids():
-            path = self.store.study_directory(study_id) / "study.json"
-            with suppress(FileDamaged):
-                found[str(content_of(path, f"study {study_id}").get("scene"))] = study_id
-        with self.jobs.transaction("BEGIN") as queue:
-            found.update(queue.execute("SELECT scene, id FROM job").fetchall())
-        return found
+        every = {each: self.store.definition(each) for each in self.store.study_ids()}
+        found = {str(study.get("scene")): study_id for study_id, study in every.items() if study}
+        return found | dict(self.jobs.rows("SELECT scene, id FROM job"))
 
     def purge(self, study_id: str) -> int:
         """Delete a study, its data set, and those of its runs that no other study needs.
 
-        Returns
-        -------
-        Number of bytes freed.
-
-        Raises
-        ------
-        NotFound
-            If the study is unknown.
-        Conflict
-            If it is waiting or running, or its process has not ended yet.
+        Return the number of bytes freed. Raise `Conflict` if it is waiting or running, or its
+        process has not ended yet.
         """
         with self._ended(study_id) as queue, suppress(NotFound):  # its row cannot be read
             job = self.jobs.read(queue, study_id)
@@ -286,8 +261,7 @@ class Keeper:
         A study that cannot be read, or whose id has changed, cannot be computed again, and needs no
         run. One that chooses its runs needs those that it has asked for (`Store.runs_of`).
         """
-        with self.jobs.transaction("BEGIN") as queue:
-            known = {row["id"] for row in queue.execute("SELECT id FROM job")}
+        known = {row["id"] for row in self.jobs.rows("SELECT id FROM job")}
         needed: set[str] = set()
         for study_id in set(self.store.study_ids()) - known:
             with suppress(FileDamaged, ValueError):

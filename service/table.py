@@ -32,9 +32,6 @@ from studies.views.table import MESSAGE, RUN, STATUS, Column, RunTable, column_o
 KEPT = 8
 """Number of tables that are kept."""
 
-BATCH = 1000
-"""Number of runs whose rows of the catalogue are in memory at a time."""
-
 OUTCOMES = (*STATUSES[:-1], PENDING)
 """Statuses of runs in a table, by their number in the column ``status`` of octets."""
 
@@ -70,20 +67,17 @@ class Tables:
         outcome, said = (np.full(len(runs), text, dtype=object) for text in (PENDING, ""))
         numbers: dict[str, np.ndarray] = {}
         asked: dict[str, list[Any]] = {}
-        for first in range(0, len(runs), BATCH):
-            some = runs[first : first + BATCH]
-            rows = self.store.catalogue.rows(some)
-            for at, row in enumerate(map(rows.get, some), first):
-                if row is None:
-                    continue
-                outcome[at], said[at] = taken(row["status"], allow), row["message"]
-                for name, number in row["scalars"].items():
-                    if name not in numbers:
-                        numbers[name] = np.full(len(runs), math.nan)
-                    numbers[name][at] = math.nan if number is None else number
-                place = _asked(study, axes, row["parameters"]) if asks else {}
-                for name, value in place.items():
-                    asked.setdefault(name, [None] * len(runs))[at] = value
+        for at, (_, row) in enumerate(self.store.catalogue.each(runs)):
+            if row is None:
+                continue
+            outcome[at], said[at] = taken(row["status"], allow), row["message"]
+            for name, number in row["scalars"].items():
+                if name not in numbers:
+                    numbers[name] = np.full(len(runs), math.nan)
+                numbers[name][at] = math.nan if number is None else number
+            place = _asked(study, axes, row["parameters"]) if asks else {}
+            for name, value in place.items():
+                asked.setdefault(name, [None] * len(runs))[at] = value
         if asks:
             axes = {}
             columns = [_placed(name, _array(each), scene) for name, each in asked.items()]

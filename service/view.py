@@ -27,6 +27,7 @@ from service.connections import limited
 from service.errors import Conflict, NotFound
 from service.job import Job, StudyState, verdict
 from service.jobs import Jobs, forget, put
+from service.processes import share_arenas
 from service.recovery import add
 from service.settings import Settings
 from studies import Store, Study, StudyError
@@ -188,6 +189,7 @@ def view(path: Path, port: int = 0, browser: bool = True) -> None:
     except OSError as error:
         allowed = f"must be free, or left out for any free one ({error.strerror})"
         raise StudyError("--port", port, allowed) from None
+    share_arenas()
     with listening, application(path) as (app, first):
         url = f"http://{HOST}:{listening.getsockname()[1]}{first}"
         print(f"{url}  (Ctrl-C ends it)", flush=True)

@@ -44,7 +44,7 @@ class StudyError(ValueError):
         field, allowed = cut(field, LONGEST_FIELD), cut(allowed, LONGEST_TEXT)
         value = plain(value)
         self.field, self.value, self.allowed = field, value, allowed
-        self.others = tuple(others)
+        self.others, self.count = tuple(others), 1 + len(others)
         own = f"{field} = {reprlib.repr(value)}: {allowed}"
         super().__init__("\n".join([own, *map(str, self.others)]))
 
@@ -57,6 +57,12 @@ class StudyError(ValueError):
     def each(self) -> list[StudyError]:
         """The mistakes, this one first."""
         return [self, *self.others]
+
+    @property
+    def listed(self) -> list[str]:
+        """The mistakes as text; the last one tells how many more there are."""
+        more = self.count - len(self.each)
+        return [*map(str, self.each), *([f"and {more} more"] if more else [])]
 
     def renamed(self, rename: Callable[[str], str]) -> StudyError:
         """Return the same mistakes of other fields."""
@@ -89,10 +95,9 @@ class SceneError(StudyError):
         return f"scene = {self.name!r}: {self.allowed}"
 
     @property
-    def listed(self) -> list[str]:
-        """The mistakes as text; the last one tells how many more there are."""
-        more = self.count - len(self.mistakes)
-        return [*map(str, self.mistakes), *([f"and {more} more"] if more else [])]
+    def each(self) -> list[StudyError]:
+        """The mistakes."""
+        return [*self.mistakes]
 
     def __reduce__(self) -> tuple[type[SceneError], tuple[str, tuple[StudyError, ...], int]]:  # type: ignore[override]
         return type(self), (self.name, self.mistakes, self.count)

@@ -89,6 +89,12 @@ def page(
     return HTMLResponse(text, status, headers)
 
 
+def to_study(request: Request, study_id: str) -> Response:
+    """Lead to the page of a study."""
+    where = request.url_for("study_page", study_id=study_id).path
+    return RedirectResponse(where, HTTPStatus.SEE_OTHER)
+
+
 COOKIE = "residua_key"
 """Name of the cookie that has the key of a caller who has signed in."""
 

@@ -1,11 +1,13 @@
-"""The pages: studies, a study, a run, runs compared, health; signing in and out."""
+"""The pages: studies, a study, a run, runs compared, health; signing in and out.
+
+That of a new study is in `service.pages.new`.
+"""
 
 from __future__ import annotations
 
-import dataclasses
 import gzip
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import lru_cache
 from http import HTTPStatus
@@ -13,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, File, Form, Query, Request, Response, UploadFile
+from fastapi import APIRouter, Form, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import JSONResponse, RedirectResponse
+from fastapi.responses import RedirectResponse
 
 from service import overview
 from service.datasets import Datasets
@@ -23,12 +25,8 @@ from service.dependencies import (
     TheCaller,
     TheDatasets,
     TheDetails,
-    TheExaminer,
-    TheInspector,
     TheJobs,
-    TheKeeper,
     TheKeys,
-    TheName,
     ThePictures,
     TheProbe,
     TheRun,
@@ -36,28 +34,23 @@ from service.dependencies import (
     TheStore,
     TheTables,
 )
-from service.errors import Busy, Conflict, NoRoom, NotFound
-from service.examiner import Examined
+from service.errors import Busy, Conflict, NotFound
 from service.job import Job, StudyState
 from service.jobs import Jobs
-from service.maps import PNG
-from service.pages import form
 from service.pages import study as chosen
 from service.pages.assets import asset
 from service.pages.compare import MOST, compared
-from service.pages.rendering import COOKIE, ROOT, PageRoute, number_text, page
+from service.pages.rendering import COOKIE, ROOT, PageRoute, number_text, page, to_study
 from service.pages.run import audited, numbers_shown, parameters_shown
 from service.routes.health import health
 from service.routes.numbers import outlined
-from service.routes.scenes import post_scene
-from service.scenes import known_scene, scene_name, scene_of
+from service.scenes import scene_name, scene_of
 from service.schemas import ContentId, StudyFilter, Window
 from service.table import Tables
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
-from studies.errors import SceneError
-from studies.scenes.registry import known_names, known_scenes
+from studies.scenes.registry import known_names
 from studies.storage.seal import State, state_of
 from studies.views.table import MESSAGE, RUN, STATUS, varied
 
@@ -68,8 +61,6 @@ router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
 home = APIRouter(include_in_schema=False)
 
 FOR_GOOD = {"cache-control": "public, max-age=31536000, immutable", "vary": "accept-encoding"}
-USUAL = "punch"
-"""The scene of the form of a new study."""
 LISTED = 25
 """Number of studies on a page."""
 POLLED = ("accepted", "running")
@@ -310,142 +301,6 @@ async def health_page(
     return page(request, "health", health=state, states=states, runs=runs, queue=queue)
 
 
-@router.get("/new")
-def new_page(request: Request, store: TheStore, scene: str = USUAL) -> Response:
-    """Show the form of a new study; parameters in the address fill it."""
-    given = _given(request.query_params.multi_items())
-    return _form(request, store, store.scene_id(scene), given, {}, None)
-
-
-def _given(fields: Iterable[tuple[str, object]]) -> dict[str, list[str]]:
-    """Return the texts of the fields of a form by their names."""
-    given: dict[str, list[str]] = {}
-    for name, value in fields:
-        given.setdefault(name, []).append(str(value))
-    return given
-
-
-@router.get("/scene.png")
-async def draw_scene(
-    request: Request, store: TheStore, inspector: TheInspector, caller: TheName
-) -> Response:
-    """Draw the scene of the first run that the fields describe; of a scene without a model nothing.
-
-    A page asks for what may not be there, which no browser takes for an error.
-    """
-    given = _given(request.query_params.multi_items())
-    name = given.get("scene", [""])[0]
-    scene = await run_in_threadpool(known_scene, store, name)
-    content, wrong = await run_in_threadpool(form.study_of, name, scene, given)
-    for field, allowed in wrong.items():
-        raise StudyError(field, given.get(f"p.{field}"), allowed)
-    try:
-        picture = await inspector.picture(store.directory, content, caller)
-    except StudyError as error:
-        if error.field != "scene":
-            raise
-        return Response(status_code=HTTPStatus.NO_CONTENT)
-    return Response(picture, media_type=PNG, headers={"cache-control": "no-cache"})
-
-
-@router.post("/scenes")
-async def take_scene(
-    request: Request,
-    scene: Annotated[UploadFile, File()],
-    inspector: TheInspector,
-    keeper: TheKeeper,
-    store: TheStore,
-    caller: TheName,
-    meshes: Annotated[list[UploadFile], File(default_factory=list)],
-) -> Response:
-    """Keep a scene file with its meshes, and show the form of its studies."""
-    there = [each for each in meshes if each.filename]  # a browser sends one of no name for none
-    try:
-        found = await post_scene(
-            scene, inspector, keeper, store, caller, request, Response(), there
-        )
-    except StudyError as error:
-        mistakes = error.listed if isinstance(error, SceneError) else [*map(str, error.each)]
-        refused = {"file": scene.filename or "", "mistakes": mistakes}
-        return await run_in_threadpool(_form, request, store, USUAL, {}, {}, None, refused)
-    where = request.url_for("new_page").include_query_params(scene=found.id)
-    return RedirectResponse(f"{where.path}?{where.query}", HTTPStatus.SEE_OTHER)
-
-
-@router.post("/new")
-async def make(
-    request: Request, store: TheStore, examiner: TheExaminer, keeper: TheKeeper
-) -> Response:
-    """Tell what a study costs and what is wrong in the form, or accept the study and show it."""
-    given = _given((await request.form()).multi_items())
-    scene_name = given.get("scene", [""])[0]
-    scene = await run_in_threadpool(known_scene, store, scene_name)
-    content, wrong = await run_in_threadpool(form.study_of, scene_name, scene, given)
-    found: Examined | None = None
-    if not wrong:
-        try:
-            examined = await examiner.examine(content)
-            await run_in_threadpool(keeper.check_room, examined)
-            found = examined
-        except StudyError as error:
-            wrong = form.beside(error, scene)
-        except NoRoom as error:
-            wrong[""] = str(error)
-    if "submit" in given and found is not None:
-        job, _ = await run_in_threadpool(keeper.accept, found, 0)
-        return _back(request, job.id)
-    if "application/json" in request.headers.get("accept", ""):
-        costs = None if found is None else dataclasses.asdict(found.estimate)
-        return JSONResponse({"wrong": wrong, "estimate": costs, **_copies(request, content, scene)})
-    return await run_in_threadpool(_form, request, store, scene_name, given, wrong, found)
-
-
-def _copies(request: Request, content: dict[str, Any], scene: Scene) -> dict[str, str]:
-    """Return a study as texts to copy."""
-    address = str(request.url_for("submit"))
-    return {
-        "toml": form.as_toml(content, scene.name),
-        "curl": form.as_curl(content, address),
-        "python": form.as_python(content, address.removesuffix("/studies")),
-    }
-
-
-def _form(
-    request: Request,
-    store: Store,
-    name: str,
-    given: dict[str, list[str]],
-    wrong: dict[str, str],
-    found: Examined | None,
-    refused: Mapping[str, Any] | None = None,
-) -> Response:
-    """Return the page of the form; ``refused`` is a scene file that was posted, with mistakes."""
-    scene = known_scene(store, name)
-    content, early = form.study_of(name, scene, given)
-    mistakes = {**early, **wrong}
-    fields = form.entries(scene, given, mistakes)
-    posted = [(each.id, f"{each.name} (posted)") for each in store.scenes(LISTED)]
-    own = {each.parameter.name for each in fields} | {"name"}
-    return page(
-        request,
-        "new",
-        HTTPStatus.UNPROCESSABLE_ENTITY if wrong or refused else HTTPStatus.OK,
-        scene=scene,
-        scene_name=name,
-        name=content["name"],
-        scenes=[*((each.name, each.name) for each in known_scenes()), *posted],
-        given={key: values[0] for key, values in given.items()},
-        query_of=urlencode({**given, "scene": [name]}, doseq=True),
-        first=[each for each in fields if each.first],
-        rest=[each for each in fields if not each.first],
-        wrong=mistakes,
-        general=[text for key, text in mistakes.items() if key not in own],
-        estimate=found.estimate if found else None,
-        refused=refused,
-        **_copies(request, content, scene),
-    )
-
-
 @router.get("/sign-in")
 def sign_in(request: Request, then: str = "") -> Response:
     """Show the form for a key."""
@@ -492,19 +347,14 @@ def inside(request: Request, then: str) -> str:
 def stop(study_id: ContentId, request: Request, jobs: TheJobs) -> Response:
     """Stop a study, and show it."""
     jobs.dismiss(study_id)
-    return _back(request, study_id)
+    return to_study(request, study_id)
 
 
 @router.post("/studies/{study_id}/retry")
 def again(study_id: ContentId, request: Request, jobs: TheJobs) -> Response:
     """Compute the failed and missing runs of a study, and show it."""
     jobs.retry(study_id)
-    return _back(request, study_id)
-
-
-def _back(request: Request, study_id: str) -> Response:
-    where = request.url_for("study_page", study_id=study_id).path
-    return RedirectResponse(where, HTTPStatus.SEE_OTHER)
+    return to_study(request, study_id)
 
 
 @router.get("/{rest:path}")

@@ -25,7 +25,7 @@ from studies import StudyError
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
 from studies.views.audited import Worst, worst
-from studies.views.table import RUN, STATUS, RunTable, varied
+from studies.views.table import RUN, STATUS, varied
 from studies.views.written import FORMS
 
 router = APIRouter()
@@ -42,27 +42,12 @@ OCTETS: dict[int | str, dict[str, Any]] = {
     tags=["studies"],
     responses={200: {"content": {FORMS["csv"].media_type: {}}}, **REFUSED},
 )
-def table(
-    study_id: ContentId, which: Annotated[TableFilter, Query()], tables: TheTables
-) -> Response:
-    """Return a line for each run: its place in the sweep, its status, its numbers.
-
-    Beside the queries named below, every column is one: `?friction=0.1..0.4&hardening=none`. A text
-    that a spreadsheet would take for a formula has an apostrophe before it.
-    """
-    return _table("csv", tables.get(study_id), which)
-
-
-@router.get("/studies/{study_id}/table.json", tags=["studies"], responses=REFUSED)
-def table_of_objects(
-    study_id: ContentId, which: Annotated[TableFilter, Query()], tables: TheTables
-) -> Response:
-    """Return the same as `rows`, an object for each run; `columns` tells meaning and unit."""
-    return _table("json", tables.get(study_id), which)
-
-
+@router.get(
+    "/studies/{study_id}/table.json", name="table_of_objects", tags=["studies"], responses=REFUSED
+)
 @router.get(
     "/studies/{study_id}/table.parquet",
+    name="table_of_columns",
     tags=["studies"],
     responses={
         200: {"content": {FORMS["parquet"].media_type: {}}},
@@ -70,17 +55,22 @@ def table_of_objects(
         **REFUSED,
     },
 )
-def table_of_columns(
-    study_id: ContentId, which: Annotated[TableFilter, Query()], tables: TheTables
+def table(
+    study_id: ContentId,
+    which: Annotated[TableFilter, Query()],
+    tables: TheTables,
+    request: Request,
 ) -> Response:
-    """Return the same as a Parquet file, if the service has pyarrow."""
-    if find_spec("pyarrow") is None:
+    """Return a line for each run: its place in the sweep, its status, its numbers.
+
+    Beside the queries named below, every column is one: `?friction=0.1..0.4&hardening=none`. In CSV
+    a text that a spreadsheet would take for a formula has an apostrophe before it. JSON has an
+    object for each run in `rows`; `columns` tells meaning and unit. Parquet needs pyarrow.
+    """
+    ending = request.scope["path"].rpartition(".")[2]
+    if ending == "parquet" and find_spec("pyarrow") is None:
         raise HTTPException(HTTPStatus.NOT_ACCEPTABLE, MISSING)
-    return _table("parquet", tables.get(study_id), which)
-
-
-def _table(ending: str, found: RunTable, which: TableFilter) -> Response:
-    """Return the part of a table that is asked for, in the form of an ending."""
+    found = tables.get(study_id)
     at = found.chosen(which.sort, which.selection)
     names = dict.fromkeys(which.columns.split(",") if which.columns else found.columns)
     form, columns = FORMS[ending], [found.column(name) for name in names]

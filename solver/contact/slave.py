@@ -11,7 +11,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from solver.contact.normals import is_curved
 from solver.model.rigid import RigidBody
@@ -57,8 +56,9 @@ def _ordered(
 
 def _edges(slave: Surface, master: Surface) -> float:
     """Return the median ratio of slave to master edge lengths, of the vertices near contact."""
-    at, partner = slave.X[:, slave.vertices].T, master.X[:, master.vertices].T
-    distance, nearest = cKDTree(partner).query(at)
+    at, partner = slave.X[:, slave.vertices], master.X[:, master.vertices]
+    apart = np.hypot(*(at[:, :, None] - partner[:, None]))
+    distance, nearest = apart.min(axis=1), apart.argmin(axis=1)
     own, its = slave.spacing, master.spacing
     near = distance <= distance.min() + _NEAR * np.minimum(own, its[nearest])
     return float(np.median(own[near] / its[nearest[near]]))

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy  # loads spatial when it is used: few models look for places
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,7 +31,7 @@ _SAME = 1e-6
 def same_unknowns(nodes: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the unknowns (2 n,) of nodes (2, m) at given places (2, n), -1 if no node is there."""
     near = _SAME * float(np.ptp(nodes, axis=1).max())
-    _, at = cKDTree(nodes.T).query(places.T, distance_upper_bound=near)
+    _, at = scipy.spatial.cKDTree(nodes.T).query(places.T, distance_upper_bound=near)
     found = at < nodes.shape[1]
     unknowns = np.stack([2 * at, 2 * at + 1], axis=1)
     return np.asarray(np.where(found[:, None], unknowns, -1).ravel(), dtype=np.int64)

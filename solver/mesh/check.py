@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 from skfem.quadrature import get_quadrature
 
 from solver.errors import ModelError
@@ -30,6 +29,7 @@ _FOLDED = 1e-6
 # Ratio of the distance of nodes to the shortest edge; below it they count as coincident. Duplicate
 # nodes are far closer. A narrower notch would close under load without contact in the model.
 _CLOSED = 1e-3
+_DIRECTION = np.array([0.8, 0.6])
 _ROUNDING = 8 * np.finfo(float).eps  # of coordinates, a few operations deep
 
 
@@ -130,16 +130,15 @@ def _check_cracks(mesh: Mesh, where: str) -> None:
     for ends in mesh.facets:  # one by one: numpy 2.4 gives a needless warning when it broadcasts
         np.minimum.at(shortest, ends, length)
     nodes = np.unique(mesh.facets[:, mesh.boundary_facets()])
-    tree = cKDTree(mesh.p[:, nodes].T)
-    distance, found = tree.query(tree.data, k=2)
-    nearest = np.where(found[:, 0] == np.arange(len(nodes)), found[:, 1], found[:, 0])
     apart = "; surfaces meant to touch need two bodies and a contact pair"
-    one, other = nodes, nodes[nearest]
+    X = mesh.p[:, nodes]
+    one, other = nodes[np.stack(_within(X, X, _close(mesh, nodes, shortest[nodes])))]
+    distance = np.hypot(*(mesh.p[:, one] - mesh.p[:, other]))
     close = _close(mesh, one, np.minimum(shortest[one], shortest[other]))
-    for i in np.flatnonzero(distance[:, 1] <= close)[:1]:
+    for i in np.flatnonzero((one != other) & (distance <= close))[:1]:
         allowed = f"lie on one another at {_at(mesh, one[i])}: merge them{apart}"
         _refuse(f"nodes {one[i]} and {other[i]}", where, allowed)
-    for node, facet in _hanging(mesh, nodes, tree, shortest)[:1]:
+    for node, facet in _hanging(mesh, nodes, shortest)[:1]:
         a, b = mesh.facets[:, facet]
         allowed = f"lies on the edge from node {a} to node {b}: divide the element there{apart}"
         _refuse(f"node {node}", where, allowed)
@@ -150,8 +149,26 @@ def _close(mesh: Mesh, nodes: NDArray[np.int64], edges: NDArray[np.float64]) -> 
     return np.asarray(_CLOSED * edges + _ROUNDING * np.abs(mesh.p[:, nodes]).max(axis=0))
 
 
+def _within(
+    centres: NDArray[np.float64], places: NDArray[np.float64], radii: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return pairs of a centre (2, n) and a place (2, m) within its radius (n,), by centres.
+
+    Places are sorted along a direction in which sides of bodies seldom lie. A tree of `scipy` would
+    take as long to load as all else that checks a mesh takes.
+    """
+    at, along = _DIRECTION @ centres, _DIRECTION @ places
+    order = np.argsort(along, kind="stable")
+    first = np.searchsorted(along[order], at - radii)
+    count = np.searchsorted(along[order], at + radii, side="right") - first
+    centre = np.repeat(np.arange(len(at)), count)
+    place = order[np.arange(len(centre)) + np.repeat(first - (np.cumsum(count) - count), count)]
+    near = np.hypot(*(centres[:, centre] - places[:, place])) <= radii[centre]
+    return centre[near], place[near]
+
+
 def _hanging(
-    mesh: Mesh, nodes: NDArray[np.int64], tree: cKDTree, shortest: NDArray[np.float64]
+    mesh: Mesh, nodes: NDArray[np.int64], shortest: NDArray[np.float64]
 ) -> NDArray[np.int64]:
     """Return (n, 2): boundary nodes on a boundary facet between its ends, and that facet."""
     facets = mesh.boundary_facets()
@@ -159,9 +176,8 @@ def _hanging(
     centre, half = X.mean(axis=1), np.hypot(*(X[:, 1] - X[:, 0])) / 2
     curved = len(mesh.dofs.facet_dofs) > 0
     middle = mesh.p[:, mesh.dofs.facet_dofs[0, facets]] if curved else centre
-    near = tree.query_ball_point(centre.T, half + np.hypot(*(middle - centre)))
-    edge = np.repeat(np.arange(len(facets)), [len(found) for found in near])
-    node = nodes[np.concatenate(near).astype(int)]
+    edge, near = _within(centre, mesh.p[:, nodes], half + np.hypot(*(middle - centre)))
+    node = nodes[near]
     inner = (mesh.facets[:, facets[edge]] != node).all(axis=0)
     edge, node = edge[inner], node[inner]
     X = np.concatenate([X, middle[:, None]], axis=1)[:, :, edge]

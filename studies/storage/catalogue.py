@@ -13,6 +13,7 @@ import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,9 @@ _TABLE = """runs (
     modified INTEGER, checksum INTEGER NOT NULL
 )"""
 _INDICES = {"runs_by_time": "created, id", "runs_by_scene": "scene, status"}
+
+BATCH = 500
+"""Number of runs whose rows are in memory, or are written, at a time."""
 
 Row = dict[str, Any]
 
@@ -93,6 +97,13 @@ class Catalogue(Database):
         with self._reading() as connection:
             found = _select(connection, "WHERE id IN (SELECT value FROM json_each(?))", [wanted])
         return {row["id"]: row for row in found}
+
+    def each(self, run_ids: Iterable[str]) -> Iterator[tuple[str, Row | None]]:
+        """Yield ids of runs with their rows, None for one that the catalogue has not."""
+        ids = iter(run_ids)
+        while some := list(islice(ids, BATCH)):
+            rows = self.rows(some)
+            yield from ((run_id, rows.get(run_id)) for run_id in some)
 
     def counts(self, run_ids: Iterable[str] | None = None) -> dict[str, int]:
         """Return the number of runs by status, of all or of `run_ids`."""

@@ -97,16 +97,18 @@ def _combined(
             with h5netcdf.File(disk, "w") as file:
                 file.attrs.update(attrs | {"id": study.id, SYMMETRIC: int(halves == {1})})
                 frame.create_axes(file)
-                frame.create_fields(file)
-                frame.write_small(file)
-                if beside:
-                    write_beside(file, beside.variables)
             disk.check()
             with h5py.File(disk, "r+") as file:
+                frame.create_fields(file)
+                frame.write_small(file)
+                disk.check()
                 for run_id, at in places.items():
                     with opened(store.run_path(run_id)) as run:
                         frame.fill(file, run, at)
                     disk.check()
+            if beside:
+                with h5netcdf.File(disk, "r+") as file:
+                    write_beside(file, beside.variables)
             disk.check()
         seal.seal(part, f"dataset {study.id}")
     counts = Counter([status for status, _ in outcomes.values()] + [MISSING] * len(missing))

@@ -73,15 +73,43 @@ def usual_dimensions(scene: Scene) -> tuple[str, ...]:
     return tuple(name for name in USUAL_AXES if name in known)
 
 
-def run_content(scene: Scene, case: Case, record: Record, keep: str = "") -> RunContent:
-    """Return the content of the file of a run.
+def run_content(scene: Scene, case: Case, outcome: Record | str, keep: str = "") -> RunContent:
+    """Return the content of the file of a run: its record, or the reason why there is none.
 
     It does not depend on the study, except for ``keep``: with it a complete run has the fields at
     the nodes.
     """
-    sweep = usual_dimensions(scene)
+    sweep, attrs = usual_dimensions(scene), dict[str, Any]()
+    record = None if isinstance(outcome, str) else outcome
+    said = (record.status.name.lower(), record.message) if record else (ERROR, str(outcome))
+    every: dict[str, tuple[Any, Any, Mapping[str, Any]]] = {
+        name: (sweep, np.full((1,) * len(sweep), text, dtype=object), attributes_of(name))
+        for name, text in zip(("status", "message"), said, strict=True)
+    }
+    for name in sweep:
+        every[name] = name, [case.values[name]], axis_attributes(scene, name)
+    if record:
+        every |= _results(scene, record, sweep)
+        attrs[SYMMETRIC] = int(record.symmetric)
+        if keep and record.mesh is not None:
+            every |= ugrid.variables(record.mesh())
+            attrs[KEEP] = keep
+    title = f"{scene.name}: {scene.summary}"
+    known = provenance(title, scene, completed(scene, case.values))
+    return RunContent(
+        {
+            name: Variable((dims,) if isinstance(dims, str) else dims, np.asarray(values), words)
+            for name, (dims, values, words) in every.items()
+        },
+        {**known, "id": case.id, **attrs},
+    )
+
+
+def _results(
+    scene: Scene, record: Record, sweep: tuple[str, ...]
+) -> dict[str, tuple[Any, np.ndarray, Mapping[str, Any]]]:
+    """Return coordinates, fields and numbers of a record."""
     ones = (1,) * len(sweep)
-    status = record.status.name.lower()
     variables: dict[str, tuple[Any, np.ndarray, Mapping[str, Any]]] = {
         name: (name, np.asarray(labels), attributes_of(name))
         for name, labels in record.coordinates.items()
@@ -93,16 +121,7 @@ def run_content(scene: Scene, case: Case, record: Record, keep: str = "") -> Run
         variables[name] = (*sweep, *dimensions), array, attributes_of(name, scene)
     for name, number in record.scalars.items():
         variables[name] = sweep, _scalar(name, number).reshape(ones), attributes_of(name, scene)
-    attrs: dict[str, Any] = {SYMMETRIC: int(record.symmetric)}
-    if keep and record.mesh is not None:
-        variables |= ugrid.variables(record.mesh())
-        attrs[KEEP] = keep
-    return _content(scene, case, status, record.message, variables, attrs)
-
-
-def broken_content(scene: Scene, case: Case, message: str) -> RunContent:
-    """Return the content of the file of a run without a record: status and message only."""
-    return _content(scene, case, ERROR, message, {}, {})
+    return variables
 
 
 def storage_of(variable: Variable) -> dict[str, Any]:
@@ -146,34 +165,6 @@ def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[st
         "solver_source": attributes["solver_source"],
         KEEP: attributes.get(KEEP, ""),
     }
-
-
-def _content(
-    scene: Scene,
-    case: Case,
-    status: str,
-    message: str,
-    variables: Mapping[str, tuple[Any, Any, Mapping[str, Any]]],
-    attrs: Mapping[str, Any],
-) -> RunContent:
-    """Return status, message, parameters of the sweep, and the results of the solver."""
-    sweep = usual_dimensions(scene)
-    ones = (1,) * len(sweep)
-    every: dict[str, tuple[Any, Any, Mapping[str, Any]]] = {
-        name: (sweep, np.full(ones, text, dtype=object), attributes_of(name))
-        for name, text in (("status", status), ("message", message))
-    }
-    for name in sweep:
-        every[name] = name, [case.values[name]], axis_attributes(scene, name)
-    title = f"{scene.name}: {scene.summary}"
-    known = provenance(title, scene, completed(scene, case.values))
-    return RunContent(
-        {
-            name: Variable((dims,) if isinstance(dims, str) else dims, np.asarray(values), words)
-            for name, (dims, values, words) in {**every, **variables}.items()
-        },
-        {**known, "id": case.id, **attrs},
-    )
 
 
 def _is_count(name: str) -> bool:

@@ -137,21 +137,21 @@ class Frame:
         for name, (dims, values, attributes) in axis_variables(
             self.scene, self.axes, self.linked
         ).items():
-            _write(file, name, dims, values, attributes, complete=True)
+            _write(file, name, dims, values, attributes)
         for name, labels in self.labels.items():
             texts = np.array(labels, dtype=object)
-            _write(file, name, (name,), texts, layout.attributes_of(name), complete=True)
+            _write(file, name, (name,), texts, layout.attributes_of(name))
         for name, grid in self.grids.items():
             if name in self.ragged:
                 self.fields[name] = ([name], layout.attributes_of(name))
             else:
-                _write(file, name, (name,), grid, layout.attributes_of(name), complete=True)
+                _write(file, name, (name,), grid, layout.attributes_of(name))
         for name, share in self.fractions.items():
             words = f"{name} / the largest {name} of the run"
             attrs = {"long_name": words, "units": "1"}
-            _write(file, f"{name}{FRACTION}", (name,), share, attrs, complete=True)
+            _write(file, f"{name}{FRACTION}", (name,), share, attrs)
 
-    def create_fields(self, file: h5netcdf.File) -> None:
+    def create_fields(self, file: h5py.File) -> None:
         """Create the variables that are written run by run.
 
         A run has one compressed chunk, or several along a dimension that is longer in other runs,
@@ -160,18 +160,17 @@ class Frame:
         for name, (inner, attributes) in self.fields.items():
             sizes = [self.sizes.get(each) or len(self.labels[each]) for each in inner]
             pieces = [max(self.shortest.get(each, _PIECE), _PIECE) for each in inner]
-            variable = file.create_variable(
-                name,
+            _created(
+                file,
+                NO_COORDINATE + name if name in self.ragged else name,
                 (*self.axes, *inner),
-                dtype="f8",
-                fillvalue=np.nan,
+                np.dtype(float),
+                self._with_auxiliary(attributes),
                 chunks=(*(1,) * len(self.axes), *map(min, sizes, pieces)),
                 compression="gzip",
                 compression_opts=1,
                 shuffle=True,
-                fletcher32=True,
             )
-            variable.attrs.update(self._with_auxiliary(attributes))
 
     def fill(self, file: h5py.File, run: h5py.File, at: tuple[int, ...]) -> None:
         """Write the fields of one run in their place."""
@@ -180,15 +179,19 @@ class Frame:
             if name in run:
                 values = _values(run[name])
                 values = values.reshape(values.shape[values.ndim - len(inner) :])
-                whole = np.full(tuple(map(self._extent, inner, values.shape)), np.nan)
-                whole[np.ix_(*map(places, inner))] = values
+                found = list(map(places, inner))
+                if any(each != list(range(len(each))) for each in found):  # other labels in between
+                    whole = np.full(tuple(map(self._extent, inner, values.shape)), np.nan)
+                    whole[np.ix_(*found)] = values
+                    values = whole
                 target = file[NO_COORDINATE + name if name in self.ragged else name]
-                target[(*at, *map(slice, whole.shape))] = whole
+                target[(*at, *map(slice, values.shape))] = values
 
-    def write_small(self, file: h5netcdf.File) -> None:
+    def write_small(self, file: h5py.File) -> None:
         """Write the variables that are in memory."""
         for name, (values, attributes) in self.small.items():
-            _write(file, name, tuple(self.axes), values, self._with_auxiliary(attributes))
+            words = self._with_auxiliary(attributes)
+            _created(file, name, tuple(self.axes), values.dtype, words)[...] = values
 
     def _extent(self, dimension: str, length: int) -> int:
         """Return the end up to which a run with this length writes along a dimension."""
@@ -207,7 +210,7 @@ def write_beside(file: h5netcdf.File, variables: Mapping[str, layout.Variable]) 
         for dim, size in zip(dims, values.shape, strict=True):
             if dim not in file.dimensions:
                 file.dimensions[dim] = size
-        _write(file, name, dims, values, attributes, complete=True)
+        _write(file, name, dims, values, attributes)
 
 
 def axis_variables(
@@ -241,20 +244,49 @@ def _write(
     dimensions: Sequence[str],
     values: np.ndarray,
     attributes: Mapping[str, Any],
-    *,
-    complete: bool = False,
 ) -> None:
-    """Write a variable; one that is not complete gets a fill value."""
+    """Write a variable that is complete, a coordinate for instance: it has no fill value."""
     text = values.dtype.kind == "O"
     variable = file.create_variable(
         name,
         tuple(dimensions),
         dtype=h5py.string_dtype() if text else values.dtype,
-        fillvalue=None if text or complete else _absent(name, values.dtype),
         fletcher32=bool(dimensions) and not text,
     )
     variable[...] = values
     variable.attrs.update(attributes)
+
+
+def _created(
+    file: h5py.File,
+    name: str,
+    dimensions: Sequence[str],
+    kind: np.dtype[Any],
+    attributes: Mapping[str, Any],
+    **storage: Any,
+) -> h5py.Dataset:
+    """Create a variable that has a value for absent runs, over dimensions of the file.
+
+    To netCDF it is an HDF5 data set with a scale for each dimension. h5netcdf takes five times as
+    long to make it.
+    """
+    scales = [file[dimension] for dimension in dimensions]
+    text, absent = kind.kind == "O", _absent(name, kind)
+    variable = file.create_dataset(
+        name,
+        tuple(map(len, scales)),
+        dtype=h5py.string_dtype() if text else kind,
+        fillvalue=None if text else absent,
+        fletcher32=not text,
+        track_order=True,
+        **storage,
+    )
+    for axis, scale in zip(variable.dims, scales, strict=True):
+        axis.attach_scale(scale)
+    if not text:
+        variable.attrs["_FillValue"] = np.array([absent], dtype=kind)
+    variable.attrs.update(attributes)
+    return variable
 
 
 def _absent(name: str, kind: np.dtype[Any]) -> Any:

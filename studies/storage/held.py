@@ -6,15 +6,11 @@ import hashlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK
 from studies.storage.store import Store
-
-_BATCH = 500
-"""Number of runs whose rows are in memory at a time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,18 +41,15 @@ def held(study: Study, store: Store) -> tuple[str, Combined]:
     digest = hashlib.sha256()
     counts: Counter[str] = Counter()
     failed, missing = [], []
-    ids = study.run_ids()
-    while some := list(islice(ids, _BATCH)):
-        rows = store.catalogue.rows(some)
-        for run_id in some:
-            row = rows.get(run_id, {"status": MISSING})
-            digest.update(f"{run_id} {row.get('size')} {row.get('modified')}\n".encode())
-            status = study.taken(row["status"])
-            counts[status] += 1
-            if status == MISSING:
-                missing.append(run_id)
-            elif status != OK:
-                failed.append((run_id, status, row["message"]))
+    for run_id, found in store.catalogue.each(study.run_ids()):
+        row = found or {"status": MISSING}
+        digest.update(f"{run_id} {row.get('size')} {row.get('modified')}\n".encode())
+        status = study.taken(row["status"])
+        counts[status] += 1
+        if status == MISSING:
+            missing.append(run_id)
+        elif status != OK:
+            failed.append((run_id, status, row["message"]))
     path = store.dataset_path(study.id)
     ended = Combined(path=path, counts=dict(counts), failed=failed, missing=missing, anew=False)
     return digest.hexdigest(), ended

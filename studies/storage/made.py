@@ -76,7 +76,8 @@ class Made:
             return {}
 
     def _write(self, path: Path, content: bytes) -> None:
-        self._store.clear(path)
+        if path.is_dir():
+            self._store.put_aside(path, "it is a directory", "a file takes its place")
         with needs_room(self._store.directory), appearing(path) as part:
             part.write_bytes(content)
 

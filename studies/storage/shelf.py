@@ -74,33 +74,22 @@ def keep(directory: Path, scene_id: str, description: Description, owner: str) -
             part.write_bytes(data)
 
 
-def described(directory: Path, scene_id: str) -> Scene | None:
-    """Return the scene of this id without its meshes, None if it is not stored.
+def stored(directory: Path, scene_id: str, whole: bool) -> Scene | None:
+    """Return the scene of this id, None if it is not stored.
 
-    It has parameters, but no model can be built of it.
+    One that is not ``whole`` has parameters, but no meshes: no model can be built of it.
 
     Raises
     ------
     FileDamaged
-        if scene.json is damaged
+        if the stored content is damaged, or that of a whole one does not have this id
     ValueError
         if it is not, and this version does not allow the scene
     """
     folder = directory / "scenes" / scene_id
+    if whole:
+        return _made(folder, whole=True)
     return _described(folder, state_of(folder / _FILE), state_of(folder))
-
-
-def kept(directory: Path, scene_id: str) -> Scene | None:
-    """Return the scene of this id, None if it is not stored.
-
-    Raises
-    ------
-    FileDamaged
-        if the stored content does not have this id
-    ValueError
-        if it has, and this version does not allow the scene
-    """
-    return _made(directory / "scenes" / scene_id, whole=True)
 
 
 @lru_cache(maxsize=16)

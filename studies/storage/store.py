@@ -45,15 +45,12 @@ from studies.scenes.registry import known_names
 from studies.scenes.scene import FileScene
 from studies.storage import dataset as layout
 from studies.storage import runfile, seal, shelf
-from studies.storage.catalogue import Catalogue, Row
+from studies.storage.catalogue import BATCH, Catalogue, Row
 from studies.storage.lock import lock
 from studies.storage.readback import verified
 from studies.storage.room import needs_room
 
 _STUDY = "study.json"
-_BATCH = 500
-"""Number of runs that are verified before their rows are written."""
-
 _UNFINISHED = 600.0
 """Seconds after which an unfinished file beside a data set counts as abandoned."""
 _LOG = logging.getLogger("studies")
@@ -95,8 +92,9 @@ class Store:
         return self.directory / "studies" / _checked(study_id)
 
     def study_ids(self) -> list[str]:
-        """Return the names of the folders that have the definition of a study, in order."""
-        return sorted(path.parent.name for path in self.directory.glob(f"studies/*/{_STUDY}"))
+        """Return the ids of the studies whose definition is here, in order."""
+        there = (path.parent.name for path in self.directory.glob(f"studies/*/{_STUDY}"))
+        return sorted(filter(is_id, there))
 
     def dataset_path(self, study_id: str) -> Path:
         """Return the path of the combined data set of a study."""
@@ -109,9 +107,8 @@ class Store:
 
         One that is not ``whole`` has no meshes, so that it takes little time and memory.
         """
-        read = shelf.kept if whole else shelf.described
         try:
-            return read(self.directory, scene_id) if is_id(scene_id) else None
+            return shelf.stored(self.directory, scene_id, whole) if is_id(scene_id) else None
         except FileDamaged as error:
             self.set_aside(error, "post the scene again")
             return None
@@ -123,13 +120,7 @@ class Store:
             return None
 
     def scenes(self, limit: int, offset: int = 0, name: str | None = None) -> list[shelf.Entry]:
-        """Return a page of the scenes that are stored here, or of those of a name, newest first.
-
-        Raises
-        ------
-        CatalogueDamaged
-            if the index is damaged again after it was made again, or cannot be set aside
-        """
+        """Return a page of the scenes that are stored here, or of those of a name, newest first."""
         return self._indexed(lambda index: index.page(limit, offset, name))
 
     def scene_id(self, name: str) -> str:
@@ -152,14 +143,14 @@ class Store:
         return found[0].id if found else name
 
     def scene_files(self) -> list[shelf.Kept]:
-        """Return the files of all scenes, the oldest first; errors as `scenes`.
-
-        Scenes that this version does not allow are among them.
-        """
+        """Return the files of all scenes, the oldest first, also of those not allowed here."""
         return self._indexed(shelf.Index.files)
 
     def _indexed(self, ask: Callable[[shelf.Index], Found]) -> Found:
-        """Return what is asked of the index of scenes, which follows the files first."""
+        """Return what is asked of the index of scenes, which follows the files first.
+
+        Raise `CatalogueDamaged` if it is damaged again after it was made again.
+        """
         index = shelf.Index(self.directory, self._lists)
 
         def asked() -> Found:
@@ -325,13 +316,10 @@ class Store:
         FileDiffers
             if the file differs from the record; then there is no file
         """
-        if isinstance(outcome, str):
-            run = layout.broken_content(case.scene, case, outcome)
-        else:
+        if not isinstance(outcome, str):
             outcome = outcome.with_one_mesh()
-            run = layout.run_content(case.scene, case, outcome, keep)
         path = self.run_path(case.id)
-        content = runfile.sealed(run)
+        content = runfile.sealed(layout.run_content(case.scene, case, outcome, keep))
         with self._writable():
             path.parent.mkdir(parents=True, exist_ok=True)
             with appearing(path) as part:
@@ -455,7 +443,7 @@ class Store:
         }
         self.catalogue.remove(known.keys() - there.keys())
         changed = iter([run_id for run_id, state in there.items() if known.get(run_id) != state])
-        while batch := list(islice(changed, _BATCH)):
+        while batch := list(islice(changed, BATCH)):
             self._sound(batch)
 
     @contextmanager
@@ -465,19 +453,14 @@ class Store:
         With `tidy`, unfinished files of killed writers are deleted. A store whose caller has the
         lock (`held`) does nothing here.
 
-        Raises
-        ------
-        StoreBusy
-            if another process has the lock
-        StudyError
-            if the directory is not writable
+        Raise `StoreBusy` if another process has the lock.
         """
         if self.held:
             yield
             return
         held = self._locked()
         try:
-            self.remove_claims()
+            shutil.rmtree(self.directory / "claims", ignore_errors=True)  # of those that shared it
             patterns = ("*/**/*.part", "catalogue*.part") if tidy else ()  # not those of keys
             for part in filter(_left, chain.from_iterable(map(self.directory.glob, patterns))):
                 part.unlink(missing_ok=True)
@@ -490,12 +473,7 @@ class Store:
     def sharing(self) -> Iterator[None]:
         """Lock the directory against those who are its only writer, together with others.
 
-        Raises
-        ------
-        StoreBusy
-            if a process that does not share has the lock
-        StudyError
-            if the directory is not writable
+        Raise `StoreBusy` if a process that does not share has the lock.
         """
         held = self._locked(shared=True)
         try:
@@ -512,10 +490,6 @@ class Store:
             busy = "computes here; wait until it has ended, or name another directory"
             return lock(self.directory / ".lock", busy, shared=shared)
 
-    def remove_claims(self) -> None:
-        """Delete what processes that shared the directory, and have ended, have claimed."""
-        shutil.rmtree(self.directory / "claims", ignore_errors=True)
-
     @contextmanager
     def _writable(self) -> Iterator[None]:
         """Raise `Unusable`, with the directory as it was given, if it is not writable."""
@@ -525,11 +499,6 @@ class Store:
         except OSError as error:
             allowed = f"must be a directory to write in ({error.strerror})"
             raise Unusable("directory", str(self.directory), allowed) from None
-
-    def clear(self, path: Path) -> None:
-        """Set a directory aside that has the name of a file."""
-        if path.is_dir():
-            self.put_aside(path, "it is a directory", "a file takes its place")
 
 
 def _left(part: Path) -> bool:

@@ -10,7 +10,7 @@ import xarray as xr
 
 from studies.errors import StudyError
 from studies.storage.ugrid import keeps
-from studies.views.picking import one_run, run_file, study_of, sweep_coordinates
+from studies.views.picking import file_of, one_run, study_of, sweep_coordinates
 from studies.views.plots.fields import usual_field
 from studies.views.plots.meshed import MESH_MAPS
 from studies.views.reading import find_study, open_netcdf
@@ -47,9 +47,11 @@ def _run_of(
     if found.name != "dataset.nc" or not found.with_name("study.json").is_file():
         return None
     try:
-        if not study_of(found)[0].keep:
-            return None
+        study, store = study_of(found)
     except StudyError:  # of another version of the solver: its runs are not found by their ids
         return None
+    if not study.keep:
+        return None
     swept = sweep_coordinates(dataset)
-    return run_file(path, {name: each for name, each in selection.items() if name in swept})
+    chosen = {name: each for name, each in selection.items() if name in swept}
+    return file_of(dataset, study, store, chosen)

@@ -163,15 +163,29 @@ def run_file(path: Path | str, selection: Mapping[str, str | float]) -> Path:
     if found.name != "dataset.nc" or not found.with_name("study.json").is_file():
         return found
     study, store = study_of(found)
+    with open_netcdf(found) as dataset:
+        return file_of(dataset, study, store, selection)
+
+
+def file_of(
+    dataset: xr.Dataset, study: Study, store: Store, selection: Mapping[str, str | float]
+) -> Path:
+    """Return the file of the run that `one_run` selects from the data set of a study in a store.
+
+    Raises
+    ------
+    StudyError
+        if there is no such run, or the study has searched
+    """
     if study.goal or study.fit:
         such = "run_high" if study.goal else "tried_run"
+        path = str(store.dataset_path(study.id))
         allowed = f"holds what a search found: give the file of a run, such as that of {such}"
-        raise StudyError("path", str(path), allowed)
-    with open_netcdf(found) as dataset:
-        run = one_run(dataset, selection)
-        if "run" in run:  # of a refinement, which chose its runs
-            return store.run_path(str(run["run"].item()))
-        index = tuple(int(positions(dataset[axis], run[axis].item())[0]) for axis in study.axes)
+        raise StudyError("path", path, allowed)
+    run = one_run(dataset, selection)
+    if "run" in run:  # of a refinement, which chose its runs
+        return store.run_path(str(run["run"].item()))
+    index = tuple(int(positions(dataset[axis], run[axis].item())[0]) for axis in study.axes)
     return store.run_path(next(case.id for case in study.cases() if case.index == index))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import re
 import runpy
 from importlib.metadata import distribution
@@ -107,6 +108,25 @@ def test_the_locks_have_all_that_the_image_needs_at_the_versions_of_the_tests() 
         assert version == pins()[name], name
         assert digests, name
     assert "mkl" not in lock, "its licence is not free"
+
+
+def test_the_list_of_what_the_image_installs_is_made_of_the_lock() -> None:
+    """`make sbom` needs a registry: the test reads its commands, and its list if it was made."""
+    lines = (ROOT / "Makefile").read_text().partition("\nsbom:")[2].partition("\n\n")[0]
+    assert re.search(r"pip install .*cyclonedx-bom==\d", lines), "the tool is pinned"
+    assert re.search(
+        r"cyclonedx-py requirements requirements\.lock .*\s.*-o build/sbom\.json", lines
+    )
+    made = ROOT / "build" / "sbom.json"
+    if made.exists() and made.stat().st_mtime > (ROOT / "requirements.lock").stat().st_mtime:
+        listed = json.loads(made.read_text())
+        parts = {
+            (canonicalize_name(p["name"]), Version(p["version"])) for p in listed["components"]
+        }
+        assert listed["bomFormat"] == "CycloneDX"
+        assert listed["metadata"]["component"]["name"] == PROJECT["project"]["name"]
+        lock = locked("requirements.lock")
+        assert parts == {(name, version) for name, (version, _) in lock.items()}
 
 
 @pytest.mark.parametrize("page", [p for p in tracked() if p.suffix == ".md"], ids=str)

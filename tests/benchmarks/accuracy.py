@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver import SCENES, Record
+from solver import Record
 from solver.memory import release
 from solver.scenes.punch import PunchParameters
 from solver.scenes.rolling_parameters import RollingParameters
+from studies.scenes.registry import scene_named
 from tests.benchmarks.measure import Point, timed
 
 Array = NDArray[np.float64]
@@ -94,11 +95,10 @@ def measure(quick: bool, repeats: int) -> list[Point]:
             continue
         levels = problem.levels[: 1 if quick else None]
         finest = {} if quick else problem.finest
-        exact = problem.stress(_run(problem, replace(problem.parameters, **finest)))
+        exact = problem.stress(anew(problem.scene, replace(problem.parameters, **finest)))
         for level in levels:
-            run = timed(
-                lambda _, p=problem, level=level: _run(p, at_level(p.parameters, level)), repeats
-            )
+            own = at_level(problem.parameters, level)
+            run = timed(lambda _, scene=problem.scene, own=own: anew(scene, own), repeats)
             error = np.abs(problem.stress(run.result) - exact) / problem.parameters.yield_stress
             points.append(
                 Point(
@@ -121,10 +121,10 @@ def at_level(parameters: Any, level: str) -> Any:
     return replace(parameters, accuracy=level, **dict.fromkeys(parameters.usual()))
 
 
-def _run(problem: Problem, parameters: Any) -> Record:
+def anew(name: str, parameters: Any) -> Record:
     """Return the record of a run that shares nothing with one before; raise where it failed."""
     release(0)
-    scene = SCENES[problem.scene]
+    scene = scene_named(name)
     (record,) = scene.path(parameters, [getattr(parameters, scene.branch)], lambda share: None)
     if not record.status.solved:
         raise RuntimeError(f"{record.status.name}: {record.message} ({parameters})")

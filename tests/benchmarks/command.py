@@ -10,7 +10,9 @@ from pathlib import Path
 from tests.benchmarks import (
     accuracy,
     figures,
+    growth,
     hertz,
+    memory,
     prism,
     punch,
     rolling,
@@ -21,6 +23,7 @@ from tests.benchmarks import (
 )
 from tests.benchmarks.measure import REPEATS, Point
 from tests.benchmarks.report import conditions, table, write_csv
+from tests.stress.measure import Figure
 
 PUNCH_FIGURES = {
     "mesh": (
@@ -36,9 +39,9 @@ PUNCH_FIGURES = {
 ALONE = {f"{n} alone": text for n, text in punch.MEASURES.items() if n != "plateau"}
 
 
-NAMES = ("hertz", "walls", "punch", "steady", "rolling", "skips", "prism", "accuracy", "sweep")
-SLOW = ("prism", "accuracy", "sweep")
+SLOW = ("prism", "accuracy", "growth", "memory", "pairs", "table", "sweep")
 """Measured where they are named alone."""
+NAMES = ("hertz", "walls", "punch", "steady", "rolling", "skips", *SLOW)
 
 
 def run(arguments: Sequence[str] | None = None) -> None:
@@ -61,7 +64,11 @@ def run(arguments: Sequence[str] | None = None) -> None:
         "skips": lambda: of_skips(repeats),
         "prism": lambda: of_prism(given.out, quick=given.quick, repeats=repeats),
         "accuracy": lambda: of_accuracy(given.out, quick=given.quick, repeats=repeats),
-        "sweep": lambda: of_sweep(quick=given.quick),
+        "growth": lambda: of_growth(given.out, quick=given.quick, repeats=repeats),
+        "memory": lambda: told("What a process keeps", memory.measure(given.quick)),
+        "pairs": lambda: told("Two workers and one", sweep.pairs(given.quick)),
+        "table": lambda: told("The published table", sweep.table(given.quick)),
+        "sweep": lambda: told("A study around its runs", sweep.measure(given.quick)),
     }
     names = given.only or [name for name in NAMES if name not in SLOW]
     benchmark(given.out, [problems[name] for name in names])
@@ -188,9 +195,17 @@ def of_accuracy(out: Path, *, quick: bool, repeats: int) -> list[str]:
     return [text[0].upper() + text[1:], *table(points, (measure,))]
 
 
-def of_sweep(*, quick: bool) -> list[str]:
-    """Measure what a study adds to its runs, and return the table."""
-    return ["A study around its runs", *map(str, sweep.measure(quick))]
+def of_growth(out: Path, *, quick: bool, repeats: int) -> list[str]:
+    """Measure how cost grows with the mesh, and return its table."""
+    points, exponents = growth.measure(quick, repeats)
+    write_csv(points, out / "growth.csv")
+    title = "Processor time over unknowns"
+    return [title, *table(points, (), ("iterations",)), *map(str, exponents)]
+
+
+def told(title: str, found: Sequence[Figure]) -> list[str]:
+    """Return lines that tell what was measured."""
+    return [title, *map(str, found)]
 
 
 def verdict(points: Sequence[Point]) -> list[str]:

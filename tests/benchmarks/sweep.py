@@ -28,7 +28,11 @@ from tests.stress.measure import Figure, megabytes
 RUNS = 8
 """Runs of the balanced study: the same punch in other sizes, so that all take the same time."""
 PATHS = 10_000
-_COARSE = {"smallest_element": 0.05, "growth": 2.0, "load_step": 0.2}
+COARSE = {"smallest_element": 0.05, "growth": 2.0, "load_step": 0.2}
+_SMALL = {"coarse": COARSE, "draft": {"accuracy": "draft"}}
+_GAINS = {16: 1.6, 32: 1.6, 64: 1.8}
+"""Numbers of equal small runs, and how much faster two workers shall be than one."""
+_TABLE = Path(__file__).parents[2] / "data" / "studies" / "rolling-table.toml"
 _LOOK = 0.5  # seconds between two looks at the memory
 
 
@@ -66,9 +70,9 @@ def measure(quick: bool) -> list[Figure]:
 
 def balanced(folder: Path, quick: bool) -> list[Figure]:
     """Return start, speed-up, overhead, and the time to answer a complete study again."""
-    one = Content("punch", _COARSE, {"half_width": [50.0]})
+    one = Content("punch", COARSE, {"half_width": [50.0]})
     start = _wall(one.written(folder), folder / "one", 1) - _own(one).cpu
-    parameters = {"friction": 0.4, **(_COARSE if quick else {})}
+    parameters = {"friction": 0.4, **(COARSE if quick else {})}
     study = Content("punch", parameters, {"half_width": [40.0 + k for k in range(RUNS)]})
     file, own = study.written(folder), _own(study)
     walls, shares = {}, {}
@@ -90,6 +94,39 @@ def balanced(folder: Path, quick: bool) -> list[Figure]:
         Figure("the same, 2 workers", 100 * shares[2], "%", most=5.0),
         Figure("the same study again, complete", again, "s", most=1.0),
     ]  # fmt: skip
+
+
+def pairs(quick: bool) -> list[Figure]:
+    """Return the times of equal small runs by one worker and by two."""
+    figures = []
+    with tempfile.TemporaryDirectory(prefix="residua-pairs-") as name:
+        folder = Path(name)
+        for size, parameters in _SMALL.items():
+            for count, least in {4: 0.5}.items() if quick else _GAINS.items():
+                sweep = {"half_width": [40.0 + k for k in range(count)]}
+                file = Content("punch", {"friction": 0.4, **parameters}, sweep).written(folder)
+                one, two = (
+                    _wall(file, folder / f"{size}-{count}-{workers}", workers) for workers in (1, 2)
+                )
+                what = f"{count} punches, {size}"
+                figures += [
+                    Figure(f"{what}: 1 worker", one, "s"),
+                    Figure(f"{what}: 2 workers", two, "s"),
+                    Figure(f"{what}: time of 2 workers over that of 1", two / one, most=1 / least),
+                ]
+            if quick:
+                break
+    return figures
+
+
+def table(quick: bool) -> list[Figure]:
+    """Return the time of the published table of ten cases of rolling, by two workers."""
+    with tempfile.TemporaryDirectory(prefix="residua-table-") as name:
+        file, text = Path(name) / "table.toml", _TABLE.read_text()
+        if quick:
+            text = text.replace("track = 50.0", 'track = 24.0\naccuracy = "draft"')
+        file.write_text(text)
+        return [Figure("T1 to T10, 2 workers", _wall(file, Path(name) / "out", 2), "s", most=85.0)]
 
 
 def _own(content: Content) -> Own:

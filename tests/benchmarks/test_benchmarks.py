@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.benchmarks import accuracy, punch, sweep
+from tests.benchmarks import accuracy, growth, memory, punch, sweep
 from tests.benchmarks.command import (
     benchmark,
     of_accuracy,
@@ -22,7 +22,7 @@ from tests.benchmarks.command import (
     of_steady,
     of_walls,
 )
-from tests.benchmarks.measure import timed
+from tests.benchmarks.measure import Point, timed
 
 TINY = punch.Plan(
     base=replace(punch.BASE, smallest_element=0.05, growth=2.0, load_step=0.2, unload_steps=1),
@@ -130,6 +130,20 @@ def test_many_paths_are_counted_and_their_memory_is_seen(tmp_path: Path) -> None
     assert len(memory) == 8
     assert figures["8 paths that cost nothing, 2 workers"] > 0
     assert len(list((tmp_path / "many" / "runs").glob("*.nc"))) == 8
+
+
+def test_a_process_tells_its_memory_after_each_path() -> None:
+    punches = [{**sweep.COARSE, "half_width": width} for width in (40.0, 41.0)]
+    held, cpu = memory.after_each("punch", punches)
+    assert len(held) == 2
+    assert min(held) > 50.0  # Python with numpy and scipy
+    assert cpu > 0.0
+
+
+def test_the_exponent_of_growth_is_that_of_a_power() -> None:
+    given = {"problem": "", "series": "", "setting": "", "spread": 0.0, "repeats": 1, "values": {}}
+    points = [Point(**given, unknowns=n, cpu=1e-6 * n**1.3) for n in (1000, 3000, 20_000)]
+    assert growth.exponent(points) == pytest.approx(1.3)
 
 
 def test_errors_of_the_punch_are_distances_from_its_references(written: Path) -> None:

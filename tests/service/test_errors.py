@@ -13,7 +13,7 @@ from fastapi import FastAPI, Request
 from starlette.exceptions import HTTPException
 
 from service.app import create_app
-from service.errors import STATUS, on_http_error, on_scene_error
+from service.errors import STATUS, on_field_error, on_http_error
 from service.guarded import READERS
 from service.settings import Settings
 from service.strict import StrictRequest
@@ -160,7 +160,7 @@ def test_an_answer_to_mistakes_has_less_than_a_megabyte() -> None:
     """Characters that JSON writes with twelve are the worst."""
     text = "\U0001f600" * 100_000
     mistakes = [StudyError(text, text, text)] * 5000
-    whole = on_scene_error(request_to("/scenes"), SceneError(text, mistakes))
+    whole = on_field_error(request_to("/scenes"), SceneError(text, mistakes))
     assert len(whole.body) < 1_000_000
     found = json.loads(whole.body)
     assert len(found["errors"]) == 20 and found["detail"].startswith("\U0001f600")

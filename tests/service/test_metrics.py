@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -110,3 +112,18 @@ def test_figures_that_cannot_be_read_are_left_out(client: TestClient, tmp_path: 
 
 def test_a_working_service_says_that_its_runner_is_up(service: Server) -> None:
     assert "residua_runner_up 1.0" in service.client.get("/metrics").text
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_threads_of_the_service_share_what_they_have_freed(service: Server) -> None:
+    """Else memory grows with the number of threads that have answered at the same time."""
+    with ThreadPoolExecutor(20) as pool:
+        answers = [*pool.map(service.client.get, ["/studies"] * 40)]
+    assert {each.status_code for each in answers} == {200}
+    assert service.process is not None
+    reserved = []  # the rest of an arena of glibc, which ends at a multiple of 64 MiB
+    for line in Path(f"/proc/{service.process.pid}/maps").read_text().splitlines():
+        span, mode, _, _, _, *name = line.split()
+        end = int(span.partition("-")[2], 16)
+        reserved += [span] if mode == "---p" and not name and end % 2**26 == 0 else []
+    assert len(reserved) <= 1, "one beside the main arena"

@@ -244,7 +244,7 @@ async def work():
     order = json.loads(await process.stdout.readline())
     running = process.returncode
     await processes.end(process, 10.0)
-    pid, code = process.pid, process.returncode
+    pid, code = process.process.pid, process.returncode
     other = await starter.start("echo_order", {"id": "b"})
     other.kill()
     await other.wait()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import psutil
@@ -31,10 +31,26 @@ class Figure:
         """Whether the number is allowed; NaN is not."""
         return self.most is None or self.value <= self.most
 
+    @property
+    def measured(self) -> str:
+        """The number and its unit."""
+        number = f"{self.value:d}" if isinstance(self.value, int) else f"{self.value:.3g}"
+        return f"{number} {self.unit}".strip()
+
     def __str__(self) -> str:
         bound = "" if self.most is None else f"   (at most {self.most:g})"
-        mark = "ok  " if self.good else "FAIL"
-        return f"  {mark} {self.what}: {self.value:.3g} {self.unit}{bound}"
+        return f"  {'ok  ' if self.good else 'FAIL'} {self.what}: {self.measured}{bound}"
+
+
+def table(found: Mapping[str, Sequence[Figure]]) -> str:
+    """Return the figures of all scenarios in aligned columns, those not allowed marked."""
+    rows = [("scenario", "figure", "measured", "at most", "")]
+    for name, figures in found.items():
+        for each in figures:
+            most = "" if each.most is None else f"{each.most:g}"
+            rows.append((name, each.what, each.measured, most, "" if each.good else "FAIL"))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
 
 
 def quantile(values: Sequence[float], share: float) -> float:

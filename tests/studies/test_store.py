@@ -91,6 +91,13 @@ def test_a_saved_study_is_found_again(computed: ComputedStudy) -> None:
     assert json.loads(text)["name"] == study.name
 
 
+def test_a_folder_with_another_name_than_an_id_holds_no_study(store: Store) -> None:
+    folder = store.directory / "studies" / "copy"
+    folder.mkdir(parents=True)
+    (folder / "study.json").write_text('{"name": "copy"}')
+    assert store.study_ids() == [] and store.definition("copy") is None
+
+
 def test_a_row_says_what_the_run_is(computed: ComputedStudy) -> None:
     study, store = computed
     case = next(study.cases())

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy  # loads ndimage when it is used: maps on meshes do not need it
 import xarray as xr
 from matplotlib.path import Path
-from scipy.ndimage import distance_transform_edt
 
 from studies.views.plots.fields import OUTLINE, is_half, map_axes
 
@@ -63,6 +63,8 @@ def reaching(values: xr.DataArray, curves: list[Array]) -> xr.DataArray:
     outside = (turns <= 0).reshape(there.shape) & ~there
     if not there.any():
         return values
-    nearest = distance_transform_edt(~there, return_distances=False, return_indices=True)
+    nearest = scipy.ndimage.distance_transform_edt(
+        ~there, return_distances=False, return_indices=True
+    )
     filled = np.where(outside, whole.to_numpy()[tuple(nearest)], whole.to_numpy())
     return whole.copy(data=filled)
