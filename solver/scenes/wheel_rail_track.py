@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.materials import Elasticity
-from solver.memory import kept, remembered
+from solver.memory import kept
 from solver.mesh.section_mesh import MeshedRail, SectionMesh, ZonedMesh
 from solver.mesh.zone import Zone, rail_mesh
 from solver.prism.patch import RollingPatch
@@ -293,16 +294,15 @@ class RolledRail:
         return stressed_track(own, p.rail_stress, p.thermal_strain)
 
     def load(self, track: PrismTrack, number: int) -> RollingPatch:
-        """See `RolledPrism`; all wheels on a rail share the influences of tractions."""
+        """See `RolledPrism`; wheels of other passes share the influences of tractions."""
         p, last = self._passes[number], self._made
         if last is not None and last[:2] == (track, p):
             return last[2]
         wheel = wheel_of(p)
-        load = {"friction": p.friction, "force": p.load, **p.motion}
-        made = remembered(
-            (RollingPatch, track, wheel.elasticity),
-            lambda: RollingPatch(track.grid, track.compliance, wheel, **load),
-        )
-        made = made.with_wheel(wheel).with_load(**load)
+        if last is not None and last[0] is track:
+            make = last[2].with_wheel(wheel).with_load
+        else:
+            make = partial(RollingPatch, track.grid, track.compliance, wheel)
+        made = make(friction=p.friction, force=p.load, **p.motion)
         self._made = track, p, made
         return made
