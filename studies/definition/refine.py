@@ -462,13 +462,14 @@ class Refinement(Chooser):
             untold -= {axis}
             runs = (Wanted(cell.branch, (*sides[0], x, *sides[1])) for x in xs)
             slopes = np.diff([self._numbers[each] or () for each in runs], axis=0).T / np.diff(xs)
-            lacks = (0, 0), (beyond - len(below), beyond - len(above))
+            before, after = beyond - len(below), beyond - len(above)
             errors, corners = [], []
-            for jumps in np.pad(np.diff(slopes), lacks, mode="edge"):
+            for each in np.diff(slopes).tolist():
+                jumps = [each[0]] * before + each + [each[-1]] * after
                 ends = between(first, *jumps[-3:]), between(last, *jumps[2::-1])
                 errors.append(max(ends))
-                inner = np.diff(jumps[beyond - 1 : len(jumps) + 1 - beyond])
-                corners.append(max(abs(inner)) * (own[-1] - own[0]) / 4.0)
+                inner = itertools.pairwise(jumps[beyond - 1 : len(jumps) + 1 - beyond])
+                corners.append(max(abs(a - b) for a, b in inner) * (own[-1] - own[0]) / 4.0)
             found[axis] = tuple(map(max, zip(found[axis], errors, strict=True)))
             turns = tuple(map(max, zip(turns, corners, strict=True)))
         for axis in untold & {each.axis for each in every}:
