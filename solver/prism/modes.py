@@ -22,6 +22,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numba import float32, float64, njit
 from scipy import sparse
 
 from solver.errors import ModelError
@@ -121,8 +122,8 @@ class Modes:
         self.B0, self.B1 = (B[order] for B in both)
         self.carrying = np.repeat([False] * _PLAIN + [True] * len(I_COMPONENTS), len(self.points))
         areas = sparse.diags_array(np.tile(self.weights, 6))
-        self._force0 = sparse.csr_array(self.B0.T @ areas)
-        self._force1 = sparse.csr_array(self.B1.T @ areas)
+        self._force0 = sparse.csc_array(self.B0.T @ areas)
+        self._force1 = sparse.csc_array(self.B1.T @ areas)
         self._set_rows(surface, zone)
         self.behind = np.asarray(behind, dtype=float)
         self._set_transforms(window, self.behind)
@@ -143,8 +144,9 @@ class Modes:
         """The same waves, in single precision."""
         other, kind = copy(self), np.dtype(np.float32)
         other.precision = kind
-        for name in ("B0", "B1", "_force0", "_force1", "rows", "columns", "_twice_k"):
+        for name in ("B0", "B1", "_force0", "_force1", "rows", "_twice_k"):
             setattr(other, name, getattr(self, name).astype(kind))
+        other.columns = self.columns  # few of them are read at a time
         for name in ("_into", "_into_behind", "_back"):
             setattr(other, name, tuple(each.astype(kind) for each in getattr(self, name)))
         return other
@@ -228,7 +230,7 @@ class Modes:
         ----------
         nodal : (waves, 2, m) nodal forces, as for `solved` [N/mm]
         """
-        amplitudes = np.matmul(nodal, self.columns)  # (waves, 2, n_rows)
+        amplitudes = _weighted(nodal, self.columns)  # (waves, 2, n_rows)
         return self._rows_at_stations(amplitudes.reshape(-1, len(self.along)).T)
 
     def moved_by(self, forces: Array) -> Array:
@@ -289,10 +291,15 @@ class Modes:
         return nodal
 
     def nodal(self, eigenstress: Array) -> Array:
-        """Return the nodal forces (waves, 2, m) of an eigenstress (n_points, window, 6) [N/mm]."""
-        s = self._amplitudes(eigenstress)
-        nodal = self._force0 @ s
-        nodal += (self._force1 @ s) * self._twice_k
+        """Return the nodal forces (waves, 2, m) of an eigenstress (n_points, window, 6) [N/mm].
+
+        Only points that have some are counted: few yield.
+        """
+        some = np.flatnonzero(eigenstress.any(axis=(1, 2)))
+        s = self._amplitudes(eigenstress[some])
+        at = (len(self.points) * np.arange(6)[:, None] + some).ravel()
+        nodal = self._force0[:, at] @ s
+        nodal += (self._force1[:, at] @ s) * self._twice_k
         return self._by_wave(nodal)
 
     def pushed(self, forces: Array) -> Array:
@@ -305,10 +312,10 @@ class Modes:
         return np.ascontiguousarray(each)
 
     def _amplitudes(self, stress: Array) -> Array:
-        """Return the amplitudes (6 n_points, 2 waves) of a stress (n_points, window, 6)."""
+        """Return the amplitudes (6 n, 2 waves) of a stress (n, window, 6)."""
         by_component = np.ascontiguousarray(np.moveaxis(stress, 2, 0)[list(_ORDER)])
         flat = by_component.reshape(-1, stress.shape[1])
-        split = _PLAIN * len(self.points)
+        split = _PLAIN * len(stress)
         out = np.empty((len(flat), len(self._twice_k)), self.precision)
         np.matmul(flat[:split], self._into_behind[0], out=out[:split])
         np.matmul(flat[split:], self._into_behind[1], out=out[split:])
@@ -340,6 +347,27 @@ class Modes:
         """Return the displacements (n_rows, window) of amplitudes (n_rows, 2 waves)."""
         plain, carrying = self._back
         return np.where(self.along[:, None], amplitudes @ carrying, amplitudes @ plain)
+
+
+@njit(
+    [float64[:, :, ::1](kind[:, :, ::1], float64[:, :, ::1]) for kind in (float32, float64)],
+    cache=True,
+)
+def _weighted(forces: Array, columns: Array) -> Array:  # pragma: no cover - compiled
+    """Return sums (waves, k, n) of columns (waves, m, n), times forces (waves, k, m).
+
+    Columns of nodes without force, most of them, are not read.
+    """
+    waves, count, size = forces.shape
+    out = np.zeros((waves, count, columns.shape[2]))
+    for wave in range(waves):
+        for node in range(size):
+            for k in range(count):
+                force = forces[wave, k, node]
+                if force != 0.0:
+                    for row in range(columns.shape[2]):
+                        out[wave, k, row] += force * columns[wave, node, row]
+    return out
 
 
 def superposed(

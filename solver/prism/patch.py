@@ -204,21 +204,37 @@ class RollingPatch:
             found = self._solve(u, start)
         status = found.status
         _check_rim(status)
-        rigid = self._given.copy()
-        rigid[self._free] = found.rigid
-        return PatchContact(
+
+        def near(other: Array) -> PatchContact:
+            values, rigid = found.along(self._offset(other - u))
+            height, creepage, lateral, _ = self._moved(found.rigid + rigid)
+            return replace(
+                contact, traction=self._global(found.values + values), height=height,
+                creepage=creepage, lateral_creepage=lateral,
+            )  # fmt: skip
+
+        height, creepage, lateral, spin = self._moved(found.rigid)
+        contact = PatchContact(
             grid=self.grid,
             traction=self._global(found.values),
             gap=found.effects[..., NORMAL],
             slip=found.effects[..., TANGENTS],
             status=status,
             along=lambda change: self._global(found.along(self._offset(change))[0]),
-            height=float(rigid[0]),
-            creepage=float(rigid[1]),
-            lateral_creepage=float(rigid[2]),
-            spin=float(rigid[3]),
+            near=near,
+            height=height,
+            creepage=creepage,
+            lateral_creepage=lateral,
+            spin=spin,
             steps=found.steps,
         )
+        return contact
+
+    def _moved(self, free: Array) -> list[float]:
+        """Return height, creepages and spin, from the rigid motions (k,) that are free."""
+        rigid = self._given.copy()
+        rigid[self._free] = free
+        return rigid.tolist()
 
     def _solve(self, u: Array, start: PatchContact | None) -> ConeSolution:
         """Solve the frictional problem of a surface with these displacements (n, m, 3)."""

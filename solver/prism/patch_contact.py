@@ -33,6 +33,8 @@ class PatchContact:
     status : (n, m) OPEN, STICK or SLIP of `solver.prism.friction_cone`
     along : (change (n, m, 3) of the surface's displacement without tractions) -> change of
         ``traction``
+    near : (displacement (n, m, 3) of the surface without tractions) -> the contact with it to first
+        order: tractions and motions; None for a given load
     height : displacement of the wheel along y [mm]
     creepage, lateral_creepage, spin : as in `ProfiledWheel.rolling` [1, 1, 1/mm]
     steps : Newton steps, with and without friction
@@ -44,6 +46,7 @@ class PatchContact:
     slip: Array
     status: NDArray[np.int64]
     along: Callable[[Array], Array]
+    near: Callable[[Array], PatchContact] | None = None
     height: float = 0.0
     creepage: float = 0.0
     lateral_creepage: float = 0.0

@@ -44,12 +44,16 @@ class PatchPassing:
     def __init__(
         self, load: PatchLoad, moved: Array | None = None, start: PatchContact | None = None
     ) -> None:
-        self._load, self._moved, self._last = load, moved, start
+        self._load, self._moved, self._start = load, moved, start
+        self._last: PatchContact | None = None
 
     def on(self, u: PrismField) -> AppliedPatch:
         """See `PassingLoad`."""
         moved = u.displacement if self._moved is None else u.displacement + self._moved
-        self._last = found = self._load.solve(moved, self._last)
+        start = self._start if self._last is None else self._last
+        if self._last is not None and self._last.near is not None:
+            start = self._last.near(moved)
+        self._last = found = self._load.solve(moved, start)
 
         def along(change: PrismField) -> PrismField:
             return change.loaded(found.along(change.displacement))

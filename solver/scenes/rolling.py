@@ -225,6 +225,17 @@ def warnings(run: FinishedRun) -> tuple[str, ...]:
     )
 
 
+def advice(parameters: RollingParameters) -> dict[Status, str]:
+    """Return what the user can do by status; on an endless track nothing advances by steps."""
+    refined = "refine the mesh by element_size or growth"
+    return {
+        Status.LIMIT_LOAD: "lower load_ratio or traction, or let the material harden",
+        Status.NOT_CONVERGED: f"{refined}, or lower load_ratio or traction"
+        if parameters.endless
+        else f"reduce advance_step, or {refined}",
+    }
+
+
 ROLLING = Scene(
     name="rolling",
     summary="elastic cylinder rolling on an elastic-plastic half-space, pass after pass",
@@ -244,8 +255,5 @@ ROLLING = Scene(
     refinement=refinement,
     effort=effort,
     warnings=warnings,
-    advice={
-        Status.LIMIT_LOAD: "lower load_ratio or traction, or let the material harden",
-        Status.NOT_CONVERGED: "reduce advance_step, or refine the mesh by element_size or growth",
-    },
+    advice=advice,
 )  # fmt: skip

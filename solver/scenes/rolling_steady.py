@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.errors import LimitLoad, ModelError, NotConverged, TooLong
+from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.linear.threads import one_thread
 from solver.loading.bearing import too_much_shear
 from solver.materials.material import Material
@@ -70,7 +70,7 @@ def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
                 track.rows.virgin(p.material()), _first_guess(coarse, reach), parts=_PARTS,
                 tolerance=_TOLERANCE,
             )  # fmt: skip
-    except (LimitLoad, TooLong):
+    except LimitLoad:
         raise
     except (NotConverged, ModelError):
         return None

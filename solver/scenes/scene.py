@@ -97,7 +97,7 @@ class Scene:
         run; a study gives runs with an equal one to the same worker. It must take milliseconds, as
         it is asked for every path before the first is computed
     warnings : (run) -> texts for the user, added to the message of its record
-    advice : status -> what the user can do
+    advice : status -> what the user can do; or (parameters) -> such a table
     quantities : quantities that only this scene declares
     source : digest of the data it was made from, if any; it counts in the ids of runs
     allow : what all its studies allow: with ``large_strain`` runs outside small-strain theory are
@@ -123,7 +123,9 @@ class Scene:
     effort: Callable[[Any, Sequence[float]], Effort] | None = None
     setup: Callable[[Any], Hashable] | None = None
     warnings: Callable[[FinishedRun], tuple[str, ...]] | None = None
-    advice: Mapping[Status, str] = field(default_factory=dict, hash=False)
+    advice: Mapping[Status, str] | Callable[[Any], Mapping[Status, str]] = field(
+        default_factory=dict, hash=False
+    )
     quantities: tuple[Quantity, ...] = ()
     source: str = ""
     allow: tuple[str, ...] = ()
@@ -198,16 +200,15 @@ class Scene:
         return replace(
             written,
             status=status,
-            message=self._message(status, messages),
+            message=self._message(run, status, messages),
             scalars={**written.scalars, "audit_stored": comparison.figure},
             mesh=partial(mesh_fields, run.samples.fields, states, run.beside),
         )
 
-    def _message(
-        self, status: Status, messages: tuple[str, ...], error: Exception | None = None
-    ) -> str:
+    def _message(self, run: FinishedRun, status: Status, messages: tuple[str, ...]) -> str:
         """Return the message of a run; `TooLong` has its own advice, opposite to a finer mesh."""
-        advice = None if isinstance(error, TooLong) else self.advice.get(status)
+        table = self.advice(run.parameters) if callable(self.advice) else self.advice
+        advice = None if isinstance(run.outcome.error, TooLong) else table.get(status)
         return "; ".join((*messages, advice) if advice else messages)
 
     def _labelled(
@@ -217,7 +218,7 @@ class Scene:
         return Record(
             parameters=run.parameters,
             status=status,
-            message=self._message(status, messages, run.outcome.error),
+            message=self._message(run, status, messages),
             coordinates={**run.view.coordinates, **own},
             fields={
                 q.name: (q.dims, value)

@@ -127,15 +127,15 @@ def test_what_passes_has_the_shear_of_small_increments(
 ) -> None:
     """Of vertices that stick before they touch, and of a contact that mostly slips or rolls aside.
 
-    The mean error of shear, as a share of all friction, was 0.15 in a single increment that was not
+    In eight increments it is within 2 % of all friction in each. The mean error of shear, as a share of all friction, was 0.15 in a single increment that was not
     divided, and 0.29 where 85 % of the friction acts; both passed their audit.
     """
     exact = leaned(slave, aside, 24).stages["loaded"].state.contacts[0]
-    for increments in (1, 2, 4):
+    for increments, most in ((1, claimed), (2, claimed), (4, claimed), (8, 0.02)):
         found = leaned(slave, aside, increments)
         contact = found.stages["loaded"].state.contacts[0]
         error = np.abs(contact.tangential - exact.tangential).sum()
-        assert error < claimed * FRICTION * exact.normal.sum()
+        assert error < most * FRICTION * exact.normal.sum()
         assert found.audit("loaded").passed
 
 
