@@ -118,7 +118,7 @@ def glue(patch: Patch) -> None:
         status = np.where((found.status != OPEN) | (start != OPEN), STICK, OPEN)
         first = np.zeros(problem.n, dtype=int)
         forces = complementarity._forces(problem, status, first, problem.lines)
-        return None if forces is None else ContactSolution(*forces, status, False)
+        return None if forces is None else ContactSolution(*forces[:2], status, False)
 
     patch.setattr(solver.loading.step, "solve_contact", glued)
     patch.setattr(candidates.Candidates, "violation", lambda self, stiffness: 0.0)
