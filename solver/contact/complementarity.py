@@ -40,8 +40,6 @@ _KNOWN = 1e-8
 def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactSolution | None:
     """Return the solution, or None when there is none or none was found.
 
-    If none is found, G is replaced by A: such a step of Newton's method may still lead to one.
-
     ``start`` (n,) is the initial status of the points, usually that of the previous iteration.
     """
     if problem.n == 0:
@@ -51,10 +49,7 @@ def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactS
     if _at_rest(problem):
         nothing = np.zeros_like(problem.offset), np.zeros_like(problem.balance)
         return ContactSolution(*nothing, np.full_like(start, OPEN), False)
-    found = _active_sets(problem, start, np.zeros(problem.n, dtype=int)) or _lag_bound(problem)
-    if found is None and (problem.turned != problem.A).any():
-        return solve_contact(replace(problem, G=None), start)
-    return found
+    return _active_sets(problem, start, np.zeros(problem.n, dtype=int)) or _lag_bound(problem)
 
 
 def _at_rest(problem: ContactProblem) -> bool:

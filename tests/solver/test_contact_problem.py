@@ -11,6 +11,7 @@ from solver.contact import complementarity
 from solver.contact.complementarity import solve_contact
 from solver.contact.given_bound import given_bound
 from solver.contact.lemke import lemke
+from solver.contact.links import solve_linked
 from solver.contact.problem import BACKWARD, FORWARD, OPEN, STICK, ContactProblem
 from solver.model.friction import BoundLines
 
@@ -362,7 +363,7 @@ def test_a_round_body_without_friction_is_pressed_though_nothing_resists_its_tur
         balance=np.array([-1.0, 0.0]),
         G=np.array([[1.0, -0.1], [1.0, 0.1]]),
     )
-    found = solve_contact(problem, np.array([STICK, STICK]))
+    found = solve_linked(problem, 0, np.ones(2, dtype=bool), np.array([STICK, STICK]))
     assert found is not None
     assert natural_residual(problem, found) < 1e-8
 
@@ -373,7 +374,7 @@ def test_a_load_that_nothing_bears_is_tried_again_only_if_normals_lean(monkeypat
     pulled = replace(problem, balance=-problem.balance, G=problem.A + lean * np.eye(24, 2))
     tried = []
     monkeypatch.setattr(complementarity, "_lag_bound", tried.append)
-    assert solve_contact(pulled, np.full(12, OPEN)) is None
+    assert solve_linked(pulled, 0, np.ones(2, dtype=bool), np.full(12, OPEN)) is None
     assert len(tried) == times
 
 
