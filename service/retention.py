@@ -153,8 +153,8 @@ class Keeper:
 
     def _users(self) -> dict[str, str]:
         """Return a study for each scene that is named, in the queue or by the command line."""
-        every = {each: self.store.definition(each) for each in self.store.study_ids()}
-        found = {str(study.get("scene")): study_id for study_id, study in every.items() if study}
+        every = ((each, self.store.definition(each)) for each in self.store.study_ids())
+        found = {str(study.get("scene")): study_id for study_id, study in every if study}
         return found | dict(self.jobs.rows("SELECT scene, id FROM job"))
 
     def purge(self, study_id: str) -> int:

@@ -45,8 +45,7 @@ class StudyError(ValueError):
         value = plain(value)
         self.field, self.value, self.allowed = field, value, allowed
         self.others, self.count = tuple(others), 1 + len(others)
-        own = f"{field} = {reprlib.repr(value)}: {allowed}"
-        super().__init__("\n".join([own, *map(str, self.others)]))
+        super().__init__("\n".join(self.listed))
 
     def __reduce__(
         self,
@@ -62,7 +61,8 @@ class StudyError(ValueError):
     def listed(self) -> list[str]:
         """The mistakes as text; the last one tells how many more there are."""
         more = self.count - len(self.each)
-        return [*map(str, self.each), *([f"and {more} more"] if more else [])]
+        texts = [f"{each.field} = {reprlib.repr(each.value)}: {each.allowed}" for each in self.each]
+        return [*texts, *([f"and {more} more"] if more else [])]
 
     def renamed(self, rename: Callable[[str], str]) -> StudyError:
         """Return the same mistakes of other fields."""

@@ -15,6 +15,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cache, lru_cache
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -133,6 +134,12 @@ def written(scene: Scene) -> list[list[str]]:
     return [*found, *_read(scene)] if scene.source else found
 
 
+def loaded(scene: Scene) -> dict[str, str]:
+    """Return the digests of the modules by whose names a scene goes to another process."""
+    names = {each.__module__ for each in _functions(scene)} - {"__main__"}
+    return {name: found for name in names if (found := _module_digest(name))}
+
+
 def _read(scene: Scene) -> list[list[str]]:
     """Return the data that a scene was made from, and the modules that have read it."""
     file = _own_file(type(scene).__module__)
@@ -175,9 +182,24 @@ def _own_file(module: str) -> Path | None:
 
 
 def _module_digest(name: str) -> str:
-    """Return the digest of a module's source without comments; empty for one of the solver's."""
+    """Return the digest of a module's source without comments; empty for one of the solver's.
+
+    It is that of the code which this process has loaded, though the file may be another one by now:
+    it is read when an id is made for the first time, and again after the module is loaded again.
+    """
     file = _own_file(name)
-    return "" if file is None else _code_digest(file.read_bytes())
+    if file is None:
+        return ""
+    spec = getattr(sys.modules[name], "__spec__", None)
+    before, known = _LOADED.get(name, (None, ""))
+    if spec is None or before is not spec:  # of a script nothing tells whether it is loaded again
+        known = _code_digest(file.read_bytes())
+        _LOADED[name] = spec, known
+    return known
+
+
+_LOADED: dict[str, tuple[ModuleSpec | None, str]] = {}
+"""By the name of a module, how it was loaded, and the digest of its source."""
 
 
 @lru_cache(maxsize=100)

@@ -15,7 +15,7 @@ from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.goal import PathLimit, Search
-from studies.definition.identity import solver_hash
+from studies.definition.identity import loaded, solver_hash
 from studies.definition.place import Place
 from studies.definition.study import Study
 from studies.errors import StoreFull, StudyError, without_folders
@@ -49,6 +49,8 @@ class PathTask:
         time was written by a worker that died on this task, and is kept
     limit : tells the run behind which no other of its path is needed; None if all are
     place : of a path that goes on, the place whose search asks for its runs: the path has no cases
+    code : digests of the scene's modules that the process which made this task has loaded; a worker
+        with others refuses it too
     """
 
     scene: Scene
@@ -60,6 +62,10 @@ class PathTask:
     stale: Mapping[str, int] = field(default_factory=dict)
     limit: PathLimit | None = None
     place: Place[Search] | None = None
+    code: Mapping[str, str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "code", loaded(self.scene))
 
     def __dask_tokenize__(self) -> tuple[Any, ...]:
         """Return an identity of this task, so that dask need not hash its content."""
@@ -108,6 +114,13 @@ def walk(
         raise Unfit(
             "has another version of the solver than the process that started the study; install "
             "the same one for both and restart the worker"
+        )
+    own = loaded(task.scene)
+    if other := [name for name, found in own.items() if found != task.code.get(name, found)]:
+        time.sleep(REFUSAL_SECONDS)
+        raise Unfit(
+            f"has another version of {other[0]} than the process that started the study; start "
+            "both again, with the same file"
         )
     store = Store(task.directory)
     stored = task.stored(store)

@@ -277,7 +277,7 @@ def _created(
         tuple(map(len, scales)),
         dtype=h5py.string_dtype() if text else kind,
         fillvalue=None if text else absent,
-        fletcher32=not text,
+        fletcher32=bool(dimensions) and not text,
         track_order=True,
         **storage,
     )

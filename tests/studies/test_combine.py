@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -14,12 +15,14 @@ import pytest
 import xarray as xr
 
 from solver.linear import solvers
+from solver.results.record import Record, Status
+from solver.scenes import SCENES
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.storage import provenance
 from studies.storage.combine import combine
 from studies.views.picking import one_run
 from tests.studies.conftest import compute_here, fake_study
-from tests.studies.fakes import record
+from tests.studies.fakes import Canned, described, record
 
 ComputedStudy = tuple[Study, Store]
 
@@ -292,3 +295,39 @@ def test_the_numbers_of_an_earlier_version_are_read_as_words(tmp_path: Path) -> 
     old.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")
     with open_study(tmp_path / "dataset.nc") as dataset:
         assert dataset.status.values.tolist() == ["ok", "limit_load", "missing"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Plain:
+    """Parameters without one that every data set has as a dimension."""
+
+    force: float = described(1.0, "force")
+
+
+def _pressed(
+    parameters: _Plain, values: Sequence[float], monitor: Callable[[float], None]
+) -> Iterator[Record]:
+    for value in values:
+        fields = {"contact_pressure": (("s",), value * np.arange(3.0))}
+        yield Record(
+            parameters=replace(parameters, force=value), status=Status.OK,
+            coordinates={"s": np.arange(3.0)}, fields=fields,
+            scalars={"increments": 2.0, "contact_half_width": value}, symmetric=True,
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
+def test_one_run_of_a_scene_without_usual_axes_has_numbers_without_dimensions(
+    store: Store, engine: Literal["h5netcdf", "netcdf4"], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = Canned(
+        name="plain", summary="a force", parameters=_Plain, branch="force", records=_pressed
+    )
+    monkeypatch.setitem(SCENES, scene.name, scene)
+    study = Study.from_dict({"name": "one", "scene": "plain", "parameters": {"force": 3.0}})
+    compute_here(study, store, scene)
+    with xr.open_dataset(store.dataset_path(study.id), engine=engine) as dataset:
+        assert dataset.status.item() == "ok" and dataset.status.dims == ()
+        assert dataset.increments.item() == 2
+        assert dataset.contact_half_width.item() == 3.0
+        assert dataset.contact_pressure.values.tolist() == [0.0, 3.0, 6.0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from studies.errors import without_folders
+from studies.errors import StudyError, without_folders
 from studies.execution.task import _reason
 
 
@@ -37,3 +37,9 @@ def test_what_is_no_path_stays(text: str) -> None:
 def test_the_message_of_a_run_that_failed_shows_no_folder() -> None:
     error = FileNotFoundError(2, "No such file", "/srv/data/own.csv")
     assert _reason(error) == "FileNotFoundError: [Errno 2] No such file: 'own.csv'"
+
+
+def test_each_of_several_mistakes_is_told_once() -> None:
+    mistake = StudyError("friction", 2, "at most 1", [StudyError("load", -1, "positive")])
+    assert mistake.listed == ["friction = 2: at most 1", "load = -1: positive"]
+    assert str(mistake).splitlines() == mistake.listed

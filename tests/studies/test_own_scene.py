@@ -6,14 +6,17 @@ import importlib.util
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
 from solver.scenes import SCENES
-from studies import Study
-from studies.definition.identity import written
+from studies import Store, Study
+from studies.definition.identity import solver_hash, written
+from studies.execution.proof import Unfit
+from studies.execution.task import PathTask, walk
 
 SCRIPT = '''"""A scene."""
 
@@ -80,6 +83,35 @@ def test_a_change_of_what_a_script_computes_gives_new_ids(
     before = ids(load(SCRIPT), monkeypatch)
     after = ids(load(SCRIPT.replace(old, new)), monkeypatch)
     assert [a == b for a, b in zip(before, after, strict=True)] == [same] * 3
+
+
+def test_ids_are_those_of_the_code_that_is_loaded(
+    load: Load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A notebook goes on with the code it has, also when its file is another one."""
+    monkeypatch.syspath_prepend(tmp_path)
+    own = load(SCRIPT)
+    before = ids(own, monkeypatch)
+    Path(str(own.__file__)).write_text(SCRIPT.replace("FACTOR = 2.0", "FACTOR = 3.25"))
+    assert ids(own, monkeypatch) == before, "though the file has changed"
+    after = ids(importlib.reload(own), monkeypatch)
+    assert own.FACTOR == 3.25
+    assert not {*after} & {*before}
+
+
+def test_a_worker_that_has_loaded_another_scene_of_the_name_refuses(
+    load: Load, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = load(SCRIPT)
+    monkeypatch.setitem(SCENES, "own", own.OWN)
+    study = Study.from_dict({"name": "own", "scene": "own", "parameters": {}})
+    task = PathTask(own.OWN, tuple(study.paths()), store.directory, solver_hash())
+    other = ModuleSpec(own.__name__, None)  # as where another process has loaded it
+    monkeypatch.setattr(own, "__spec__", other)
+    Path(str(own.__file__)).write_text(SCRIPT.replace("FACTOR = 2.0", "FACTOR = 3.25"))
+    with pytest.raises(Unfit, match=f"another version of {own.__name__}"):
+        walk(task, lambda content: None, lambda: False)
+    assert not list(store.directory.glob("runs/*"))
 
 
 def test_an_output_taken_from_a_scene_of_the_solver_is_seen() -> None:

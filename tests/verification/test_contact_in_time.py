@@ -127,8 +127,9 @@ def test_what_passes_has_the_shear_of_small_increments(
 ) -> None:
     """Of vertices that stick before they touch, and of a contact that mostly slips or rolls aside.
 
-    In eight increments it is within 2 % of all friction in each. The mean error of shear, as a share of all friction, was 0.15 in a single increment that was not
-    divided, and 0.29 where 85 % of the friction acts; both passed their audit.
+    In eight increments it is within 2 % of all friction in each. The mean error of shear, as a
+    share of all friction, was 0.15 in a single increment that was not divided, and 0.29 where 85 %
+    of the friction acts; both passed their audit.
     """
     exact = leaned(slave, aside, 24).stages["loaded"].state.contacts[0]
     for increments, most in ((1, claimed), (2, claimed), (4, claimed), (8, 0.02)):
