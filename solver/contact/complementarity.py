@@ -127,7 +127,8 @@ def _forces(
         if free and (not size or np.linalg.matrix_rank(problem.turned[rows]) == k):
             return None
     if free:
-        # the rounding of positions may contradict a body that slips on all points: gaps bear it
+        # where a body slips on all points, the rounding of positions may leave no exact solution:
+        # gaps then miss their conditions by it, forces do not
         forces = np.arange(size + k) >= size
         first = np.where(forces, _FIRST, 1.0)
         solution = linalg.lstsq(first[:, None] * S, first * rhs)[0]
