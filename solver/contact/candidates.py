@@ -107,9 +107,9 @@ class Candidates(OnParts):
         return _places(self.vertices)
 
     def motions(self, part: int, rigid: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the gaps and slips that rigid motions (n, k) of a part cause [mm].
+        """Return the gaps and slips that the free rigid motions (n, k) of a part cause [mm].
 
-        Rows are directions of forces; gaps change as the bodies turn.
+        Gaps are those of ``turned``; `of_part` has what forces work on instead.
         """
         moved = self.of_part(part, rigid)
         if moved.size:

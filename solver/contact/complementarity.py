@@ -49,11 +49,7 @@ def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactS
     if _at_rest(problem):
         nothing = np.zeros_like(problem.offset), np.zeros_like(problem.balance)
         return ContactSolution(*nothing, np.full_like(start, OPEN), False)
-    found = _active_sets(problem, start, np.zeros(problem.n, dtype=int)) or _lag_bound(problem)
-    if found is None and problem.G is not None:
-        # pivoting needs symmetry: without the lean of normals it may find a way on
-        return solve_contact(replace(problem, G=None), start)
-    return found
+    return _active_sets(problem, start, np.zeros(problem.n, dtype=int)) or _lag_bound(problem)
 
 
 def _at_rest(problem: ContactProblem) -> bool:
@@ -131,7 +127,8 @@ def _forces(
         if free and (not size or np.linalg.matrix_rank(problem.turned[rows]) == k):
             return None
     if free:
-        # the rounding of positions may contradict a body that slips on all points: gaps bear it
+        # where a body slips on all points, the rounding of positions may leave no exact solution:
+        # gaps then miss their conditions by it, forces do not
         forces = np.arange(size + k) >= size
         first = np.where(forces, _FIRST, 1.0)
         solution = linalg.lstsq(first[:, None] * S, first * rhs)[0]

@@ -2,7 +2,8 @@
 
 Each condition is ``C u + compliance F = 0`` with a force F of any sign, which acts on the parts by
 ``C' F``. In a Newton step they are eliminated exactly, together with the rigid motions that they
-hold; what is left is a contact problem like any other, symmetric.
+hold; what is left is a contact problem like any other. It is symmetric but for bodies that links
+hold and whose normals lean, see `solver.contact.problem`.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
+from solver.contact.complementarity import solve_contact
 from solver.contact.geometry import pair
 from solver.contact.overlap import largest_overlap
 from solver.contact.problem import ContactProblem, ContactSolution
@@ -100,6 +102,26 @@ class Links(OnParts):
         return force, energy
 
 
+def solve_linked(
+    problem: ContactProblem, links: int, touched: NDArray[np.bool_], start: NDArray[np.int64]
+) -> ContactSolution | None:
+    """Return the solution with links, or None when there is none or none was found.
+
+    If none is found, G is replaced by A: pivoting then has a symmetric problem, and such a step of
+    Newton's method may still lead to a solution.
+
+    Parameters
+    ----------
+    links, touched : as of `eliminated`
+    start : (n,) as of `solve_contact`
+    """
+    rest, whole = eliminated(problem, links, touched) if links else (problem, None)
+    found = solve_contact(rest, start)
+    if found is None and (problem.turned != problem.A).any():
+        return solve_linked(replace(problem, G=None), links, touched, start)
+    return found if found is None or whole is None else whole(found)
+
+
 def eliminated(
     problem: ContactProblem, links: int, touched: NDArray[np.bool_]
 ) -> tuple[ContactProblem, Callable[[ContactSolution], ContactSolution]]:
@@ -137,10 +159,11 @@ def eliminated(
     except np.linalg.LinAlgError as error:  # what is linked flows without stiffness
         raise Singular("links cannot hold bodies without stiffness") from error
     change = by_force.T @ inverse
+    lean = (problem.turned - A)[:m] @ held @ inverse[links:]
     rest = replace(
         problem,
-        W=W[:m, :m] - (change[:, :m] + change[:, :m].T) / 2,
-        offset=offset[:m] - change[:, m],
+        W=W[:m, :m] - (change[:, :m] + change[:, :m].T) / 2 - lean[:, :m],
+        offset=offset[:m] - change[:, m] - lean[:, m],
         A=A[:m] @ loose,
         G=problem.turned[:m] @ loose,
         balance=loose.T @ problem.balance,

@@ -34,7 +34,8 @@ class ContactProblem:
 
     Attributes
     ----------
-    W : (m, m) compliance of the contact points [mm/N], m = 2n with friction, n without
+    W : (m, m) compliance of the contact points [mm/N], m = 2n with friction, n without; symmetric,
+        but for links that hold a body with a G of its own
     offset : (m,) gap and slip at zero force [mm]
     lines : the friction bound at each point, the least of lines of tangential over normal force [N]
     A : (m, k) motions along the forces of the free rigid motions

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.complementarity import solve_contact
-from solver.contact.links import eliminated
+from solver.contact.links import solve_linked
 from solver.contact.problem import ContactProblem
 
 if TYPE_CHECKING:
@@ -111,13 +110,10 @@ def newton_step(
             ]
         ),
     )
-    if links:
-        touched = np.repeat(candidates.holds, [R.shape[1] for R in floating])
-        problem, whole = eliminated(problem, links, touched)
-    solution = solve_contact(problem, candidates.status)
+    touched = np.repeat(candidates.holds, [R.shape[1] for R in floating])
+    solution = solve_linked(problem, links, touched, candidates.status)
     if solution is None:
         return None
-    solution = whole(solution) if links else solution
     more = solution.forces - candidates.forces
     change = [candidates.on_part(i, more, part.n) for i, part in enumerate(system.parts)]
     rigid = np.split(solution.rigid, np.cumsum([R.shape[1] for R in floating])[:-1])

@@ -33,6 +33,8 @@ from solver.prism.influence import Influence
 from solver.prism.patch_contact import PatchContact
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from solver.prism.friction_cone import ConeSolution
@@ -205,30 +207,30 @@ class RollingPatch:
         status = found.status
         _check_rim(status)
 
-        def near(other: Array) -> PatchContact:
-            values, rigid = found.along(self._offset(other - u))
-            height, creepage, lateral, _ = self._moved(found.rigid + rigid)
-            return replace(
-                contact, traction=self._global(found.values + values), height=height,
-                creepage=creepage, lateral_creepage=lateral,
-            )  # fmt: skip
+        def of(
+            values: Array, free: Array, near: Callable[[Array], PatchContact] | None
+        ) -> PatchContact:
+            height, creepage, lateral, spin = self._moved(free)
+            return PatchContact(
+                grid=self.grid,
+                traction=self._global(values),
+                gap=found.effects[..., NORMAL],
+                slip=found.effects[..., TANGENTS],
+                status=status,
+                along=lambda change: self._global(found.along(self._offset(change))[0]),
+                near=near,
+                height=height,
+                creepage=creepage,
+                lateral_creepage=lateral,
+                spin=spin,
+                steps=found.steps,
+            )
 
-        height, creepage, lateral, spin = self._moved(found.rigid)
-        contact = PatchContact(
-            grid=self.grid,
-            traction=self._global(found.values),
-            gap=found.effects[..., NORMAL],
-            slip=found.effects[..., TANGENTS],
-            status=status,
-            along=lambda change: self._global(found.along(self._offset(change))[0]),
-            near=near,
-            height=height,
-            creepage=creepage,
-            lateral_creepage=lateral,
-            spin=spin,
-            steps=found.steps,
-        )
-        return contact
+        def near(other: Array) -> PatchContact:
+            values, free = found.along(self._offset(other - u))
+            return of(found.values + values, found.rigid + free, None)
+
+        return of(found.values, found.rigid, near)
 
     def _moved(self, free: Array) -> list[float]:
         """Return height, creepages and spin, from the rigid motions (k,) that are free."""

@@ -116,7 +116,10 @@ def test_a_working_service_says_that_its_runner_is_up(service: Server) -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_threads_of_the_service_share_what_they_have_freed(service: Server) -> None:
-    """Else memory grows with the number of threads that have answered at the same time."""
+    """Else memory grows with the number of threads that have answered at the same time.
+
+    20 requests at once made 15 arenas. Two may be there before the limit is set.
+    """
     with ThreadPoolExecutor(20) as pool:
         answers = [*pool.map(service.client.get, ["/studies"] * 40)]
     assert {each.status_code for each in answers} == {200}
@@ -126,4 +129,4 @@ def test_threads_of_the_service_share_what_they_have_freed(service: Server) -> N
         span, mode, _, _, _, *name = line.split()
         end = int(span.partition("-")[2], 16)
         reserved += [span] if mode == "---p" and not name and end % 2**26 == 0 else []
-    assert len(reserved) <= 1, "one beside the main arena"
+    assert len(reserved) <= 3

@@ -544,7 +544,13 @@ def test_scenes_are_read_once_for_lists_and_searches(
     assert set(listed("?limit=1000")) == set(ids)
     read: list[str] = []
     content_of = shelf.content_of
-    monkeypatch.setattr(shelf, "kept", None)  # the meshes are not needed
+    made = shelf._made
+
+    def without_meshes(folder: Path, *, whole: bool) -> Any:
+        assert not whole
+        return made(folder, whole=whole)
+
+    monkeypatch.setattr(shelf, "_made", without_meshes)
     monkeypatch.setattr(shelf, "content_of", lambda p, n: read.append(n) or content_of(p, n))
     shelf._described.cache_clear()
     every = ask("GET", "/scenes?limit=1000").json()

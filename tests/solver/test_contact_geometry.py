@@ -15,8 +15,9 @@ ELEMENTS = ["quad8", "quad4"]
 
 
 def two_surfaces(
-    element="quad8", bend=0.0, gap=0.0, state="plane_strain", thickness=1.0, width=6.0, below=None
-):
+    element="quad8", bend=0.0, gap=0.0, state="plane_strain", thickness=1.0, width=6.0, below=None,
+    sliding="finite",
+):  # fmt: skip
     """A body of width 6 above one of the given width, bent to y = bend x², or ``below`` x²."""
 
     def body(name, x, y, held):
@@ -38,7 +39,7 @@ def two_surfaces(
     x = np.append(np.arange(0.0, width - 0.3, 0.7), width)
     upper = body("upper", np.linspace(0.0, 6.0, 7), gap + np.linspace(0.0, 2.0, 3), {"top": "x"})
     lower = body("lower", x, np.linspace(-2.0, 0.0, 3), {"bottom": "xy"})
-    pair = ContactPair(slave=("upper", "bottom"), master=("lower", "top"), sliding="finite")
+    pair = ContactPair(slave=("upper", "bottom"), master=("lower", "top"), sliding=sliding)
     system = System(Model(bodies=(upper, lower), contacts=(pair,)))
     return system, system.interfaces[0]
 
@@ -133,6 +134,18 @@ def test_gaps_of_a_bow_on_a_plane_change_as_it_turns_and_shifts():
         scale = np.abs(motion).max()
         assert np.abs(found - change).max() < 0.01 * scale  # the lean, 0.2, squared or more
         assert np.abs(by_work - change).max() > 0.05 * scale
+
+
+def test_gaps_of_small_sliding_change_by_any_motion_as_forces_act():
+    """They are linear: a lean of the master's normals, which a finite motion sees, is none here."""
+    system, interface = two_surfaces(bend=0.05, below=0.0, sliding="small")
+    u = [np.random.default_rng(4).normal(size=part.n) for part in system.parts]
+    before, after = interface.pairing(at_rest(system)), interface.pairing(u)
+    moved = sum(
+        block @ u[number][surface.dofs]
+        for (number, _, surface), block in zip(interface.sides, after.closing, strict=True)
+    )
+    assert np.abs(moved - (after.gap - before.gap)).max() < 1e-12
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.05])

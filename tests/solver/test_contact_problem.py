@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver.contact import complementarity
 from solver.contact.complementarity import solve_contact
 from solver.contact.given_bound import given_bound
 from solver.contact.lemke import lemke
+from solver.contact.links import solve_linked
 from solver.contact.problem import BACKWARD, FORWARD, OPEN, STICK, ContactProblem
 from solver.model.friction import BoundLines
 
@@ -349,6 +351,31 @@ def test_a_ring_that_slips_on_all_points_is_pushed_until_one_sticks(push):
     assert (found.status == STICK).any()
     assert np.sign(found.rigid[0]) == np.sign(push)
     assert natural_residual(problem, found) < 1e-8
+
+
+def test_a_round_body_without_friction_is_pressed_though_nothing_resists_its_turn():
+    """Its gaps change as it turns, but no force does work: the split of forces is not unique."""
+    problem = ContactProblem(
+        W=1e-3 * (np.eye(2) + 0.5),
+        offset=np.array([-1e-6, 3e-6]),
+        lines=BoundLines.none(2),
+        A=np.array([[1.0, 0.0], [1.0, 0.0]]),
+        balance=np.array([-1.0, 0.0]),
+        G=np.array([[1.0, -0.1], [1.0, 0.1]]),
+    )
+    found = solve_linked(problem, 0, np.ones(2, dtype=bool), np.array([STICK, STICK]))
+    assert found is not None
+    assert natural_residual(problem, found) < 1e-8
+
+
+@pytest.mark.parametrize(("lean", "times"), [(0.0, 1), (0.1, 2)])
+def test_a_load_that_nothing_bears_is_tried_again_only_if_normals_lean(monkeypatch, lean, times):
+    problem = instance(1, 0.4, rigid=2)
+    pulled = replace(problem, balance=-problem.balance, G=problem.A + lean * np.eye(24, 2))
+    tried = []
+    monkeypatch.setattr(complementarity, "_lag_bound", tried.append)
+    assert solve_linked(pulled, 0, np.ones(2, dtype=bool), np.full(12, OPEN)) is None
+    assert len(tried) == times
 
 
 @pytest.mark.parametrize("aside", [1e-9, -0.3])

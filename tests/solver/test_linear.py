@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import gc
-import re
-import time
 
 import numpy as np
 import pytest
 from scipy import sparse
 
-from solver import SCENES
 from solver.errors import ModelError
 from solver.linear import pardiso
 from solver.linear import solvers as linear
 from solver.linear.schur import SchurComplement
-from solver.results.record import Status
-from tests.architecture.sources import ROOT
 
 NAMES = ["superlu", *(["pardiso"] if pardiso.library() else [])]
 
@@ -97,27 +92,6 @@ def test_pardiso_frees_its_memory():
     gc.collect()
     growth = psutil.Process().memory_info().rss - before
     assert growth < 40e6  # 20 leaked handles of this matrix hold over 200 MB
-
-
-@pytest.mark.solves
-@pytest.mark.skipif(not pardiso.library(), reason="needs the mkl extra")
-def test_mkl_saves_the_time_that_the_page_tells(monkeypatch):
-    """The ratio is compared: both runs are as slow as the machine. The margin is for its noise."""
-    page = " ".join((ROOT / "docs/operations.md").read_text().split())
-    told = re.search(r'SuperLU: ([\d.]+) s and ([\d.]+) s \(`accuracy = "draft"`\)', page)
-    punch = SCENES["punch"]
-    parameters = punch.parameters(accuracy="draft")
-
-    def seconds(name):
-        monkeypatch.setenv("RESIDUA_LINEAR_SOLVER", name)
-        began = time.process_time()
-        (record,) = punch.path(parameters, [parameters.load_ratio], lambda _: None)
-        assert record.status is Status.OK
-        return time.process_time() - began
-
-    taken = [min(seconds(name) for _ in range(2)) for name in ("pardiso", "superlu")]
-    expected = float(told[2]) / float(told[1])
-    assert expected / 1.4 < taken[1] / taken[0] < 1.4 * expected
 
 
 def test_unknown_solver_is_refused_by_name():

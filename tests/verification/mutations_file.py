@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from solver.results.record import Status
+from solver.results.record import Record, Status
 from studies.storage import dataset as layout
 from studies.storage import runfile, ugrid
 from tests.verification.mutations import Fault, Patch
@@ -29,13 +29,14 @@ class FileFault:
 
 
 def written(change: Callable[[xr.Dataset], xr.Dataset]) -> Fault:
-    """The data set that is written is changed."""
+    """The data set of a record that is written is changed."""
     make = layout.run_content
 
-    def fault(patch: Patch) -> None:
-        patch.setattr(layout, "run_content", lambda *given: change(labelled(make(*given))))
+    def changed(scene: Any, case: Any, outcome: Any, keep: Any) -> Any:
+        made = make(scene, case, outcome, keep)
+        return change(labelled(made)) if isinstance(outcome, Record) else made
 
-    return fault
+    return lambda patch: patch.setattr(layout, "run_content", changed)
 
 
 def labelled(run: layout.RunContent) -> xr.Dataset:

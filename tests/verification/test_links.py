@@ -31,7 +31,7 @@ from solver import (
     solve,
 )
 from solver.contact.parting import parted
-from solver.mesh import grid, mapped, merged, within
+from solver.mesh import grid, mapped, merged, ring, within
 from solver.model.rigid import line
 from solver.results.audit import links
 from studies.scenes.scene import read_scene
@@ -346,6 +346,30 @@ def test_springs_keep_their_energy_when_bodies_are_separated() -> None:
     for stage in ("on", "off"):
         assert found.audit(stage).figures["audit_energy"] < 1e-9
     assert found.stages["off"].energy.contact > 0.1 * found.stages["on"].energy.external
+
+
+@pytest.mark.parametrize("stiffness", [1e-3, 1.0])
+def test_a_coarse_ring_on_soft_springs_finds_its_place_between_plates(stiffness: float) -> None:
+    """Its gaps change as it turns, which the springs let it do: see `eliminated`."""
+    force, size = 0.2, 1 / 6
+    low, high = line((1.0, -1.0), (-1.0, -1.0)), line((-1.0, 1.0), (1.0, 1.0))
+    plates = (RigidBody(name="low", surfaces={"face": low}),
+              RigidBody(name="high", surfaces={"face": high}, y=Pushed(value=-force)))  # fmt: skip
+    mesh = ring((0.6, 1.0), size=size).with_boundaries({
+        "top": lambda x: (x[1] > 0.3) & (np.hypot(*x) > 0.95),
+        "bottom": lambda x: (x[1] < -0.3) & (np.hypot(*x) > 0.95),
+    })  # fmt: skip
+    found = solve(Model(
+        bodies=(Body(name="ring", mesh=mesh, material=steel()),), rigid=plates,
+        links=(Link(slave=("ring", "inner"), stiffness=stiffness),),
+        contacts=tuple(ContactPair(slave=("ring", side), master=(plate, "face"), friction=0.3)
+                       for side, plate in (("top", "high"), ("bottom", "low"))),
+    ))  # fmt: skip
+    most = size**2 / 2  # a hat reaches so far from the plate: by less the ring goes down
+    springs = force - found.reaction("low")[1]
+    assert 0 <= springs < most * stiffness * 2 * np.pi * 0.6
+    (told,) = {text.split()[0] for text in found.audit("loaded").violations}
+    assert told == "audit_contact_resolution"
 
 
 def test_a_boundary_kept_plane_takes_the_mean_of_its_load() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import re
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -71,6 +73,35 @@ def test_along_is_the_derivative_by_displacements_of_the_surface(given: dict[str
     change = contact.along(wave(patch, 1.0))
     central = (ahead.traction - behind.traction) / (2 * size)
     assert central == pytest.approx(change, abs=1e-4 * np.abs(change).max())
+
+
+def test_near_is_the_contact_to_first_order_in_tractions_and_motions() -> None:
+    hertz = ellipse(1.0, 1.0)
+    patch = pressed(hertz, 1 / 8, 1 / 6, friction=FRICTION, drive=-0.5, lateral_force=10.0)
+    contact = patch.solve(flat(patch))
+    assert contact.near is not None
+    other = wave(patch, 1e-4 * hertz.approach)
+    near, exact = contact.near(other), patch.solve(other, contact)
+    for name in ("traction", "height", "creepage", "lateral_creepage"):
+        first, then, known = (np.array(getattr(c, name)) for c in (contact, exact, near))
+        change = np.abs(then - first).max()
+        assert change > 0
+        assert np.abs(then - known).max() < 0.01 * change, name
+    assert patch.solve(other, near).steps < exact.steps
+
+
+def test_the_equations_of_a_contact_are_freed_with_it() -> None:
+    """They are dense: a pass solves many contacts, and must not wait for the garbage collector."""
+    patch = pressed(ellipse(1.0, 1.0), 1 / 6, 1 / 5)
+    gc.collect()
+    gc.disable()
+    try:
+        contact = patch.solve(flat(patch))
+        traction = weakref.ref(contact.traction)
+        del contact
+        assert traction() is None
+    finally:
+        gc.enable()
 
 
 def test_a_contact_is_its_own_start() -> None:
