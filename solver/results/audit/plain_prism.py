@@ -75,7 +75,6 @@ class PlainPrism:
         self._k = -2 * np.pi / modes.length * np.arange(modes.stations // 2 + 1)
         self.sampled = tuple(wave for wave in _SAMPLED if wave < len(self._k))
         self._own = np.setdiff1d(modes.unknowns, self._dofs[self._outside])
-        self._factors: dict[np.intp, LinearSolver] = {}  # outside the zone, of waves met so far
 
     # -- operators -----------------------------------------------------------------------------
 
@@ -236,7 +235,7 @@ class PlainPrism:
         at_rim = share * np.abs(found.strain[track.rim] @ C).max(axis=(0, 2))
         lowest = np.argsort(at_rim)
         few = np.cumsum(at_rim[lowest]) > _LEFT_OUT * at_rim.sum()
-        still, waving, rest, stiffness = self._around
+        still, waving, rest, stiffness, factors = self._around
         area = self.area[self._outside].reshape(-1, 1)
         turn, strain = self._turn[rest], np.zeros((len(area), 6))
         for wave in lowest[few]:
@@ -245,10 +244,7 @@ class PlainPrism:
             if wave not in self.sampled:  # there the whole section is known
                 own = (still @ u + ik * (waving @ u)).reshape(-1, 6) @ C * area
                 force = (still.T @ own.ravel() - ik * (waving.T @ own.ravel()))[rest] / turn
-                factors = self._factors.get(wave)
-                if factors is None:
-                    factors = self._factors[wave] = linear.analyse(stiffness.pattern)
-                    factors.factorise(stiffness.at(self._k[wave]))
+                factors.factorise(stiffness.at(self._k[wave]))
                 both = factors.solve(-np.stack([force.real, force.imag], axis=1))
                 u[rest] = (both[:, 0] + 1j * both[:, 1]) * turn
             amplitude = still @ u + ik * (waving @ u)
@@ -262,12 +258,12 @@ class PlainPrism:
     @cached_property
     def _around(
         self,
-    ) -> tuple[sparse.csr_array, sparse.csr_array, NDArray[np.int64], Stiffness]:
-        """Operators of elements outside the zone; unknowns there and their stiffness."""
+    ) -> tuple[sparse.csr_array, sparse.csr_array, NDArray[np.int64], Stiffness, LinearSolver]:
+        """Operators of elements outside the zone; unknowns there, their stiffness, and a solver."""
         still, waving = (self._rows(each, self._outside) for each in self._gradients)
         rest = np.setdiff1d(self.track.section.free, self.track.modes.unknowns)
         stiffness = self.track.section.stiffness(rest)
-        return still, waving, rest, stiffness
+        return still, waving, rest, stiffness, linear.analyse(stiffness.pattern)
 
     def resultants(self, pulled: Complex) -> Array:
         """Return forces along x, y, z [N] and the moment about x [N mm] of nodal forces."""
