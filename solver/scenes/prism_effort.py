@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _FIRST, _FACTOR = 0.5, 2.2e-5
 """Seconds of a set-up: at least, and per wave and unknown of the zone."""
-_LEAST_BYTES, _BYTES = 7.5e7, 4400.0
+_LEAST_BYTES, _BYTES = 1.4e8, 4400.0
 """Bytes of a path: at least, and per wave and unknown of the zone."""
 _STILL, _POINT = 0.01, 1.5e-6
 """Seconds of a pass where nothing yields: at least, and per point and station of the window."""

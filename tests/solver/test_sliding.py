@@ -101,8 +101,9 @@ def test_surfaces_that_slide_by_more_than_an_element_are_outside_small_sliding()
     assert audit.passed
     within = slid(0.1, "small").audit(), slid(0.8, "finite").audit()
     assert [each.outside for each in within] == [(), ()]
-    for each in (audit, *within):  # the block is wider than the plate
-        assert all("beyond the end of plate.base" in text for text in each.warnings)
+    for each in (audit, *within):  # the block is wider than the plate, with few elements
+        about = ("beyond the end of plate.base", "contact pressure has an estimated error")
+        assert all(any(words in text for words in about) for text in each.warnings)
 
 
 @pytest.mark.solves
