@@ -69,16 +69,22 @@ class Attacked:
         self.damaged, self.wrong, self.untrue, self.checked = 0, 0, 0, 0
 
     def post(self) -> None:
-        """Post a study of runs that no other has."""
+        """Post a study of runs that no other has, again while the service cannot take it."""
         first = len(self.studies) * FRICTIONS
         study = fake_study(f"attacked-{len(self.studies)}", seconds=0.1)
         study["sweep"] = {
             "load_ratio": LOADS,
             "friction": [(first + k) / 10_000 for k in range(FRICTIONS)],
         }
-        answer = self.ask("POST", "/studies", json=study)
-        if answer is not None and answer.status_code in (200, 201):
-            self.studies.append(answer.json()["id"])
+
+        def posted() -> httpx.Response | None:
+            answer = self.ask("POST", "/studies", json=study)
+            again = answer is None or answer.status_code == 503  # queue or catalogue is made again
+            return None if again else answer
+
+        answer = wait_until(posted, 60.0)
+        assert answer.status_code in (200, 201), answer.text
+        self.studies.append(answer.json()["id"])
 
     def ask(self, method: str, path: str, **given: Any) -> httpx.Response | None:
         """Return an answer; None where the service was just ended."""
