@@ -26,6 +26,8 @@ _RIGID = (0.4, 1.1)
 _COARSE = 2.0
 """Ratio of the edge length of a slave to that of its partner; above it the partner becomes the
 slave if one of them is curved."""
+_AT_ONCE = 1_000_000
+"""Number of distances between vertices that are in memory at a time, about."""
 _NEAR = 0.01
 """Ratio of (distance of a vertex - least distance) to the edge length; up to it the vertex is near
 contact."""
@@ -57,8 +59,10 @@ def _ordered(
 def _edges(slave: Surface, master: Surface) -> float:
     """Return the median ratio of slave to master edge lengths, of the vertices near contact."""
     at, partner = slave.X[:, slave.vertices], master.X[:, master.vertices]
-    apart = np.hypot(*(at[:, :, None] - partner[:, None]))
-    distance, nearest = apart.min(axis=1), apart.argmin(axis=1)
+    pieces = np.array_split(at, at.shape[1] * partner.shape[1] // _AT_ONCE + 1, axis=1)
+    each = (np.hypot(*(piece[:, :, None] - partner[:, None])) for piece in pieces)
+    nearest = np.concatenate([apart.argmin(axis=1) for apart in each])
+    distance = np.hypot(*(at - partner[:, nearest]))
     own, its = slave.spacing, master.spacing
     near = distance <= distance.min() + _NEAR * np.minimum(own, its[nearest])
     return float(np.median(own[near] / its[nearest[near]]))
