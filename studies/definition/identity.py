@@ -181,6 +181,10 @@ def _own_file(module: str) -> Path | None:
     return Path(file)
 
 
+_LOADED: dict[str, tuple[ModuleSpec, str]] = {}
+"""By the name of a module, how it was loaded, and the digest of its source."""
+
+
 def _module_digest(name: str) -> str:
     """Return the digest of a module's source without comments; empty for one of the solver's.
 
@@ -191,15 +195,11 @@ def _module_digest(name: str) -> str:
     if file is None:
         return ""
     spec = getattr(sys.modules[name], "__spec__", None)
-    before, known = _LOADED.get(name, (None, ""))
-    if spec is None or before is not spec:  # of a script nothing tells whether it is loaded again
-        known = _code_digest(file.read_bytes())
-        _LOADED[name] = spec, known
-    return known
-
-
-_LOADED: dict[str, tuple[ModuleSpec | None, str]] = {}
-"""By the name of a module, how it was loaded, and the digest of its source."""
+    if spec is None:  # of a script nothing tells whether it is loaded again
+        return _code_digest(file.read_bytes())
+    if name not in _LOADED or _LOADED[name][0] is not spec:
+        _LOADED[name] = spec, _code_digest(file.read_bytes())
+    return _LOADED[name][1]
 
 
 @lru_cache(maxsize=100)
