@@ -42,7 +42,7 @@ class Jobs(Database):
     """The queue in the file ``path``; safe to use from many threads and processes.
 
     Methods raise `QueueLost` if the file is missing or damaged, `StoreFull` if the disk is full,
-    and `NotFound` if the study they are asked for is not there.
+    and those that return or change one job `NotFound` if it is not there.
 
     Parameters
     ----------
