@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from residua.cli import main
 from residua.cost import Foreseen
 from studies import Store, Study, StudyError
 from studies.execution.estimate import Bounds, Estimate, estimate, memory_needed
+from tests.counted import counted
 from tests.studies.conftest import fake_study
 from tests.studies.test_study import many
 
@@ -205,9 +205,9 @@ def test_a_worker_is_told_to_need_what_it_keeps_beside_its_path(
 def test_20_000_runs_are_estimated_in_a_second(store: Store) -> None:
     remember(store, ids(1000), made_up([9_000] * 1000, *LAW))
     study = Study.known(many(20_000))
-    started = time.process_time()
-    found = estimate(study, store)
-    assert time.process_time() - started < 1.0
+    with counted() as calls:
+        found = estimate(study, store)
+    assert calls < 600_000
     assert (found.to_compute, found.paths) == (20_000, 5_000)
 
 
@@ -244,9 +244,9 @@ def test_millions_of_elements_and_ten_thousands_of_increments_are_refused(store:
             },
         }
     )  # fmt: skip
-    started = time.process_time()
-    found = estimate(study, store)
-    assert time.process_time() - started < 0.2
+    with counted() as calls:
+        found = estimate(study, store)
+    assert calls < 15_000
     assert found.unknowns is not None and found.unknowns > 3e6
     assert found.longest is not None and found.longest > 49_000
     for bounds in (Bounds(unknowns=500_000), Bounds(increments=20_000), Bounds(cpu_seconds=1e6)):
@@ -256,10 +256,9 @@ def test_millions_of_elements_and_ten_thousands_of_increments_are_refused(store:
 
 def test_too_many_runs_are_refused_before_they_are_gone_through() -> None:
     study = Study.known(many(80_000))
-    started = time.process_time()
-    with pytest.raises(StudyError, match=r"estimate\.runs = 80000: at most 20000"):
+    with counted() as calls, pytest.raises(StudyError, match=r"estimate\.runs = 80000: at most"):
         Bounds(runs=20_000).check_size(study)
-    assert time.process_time() - started < 0.5
+    assert calls < 300_000
 
 
 def test_dry_run_tells_the_cost_and_writes_nothing(
