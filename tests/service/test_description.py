@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.service.servers import Server, fake_study
+from tests.service.servers import NOWHERE, Server, fake_study
 
 CONFIGURATION = Path(__file__).with_name("schemathesis.toml")
 
@@ -31,10 +32,18 @@ def explore(server: Server, extent: list[str], seed: int = 1) -> subprocess.Comp
 
 
 @pytest.fixture
-def explored(tmp_path: Path) -> Iterator[Server]:
-    """A service of the test's own, which is left full of studies, with one that was computed."""
-    server = Server(tmp_path / "explored").start()
-    server.finished(server.post(fake_study("computed")))
+def explored(service: Server, tmp_path: Path) -> Iterator[Server]:
+    """A service of the test's own with a study that another has computed; it computes nothing.
+
+    What is posted is left waiting: the worker would compute until the test ends.
+    """
+    study = service.finished(service.post(fake_study("computed")))
+    server = Server(tmp_path / "explored", settings=NOWHERE)
+    shutil.copytree(service.data / "studies" / study["id"], server.data / "studies" / study["id"])
+    (server.data / "runs").mkdir()
+    for run in study["runs"]:
+        shutil.copy(service.data / "runs" / f"{run['id']}.nc", server.data / "runs")
+    assert server.start().study(study["id"])["status"] == "successful"
     yield server
     server.close()
 
