@@ -32,7 +32,6 @@ from studies.scenes.meshfile import MeshFile
 from tests.service.test_access import asking
 from tests.service.test_errors import problem
 
-
 INCH, NEWTON = (
     {"scene": "punch", "name": "a", "parameters": {"half_width": each}} for each in ("2 in", "2 N")
 )
