@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -11,7 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.service.servers import NOWHERE, Server, fake_study
+from service.routes.studies import EXAMPLE
+from studies import Store, Study
+from tests.service.servers import NOWHERE, Server
+from tests.studies.conftest import compute_here
 
 CONFIGURATION = Path(__file__).with_name("schemathesis.toml")
 
@@ -32,18 +34,15 @@ def explore(server: Server, extent: list[str], seed: int = 1) -> subprocess.Comp
 
 
 @pytest.fixture
-def explored(service: Server, tmp_path: Path) -> Iterator[Server]:
-    """A service of the test's own with a study that another has computed; it computes nothing.
+def explored(tmp_path: Path) -> Iterator[Server]:
+    """A service that computes nothing, and has the runs of the example of its description.
 
-    What is posted is left waiting: the worker would compute until the test ends.
+    So answers with data are looked at, and no worker computes what is posted until the test ends.
     """
-    study = service.finished(service.post(fake_study("computed")))
     server = Server(tmp_path / "explored", settings=NOWHERE)
-    shutil.copytree(service.data / "studies" / study["id"], server.data / "studies" / study["id"])
-    (server.data / "runs").mkdir()
-    for run in study["runs"]:
-        shutil.copy(service.data / "runs" / f"{run['id']}.nc", server.data / "runs")
-    assert server.start().study(study["id"])["status"] == "successful"
+    study = Study.from_dict(EXAMPLE)
+    compute_here(study, Store(server.data), study.problem)
+    assert server.start().study(study.id)["status"] == "successful"
     yield server
     server.close()
 
