@@ -5,7 +5,7 @@ studies and scene files of `data`, the studies on the coarsest meshes and with t
 pages look at; so do those of every page that has any. What an earlier page has computed by the
 same command is there already. ``python`` blocks are programs, each in a file and a process of its
 own, as workers import it; in ``console`` blocks each line ``$ residua …`` runs in this process and
-must succeed, a study on one worker. A block after ``<!-- no-test -->`` is left out, which only
+must succeed, a study in it too. A block after ``<!-- no-test -->`` is left out, which only
 those may be that need a server or compute for minutes. A block after
 ``<!-- from examples/NAME.py -->`` is not run: its lines stand in that script, which is. Links lead
 to files and headings that exist, and so do the files a page names.
@@ -103,9 +103,10 @@ def steps(page: list[Block], folder: Path) -> Iterator[tuple[int, list[str] | Pa
 
 
 def carry_out(commands: list[str]) -> None:
-    """Run commands in this process: in one of their own they would import for seconds."""
+    """Run commands and their studies in this process: others would import for seconds."""
     for command in commands:
-        alone = ["--workers", "1"] if command.startswith("run ") else []
+        computes = command.startswith(("run ", "fit ")) and "--part" not in command
+        alone = ["--workers", "0"] if computes else []
         assert main([*shlex.split(command), *alone]) == 0, f"$ residua {command}"
 
 
@@ -171,7 +172,6 @@ def computed() -> dict[str, Path]:
 
 
 @pytest.mark.pages
-@pytest.mark.usefixtures("one_worker")
 @pytest.mark.parametrize("page", PAGES, ids=str)
 def test_blocks_of_a_page_run(
     page: Path,
