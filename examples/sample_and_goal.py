@@ -9,7 +9,8 @@ import numpy as np
 from studies import Store, open_study, run_study
 
 COARSE = {
-    "accuracy": "draft", "smallest_element": 0.02, "growth": 2.0, "hardening": "isotropic",
+    "accuracy": "draft", "smallest_element": 0.02, "growth": 2.0, "load_step": 0.25,
+    "unload_steps": 1, "hardening": "isotropic",
 }  # fmt: skip
 
 # Eight points fill three ranges. With num = 16 the first eight would be the same, and be kept.
