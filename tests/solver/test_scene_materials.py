@@ -138,14 +138,12 @@ def test_without_friction_tresca_lets_the_half_plane_yield_in_plane_stress_alone
 
 @pytest.mark.solves
 def test_no_tangent_in_a_corner_of_the_yield_surface_is_no_limit_load() -> None:
-    # a punch without hardening bears this load; on fine meshes whole elements stand in corners
+    # a punch without hardening bears this load; in long increments whole elements stand in corners
     scene = SCENES["punch"]
-    fine = {
-        "friction": 0.0, "smallest_element": 0.01, "load_step": 0.2, "state": "plane_stress"
-    }  # fmt: skip
-    parameters = scene.parameters(**(ROUGH | fine), yield_condition="tresca")
+    own = ROUGH | {"friction": 0.0, "load_step": 0.2, "state": "plane_stress"}
+    parameters = scene.parameters(**own, yield_condition="tresca")
     (record,) = scene.path(parameters, [0.6], lambda fraction: None)
-    assert record.status in (Status.OK, Status.NOT_CONVERGED)
+    assert record.status is Status.OK, record.message
     law, strained = parameters.material().in_plane_stress(), PlaneStress(parameters.material())
     assert law is None and strained.has_corners
     assert not PlaneStress(PunchParameters().material()).has_corners
