@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.architecture.sources import ROOT
+from tests.programs import Programs
 
 OWN = ROOT / "examples/own_friction.py"
 BY_ITS_WORD = """
@@ -56,16 +57,24 @@ class Own(FrictionLaw):
 """
 
 
-def run(code: str, own: Path | str) -> subprocess.CompletedProcess[str]:
-    setting = os.environ | {"RESIDUA_PARTS": str(own), "PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        [sys.executable, "-c", code], env=setting, capture_output=True, text=True, check=False
-    )
+Called = Callable[[str, Path | str], subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture
+def called(tmp_path: Path, programs: Programs) -> Called:
+    """Run a program with a file of parts."""
+
+    def run(code: str, own: Path | str) -> subprocess.CompletedProcess[str]:
+        (tmp_path / "program.py").write_text(code)
+        setting = os.environ | {"RESIDUA_PARTS": str(own), "PYTHONPATH": str(ROOT)}
+        return programs.run(Path("program.py"), tmp_path, setting)
+
+    return run
 
 
 @pytest.mark.processes
-def test_a_law_of_ones_own_is_known_by_its_word() -> None:
-    done = run(BY_ITS_WORD, OWN)
+def test_a_law_of_ones_own_is_known_by_its_word(called: Called) -> None:
+    done = called(BY_ITS_WORD, OWN)
     assert done.returncode == 0, done.stderr
     law, record, scene, idle, *refused = done.stdout.splitlines()
     assert law == "Saturating(friction=0.2, tau_max=8.0)"
@@ -82,19 +91,19 @@ def test_a_law_of_ones_own_is_known_by_its_word() -> None:
 
 
 @pytest.mark.processes
-def test_a_parameter_that_scenes_have_already_is_refused(tmp_path: Path) -> None:
+def test_a_parameter_that_scenes_have_already_is_refused(tmp_path: Path, called: Called) -> None:
     own = tmp_path / "own.py"
     own.write_text(CLASHES)
-    done = run("import solver.scenes.punch", own)
+    done = called("import solver.scenes.punch", own)
     assert "friction_law = 'yield_stress': is another parameter already" in done.stderr
 
 
 @pytest.mark.processes
-def test_ids_follow_the_file_of_a_law(tmp_path: Path) -> None:
+def test_ids_follow_the_file_of_a_law(tmp_path: Path, called: Called) -> None:
     own, found = tmp_path / "own.py", []
     asked = "from studies.definition.identity import solver_hash; print(solver_hash())"
     for text in ("", OWN.read_text(), OWN.read_text().replace("6.0, 25", "6.0, 13")):
         own.write_text(text)
-        found.append(run(asked, own if text else "").stdout)
+        found.append(called(asked, own if text else "").stdout)
     assert all(found)
     assert len(set(found)) == 3

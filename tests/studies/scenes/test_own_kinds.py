@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from tests.architecture.sources import ROOT
+from tests.programs import Programs
 
 pytestmark = pytest.mark.processes
 
@@ -44,7 +45,7 @@ body = "shaft"
 stage = "sunk"
 """
 RUN = """
-import json, sys, tempfile, tomllib
+import json, sys, tempfile
 from pathlib import Path
 import meshio
 from solver.results.export import write_vtu
@@ -52,7 +53,7 @@ from studies.errors import SceneError
 from studies.scenes.description import Description
 from studies.scenes.scene import file_scene
 try:
-    scene = file_scene(Description("shaft.toml", tomllib.loads(sys.stdin.read()), {}), built=True)
+    scene = file_scene(Description.read(Path("shaft.toml")), built=True)
 except SceneError as error:
     print(json.dumps({"error": str(error)}))
     sys.exit()
@@ -65,20 +66,31 @@ print(json.dumps({"status": record.status.name, "message": record.message, "cell
 """
 
 
-def run(text: str, *examples: str) -> dict[str, object]:
-    own = os.pathsep.join(str(ROOT / "examples" / name) for name in examples)
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", RUN], input=text, capture_output=True, text=True,
-        env=os.environ | {"RESIDUA_PARTS": own, "PYTHONPATH": str(ROOT)}, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+Told = Callable[..., dict[str, object]]
+
+
+@pytest.fixture
+def told(tmp_path: Path, programs: Programs) -> Told:
+    """Run a scene file with some of the examples, and return what is told of it."""
+    (tmp_path / "program.py").write_text(RUN)
+
+    def run(text: str, *examples: str) -> dict[str, object]:
+        (tmp_path / "shaft.toml").write_text(text)
+        own = os.pathsep.join(str(ROOT / "examples" / name) for name in examples)
+        setting = os.environ | {"RESIDUA_PARTS": own, "PYTHONPATH": str(ROOT)}
+        done = programs.run(Path("program.py"), tmp_path, setting, strict=True)
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    return run
 
 
 @pytest.mark.parametrize("element", ["quad8", "quad8_mean"])
-def test_a_load_and_an_element_of_ones_own_are_named_in_a_scene_file(element: str) -> None:
+def test_a_load_and_an_element_of_ones_own_are_named_in_a_scene_file(
+    element: str, told: Told
+) -> None:
     text = SHAFT.replace("ELEMENT", element).replace("WEIGHT", "1e-3")
-    found = run(text, "own_load.py", "own_element.py")
+    found = told(text, "own_load.py", "own_element.py")
     assert found["status"] == "OK", found["message"]
     assert found["cells"] == "quad8"
     assert found["largest"] == pytest.approx(-100.0, rel=1e-3)
@@ -94,7 +106,7 @@ def test_a_load_and_an_element_of_ones_own_are_named_in_a_scene_file(element: st
     ],
 )
 def test_what_is_not_declared_is_refused(
-    weight: str, element: str, examples: list[str], words: str
+    weight: str, element: str, examples: list[str], words: str, told: Told
 ) -> None:
     text = SHAFT.replace("ELEMENT", element).replace("WEIGHT", weight)
-    assert words in str(run(text, *examples)["error"])
+    assert words in str(told(text, *examples)["error"])
