@@ -55,11 +55,15 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
 def records() -> list[Record]:
     coarse = {
         "punch": (COARSE, 0.4),
-        "elastic_punch": ({"accuracy": "draft", "growth": 2.5}, 50.0),
+        "elastic_punch": ({"smallest_element": 0.1, "growth": 2.5}, 50.0),
         "shaft_hub": ({"accuracy": "draft", "growth": 2.0}, 50.0),
-        "ball": ({"accuracy": "draft", "load_ratio": 2.0}, 1),
-        "rigid_punch": ({"accuracy": "draft", "largest_element": 0.05}, 50.0),
-        "rolling": ({"element_size": 2.0, "advance_step": 2.0, "track": 8.0}, 1),
+        "ball": ({"accuracy": "draft", "load_ratio": 2.0, "load_step": 0.5}, 1),
+        "rigid_punch": ({"smallest_element": 0.1, "largest_element": 0.1}, 50.0),
+        "rolling": (
+            {"element_size": 2.0, "advance_step": 2.0, "track": 4.0, "growth": 3.0}
+            | {"half_space_size": 50.0, "press_steps": 2, "unload_steps": 1},
+            1,
+        ),
         "rolling, endless": ({"element_size": 3.0}, 1),
         "wheel_rail": ({"accuracy": "draft"}, 1),
         "raceway": ({"accuracy": "draft"}, 1),
