@@ -82,7 +82,7 @@ def command(*words: str) -> str:
 
 
 Called = Callable[[str, str], subprocess.CompletedProcess[str]]
-RUN = command("run", "study.toml", "--out", "out", "--workers", "1")
+RUN, HERE = (command("run", "study.toml", "--out", "out", "--workers", workers) for workers in "10")
 SCENES = command("scenes", "punch")
 
 
@@ -132,7 +132,7 @@ def test_a_yield_surface_of_ones_own_is_swept_in_a_scene_file(
     (tmp_path / "bar.toml").write_text(HELD)
     study = STUDY.replace('["swift", "threshold"]', str([*EXPONENTS]))
     (tmp_path / "study.toml").write_text(study)
-    done = called("own_yield_surface.py", RUN)
+    done = called("own_yield_surface.py", HERE)
     assert done.returncode == 0, done.stderr
     rows = [line.split() for line in done.stdout.splitlines()]
     stress = [float(row[2]) for row in rows if row[:1] in [[f"{a:g}"] for a in EXPONENTS]]
@@ -153,7 +153,7 @@ print(type(PunchParameters(yield_condition="hosford").material()).__name__)
 print(unmet(PunchParameters(), "hosford_exponent"))
 print(bool(unmet(PunchParameters(yield_condition="hosford"), "hosford_exponent")))
 p = RollingParameters(
-    element_size=3.0, growth=1.5, load="hertz", passes=2, yield_condition="hosford",
+    element_size=4.0, growth=2.0, load="hertz", passes=2, yield_condition="hosford",
     direction="back_and_forth",
 )
 (record,) = SCENES["rolling"].path(p, [2], lambda share: None)
