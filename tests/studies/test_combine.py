@@ -190,7 +190,7 @@ def test_other_readers_agree(computed: ComputedStudy) -> None:
 
 def test_combining_45_runs_takes_seconds(store: Store) -> None:
     sweep = {"load_ratio": [0.3, 0.5, 0.7], "friction": [i / 20 for i in range(15)]}
-    study = fake_study(sweep=sweep, points=100)
+    study = fake_study(sweep=sweep, points=20)
     compute_here(study, store)
     with counted() as calls:
         combine(study, store, list(study.cases()))
