@@ -31,7 +31,7 @@ COARSE = {
 def computed():
     """Return the directory of a coarse study."""
     directory = Path(mkdtemp())
-    outcome = run_study(Study.from_dict(COARSE), Store(directory), workers=1)
+    outcome = run_study(Study.from_dict(COARSE), Store(directory), workers=0)
     assert outcome.ok, outcome.failed
     return directory
 
@@ -69,7 +69,7 @@ def drawn(data):
     return figure
 
 
-if __name__ == "__main__":  # worker processes import this script
+if __name__ == "__main__":
     directory = sys.argv[1] if len(sys.argv) > 1 else computed()
     study = open_study(directory).squeeze(["friction", "hardening"])
     last = study.isel(passes=-1)

@@ -9,7 +9,8 @@ import numpy as np
 from studies import Store, open_study, run_study
 
 COARSE = {
-    "accuracy": "draft", "smallest_element": 0.02, "growth": 2.0, "hardening": "isotropic",
+    "accuracy": "draft", "smallest_element": 0.02, "growth": 2.0, "load_step": 0.25,
+    "unload_steps": 1, "hardening": "isotropic",
 }  # fmt: skip
 
 # Eight points fill three ranges. With num = 16 the first eight would be the same, and be kept.
@@ -41,7 +42,7 @@ GOAL = {
 
 def sample() -> None:
     """Compute the sample, and print how each parameter goes with the tension."""
-    assert run_study(SAMPLE, Store("sample"), workers=1).ok
+    assert run_study(SAMPLE, Store("sample"), workers=0).ok
     with open_study("sample", SAMPLE["name"]) as dataset:
         runs = dataset.squeeze()
         assert runs.sizes["point"] == 8
@@ -52,7 +53,7 @@ def sample() -> None:
 
 def search() -> None:
     """Search the load, and check the brackets."""
-    outcome = run_study(GOAL, Store("sample"), workers=1)
+    outcome = run_study(GOAL, Store("sample"), workers=0)
     assert outcome.ok, outcome.failed
     with open_study("sample", GOAL["name"]) as dataset:
         found = dataset.squeeze()
@@ -61,7 +62,8 @@ def search() -> None:
         assert (found.load_ratio.diff("friction") < 0.0).all(), "friction leaves more tension"
 
 
-# Worker processes import this script again. Without this line each of them would start the study.
+# Worker processes, where a study has any, import this script again: without this line each of them
+# would start the study.
 if __name__ == "__main__":
     sample()
     search()

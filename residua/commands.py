@@ -147,7 +147,7 @@ def scenes(options: argparse.Namespace) -> int:
 def draw(options: argparse.Namespace) -> int:
     """Draw a scene before anything is computed: meshes, boundaries, supports, loads, contacts."""
     from studies.views.described import described_scene
-    from studies.views.plots.picture import resolved
+    from studies.views.plots.saved import resolved
     from studies.views.plots.setup import setup_figure
 
     scene, values = described_scene(options.what, _selection(options.set, "--set"))
@@ -401,12 +401,14 @@ def _interruption(*others: signal.Signals) -> Iterator[list[int]]:
 
 def _save(drawn: Any, path: Path) -> None:
     """Write a figure in the format given by the ending of the file name."""
+    from studies.views.plots.saved import save
+
     kinds = drawn.canvas.get_supported_filetypes()
     kind = path.suffix.removeprefix(".").lower() or "png"
     if kind not in kinds:
         raise StudyError("--out", str(path), f"must end in one of {', '.join(sorted(kinds))}")
     with _written("--out", path) as part:
-        drawn.savefig(part, format=kind, dpi=drawn.dpi)  # matplotlib's default is another dpi
+        save(drawn, part, kind)
 
 
 @contextmanager

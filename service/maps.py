@@ -122,7 +122,7 @@ def draw_map(path: Path, query: MapQuery) -> bytes:
     """
     from studies import open_netcdf
     from studies.views.plots.maps import map_figure  # matplotlib takes a second to import
-    from studies.views.plots.picture import png
+    from studies.views.plots.saved import png
 
     verify(path)
     with open_netcdf(path) as run:
@@ -133,7 +133,8 @@ def draw_lines(path: Path, query: LineQuery) -> bytes:
     """Return lines of the run in ``path`` as PNG; raise `StudyError` as `picture` does."""
     from studies import open_netcdf
     from studies.views.plots.fields import check_field, line_fields
-    from studies.views.plots.picture import picture, png
+    from studies.views.plots.picture import picture
+    from studies.views.plots.saved import png
 
     verify(path)
     with open_netcdf(path) as run:
@@ -146,7 +147,8 @@ def draw_study(path: Path, query: PlotQuery) -> bytes:
     """Return a field of the study in ``path`` as PNG; raise `StudyError` as `picture` does."""
     from studies import open_netcdf
     from studies.views.kept import drawn_from
-    from studies.views.plots.picture import picture, png
+    from studies.views.plots.picture import picture
+    from studies.views.plots.saved import png
 
     with (
         open_netcdf(path) as dataset,
@@ -164,7 +166,7 @@ def draw_scene(scene: Scene, values: Mapping[str, Any], query: SketchQuery) -> b
     StudyError
         If a parameter or the part is refused, or the scene has nothing to draw.
     """
-    from studies.views.plots.picture import png
+    from studies.views.plots.saved import png
     from studies.views.plots.setup import setup_figure
 
     try:

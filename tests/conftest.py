@@ -46,11 +46,16 @@ def pytest_collection_finish() -> None:
     """Keep the thousands of collected tests out of each search for garbage: 2 % of all time."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 @pytest.hookimpl
 def pytest_collection(session: pytest.Session) -> None:
-    """Let each test process begin with other files: what one has compiled the others only load."""
+    """Let each test process begin with other files: what one has compiled the others only load.
+
+    No garbage is searched for until all tests are collected: there is hardly any.
+    """
+    gc.disable()
     config = session.config
     of_worker = getattr(config, "workerinput", None)
     if of_worker and config.args_source is config.ArgsSource.TESTPATHS:

@@ -24,9 +24,9 @@ from types import ModuleType
 from typing import NoReturn, Self
 
 LIBRARIES = (
-    "h5netcdf", "matplotlib.backends.backend_agg", "matplotlib.figure", "multiprocessing.pool",
-    "netCDF4", "pandas", "pydantic.type_adapter", "scipy.optimize", "scipy.sparse.linalg",
-    "scipy.special", "skfem.helpers", "sqlite3", "xarray",
+    "dask.array", "h5netcdf", "jinja2", "matplotlib.backends.backend_agg", "matplotlib.figure",
+    "multiprocessing.pool", "netCDF4", "numba", "pandas", "pint", "pydantic.type_adapter",
+    "scipy.optimize", "scipy.sparse.linalg", "scipy.special", "skfem.helpers", "sqlite3", "xarray",
 )  # fmt: skip
 LASTS = 300
 """Seconds after which a program is ended."""

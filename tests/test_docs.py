@@ -1,14 +1,14 @@
 """What the pages show works, as a reader would try it.
 
 The blocks of a page run from top to bottom in one empty directory that holds a copy of the
-studies and scene files of `data`, the studies on the coarsest meshes and with the values that the
-pages look at; so do those of every page that has any. What an earlier page has computed by the
-same command is there already. ``python`` blocks are programs, each in a file and a process of its
-own, as workers import it; in ``console`` blocks each line ``$ residua …`` runs in this process and
-must succeed, a study on one worker. A block after ``<!-- no-test -->`` is left out, which only
-those may be that need a server or compute for minutes. A block after
-``<!-- from examples/NAME.py -->`` is not run: its lines stand in that script, which is. Links lead
-to files and headings that exist, and so do the files a page names.
+studies and scene files of `data`, the studies on the coarsest meshes, those of punches in few
+increments, and with the values that the pages look at; so do those of every page that has any. What
+an earlier page has computed by the same command is there already. ``python`` blocks are programs,
+each in a file and a process of its own, as workers import it; in ``console`` blocks each line
+``$ residua …`` runs in this process, studies too, and must succeed. A block after
+``<!-- no-test -->`` is left out, which only those may be that need a server or compute for minutes.
+A block after ``<!-- from examples/NAME.py -->`` is not run: its lines stand in that script, which
+is. Links lead to files and headings that exist, and so do the files a page names.
 """
 
 from __future__ import annotations
@@ -103,9 +103,10 @@ def steps(page: list[Block], folder: Path) -> Iterator[tuple[int, list[str] | Pa
 
 
 def carry_out(commands: list[str]) -> None:
-    """Run commands in this process: in one of their own they would import for seconds."""
+    """Run commands and their studies in this process: others would import for seconds."""
     for command in commands:
-        alone = ["--workers", "1"] if command.startswith("run ") else []
+        computes = command.startswith(("run ", "fit ")) and "--part" not in command
+        alone = ["--workers", "0"] if computes else []
         assert main([*shlex.split(command), *alone]) == 0, f"$ residua {command}"
 
 
@@ -141,11 +142,14 @@ def coarse(study: str) -> str:
     """Return a study file with the coarsest accuracy, where it does not choose one."""
     if "accuracy" in study:
         return study
+    given = 'accuracy = "draft"\n'
+    if 'scene = "punch"' in study:
+        given += "load_step = 0.25\nunload_steps = 1\n"
     head, table, rest = study.partition("[parameters]\n")
     if not table:
         head, table, rest = study.partition("[sweep]\n")
         rest = f"{table}{rest}"
-    return f'{head}[parameters]\naccuracy = "draft"\n{rest}'
+    return f"{head}[parameters]\n{given}{rest}"
 
 
 def shortened(study: str, entries: Mapping[str, Any]) -> str:
@@ -171,7 +175,6 @@ def computed() -> dict[str, Path]:
 
 
 @pytest.mark.pages
-@pytest.mark.usefixtures("one_worker")
 @pytest.mark.parametrize("page", PAGES, ids=str)
 def test_blocks_of_a_page_run(
     page: Path,

@@ -56,7 +56,6 @@ def test_an_example_runs(script: Path, tmp_path: Path, programs: Programs) -> No
 
 
 @pytest.mark.pages
-@pytest.mark.usefixtures("one_worker")
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_the_cells_of_a_notebook_run_after_make_run(
     notebook: Path, tmp_path: Path, programs: Programs, monkeypatch: pytest.MonkeyPatch
@@ -69,7 +68,7 @@ def test_the_cells_of_a_notebook_run_after_make_run(
     study = study.replace('["none", "isotropic", "kinematic"]', '["isotropic", "kinematic"]')
     (tmp_path / "punch.toml").write_text(study)
     monkeypatch.chdir(tmp_path)
-    assert main(["run", "punch.toml", "--out", "out", "--workers", "1"]) == 0
+    assert main(["run", "punch.toml", "--out", "out", "--workers", "0"]) == 0
     cells = json.loads(notebook.read_text())["cells"]
     code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
     assert not any(cell.get("outputs") for cell in cells), "a notebook is kept without its outputs"

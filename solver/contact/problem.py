@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 """Status of a contact point."""
+_FAR = 1e-4
+"""Scale of lengths over the largest gap, where bodies neither overlap nor are pressed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +71,9 @@ class ContactProblem:
     def scales(self) -> tuple[float, float]:
         """A force [N] and a length [mm] that tolerances refer to."""
         compliance = np.abs(np.diag(self.W)).max()
-        length = np.abs(self.offset[: self.n]).max()
-        force = np.abs(self.balance).sum()
-        length = max(length, force * compliance * 1e-3, 1e-30)
+        gaps, force = self.offset[: self.n], np.abs(self.balance).sum()
+        # a point far apart decides nothing, but for its rounding
+        length = max(-gaps.min(), _FAR * np.abs(gaps).max(), force * compliance * 1e-3, 1e-30)
         return max(force, length / compliance), length
 
 

@@ -197,29 +197,3 @@ def weights(low: Point, high: Point, at: Point, runs: Container[Point]) -> dict[
         add(first, -weight * (b - m) / (b - a))
         add(last, -weight * (m - a) / (b - a))
     return found
-
-
-def between(length: float, before: float, after: float, further: float) -> float:
-    """Return the error that is left between two runs, by the changes of slope around them.
-
-    A kink between the two changes the slope at both and nowhere else: it is where the straight
-    lines from both sides meet, and the error is its distance from the line between the runs. A
-    change of slope that is also at a third run is that of a smooth curve.
-
-    Parameters
-    ----------
-    length : distance of the two runs
-    before, after : change of slope at each of them
-    further : the same at the run behind the second one
-
-    References
-    ----------
-    Rote, G. (1992), The convergence rate of the sandwich algorithm for approximating convex
-    functions, Computing 48, 337: the triangle of two tangents and their secant.
-    """
-    smooth = 0.0
-    if before * after > 0.0 and after * further > 0.0:
-        smooth = math.copysign(min(abs(before), abs(after), abs(further)), after)
-    a, b = before - smooth, after - smooth
-    kink = a * b / (a + b) if a * b > 0.0 else 0.5 * min(abs(a), abs(b))
-    return length * (abs(kink) + abs(smooth) / 8.0)

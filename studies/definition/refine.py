@@ -24,17 +24,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from solver.parameters import is_number
 from solver.scenes import Scene
-from studies.definition.cells import KINK, Cell, Known, Misses, Point, between, edges
+from studies.definition.around import Around
+from studies.definition.cells import KINK, Cell, Point, edges
 from studies.definition.line import Read
 from studies.definition.parameters import in_unit, parameters_of
 from studies.definition.place import Chooser
@@ -52,8 +50,6 @@ _KEYS = ("of", "until", "most", "halvings")
 _UNTIL, _MOST, _HALVINGS = 0.02, 200, 5
 """Entries that are left out."""
 _MOST_AXES, _MOST_HALVINGS = 4, 20
-_NEAR = 1.0 + 1e-9
-"""Factor on a distance within which all runs of this distance are found."""
 _ROUNDING = 1e-12
 """Part of a number that is rounding: it is the same in all runs if it varies by no more."""
 
@@ -394,18 +390,19 @@ class Refinement(Chooser):
         Cells that miss more than is allowed are to be divided after all.
         """
         settled, self.settled, self._share = self.settled, [], 0.0
-        lines = self._lines()
-        for (cell, state, left), places in zip(settled, self._inside(settled), strict=True):
-            numbers = {at: self.number(Wanted(cell.branch, at)) for at in places}
+        span = [values[-1] - values[0] for values in self.refine.axes.values()]
+        around = Around(span, {wanted: self._numbers[wanted] for wanted in self.asked})
+        for cell, state, left in settled:
+            numbers = around.of(cell)
             known = {at: each for at, each in numbers.items() if each is not None}
-            changes = [at for at in places if (at in known) != bool(left)]
+            changes = [at for at in numbers if (at in known) != bool(left)]
             if changes and state in (SETTLED, FAILED):
                 self._halve(cell, _within(cell, changes), math.inf, ())
                 continue
             if changes or not left:
                 self._settle(RefinedCell(cell, state))
                 continue
-            along, turns = self._left(cell, known, lines)
+            along, turns = around.left(cell, known)
             misses = [tuple(float(sum(each)) for each in zip(*along, strict=True))]
             if Wanted(cell.branch, cell.centre) not in self.rows:
                 misses.append(tuple(map(min, zip(cell.twists(known), turns, strict=True))))
@@ -426,71 +423,6 @@ class Refinement(Chooser):
                 self._keep(_Halving(cell, {whole: whole.points}, miss, most))
             else:
                 self._halve(cell, axes, miss, most)
-
-    def _lines(self) -> dict[Any, list[float]]:
-        """Return where runs with numbers are on each line along an axis, in increasing order."""
-        found: dict[Any, list[float]] = {}
-        for branch, at in self.asked:
-            if self.number(Wanted(branch, at)):
-                for axis, value in enumerate(at):
-                    found.setdefault((branch, axis, at[:axis], at[axis + 1 :]), []).append(value)
-        return {line: sorted(values) for line, values in found.items()}
-
-    def _left(
-        self, cell: Cell, known: Known, lines: Mapping[Any, list[float]]
-    ) -> tuple[Misses, tuple[float, ...]]:
-        """Return of each axis the largest error of each number that is left on the edges along it.
-
-        Beyond the first and the last run of a line the slope is taken to change as it does inside.
-        It is infinite along an axis where all lines end with their edges, without a third run.
-        The second result is the largest error of each number that kinks at corners may leave: a
-        quarter of what a change of slope at a corner makes along an edge.
-        """
-        found: list[tuple[float, ...]] = [(0.0,) * len(self.refine.of) for _ in cell.low]
-        turns, untold = found[0], set(range(len(found)))
-        every = list(edges(cell.low, cell.high))
-        for axis, low, high, mid in every:
-            sides = mid[:axis], mid[axis + 1 :]
-            line = lines[cell.branch, axis, *sides]
-            own = [each[axis] for each in (low, mid, high) if each in known]
-            first, last, beyond = own[1] - own[0], own[-1] - own[-2], 4 - len(own)
-            below = _beyond(line, own[0], -first, beyond)
-            above = _beyond(line, own[-1], last, beyond)
-            xs = [*below[::-1], *own, *above]
-            if len(xs) == 2:
-                continue
-            untold -= {axis}
-            runs = (Wanted(cell.branch, (*sides[0], x, *sides[1])) for x in xs)
-            slopes = np.diff([self._numbers[each] or () for each in runs], axis=0).T / np.diff(xs)
-            before, after = beyond - len(below), beyond - len(above)
-            errors, corners = [], []
-            for each in np.diff(slopes).tolist():
-                jumps = [each[0]] * before + each + [each[-1]] * after
-                ends = between(first, *jumps[-3:]), between(last, *jumps[2::-1])
-                errors.append(max(ends))
-                inner = itertools.pairwise(jumps[beyond - 1 : len(jumps) + 1 - beyond])
-                corners.append(max(abs(a - b) for a, b in inner) * (own[-1] - own[0]) / 4.0)
-            found[axis] = tuple(map(max, zip(found[axis], errors, strict=True)))
-            turns = tuple(map(max, zip(turns, corners, strict=True)))
-        for axis in untold & {each.axis for each in every}:
-            found[axis] = (math.inf,) * len(self.refine.of)
-        return found, turns
-
-    def _inside(self, found: Sequence[RefinedCell]) -> Iterator[list[Point]]:
-        """Yield of each cell where runs are in it and on its boundary."""
-        from scipy.spatial import KDTree  # takes long to load
-
-        span = np.array([values[-1] - values[0] for values in self.refine.axes.values()])
-        points: dict[int, list[Point]] = {}
-        for branch, point in self.asked:
-            points.setdefault(branch, []).append(point)
-        trees = {branch: KDTree(np.array(each) / span) for branch, each in points.items()}
-        for cell in (each.cell for each in found):
-            low, high = np.array(cell.low) / span, np.array(cell.high) / span
-            reach = (high - low).max() / 2.0 * _NEAR
-            near = trees[cell.branch].query_ball_point((low + high) / 2.0, reach, p=math.inf)
-            every = (points[cell.branch][k] for k in sorted(near))
-            yield [point for point in every if cell.holds(cell.branch, point)]
 
     def _ratio(self, misses: tuple[float, ...]) -> float:
         """Return how far misses are beyond what is allowed: above 1 if they are."""
@@ -551,19 +483,6 @@ def _within(cell: Cell, points: Sequence[Point]) -> set[int]:
 def _volume(cell: Cell) -> float:
     """Return the size of a cell as a share of its cell of the sweep."""
     return 0.5 ** sum(cell.halved)
-
-
-def _beyond(line: Sequence[float], at: float, step: float, count: int) -> list[float]:
-    """Return runs of a line beyond another one, each about a step further, as far as there are."""
-    found: list[float] = []
-    for _ in range(count):
-        k = bisect_left(line, at + step)
-        near = [each for each in line[max(k - 1, 0) : k + 1] if (each - at) * step > 0.0]
-        if not near:
-            break
-        at = min(near, key=lambda each: abs(math.log((each - at) / step)))
-        found.append(at)
-    return found
 
 
 def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:

@@ -24,7 +24,7 @@ from studies.views.picking import one_run, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import line_fields, map_fields, sweep_fields, usual_field
 from studies.views.plots.lines import line_figure
 from studies.views.plots.maps import map_figure
-from studies.views.plots.picture import png
+from studies.views.plots.saved import png
 from studies.views.plots.sweep import sweep_figure
 from studies.views.summary import place_of, placed, values_text
 from studies.views.tables import FOOTNOTE, messages, run_cells

@@ -5,10 +5,9 @@ Both are kept until the data set changes.
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from studies.definition.fit import Fit
 from studies.definition.goal import Goal
@@ -109,6 +108,7 @@ def _drawn(dataset: xr.Dataset, path: Path | None) -> dict[str, bytes]:
     from studies.views.picking import one_run
     from studies.views.plots.fields import usual_field
     from studies.views.plots.maps import map_figure
+    from studies.views.plots.saved import png
 
     field = usual_field(dataset)
     try:
@@ -119,7 +119,7 @@ def _drawn(dataset: xr.Dataset, path: Path | None) -> dict[str, bytes]:
                 drawn = map_figure(one_run(run), field, "xx")
     except StudyError:
         return {}
-    return {f"{field}_xx.png": _png(drawn)}
+    return {f"{field}_xx.png": png(drawn)}
 
 
 def _one_value(asks: Goal | Refine | Fit | None) -> str:
@@ -131,10 +131,11 @@ def _one_value(asks: Goal | Refine | Fit | None) -> str:
 
 def _found(parameter: str, dataset: xr.Dataset) -> dict[str, bytes]:
     """Draw what was found over the sweep; nothing if it cannot be drawn."""
+    from studies.views.plots.saved import png
     from studies.views.plots.sweep import sweep_figure
 
     try:
-        return {f"{parameter}.png": _png(sweep_figure(dataset, parameter))}
+        return {f"{parameter}.png": png(sweep_figure(dataset, parameter))}
     except StudyError:
         return {}
 
@@ -142,11 +143,6 @@ def _found(parameter: str, dataset: xr.Dataset) -> dict[str, bytes]:
 def _compared(dataset: xr.Dataset) -> dict[str, bytes]:
     """Draw what was fitted over what was measured; nothing if there is no answer."""
     from studies.views.plots.fit import fit_figure
+    from studies.views.plots.saved import png
 
-    return {"fit.png": _png(fit_figure(dataset))} if dataset["fitted"].notnull().all() else {}
-
-
-def _png(drawn: Any) -> bytes:
-    picture = io.BytesIO()
-    drawn.savefig(picture, format="png")
-    return picture.getvalue()
+    return {"fit.png": png(fit_figure(dataset))} if dataset["fitted"].notnull().all() else {}

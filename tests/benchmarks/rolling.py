@@ -18,6 +18,7 @@ from tests.benchmarks.measure import Point, timed
 from tests.benchmarks.steady import LOADS, graded_by
 
 BASE = RollingParameters(track=20.0)
+QUICK = {"track": 8.0, "advance_step": 2.0}
 SERIES = ("mesh", "advance", "growth")
 FIRST_ROW = "first row"
 DEPTHS = (2.0, 5.0)
@@ -44,15 +45,13 @@ def loads(quick: bool) -> tuple[str, ...]:
 
 def plan(quick: bool) -> tuple[Case, tuple[Case, ...]]:
     """Return the reference, and the cases."""
-    h, advance = (1.0, 2.0) if quick else (0.25, 0.125)
-    finest = Case("reference", "finest", {**graded_by(h), "advance_step": advance})
-    return finest, tuple(_cases(quick))
+    h, others = (4 / 3, QUICK) if quick else (0.25, {"advance_step": 0.125})
+    return Case("reference", "finest", {**graded_by(h), **others}), tuple(_cases(quick))
 
 
 def _cases(quick: bool) -> Iterator[Case]:
     for h in (4.0, 2.0) if quick else (4.0, 2.0, 1.0, 0.5):
-        advance = {"advance_step": 2.0} if quick else {}
-        yield Case("mesh", f"{h:g} mm", {**graded_by(h), **advance}, h)
+        yield Case("mesh", f"{h:g} mm", {**graded_by(h), **(QUICK if quick else {})}, h)
     if quick:
         return
     yield Case("default", "default")

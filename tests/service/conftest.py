@@ -30,9 +30,9 @@ def lively(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """One running service with a worker of its own for all tests that leave a service running.
 
     They may take down what it starts, which it starts again, and may stop or kill the service if
-    they start it again. It does not wait for studies that hang.
+    they start it again. It does not wait for studies that hang, and tells soon how far one is.
     """
-    settings = {"RESIDUA_GRACE_SECONDS": "1"}
+    settings = {"RESIDUA_GRACE_SECONDS": "1", "RESIDUA_POLL_SECONDS": "0.1"}
     server = Server(tmp_path_factory.mktemp("lively"), settings=settings).start()
     yield server
     server.close()

@@ -25,7 +25,7 @@ PROGRAM = (
 
 NOWHERE = {
     "RESIDUA_SCHEDULER": "tcp://127.0.0.1:1",
-    "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "5s",
+    "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "1s",
 }
 """Settings of a service that computes nothing: it loads nothing for workers either."""
 
@@ -38,7 +38,7 @@ def environment(log: Path) -> dict[str, str]:
     return os.environ | {
         "PYTHONPATH": os.pathsep.join([str(ROOT), str(STARTUP)]),
         "FAKE_SCENE_LOG": str(log),
-        "RESIDUA_POLL_SECONDS": "0.1",
+        "RESIDUA_POLL_SECONDS": "0.3",  # a service that waits takes half of that at 0.1 s
         "RESIDUA_ATTEMPTS": "2",
         # Processes of dask that wait for minutes, as those of the package.
         "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "1s",
@@ -55,12 +55,12 @@ def free_port() -> int:
         return port
 
 
-def wait_until(condition: Callable[[], Any], seconds: float = 60.0) -> Any:
-    """Return the first true answer of ``condition``."""
+def wait_until(condition: Callable[[], Any], seconds: float = 60.0, pause: float = 0.1) -> Any:
+    """Return the first true answer of ``condition``, which is asked at intervals."""
     deadline = time.monotonic() + seconds
     while not (answer := condition()):
         assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.1)
+        time.sleep(pause)
     return answer
 
 
@@ -77,6 +77,7 @@ def worker_elsewhere(home: Path) -> Iterator[str]:
     address = f"tcp://127.0.0.1:{port}"
     scheduler = ["scheduler", "--host", "127.0.0.1", "--port", str(port)]
     worker = ["worker", address, "--nthreads", "1", "--local-directory", str(home)]
+    worker += ["--no-nanny"]  # nothing kills it
     with ExitStack() as stack:
         log = stack.enter_context((home / "dask.log").open("ab"))
         for words in (scheduler, worker):
@@ -175,7 +176,7 @@ class Server:
             study = self.study(study_id)
             return study if study["status"] not in ("accepted", "running") else None
 
-        study: dict[str, Any] = wait_until(ended, seconds)
+        study: dict[str, Any] = wait_until(ended, seconds, pause=0.25)
         return study
 
     def computed(self) -> list[str]:

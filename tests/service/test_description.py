@@ -10,7 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.service.servers import Server, fake_study
+from service.routes.studies import EXAMPLE
+from studies import Store, Study
+from tests.service.servers import NOWHERE, Server
+from tests.studies.conftest import compute_here
 
 CONFIGURATION = Path(__file__).with_name("schemathesis.toml")
 
@@ -32,9 +35,14 @@ def explore(server: Server, extent: list[str], seed: int = 1) -> subprocess.Comp
 
 @pytest.fixture
 def explored(tmp_path: Path) -> Iterator[Server]:
-    """A service of the test's own, which is left full of studies, with one that was computed."""
-    server = Server(tmp_path / "explored").start()
-    server.finished(server.post(fake_study("computed")))
+    """A service that computes nothing, and has the runs of the example of its description.
+
+    So answers with data are looked at, and no worker computes what is posted until the test ends.
+    """
+    server = Server(tmp_path / "explored", settings=NOWHERE)
+    study = Study.from_dict(EXAMPLE)
+    compute_here(study, Store(server.data), study.problem)
+    assert server.start().study(study.id)["status"] == "successful"
     yield server
     server.close()
 

@@ -15,6 +15,7 @@ import time
 import zlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -31,57 +32,37 @@ from studies.scenes.meshfile import MeshFile
 from tests.service.test_access import asking
 from tests.service.test_errors import problem
 
-
-def doubled(number: int) -> int:
-    return 2 * number
-
-
-def too_long(_: int) -> None:
-    time.sleep(60)
-
-
-def too_large(_: int) -> None:
-    bytes(2 * BYTES)
-
-
-def killed(_: int) -> None:
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def wrong(number: int) -> None:
-    raise StudyError("scene", number, "must be even")
-
-
-def refused(_: int) -> None:
-    """Refuse a study as one does that has converted a unit, with what pint loads of Dask."""
-    Study.from_dict({"scene": "punch", "name": "a", "parameters": {"half_width": "2 in"}})
-    Study.from_dict({"scene": "punch", "name": "a", "parameters": {"half_width": "2 N"}})
-
-
-@pytest.mark.parametrize(
-    ("function", "seconds", "error", "words"),
-    [
-        (
-            too_long,
-            0.5,
-            StudyError,
-            r"scene = 'a': must be read within 0\.5 s and [\d.]+ GiB.*: less",
-        ),
-        (too_large, 60.0, StudyError, r"scene = 'a': must be read within 60 s"),
-        (killed, 60.0, Busy, "the process that reads a scene has ended: ask again"),
-        (wrong, 60.0, StudyError, "scene = 3: must be even"),
-        (refused, 60.0, StudyError, "parameters.half_width = '2 N': .* N is a force"),
-    ],
+INCH, NEWTON = (
+    {"scene": "punch", "name": "a", "parameters": {"half_width": each}} for each in ("2 in", "2 N")
 )
-def test_what_fails_in_the_process_is_told_and_the_next_call_is_answered(
-    function: Callable[[int], None], seconds: float, error: type[Exception], words: str
-) -> None:
-    async def calls() -> int:
-        with pytest.raises(error, match=words):
-            await Guarded("scene", 1, seconds).call(function, 3, name="a", advice=": less")
-        return await Guarded("scene", 1, 60.0).call(doubled, 3, name="a")
+FAILING: list[tuple[Callable[..., Any], object, float, type[Exception], str]] = [
+    (Study.from_dict, INCH | {"scene": "no"}, 60.0, StudyError, "scene = 'no': must be one of"),
+    (Study.from_dict, NEWTON, 60.0, StudyError, "parameters.half_width = '2 N': .* N is a force"),
+    (bytes, 2 * BYTES, 60.0, StudyError, r"scene = 'a': must be read within 60 s"),
+    (time.sleep, 60, 0.5, StudyError, r"'a': must be read within 0\.5 s and [\d.]+ GiB.*: less"),
+    (
+        signal.raise_signal,
+        signal.SIGKILL,
+        60.0,
+        Busy,
+        "the process that reads a scene has ended: ask again",
+    ),
+]
+"""What a process calls, with what and for how long, and the error.
 
-    assert asyncio.run(calls()) == 6
+The force is refused by a process that has converted an inch, with what pint loads of Dask.
+"""
+
+
+def test_what_fails_in_the_process_is_told_and_the_next_call_is_answered() -> None:
+    async def calls() -> None:
+        for function, given, seconds, error, words in FAILING:
+            with pytest.raises(error, match=words):
+                await Guarded("scene", 1, seconds).call(function, given, name="a", advice=": less")
+            study = await Guarded("scene", 1, 60.0).call(Study.from_dict, INCH, name="a")
+            assert study.name == "a"
+
+    asyncio.run(calls())
 
 
 def test_a_queue_that_is_full_takes_no_more() -> None:
@@ -89,13 +70,13 @@ def test_a_queue_that_is_full_takes_no_more() -> None:
 
     async def one(number: int) -> int:
         async with process.turn():
-            return await process.call(doubled, number, name="a")
+            return await process.call(abs, -number, name="a")
 
     async def calls() -> list[object]:
         return await asyncio.gather(*map(one, range(5)), return_exceptions=True)
 
     found = asyncio.run(calls())
-    assert found[:3] == [0, 2, 4], "two are read, one waits"
+    assert found[:3] == [0, 1, 2], "two are read, one waits"
     assert {type(each) for each in found[3:]} == {Busy}
 
 

@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from service.app import check_port, create_app
+from service.app import check_port, create_app, serve
 from service.settings import Settings
 from tests.architecture.sources import ROOT
-from tests.service.servers import Server, environment, fake_study
+from tests.service.servers import Server, fake_study
 
 ID = "0" * 32
 
@@ -114,17 +114,13 @@ def test_a_service_writes_json_lines_for_itself_and_its_children(tmp_path: Path)
     assert {line["study"] for line in told} == {study_id}
 
 
-def test_an_unknown_form_is_refused(tmp_path: Path) -> None:
-    program = "from service.app import serve; serve('127.0.0.1', 0, 'data')"
-    answer = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=tmp_path,
-        env=environment(tmp_path / "log") | {"RESIDUA_LOG_FORMAT": "xml"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert answer.returncode == 2 and "RESIDUA_LOG_FORMAT" in answer.stderr
+def test_an_unknown_form_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("RESIDUA_LOG_FORMAT", "xml")
+    with pytest.raises(SystemExit) as ended:
+        serve("127.0.0.1", 0, tmp_path)
+    assert ended.value.code == 2 and "RESIDUA_LOG_FORMAT" in capsys.readouterr().err
 
 
 def test_a_port_in_use_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:

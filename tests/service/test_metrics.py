@@ -16,6 +16,7 @@ from studies import Store
 from tests.service.servers import Server
 
 STUDY = {"name": "a", "scene": "punch", "sweep": {"friction": [0.1, 0.2]}}
+IDS = ("a" * 32, "b" * 32, "c" * 32)
 
 
 @pytest.fixture
@@ -43,9 +44,9 @@ def named(name: str, **labels: str) -> tuple[str, frozenset[tuple[str, str]]]:
 
 
 def test_queue_and_runs_are_counted(client: TestClient) -> None:
-    client.post("/studies", json=STUDY)
-    client.post("/studies", json=STUDY | {"name": "b"})
-    client.delete(client.post("/studies", json=STUDY | {"name": "c"}).headers["location"])
+    for each in IDS:
+        client.app.state.jobs.accept(each, STUDY, [])
+    client.delete(f"/studies/{IDS[-1]}")
     store: Store = client.app.state.store
     row = {"id": "0" * 32, "scene": "punch", "status": "ok", "message": "", "parameters": {}}
     row |= {
@@ -99,7 +100,8 @@ def test_a_defect_counts_as_500(client: TestClient, monkeypatch: pytest.MonkeyPa
 
 def test_two_services_in_a_process_count_apart(client: TestClient, tmp_path: Path) -> None:
     other = TestClient(create_app(Settings(data=tmp_path / "other")), "http://localhost")
-    client.post("/studies", json=STUDY)
+    client.app.state.jobs.accept(IDS[0], STUDY, [])
+    assert figures(client)[named("residua_studies", status="accepted")] == 1
     assert figures(other)[named("residua_studies", status="accepted")] == 0
 
 

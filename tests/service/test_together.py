@@ -78,7 +78,7 @@ def test_a_lost_queue_is_made_anew_from_the_studies(lively: Server) -> None:
     before = len(lively.computed())
     done, failed = lively.post(fake_study("done")), lively.post(fake_study("f", behaviour="limit"))
     ends = {study_id: lively.finished(study_id) for study_id in (done, failed)}
-    running = lively.post(large_study("running", paths=30, seconds=0.2))
+    running = lively.post(large_study("running", paths=30, seconds=0.25))
     wait_until(lambda: lively.study(running)["progress"] > 0)
     queue = lively.data / "jobs.sqlite"
     queue.unlink()

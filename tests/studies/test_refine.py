@@ -24,7 +24,8 @@ from studies import (
     predict,
     run_study,
 )
-from studies.definition.cells import between, weights
+from studies.definition.around import between
+from studies.definition.cells import weights
 from studies.definition.quantity import RunNumber
 from studies.definition.refine import Refine, Refinement, Wanted
 from studies.execution.asking import Asking

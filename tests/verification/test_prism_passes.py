@@ -228,6 +228,13 @@ def test_material_far_behind_is_where_the_release_says() -> None:
     assert 3.0 < np.abs(stress - residual(PERFECT, found.after)).max() < 0.3 * RE
 
 
+def test_what_a_release_leaves_over_does_not_add_up_from_pass_to_pass() -> None:
+    """Strain far behind is that of all plastic strain, also where the release yields."""
+    left = rolled(block(), HARDENS, ellipse(block(), 1700.0), 2).after
+    strain, _ = block().modes.constant(left.plastic_strain @ HARDENS.stiffness(6))
+    assert left.strain == pytest.approx(strain, abs=1e-12)
+
+
 def test_a_wheel_beside_the_middle_leaves_the_mirror_image() -> None:
     track = block()
     left, right = (

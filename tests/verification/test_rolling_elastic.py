@@ -144,7 +144,7 @@ DRIVEN = [0.25, 0.5, 0.75, -0.5]
 
 @pytest.mark.parametrize("traction", DRIVEN)
 def test_moment_makes_the_longitudinal_force_it_is_meant_to(traction):
-    run = rolled(8, traction=traction)
+    run = rolled(4, traction=traction)
     expected = traction * run.parameters.friction * run.parameters.force
     # the lever arm is R less the approach of the bodies, 0.1 % of R
     assert run.force == pytest.approx(expected, rel=5e-3)
@@ -152,7 +152,7 @@ def test_moment_makes_the_longitudinal_force_it_is_meant_to(traction):
 
 @pytest.mark.parametrize("traction", DRIVEN)
 def test_shear_of_equal_rollers_is_carters(traction):
-    run = rolled(8, traction=traction)
+    run = rolled(4, traction=traction)
     limit = run.parameters.friction * PEAK
     exact = np.sign(traction) * limit * carter_shear(run.x, abs(traction))
     assert run.mean_difference(run.shear, exact) < 0.045 * limit
@@ -160,7 +160,7 @@ def test_shear_of_equal_rollers_is_carters(traction):
 
 @pytest.mark.parametrize("traction", DRIVEN)
 def test_stick_zone_of_equal_rollers_is_carters_and_at_the_leading_edge(traction):
-    run = rolled(8, traction=traction)
+    run = rolled(4, traction=traction)
     sticks = np.abs(run.shear) < 0.97 * run.parameters.friction * run.pressure
     inside = np.abs(run.x) < 0.95
     trailing_end = run.x[inside & sticks].min()
@@ -170,7 +170,7 @@ def test_stick_zone_of_equal_rollers_is_carters_and_at_the_leading_edge(traction
 
 
 @pytest.mark.parametrize(
-    ("traction", "steps"), [*((traction, 8) for traction in DRIVEN), (0.5, 4), (-0.5, 4)]
+    ("traction", "steps"), [*((traction, 4) for traction in DRIVEN), (0.5, 8), (-0.5, 8)]
 )
 def test_creepage_of_equal_rollers_is_carters_beyond_free_rolling(traction, steps):
     free, driven = (rolled(steps, traction=t) for t in (0.0, traction))
@@ -272,10 +272,10 @@ def test_free_creepage_tends_to_that_of_half_planes_with_the_load():
     assert creepage_ratio(9.0, 1 / 2) < creepage_ratio(9.0, 1 / 4) < 1
 
 
-@pytest.mark.parametrize("stiffness", [1 / 3, 9.0])
-def test_shear_of_dissimilar_rollers_has_no_resultant_and_the_sign_of_minus_beta(stiffness):
+@pytest.mark.parametrize(("stiffness", "widths"), [(1 / 3, 3.2), (3.0, _STEADY)])
+def test_shear_of_dissimilar_rollers_has_no_resultant_and_the_sign_of_minus_beta(stiffness, widths):
     """The stiffer wheel holds the track back from shortening: outward shear on the track."""
-    run = rolled(10, stiffness=stiffness)
+    run = rolled(10, stiffness=stiffness, widths=widths)
     assert abs(run.force) < 1e-4 * run.parameters.force
     exact = PEAK * Stuck.of(run.parameters).shear(run.x)
     for side in (-1, 1):
@@ -285,7 +285,8 @@ def test_shear_of_dissimilar_rollers_has_no_resultant_and_the_sign_of_minus_beta
 
 
 def test_shear_of_dissimilar_rollers_does_not_depend_on_ample_friction():
-    some, ample = (rolled(10, stiffness=3.0, friction=f, widths=_STEADY) for f in (0.3, 0.9))
+    each = ({}, {"friction": 0.9})  # 0.3 by default, a run that another test shares
+    some, ample = (rolled(10, stiffness=3.0, widths=_STEADY, **own) for own in each)
     inside = np.abs(some.x) < 0.9
     assert ample.shear[inside] == pytest.approx(some.shear[inside], abs=0.002 * PEAK)
     assert ample.creepage == pytest.approx(some.creepage, rel=0.01)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 
 import xarray as xr
@@ -33,10 +32,8 @@ from studies.views.plots.lines import line_figure
 from studies.views.plots.mapped import STAGE
 from studies.views.plots.maps import map_figure
 from studies.views.plots.meshed import mesh_maps
+from studies.views.plots.saved import resolved
 from studies.views.plots.sweep import sweep_figure
-
-_COARSEST, _FINEST = 50, 600
-"""Range of the resolution in dots per inch."""
 
 
 def picture(
@@ -115,23 +112,6 @@ def picture(
             part = _part(dataset, field, selection or {}, axis, against)
             figure = line_figure(part, field, component, zoom, over, window, against)
     return resolved(figure, resolution)
-
-
-def png(figure: Figure, resolution: int) -> bytes:
-    """Return a figure as PNG, with a resolution [dpi]."""
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=resolution)
-    return content.getvalue()
-
-
-def resolved(figure: Figure, resolution: float | None) -> Figure:
-    """Return a figure with its resolution [dpi], by default its own, or raise `StudyError`."""
-    if resolution is not None:
-        if not _COARSEST <= resolution <= _FINEST:
-            allowed = f"must be {_COARSEST} to {_FINEST} dots per inch"
-            raise StudyError("resolution", resolution, allowed)
-        figure.set_dpi(resolution)
-    return figure
 
 
 def _refuse(given: Mapping[str, object], allowed: str) -> None:
