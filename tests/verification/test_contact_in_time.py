@@ -141,7 +141,7 @@ def test_what_passes_has_the_shear_of_small_increments(
 
 
 def dragged(slave: str, increments: int, *, resting: bool = False) -> Solution:
-    """Press the cylinder on the plane, then drag it by 6 mm, six times the width of its contact.
+    """Press the cylinder on the plane, then drag it by 3 mm, three times the width of its contact.
 
     A block may rest on another one beside them.
     """
@@ -150,8 +150,8 @@ def dragged(slave: str, increments: int, *, resting: bool = False) -> Solution:
         Stage(name="loaded", target=2.0, steps=increments),
     )
     return pressed(
-        np.arange(-1.5, 8.05, 0.15), slave, stages,
-        x=Moved(value=6.0, amplitude=Amplitude([0, 1, 2], [0, 0, 1])),
+        np.arange(-1.5, 5.05, 0.15), slave, stages,
+        x=Moved(value=3.0, amplitude=Amplitude([0, 1, 2], [0, 0, 1])),
         y=Pushed(value=-2000.0, amplitude=Amplitude([0, 1, 2], [0, 1, 1])), resting=resting,
     )  # fmt: skip
 
