@@ -159,8 +159,8 @@ def _active_sets(
     """
     n, lines, points = problem.n, problem.lines, np.arange(problem.n)
     rough, steepest = lines.rough, lines.slope.max(axis=0)
-    force, length = problem.scales
-    tiny_force, tiny_length = _TOLERANCE * force, _TOLERANCE * length
+    force, _ = problem.scales
+    tiny_force, tiny_length = _TOLERANCE * force, _TOLERANCE * problem.near
     # with little friction: a small part of the tangential force, but not less than rounding
     tiny_shear = force * np.clip(_ACCURATE * steepest, _ROUNDING, _TOLERANCE)
     status = start.copy()

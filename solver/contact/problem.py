@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 """Status of a contact point."""
 _FAR = 1e-4
-"""Scale of lengths over the largest gap, where bodies neither overlap nor are pressed."""
+"""Least length of what touches, over the largest gap."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +71,15 @@ class ContactProblem:
     def scales(self) -> tuple[float, float]:
         """A force [N] and a length [mm] that tolerances refer to."""
         compliance = np.abs(np.diag(self.W)).max()
-        gaps, force = self.offset[: self.n], np.abs(self.balance).sum()
-        # a point far apart decides nothing, but for its rounding
-        length = max(-gaps.min(), _FAR * np.abs(gaps).max(), force * compliance * 1e-3, 1e-30)
+        length = np.abs(self.offset[: self.n]).max()
+        force = np.abs(self.balance).sum()
+        length = max(length, force * compliance * 1e-3, 1e-30)
         return max(force, length / compliance), length
+
+    @property
+    def near(self) -> float:
+        """A length [mm] of what touches: points far apart count by their rounding alone."""
+        return max(-self.offset[: self.n].min(), _FAR * self.scales[1])
 
 
 @dataclass(frozen=True, slots=True)

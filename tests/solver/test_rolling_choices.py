@@ -34,7 +34,7 @@ def test_a_wheel_has_the_poisson_ratio_of_the_half_space_unless_it_is_given() ->
 
 
 @pytest.mark.solves
-@pytest.mark.parametrize("track", ["endless", 10.0])
+@pytest.mark.parametrize("track", ["endless", 4.0])
 def test_a_wheel_of_another_poisson_ratio_has_the_pressure_of_hertz_and_creeps(track: Any) -> None:
     soft = rolled(track=track, wheel_poisson_ratio=0.0)
     assert soft.scalars["peak_contact_pressure"] == pytest.approx(502.0, rel=0.01)
@@ -46,7 +46,7 @@ def test_a_wheel_of_another_poisson_ratio_has_the_pressure_of_hertz_and_creeps(t
 
 @pytest.mark.solves
 def test_a_small_half_space_is_another_problem() -> None:
-    small, large = (rolled(track=10.0, half_space_size=size, load_ratio=2.7).scalars
+    small, large = (rolled(track=4.0, half_space_size=size, load_ratio=2.7).scalars
                     for size in (10.0, 400.0))  # fmt: skip
     name = "peak_residual_tension"
     assert abs(small[name] / large[name] - 1) > 0.02

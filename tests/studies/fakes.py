@@ -189,6 +189,14 @@ class Followed(Canned):
             yield from self.records(parameters, [value], monitor)
 
 
+def numbers(
+    parameters: FakeParameters, values: Sequence[float], monitor: Monitor
+) -> Iterator[Record]:
+    """Yield the same records without fields: a run is written and read twice as fast."""
+    for each in path(parameters, values, monitor):
+        yield replace(each, coordinates={}, fields={})
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SwitchedParameters(FakeParameters):
     """The same with values that are neither numbers nor words."""
@@ -205,6 +213,8 @@ FAKE = Canned(
     records=path,
 )
 SCENES[FAKE.name] = FAKE
+NUMBERS = replace(FAKE, name="numbers", records=numbers)
+SCENES[NUMBERS.name] = NUMBERS
 SWITCHED = Canned(
     name="switched",
     summary="a scene with a switch",
@@ -217,6 +227,6 @@ FOLLOWED = Followed(
     summary="a scene that costs nothing, whose paths go on",
     parameters=FakeParameters,
     branch="load_ratio",
-    records=path,
+    records=numbers,
 )
 SCENES[FOLLOWED.name] = FOLLOWED

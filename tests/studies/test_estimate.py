@@ -202,12 +202,12 @@ def test_a_worker_is_told_to_need_what_it_keeps_beside_its_path(
     assert some == none + 10_000_000 < all_of_it < 2 * none
 
 
-def test_20_000_runs_are_estimated_in_a_second(store: Store) -> None:
+def test_20_000_runs_are_estimated_with_150_calls_each(store: Store) -> None:
     remember(store, ids(1000), made_up([9_000] * 1000, *LAW))
     study = Study.known(many(20_000))
     with counted() as calls:
         found = estimate(study, store)
-    assert calls < 600_000
+    assert calls < 3_000_000
     assert (found.to_compute, found.paths) == (20_000, 5_000)
 
 

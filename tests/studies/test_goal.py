@@ -28,7 +28,7 @@ from studies.execution.refined import refined
 from studies.execution.run import _Work
 from studies.execution.task import PathTask, walk
 from tests.studies.conftest import fake_study
-from tests.studies.fakes import FAKE, Canned, FakeParameters, Followed, path
+from tests.studies.fakes import FAKE, Canned, FakeParameters, Followed, numbers
 from tests.studies.killed import runs_before_a_kill
 
 PRESSURE = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}
@@ -36,7 +36,7 @@ PRESSURE = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}
 SWEEP = {"friction": [0.0, 0.4], "half_width": [20.0, 50.0]}
 
 
-SCENES = ["fake", "followed"]
+SCENES = ["numbers", "followed"]
 """Scenes of which each round is a path, and of which a path goes on to the end of the search."""
 
 
@@ -59,10 +59,10 @@ class Unmeshed(Followed):
 
 def alone(parameters: Any, values: Any, monitor: Any) -> Iterator[Record]:
     """Yield the record of a scene without a branch."""
-    return path(parameters, [parameters.load_ratio], monitor)
+    return numbers(parameters, [parameters.load_ratio], monitor)
 
 
-def study(goal: dict[str, Any], sweep: Any = None, scene: str = "fake", **fixed: Any) -> Study:
+def study(goal: dict[str, Any], sweep: Any = None, scene: str = "numbers", **fixed: Any) -> Study:
     content = {"name": "goal", "scene": scene, "parameters": fixed, "goal": goal}
     return Study.from_dict(content | {"sweep": SWEEP if sweep is None else sweep})
 
@@ -291,14 +291,14 @@ def test_an_interrupted_search_goes_on_and_asks_for_the_same_runs(
 
 
 def test_runs_are_those_of_any_other_study(store: Store) -> None:
-    search_here(study(PRESSURE, {}), store)
+    search_here(study(PRESSURE, {}, "fake"), store)
     same = fake_study(sweep={"load_ratio": [0.1]})
     assert store.run_path(next(same.run_ids())).exists()
 
 
 def test_a_goal_may_be_the_limit_load_or_multiply_with_points(store: Store) -> None:
     points = [{"friction": 0.1, "case": "A"}, {"friction": 0.3, "case": "B"}]
-    content = {"name": "goal", "scene": "fake", "parameters": {"trouble": "limit"}}
+    content = {"name": "goal", "scene": "numbers", "parameters": {"trouble": "limit"}}
     goal = {"find": "limit_load", "between": [0.1, 4.0], "within": 0.02}
     asked = Study.from_dict(content | {"points": points, "goal": goal})
     search_here(asked, store)
@@ -358,7 +358,7 @@ def test_a_value_that_the_scene_refuses_ends_its_search_alone(
 ) -> None:
     scene = kind(
         name="gapped", summary="a scene that refuses", parameters=Gapped, branch=branch,
-        records=path if branch else alone,
+        records=numbers if branch else alone,
     )  # fmt: skip
     goal = PRESSURE | {"at": 250.0, "parameter": "load_ratio"}
     sweep = {"friction": [0.0, 0.1]}

@@ -70,10 +70,9 @@ def test_who_lacks_the_credentials_is_refused_at_once(two: Access) -> None:
     with own_workers(0) as other:
         stranger = Access(two.address, other.ca, other.cert, other.key)
         for access in (Access(two.address.replace("tls:", "tcp:")), stranger):
-            began = time.monotonic()
-            with pytest.raises(GridLost):
+            with pytest.raises(GridLost) as caught:
                 connect(access)
-            assert time.monotonic() - began < 5.0
+            assert "imed out" not in str(caught.value)
     with connect(Access.from_dict(two.to_dict())) as friend:
         assert len(friend.nthreads()) == 2
 
@@ -228,20 +227,17 @@ def test_a_frozen_worker_is_replaced_and_others_are_not_blamed(two: Access) -> N
     ends: dict[Any, Finished] = {}
     tasks = [("freeze", 0.0), *(("nap", 0.1 + i / 100) for i in range(12))]
     with Grid(two) as grid:
-        began = time.monotonic()
         for item in grid.run(freeze, tasks, never, Limits(stall_seconds=2.0)):
             if isinstance(item, Message) and "seconds" not in item.content:
                 frozen.append(item.content["pid"])
             elif isinstance(item, Finished):
                 ends[item.task] = item
-        took = time.monotonic() - began
         assert set(ends) == set(tasks)
         failed = {task: str(end.error) for task, end in ends.items() if end.error}
         assert failed == {
             ("freeze", 0.0): "the loading path made no progress for 2 s (limit stall_seconds); "
             "its worker was replaced"
         }
-        assert took < 30.0
         pids = {
             item.content["pid"]
             for item in grid.run(nap, [1.0] * 6, never)
@@ -267,35 +263,32 @@ def test_time_in_the_queue_does_not_count(two: Access) -> None:
 
 
 def test_stopping_does_not_wait_for_a_frozen_worker(two: Access) -> None:
-    asked: list[float] = []
-
-    def stop() -> bool:
-        return bool(asked)
-
+    frozen, ended = list[int](), list[Finished]()
     with Grid(two) as grid:
-        for item in grid.run(freeze, [("freeze", 0.0), ("nap", 60.0)], stop):
+        tasks = [("freeze", 0.0), ("nap", 600.0)]
+        for item in grid.run(freeze, tasks, lambda: bool(frozen)):
             if isinstance(item, Message) and "seconds" not in item.content:
-                time.sleep(0.5)
-                asked.append(time.monotonic())
-                pid = item.content["pid"]
-        assert time.monotonic() - asked[0] < 8.0
-    os.kill(pid, 9)
+                stopped = psutil.Process(item.content["pid"])
+                while stopped.status() != psutil.STATUS_STOPPED:
+                    time.sleep(0.01)
+                frozen.append(stopped.pid)
+            elif isinstance(item, Finished):
+                ended.append(item)
+        assert frozen and not [end for end in ended if not end.error], "no task came to its end"
+    os.kill(frozen[0], 9)
 
 
 def test_no_worker_is_told_and_ends_by_a_setting(
     nobody: Access, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("studies.execution.watch._QUIET", 1.0)
-    began = time.monotonic()
     told = []
     with Grid(nobody) as grid, pytest.raises(GridLost, match="no worker is connected"):
         for item in grid.run(nap, [0.0], never, Limits(patience=3.0)):
-            told.append((item, time.monotonic() - began))
-    (item, after) = told[0]
-    assert len(told) == 1
+            told.append(item)
+    (item,) = told
     assert isinstance(item, Waiting)
     assert item.reason.startswith("no worker is connected to the scheduler: start one")
-    assert after < 3.0
 
 
 def test_workers_killed_on_sight_are_told_and_the_study_goes_on(

@@ -122,7 +122,7 @@ def test_a_goal_is_searched_by_a_part(tmp_path: Path) -> None:
 
 
 @pytest.mark.processes
-@pytest.mark.parametrize("scene", ["fake", "followed"])
+@pytest.mark.parametrize("scene", ["numbers", "followed"])
 def test_a_part_that_begins_later_leaves_a_search_to_who_is_at_it(
     tmp_path: Path, scene: str
 ) -> None:

@@ -17,7 +17,7 @@ from studies.views.gaussian import Gaussian, in_hull
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import SWITCHED
 from tests.studies.test_goal import search_here
-from tests.studies.test_refine import AXES, OF, bitten, refined_by, study
+from tests.studies.test_refine import AXES, OF, WHOLE, bitten, refined_by, study
 
 
 def smooth(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -143,7 +143,8 @@ def test_a_place_outside_the_hull_or_across_failed_runs_is_refused() -> None:
 def test_a_refinement_is_predicted_in_its_cells_and_the_run_of_a_place_is_exact(
     store: Store,
 ) -> None:
-    asked = study(sweep=AXES | {"hardening": ["none", "isotropic"]}, trouble="limit")
+    words = AXES | {"hardening": ["none", "isotropic"]}
+    asked = study({"halvings": 1}, words, scene=WHOLE, trouble="limit")
     search_here(asked, store)
     at = {"load_ratio": 0.77, "friction": 0.11, "hardening": "none"}
     with open_study(store.directory) as dataset:
@@ -225,7 +226,7 @@ def test_a_grid_is_predicted_by_a_process(store: Store) -> None:
 
 def test_a_number_that_was_not_refined_tells_a_branch(store: Store) -> None:
     pads = {"wide": {"half_width": 50.0}, "narrow": {"half_width": 20.0}}
-    search_here(study(sweep=AXES | {"pad": pads}), store)
+    search_here(study({"halvings": 1}, AXES | {"pad": pads}), store)
     at = {"load_ratio": 0.9, "friction": 0.05}
     with open_study(store.directory) as dataset:
         found = predict(dataset, **at, half_width=20.0)

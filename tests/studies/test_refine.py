@@ -297,10 +297,17 @@ def bent(parameters: FakeParameters, values: Any, monitor: Any) -> Iterator[Reco
         yield replace(made, scalars=dict(made.scalars) | {OF: number})
 
 
+def numbers(parameters: FakeParameters, values: Any, monitor: Any) -> Iterator[Record]:
+    """Yield the same records without fields."""
+    for each in bent(parameters, values, monitor):
+        yield replace(each, coordinates={}, fields={})
+
+
 BENT = Canned(
     name="bent", summary="a scene with a kink", parameters=FakeParameters, branch="load_ratio",
-    records=bent,
+    records=numbers,
 )  # fmt: skip
+WHOLE = replace(BENT, name="whole", records=bent)
 
 
 def test_rounding_of_a_number_that_does_not_vary_is_not_refined() -> None:
@@ -309,10 +316,12 @@ def test_rounding_of_a_number_that_does_not_vary_is_not_refined() -> None:
     assert {each.state for each in found.settled} == {"settled"}
 
 
-def study(asked: dict[str, Any] | None = None, sweep: Any = None, **fixed: Any) -> Study:
+def study(
+    asked: dict[str, Any] | None = None, sweep: Any = None, scene: Canned = BENT, **fixed: Any
+) -> Study:
     refine = {"of": [OF], "until": 0.05, "halvings": 2} | (asked or {})
     content = {"name": "refined", "parameters": fixed, "sweep": sweep or AXES, "refine": refine}
-    return Study.from_dict(content, BENT)
+    return Study.from_dict(content, scene)
 
 
 def test_the_data_set_has_the_runs_as_points_and_the_error_of_each_cell(store: Store) -> None:
@@ -342,7 +351,7 @@ def test_the_data_set_has_the_runs_as_points_and_the_error_of_each_cell(store: S
 
 
 def test_one_value_of_a_variable_with_dimensions_is_refined(store: Store) -> None:
-    asked = study({"of": [PRESSURE]}, half_width=2.0)
+    asked = study({"of": [PRESSURE]}, scene=WHOLE, half_width=2.0)
     search_here(asked, store)
     name = "contact_pressure_loaded_largest"
     with open_study(store.directory) as dataset:
@@ -352,11 +361,11 @@ def test_one_value_of_a_variable_with_dimensions_is_refined(store: Store) -> Non
         assert found[name].item() == pytest.approx(100.0 * 0.3 * 1.1 + 2.0)
     nowhere = PRESSURE | {"at": {"stage": "cold"}}
     with pytest.raises(StudyError, match="has no stage = cold; it has loaded, unloaded"):
-        search_here(study({"of": [nowhere]}, half_width=2.0), store)
+        search_here(study({"of": [nowhere]}, scene=WHOLE, half_width=2.0), store)
 
 
 def test_an_interrupted_refinement_goes_on_and_asks_for_the_same_runs(tmp_path: Path) -> None:
-    asked = study({"of": [OF, PRESSURE], "halvings": 1}, trouble="limit")
+    asked = study({"of": [OF, PRESSURE], "halvings": 1}, scene=WHOLE, trouble="limit")
     at_once = search_here(asked, Store(tmp_path / "a"))
     store, parts = Store(tmp_path / "b"), []
     while some := search_here(asked, store, most=7):

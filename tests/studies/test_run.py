@@ -159,23 +159,16 @@ def test_a_study_shares_the_runs_of_another(store: Store, tmp_path: Path) -> Non
 def test_stopping_keeps_finished_runs_and_leaves_the_rest_missing(store: Store) -> None:
     study = fake_study(sweep={"friction": [i / 10 for i in range(10)]}, seconds=1.0)
     finished: list[str] = []
-    asked: list[float] = []
 
     def hear(event: StudyEvent) -> None:
         if event.kind == "run":
             finished.append(event.run)
 
-    def stop() -> bool:
-        if finished and not asked:
-            asked.append(time.monotonic())
-        return bool(finished)
-
-    outcome = run_study(study, store, workers=2, on_event=hear, should_stop=stop)
+    outcome = run_study(study, store, workers=2, on_event=hear, should_stop=lambda: bool(finished))
     assert outcome.stopped
-    assert 1 <= outcome.counts["ok"] < 10
+    assert 1 <= outcome.counts["ok"] <= 4, "those that were running, and no more"
     assert outcome.counts["missing"] == 10 - outcome.counts["ok"]
     assert outcome.failed == []
-    assert time.monotonic() - asked[0] < 5.0
     assert {path.stem for path in (store.directory / "runs").iterdir()} == set(outcome.computed)
     with open_study(outcome.dataset) as together:
         assert (together["status"] == "missing").sum() == outcome.counts["missing"]

@@ -34,7 +34,7 @@ def test_each_path_ends_as_on_a_worker_and_tells_its_progress(store: Store) -> N
     assert again.computed == [] and again.counts == outcome.counts
 
 
-@pytest.mark.parametrize("scene", ["fake", "followed"])
+@pytest.mark.parametrize("scene", ["numbers", "followed"])
 def test_a_goal_is_searched(store: Store, scene: str) -> None:
     """The pressure is 100 load_ratio (1 + friction) + 50; `followed` goes on along one path."""
     goal = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}

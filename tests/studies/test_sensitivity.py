@@ -224,7 +224,8 @@ def test_methods_of_the_library_order_the_parameters_too(method: str) -> None:
     found = sensitivity(dataset, OF, method=method)
     assert np.random.get_state()[2] == before  # noqa: NPY002
     name = {"delta": "delta_balanced", "pawn": "median", "rbd_fast": "S1"}[method]
-    assert found.equals(sensitivity(dataset, OF, method=method))
+    few = dataset.isel(point=slice(64))
+    assert sensitivity(few, OF, method=method).equals(sensitivity(few, OF, method=method))
     x, y, z = found[name].values
     assert min(x, y) > z
     if method == "rbd_fast":
