@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import httpx
 import pytest
@@ -335,9 +336,10 @@ def behind(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 def logged(server: Server) -> str:
     """Return the log of a service with a line for each request that was answered."""
-    server.client.get("/health", headers={"x-request-id": "last"})
+    last = uuid4().hex
+    server.client.get("/health", headers={"x-request-id": last})
     log = server.home / "service.log"
-    wait_until(lambda: "request=last" in log.read_text())
+    wait_until(lambda: f"request={last}" in log.read_text())
     return log.read_text()
 
 

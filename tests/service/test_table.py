@@ -27,7 +27,7 @@ from studies import Store, open_netcdf, open_study
 from studies.definition.identity import content_id
 from studies.views.table import RunTable, column_of
 from studies.views.written import FORMS
-from tests.counted import counted
+from tests.counted import counted, growth
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE
 
@@ -329,10 +329,20 @@ def test_a_study_that_cannot_be_read_leaves_the_list(
 
 @pytest.mark.parametrize("text", ["0 .. 1 in " + "9" * 5000, "." * 60_000, "1," * 60_000])
 def test_a_long_text_in_a_field_is_told_soon(text: str) -> None:
+    study_of("fake", FAKE, {})  # what is looked up once
     with counted() as calls:
         _, wrong = study_of("fake", FAKE, {"p.friction": [text]})
     assert "friction" in wrong
-    assert calls < 1_000, "not in proportion to its square"
+    assert calls < 1_000, "not in proportion to its length"
+
+
+def test_the_time_for_a_long_text_does_not_grow_with_its_square() -> None:
+    def work(length: int) -> None:
+        for _ in range(20):
+            study_of("fake", FAKE, {"p.friction": ["." * length]})
+
+    work(1)
+    assert growth(work, 1_000) < 8
 
 
 def test_a_form_tells_that_there_is_no_room(seen: Seen, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import time
-
 import pytest
 
 from studies import StudyError
 from studies.toml import DEEPEST, check_depth, toml_of
+from tests.counted import counted, growth
 
 
 @pytest.mark.parametrize(
@@ -23,23 +22,18 @@ from studies.toml import DEEPEST, check_depth, toml_of
     ],
     ids=["key", "header", "lists", "tables", "quotes", "ticks", "both"],
 )
-def test_what_is_nested_too_deep_is_refused(text: str) -> None:
-    with pytest.raises(StudyError, match=f"f.toml.* deep; at most {DEEPEST} are allowed"):
+def test_what_is_nested_too_deep_is_refused_at_once(text: str) -> None:
+    refused = pytest.raises(StudyError, match=f"f.toml.* deep; at most {DEEPEST} are allowed")
+    with counted() as calls, refused:
         toml_of(text.encode(), "file", "f.toml")
+    assert calls < 2_000, "the key took 70 s"
 
 
 @pytest.mark.parametrize(
-    "text", ['"""\\' * 50_000, '"\\"' * 75_000, "a \t" * 75_000, "'" * 225_001]
+    ("part", "length"), [('"""\\', 50_000), ('"\\"', 75_000), ("a \t", 75_000), ("'", 225_001)]
 )
-def test_the_time_to_find_depth_grows_with_the_length_alone(text: str) -> None:
-    """Sixteen times the time for four times the length is growth with its square."""
-
-    def seconds(text: str) -> float:
-        began = time.process_time()
-        check_depth(text)
-        return time.process_time() - began
-
-    assert min(seconds(4 * text) for _ in range(3)) < 8 * min(seconds(text) for _ in range(3))
+def test_the_time_to_find_depth_grows_with_the_length_alone(part: str, length: int) -> None:
+    assert growth(lambda length: check_depth(part * length), length) < 8
 
 
 def test_brackets_and_dots_in_texts_and_remarks_do_not_count() -> None:
