@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -351,7 +352,8 @@ def test_the_time_left_is_told_at_the_pace_so_far(
     screen: io.StringIO, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study, clock = fake_study(), iter((0.0, 0.0, 3600.0, 5400.0, 7290.0))
-    monkeypatch.setattr("residua.progress.time.monotonic", lambda: next(clock))
+    # not the clock of other threads: a cluster that tests share would end
+    monkeypatch.setattr("residua.progress.time", SimpleNamespace(monotonic=lambda: next(clock)))
     monkeypatch.setattr("residua.progress._REDRAW", -1.0)
     first = next(study.cases())
     bar = Progress(study, screen)
