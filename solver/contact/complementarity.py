@@ -27,6 +27,8 @@ _MAX_PASSES = 20
 _LESS = 0.1
 """Ratio of a friction bound to the one before, with which friction alone bore the load."""
 _TOLERANCE = LEAST_FRICTION
+_FAR = 1e-4
+"""Share of the largest gap that lengths of what touches are not below, for its rounding."""
 _ROUNDING = 1e-14
 _ACCURATE = 1e-6
 _CONSISTENT = 1e-12
@@ -159,8 +161,9 @@ def _active_sets(
     """
     n, lines, points = problem.n, problem.lines, np.arange(problem.n)
     rough, steepest = lines.rough, lines.slope.max(axis=0)
-    force, _ = problem.scales
-    tiny_force, tiny_length = _TOLERANCE * force, _TOLERANCE * problem.near
+    force, length = problem.scales
+    near = max(-problem.offset[:n].min(), _FAR * length)  # of what touches
+    tiny_force, tiny_length = _TOLERANCE * force, _TOLERANCE * near
     # with little friction: a small part of the tangential force, but not less than rounding
     tiny_shear = force * np.clip(_ACCURATE * steepest, _ROUNDING, _TOLERANCE)
     status = start.copy()

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 """Status of a contact point."""
-_FAR = 1e-4
-"""Least length of what touches, over the largest gap."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,11 +73,6 @@ class ContactProblem:
         force = np.abs(self.balance).sum()
         length = max(length, force * compliance * 1e-3, 1e-30)
         return max(force, length / compliance), length
-
-    @property
-    def near(self) -> float:
-        """A length [mm] of what touches: points far apart count by their rounding alone."""
-        return max(-self.offset[: self.n].min(), _FAR * self.scales[1])
 
 
 @dataclass(frozen=True, slots=True)
