@@ -32,14 +32,13 @@ def graded(length: float, smallest: float, ratio: float, largest: float) -> Arra
     if not ratio >= 1:
         raise ModelError("ratio", ratio, "must be at least 1")
     sizes: list[float] = []
-    total, size, end, most = 0.0, smallest, length * (1 - 1e-9), max(largest, smallest)
-    while total < end:
+    total, size = 0.0, smallest
+    while total < length * (1 - 1e-9):
         if len(sizes) == _MOST:
             allowed = f"must make at most {_MOST} elements along {length:g} mm"
             raise ModelError("size", smallest, allowed)
-        step = size if size < most else most  # a call of `min` would take half of the time
-        sizes.append(step)
-        total += step
+        sizes.append(min(size, max(largest, smallest)))
+        total += sizes[-1]
         size *= ratio
     nodes = np.concatenate([[0.0], np.cumsum(sizes)])
     return np.asarray(nodes * (length / nodes[-1]))

@@ -7,8 +7,7 @@ numbers only.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import UnionType
 from typing import Annotated, Any, TypeAlias, Union, get_args, get_origin
 
@@ -99,8 +98,7 @@ def _entry(options: Options, table: Mapping[str, Any], key: str) -> Options:
             fields = option.model_fields
             kinds = get_args(fields["kind"].annotation) if "kind" in fields else ()
             if key in fields and (not kinds or table.get("kind") in kinds):
-                hint: Any = fields[key].annotation
-                found += _options(hint, option.unit_of(key, table))
+                found += _options(fields[key].annotation, option.unit_of(key, table))
     return found
 
 
@@ -116,12 +114,13 @@ def _item(options: Options, k: int) -> Options:
     return found
 
 
-@cache
-def _options(hint: Any, unit: str | None) -> Options:
-    """Return the types that a value may have, each with the unit of its numbers."""
+def _options(hint: Any, unit: str | None) -> Iterator[tuple[Any, str | None]]:
+    """Yield the types that a value may have, each with the unit of its numbers."""
     if get_origin(hint) is Annotated:
         inner, *marks = get_args(hint)
-        return _options(inner, unit_in(marks, unit))
-    if get_origin(hint) in (Union, UnionType):
-        return tuple(option for each in get_args(hint) for option in _options(each, unit))
-    return ((hint, unit),)
+        yield from _options(inner, unit_in(marks, unit))
+    elif get_origin(hint) in (Union, UnionType):
+        for each in get_args(hint):
+            yield from _options(each, unit)
+    else:
+        yield hint, unit
