@@ -77,8 +77,7 @@ def test_eight_parts_compute_each_run_once_although_two_are_killed(
 ) -> None:
     of, out = study(tmp_path, 0.1), tmp_path / "out"
     if asks:
-        scene = "numbers" if asks == "goal" else "fake"
-        of = study(tmp_path, 0.05, scene=scene, **{asks: ASKS[asks]}, sweep=SWEPT[asks])
+        of = study(tmp_path, 0.05, **{asks: ASKS[asks]}, sweep=SWEPT[asks])
     parts = started(of, out, 8)
 
     while len(runs(out)) < 4:
@@ -97,8 +96,7 @@ def test_eight_parts_compute_each_run_once_although_two_are_killed(
     assert outcome.computed == []
     assert len(begun(tmp_path)) == done
     again = [value for value, times in begun(tmp_path).items() if times > 1]
-    longest = 5 if asks == "goal" else 4  # values of a path, of a search those of a round
-    assert len(again) <= 2 * longest, "only what the two had begun is begun again"
+    assert len(again) <= 2 * 4, "only what the two had begun is begun again"
     assert not (out / "claims").exists()
     assert not list(out.rglob("*.part"))
     with open_study(out) as dataset:
