@@ -189,12 +189,16 @@ class Followed(Canned):
             yield from self.records(parameters, [value], monitor)
 
 
+def bare(record: Record) -> Record:
+    """Return a record without fields: a run is written and read twice as fast."""
+    return replace(record, coordinates={}, fields={})
+
+
 def numbers(
     parameters: FakeParameters, values: Sequence[float], monitor: Monitor
 ) -> Iterator[Record]:
-    """Yield the same records without fields: a run is written and read twice as fast."""
-    for each in path(parameters, values, monitor):
-        yield replace(each, coordinates={}, fields={})
+    """Yield the same records without fields."""
+    yield from map(bare, path(parameters, values, monitor))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -29,7 +29,7 @@ from studies.definition.cells import weights
 from studies.definition.quantity import RunNumber
 from studies.definition.refine import Refine, Refinement, Wanted
 from studies.execution.asking import Asking
-from tests.studies.fakes import FAKE, Canned, FakeParameters, record
+from tests.studies.fakes import FAKE, Canned, FakeParameters, bare, record
 from tests.studies.killed import runs_before_a_kill
 from tests.studies.test_goal import search_here
 
@@ -299,8 +299,7 @@ def bent(parameters: FakeParameters, values: Any, monitor: Any) -> Iterator[Reco
 
 def numbers(parameters: FakeParameters, values: Any, monitor: Any) -> Iterator[Record]:
     """Yield the same records without fields."""
-    for each in bent(parameters, values, monitor):
-        yield replace(each, coordinates={}, fields={})
+    yield from map(bare, bent(parameters, values, monitor))
 
 
 BENT = Canned(
