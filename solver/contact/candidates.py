@@ -320,14 +320,16 @@ def find_candidates(
         shear = system.bound(pair, pairing, start, time).at(at)
         lines.append(shear.over(pairing.area[at]))
         for side, (number, part, surface) in enumerate(interface.sides):
+            closing = pairing.closing[side][at if part.rigid.shape[1] else []]
             block = np.zeros((m, 2 * len(surface.nodes)))
             block[normal] = pairing.normal[side][at]
             if frictional:
                 block[tangent] = pairing.tangent[side][at]
-            pieces[number].append(ContactRows(*part.pull_back(surface, u[number], block, n)))
-            if part.rigid.shape[1]:
-                closing = pairing.closing[side][at]
-                dofs, closing = part.pull_back(surface, u[number], closing, len(at))
+            every, gaps = np.vstack([closing, block]), len(closing) + n
+            dofs, every = part.pull_back(surface, u[number], every, gaps)
+            closing, block = np.split(every, [len(closing)])
+            pieces[number].append(ContactRows(dofs, block))
+            if len(closing):
                 turned[number][normal] += closing @ part.rigid[dofs]
             if left is not None and left.any():
                 rows = left[:1] @ pairing.normal[side], left[1:] @ pairing.tangent[side]

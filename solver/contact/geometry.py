@@ -22,6 +22,8 @@ from solver.fem.surface import at_vertices
 from solver.mesh.edges import shape_functions
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from solver.fem.surface import Surface
@@ -80,15 +82,21 @@ class Pairing:
         )
 
 
-def _powers(x: Array, edges: Numbers, origin: Array | float = 0.0) -> Array:
-    """Return the positions on edges (n, 2 or 3) by powers of xi, constant first: (2, 2 or 3, n).
+def _powers(x: Array, surface: Surface) -> Array:
+    """Return the positions on edges by powers of xi, constant first: (2, 2 or 3, n_edges).
 
-    ``x`` (2, n_nodes) are the nodes; positions are relative to ``origin`` (2, n).
+    ``x`` (2, n_nodes) are the nodes of the surface.
     """
-    start, end, *middle = np.moveaxis(x[:, edges], -1, 0)
+    start, end, *middle = np.moveaxis(x[:, surface.edges], -1, 0)
     mean, half = (start + end) / 2, (end - start) / 2
-    at = middle[0] if middle else mean
-    return np.stack([at - origin, half, *(mean - each for each in middle)], axis=1)
+    return np.stack([*(middle or [mean]), half, *(mean - each for each in middle)], axis=1)
+
+
+def _from(points: Array, powers: Array) -> Array:
+    """Return the powers (2, 2 or 3, n) of positions relative to points (2, n)."""
+    out = powers.copy()
+    out[:, 0] -= points
+    return out
 
 
 def _value(powers: Array, xi: Array) -> Array:
@@ -133,27 +141,26 @@ def _project_on_slave(
     x: Array,
     normals: Array,
     slave: Surface,
+    powers: Array,
     points: Array,
 ) -> tuple[Numbers, Array]:
     """Return edges, and xi on them, where the slave's normal passes through a point."""
     ends = x[:, slave.edges[:, :2].T]
     edge, point = _near(*_cross(normals[..., None], ends[..., None] - points[:, None, None]))
-    offset = _powers(x, slave.edges[edge], points[:, point])
+    offset = _from(points[:, point], powers[..., edge])
     n0, n1 = normals[:, 0, edge], normals[:, 1, edge]
-    powers = np.zeros((offset.shape[1] + 1, len(edge)))  # the normal is linear along an edge
-    powers[:-1] += _cross((n0 + n1)[:, None] / 2, offset)
-    powers[1:] += _cross((n1 - n0)[:, None] / 2, offset)
-    return edge, _root(powers)
+    beside = np.zeros((offset.shape[1] + 1, len(edge)))  # the normal is linear along an edge
+    beside[:-1] += _cross((n0 + n1)[:, None] / 2, offset)
+    beside[1:] += _cross((n1 - n0)[:, None] / 2, offset)
+    return edge, _root(beside)
 
 
-def _project_on_master(
-    x: Array,
-    edges: Numbers,
-    points: Array,
-    normals: Array,
-) -> tuple[Array, Array]:
-    """Return eta (n,) and the distance along ``normals`` of points (2, n) on master edges."""
-    offset = _powers(x, edges, points)
+def _project_on_master(powers: Array, points: Array, normals: Array) -> tuple[Array, Array]:
+    """Return eta (n,) and the distance of points (2, n) along ``normals`` on one edge each.
+
+    ``powers`` (2, 2 or 3, n) are those of these edges of the master.
+    """
+    offset = _from(points, powers)
     eta = _root(_cross(normals[:, None], offset))
     return eta, (normals * _value(offset, eta)).sum(axis=0)
 
@@ -161,6 +168,7 @@ def _project_on_master(
 def _nearest(
     x: Array,
     master: Surface,
+    powers: Array,
     points: Array,
     normals: Array,
     reach: float,
@@ -175,7 +183,7 @@ def _nearest(
     chord = x[:, master.edges[edge, 1]] - x[:, master.edges[edge, 0]]
     opposed = _cross(chord, normals[:, point]) > _OPPOSED * np.linalg.norm(chord, axis=0)
     point, edge = point[opposed], edge[opposed]
-    eta, along = _project_on_master(x, master.edges[edge], points[:, point], normals[:, point])
+    eta, along = _project_on_master(powers[..., edge], points[:, point], normals[:, point])
     distance = np.full((points.shape[1], len(master.edges)), np.inf)
     met = np.abs(eta) <= 1 + 1e-6
     distance[point, edge] = np.where(met & (along > -reach), np.abs(along), np.inf)
@@ -210,38 +218,39 @@ def pair(
     in place of normal and tangent.
     """
     xs, xm = slave.X + slave_u, master.X + master_u
+    own, its = _powers(xs, slave), _powers(xm, master)
     normals = end_normals(xs, slave)
-    cut, xi = _project_on_slave(xs, normals, slave, xm[:, master.vertices])
+    cut, xi = _project_on_slave(xs, normals, slave, own, xm[:, master.vertices])
     edge, start, end = _segments(cut, xi, len(slave.edges))
-
-    along = _powers(xs, slave.edges)
 
     def on_slave(e: Numbers, at: Array) -> tuple[Array, Array]:
         n = (1 - at) / 2 * normals[:, 0, e] + (1 + at) / 2 * normals[:, 1, e]
-        return _value(along[..., e], at), n / np.sqrt(n[0] ** 2 + n[1] ** 2)
+        return _value(own[..., e], at), n / np.sqrt(n[0] ** 2 + n[1] ** 2)
 
     middle, n = on_slave(edge, (start + end) / 2)
-    partner, facing = _nearest(xm, master, middle, n, reach)
+    partner, facing = _nearest(xm, master, its, middle, n, reach)
     edge, partner, start, end = edge[facing], partner[facing], start[facing], end[facing]
 
-    at = ((start + end)[:, None] + (end - start)[:, None] * _GAUSS_XI) / 2
-    edge, partner = (np.repeat(a, len(_GAUSS_XI)) for a in (edge, partner))
+    at = (((start + end)[:, None] + (end - start)[:, None] * _GAUSS_XI) / 2).ravel()
     weight = ((end - start)[:, None] / 2 * _GAUSS_WEIGHTS).ravel()
-    at = at.ravel()
-    point, n = on_slave(edge, at)
-    eta, distance = _project_on_master(xm, master.edges[partner], point, n)
+    each, its = np.repeat(edge, len(_GAUSS_XI)), its[..., np.repeat(partner, len(_GAUSS_XI))]
+    point, n = on_slave(each, at)
+    eta, distance = _project_on_master(its, point, n)
     if tied:
         ways = np.eye(2)[..., None] + 0 * n
     else:
-        x, y = _value(_slopes(_powers(xm, master.edges[partner])), eta)
+        x, y = _value(_slopes(its), eta)
         facing_master = np.stack([-y, x]) / (n[1] * x - n[0] * y)
         ways = np.stack([n, [n[1], -n[0]], facing_master])
-    return _integrate(slave, xs, master, edge, partner, at, eta, ways, distance, weight)
+    areas = [
+        weight * _area_per_xi(slave, powers[..., each], at)
+        for powers in (_powers(slave.X, slave), own)
+    ]
+    return _integrate(slave, master, edge, partner, at, eta, ways, distance, weight, areas)
 
 
 def _integrate(
     slave: Surface,
-    xs: Array,
     master: Surface,
     edge: Numbers,
     partner: Numbers,
@@ -250,32 +259,44 @@ def _integrate(
     ways: Array,
     distance: Array,
     weight: Array,
+    areas: Sequence[Array],
 ) -> Pairing:
-    """Sum the integration points into rows, one per slave vertex, along ways (2 or 3, 2, n)."""
-    count, rows, vertex = len(ways), len(slave.edges) + 1, np.stack([edge, edge + 1])
-    bare = np.stack([(1 - xi) / 2, (1 + xi) / 2]) * weight
-    hats, deformed_hats = (bare * _area_per_xi(slave, x, edge, xi) for x in (slave.X, xs))
+    """Sum pieces of edges into rows, one per slave vertex, along ways (2 or 3, 2, n_points).
+
+    ``edge`` and ``partner`` belong to pieces, all else to their integration points. ``weight`` is
+    that of xi, ``areas`` are those of the points over the reference and over the current area.
+    """
+    points = len(edge), len(_GAUSS_XI)
+    xi, eta, distance, weight, area, deformed = (
+        of.reshape(points) for of in (xi, eta, distance, weight, *areas)
+    )
+    ways = ways.reshape(*ways.shape[:2], *points)
+    rows, vertex = len(slave.edges) + 1, np.stack([edge, edge + 1])
+    hats = np.stack([(1 - xi) / 2, (1 + xi) / 2])  # of the vertices of a piece at its points
 
     def summed(values: Array) -> Array:
-        return np.asarray(np.bincount(vertex.ravel(), values.ravel(), rows), dtype=float)
+        pieces = (hats * values).sum(axis=-1)
+        return np.asarray(np.bincount(vertex.ravel(), pieces.ravel(), rows), dtype=float)
 
-    area, deformed, gap, facing = map(summed, (hats, deformed_hats, hats * distance, bare))
-    covered = area > _MIN_COVERED * slave.hats
-    scale = np.where(covered, 1 / np.where(covered, area, 1.0), 0.0)
-    means = hats * scale[vertex]
-    along = (means * ways[:, :, None]).transpose(0, 2, 3, 1)  # way, vertex, point, axis
-    first = (np.arange(count)[:, None, None] * rows + vertex)[..., None, None]
+    whole, current, gap, facing = map(summed, (area, deformed, area * distance, weight))
+    covered = whole > _MIN_COVERED * slave.hats
+    scale = np.where(covered, 1 / np.where(covered, whole, 1.0), 0.0)
+    means = hats * area * scale[vertex][..., None]
+    along = np.einsum("vpg,wapg->pwvag", means, ways)
+    first = (np.arange(len(ways))[:, None] * rows + vertex.T[:, None])[..., None, None]
     sides = []
     for surface, own, at, sign in ((slave, edge, xi, -1.0), (master, partner, eta, 1.0)):
         N, size = sign * shape_functions(at, surface.edges.shape[1]), len(surface.nodes)
-        place = 2 * (first * size + surface.edges[own][..., None]) + np.arange(2)
-        value = along[..., None, :] * N[..., None]
-        each = np.bincount(place.ravel(), value.ravel(), 2 * count * rows * size)
-        sides.append(each.reshape(count, rows, 2 * size))
+        nodes = surface.edges[own][:, None, None, None]
+        place = 2 * (first * size + nodes) + np.arange(2)[:, None]
+        value = along @ N[:, None, None]  # piece, way, vertex, axis, node
+        each = np.bincount(place.ravel(), value.ravel(), 2 * len(ways) * rows * size)
+        sides.append(each.reshape(len(ways), rows, 2 * size))
+    both = (hats[0] * hats[1] * area).sum(axis=-1)
     return Pairing(
-        area=np.where(covered, area, 0.0),
-        deformed=np.where(covered, deformed, 0.0),
-        shared=np.asarray(np.bincount(edge, hats[0] * (1 + xi) / 2, rows - 1), dtype=float),
+        area=np.where(covered, whole, 0.0),
+        deformed=np.where(covered, current, 0.0),
+        shared=np.asarray(np.bincount(edge, both, rows - 1), dtype=float),
         covered=facing / at_vertices(np.ones(len(slave.edges))),
         length=slave.spacing,
         gap=np.where(covered, gap * scale, np.inf),
@@ -285,8 +306,7 @@ def _integrate(
     )
 
 
-def _area_per_xi(surface: Surface, x: Array, edge: Numbers, xi: Array) -> Array:
-    """Return the derivative of area along edges, whose nodes are at x (2, n_nodes) [mm2]."""
-    powers = _powers(x, surface.edges)[..., edge]
+def _area_per_xi(surface: Surface, powers: Array, xi: Array) -> Array:
+    """Return the derivative of area along edges, whose powers are (2, 2 or 3, n) [mm2]."""
     along = _value(_slopes(powers), xi)
     return np.asarray(np.hypot(*along) * surface.depth(_value(powers, xi)))
