@@ -150,9 +150,9 @@ class PrismTrack:
 
     # -- what a pass asks for ------------------------------------------------------------------
 
-    @cached_property
+    @property
     def at_rest(self) -> PrismField:
-        """The prism without eigenstress and load."""
+        """The prism without eigenstress and load; kept, it would hold its prism in a circle."""
         return PrismField(self)
 
     def flow(self, law: Law, before: PrismState, added: Array, parts: int) -> PrismFlow:

@@ -165,6 +165,25 @@ def test_no_factor_outlives_a_path_and_what_is_kept(scene: str, passes: float) -
     assert not {id(each) for each in factors()} - {id(each) for each in before}
 
 
+@pytest.mark.solves
+def test_the_factors_of_a_prism_end_with_it() -> None:
+    """No circle of references holds them until the garbage collector comes by."""
+    from solver.linear.pardiso import Pardiso
+
+    known = SCENES["raceway"]
+    gc.collect()
+    before = {id(each) for each in gc.get_objects() if isinstance(each, Pardiso)}
+    gc.disable()
+    try:
+        for record in known.path(known.parameters(accuracy="draft"), [1], lambda share: None):
+            del record
+        memory._evict(0)
+        left = {id(each) for each in gc.get_objects() if isinstance(each, Pardiso)}
+    finally:
+        gc.enable()
+    assert not left - before
+
+
 @pytest.mark.parametrize(
     "text, size", [("500MB", 500 * MB), ("2 GiB", 2 << 30), ("1.5kB", 1500), ("0B", 0)]
 )
