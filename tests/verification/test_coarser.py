@@ -17,12 +17,12 @@ from studies.scenes.registry import scene_named
 from tests.reference.flattening import HertzBall
 from tests.verification.closed_forms import carter_creepage, plane_strain_modulus
 from tests.verification.scene_files import (
-    FOLDER,
     NU,
     RADIUS,
     STAGES,
     E,
     cattaneo,
+    changed,
     fretting,
     pin,
     shear,
@@ -38,16 +38,6 @@ Errors = dict[str, float]
 
 def off(found: float, wanted: float) -> float:
     return abs(found / wanted - 1)
-
-
-def changed(name: str, old: str, new: str, folder: Path) -> Path:
-    """Return a folder with the scene files, of which one is changed."""
-    for file in FOLDER.iterdir():
-        (folder / file.name).write_bytes(file.read_bytes())
-    text = (FOLDER / name).read_text()
-    assert old in text
-    (folder / name).write_text(text.replace(old, new))
-    return folder
 
 
 def pressed_pad(folder: Path, steps: int, sides: int) -> tuple[Record, Errors]:
