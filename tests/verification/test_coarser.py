@@ -42,7 +42,7 @@ def off(found: float, wanted: float) -> float:
 
 def pressed_pad(folder: Path, steps: int, sides: int) -> tuple[Record, Errors]:
     """A pad pressed, pushed, pulled back and pushed again: Cattaneo and Mindlin."""
-    changed("fretting.toml", "increments = 8", f"increments = {8 // steps}", folder)
+    changed("fretting.toml", "increments = 8", f"increments = {4 // steps}", folder)
     record = fretting(element=0.1 * sides, folder=folder)
     if not record.status.solved:
         return record, {}
