@@ -77,7 +77,10 @@ class Case:
 def plan(quick: bool) -> Iterator[tuple[Case, tuple[Case, ...]]]:
     """Yield the reference of each series, and its cases."""
     if quick:
-        cases = [Case("section", f"{h:.3g} mm", h=h, spacing=2.0, size=h) for h in (10 / 3, 2.0)]
+        cases = [
+            Case("section", f"{h:.3g} mm", h=h, spacing=2.0, levels=0, size=h)
+            for h in (10 / 3, 2.0)
+        ]
         yield replace(cases[-1], h=10 / 7), tuple(cases)
         return
     yield Case("section", "", h=0.5), tuple(

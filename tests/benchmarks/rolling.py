@@ -18,7 +18,7 @@ from tests.benchmarks.measure import Point, timed
 from tests.benchmarks.steady import LOADS, graded_by
 
 BASE = RollingParameters(track=20.0)
-QUICK = {"track": 8.0, "advance_step": 2.0}
+QUICK = {"track": 8.0, "advance_step": 4.0, "press_steps": 4, "unload_steps": 1}
 SERIES = ("mesh", "advance", "growth")
 FIRST_ROW = "first row"
 DEPTHS = (2.0, 5.0)

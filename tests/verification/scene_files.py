@@ -15,6 +15,17 @@ from tests.verification.closed_forms import plane_strain_modulus
 FOLDER = Path(__file__).parents[2] / "data/scenes"
 E, NU = 2e5, 0.3
 
+
+def changed(name: str, old: str, new: str, folder: Path) -> Path:
+    """Return a folder with the scene files, of which one is changed."""
+    for file in FOLDER.iterdir():
+        (folder / file.name).write_bytes(file.read_bytes())
+    text = (FOLDER / name).read_text()
+    assert old in text
+    (folder / name).write_text(text.replace(old, new))
+    return folder
+
+
 # -- fretting.toml: pressed, then a tangential force forth, back and forth again ----------------
 
 # the pad is 160 mm wide and high: one of 20 mm bends, and its pressure is not quite even

@@ -21,7 +21,7 @@ LITTLE, MUCH, BACK = "little", "much", "back"
 
 @pytest.fixture(scope="module")
 def solution():
-    """Return the solution: approach in 4 increments, then a push and a smaller one back.
+    """Return the solution: approach in 2 increments, then a push and a smaller one back.
 
     Motions of the upper cylinder's flat side are given, for its forces would turn it.
     """
@@ -44,9 +44,9 @@ def solution():
     # small sliding would count some of the approach as slip: its normals are those before loading
     pair = ContactPair(slave=("upper", "bottom"), master=("lower", "top"), friction=FRICTION,
                        sliding="finite")  # fmt: skip
-    stages = (Stage(name="pressed", target=1.0, steps=4),
-              Stage(name=LITTLE, target=1.5, steps=6), Stage(name=MUCH, target=2.0, steps=6),
-              Stage(name=BACK, target=3.0, steps=12))  # fmt: skip
+    stages = (Stage(name="pressed", target=1.0, steps=2),
+              Stage(name=LITTLE, target=1.5, steps=3), Stage(name=MUCH, target=2.0, steps=3),
+              Stage(name=BACK, target=3.0, steps=6))  # fmt: skip
     return solve(Model(bodies=(upper, lower), contacts=(pair,)), stages=stages)
 
 

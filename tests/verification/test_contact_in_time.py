@@ -97,7 +97,7 @@ def test_friction_of_an_oblique_press_hardly_depends_on_increments() -> None:
 @cache
 def leaned(slave: str, aside: float, increments: int) -> Solution:
     """Move an elastic arc down on a plane, and aside by a given way meanwhile."""
-    size = 0.05
+    size = 0.1
     fine = np.arange(-1.0, 1.001, size)
     far = graded(10.0, size, 1.3, 4.0)[1:]
     x = np.concatenate([fine[0] - far[::-1], fine, fine[-1] + far])

@@ -6,12 +6,23 @@ import numpy as np
 import pytest
 
 from solver import Record, Status
-from tests.verification.scene_files import BACK, PUSH, STAGES, cattaneo, forces, fretting, shear
+from tests.verification.scene_files import (
+    BACK,
+    PUSH,
+    STAGES,
+    cattaneo,
+    changed,
+    forces,
+    fretting,
+    shear,
+)
 
 
 @pytest.fixture(scope="module")
-def record() -> Record:
-    found = fretting(element=0.03)
+def record(tmp_path_factory: pytest.TempPathFactory) -> Record:
+    folder = tmp_path_factory.mktemp("scenes")
+    changed("fretting.toml", "increments = 8", "increments = 2", folder)
+    found = fretting(element=0.036, folder=folder)
     assert found.status is Status.OK, found.message
     return found
 

@@ -40,9 +40,15 @@ def yielded(solution):
     }
 
 
+def told(**fields):
+    """Return parameters; half the increments would put ripple in what does not harden."""
+    step = {} if fields.get("hardening", "none") == "none" else {"load_step": 0.1}
+    return PunchParameters(**(USUAL | step | fields))
+
+
 def press(**fields):
     """What is asked of a punch, solved once however it is told."""
-    return pressed(PunchParameters(**(USUAL | fields)))
+    return pressed(told(**fields))
 
 
 @cache
@@ -157,7 +163,7 @@ def test_default_half_plane_under_no_friction_yields_in_a_few_points_of_ripple()
 @pytest.mark.parametrize("hardening", ["none", "isotropic"])
 def test_residual_tension_in_the_half_plane_grows_with_friction(hardening):
     """sigma_x at 0.005 a, friction 0, 0.1 ... 0.4, without hardening and with isotropic:
-    0, 187, 272, 351, 359 and 7, 145, 212, 260, 301 MPa. With hardening the pressure at a
+    0, 187, 272, 351, 359 and 7, 144, 212, 263, 300 MPa. With hardening the pressure at a
     frictionless corner exceeds Re, and a spot of the half-plane yields.
     """
     values = [
@@ -168,7 +174,7 @@ def test_residual_tension_in_the_half_plane_grows_with_friction(hardening):
 
 
 def test_residual_stress_of_the_punch_turns_to_compression_as_friction_grows():
-    """sigma_x at 0.028 a, isotropic hardening, friction 0, 0.1 ... 0.4: 23, 24, -12, -54, -52 MPa.
+    """sigma_x at 0.028 a, isotropic hardening, friction 0, 0.1 ... 0.4: 22, 24, -12, -56, -52 MPa.
 
     The figures stand: quad9 and tri6, half and double elements, a punch four times as high and
     increments five times as small move them by 3 MPa at most. Published is compression that
@@ -186,7 +192,7 @@ def test_residual_stress_of_the_punch_turns_to_compression_as_friction_grows():
 
 
 def test_hardening_lowers_the_residual_tension_of_the_half_plane():
-    """At friction 0.4: 359 MPa without, 301 with isotropic, 263 with kinematic hardening."""
+    """At friction 0.4: 359 MPa without, 300 with isotropic, 263 with kinematic hardening."""
     by_law = [
         press(friction=0.4, hardening=h, smallest_element=2e-3).half_plane
         for h in ("none", "isotropic", "kinematic")
@@ -207,7 +213,7 @@ def test_residual_compression_of_the_punch_is_larger_in_plane_strain():
 
 
 def test_hardening_with_friction_makes_the_pressure_climb_to_the_corner():
-    """Without friction it stays finite: 1.87 against 2.70 p0 a thousandth of a from the corner."""
+    """Without friction it stays finite: 1.88 against 2.73 p0 a thousandth of a from the corner."""
     free, rough = (press(friction=f, hardening="isotropic") for f in (0.0, 0.4))
     near = (rough.r > 0) & (rough.r < 0.03)
     assert (np.diff(rough.pressure[near]) < 0).all()
@@ -241,9 +247,9 @@ def test_accuracy_measures_settle_under_refinement():
     """Smallest element 4e-3, 2e-3, 1e-3 a; isotropic hardening, friction 0.4.
 
     ============  ======  ======  ======
-    half-plane     305.6   300.9   304.8  MPa at 0.005 a (304.3 with 5e-4)
-    punch          -52.0   -52.1   -51.5  MPa at 0.028 a (-51.2 with 5e-4)
-    plastic work   10.58   10.59   10.59  N mm / mm
+    half-plane     305.4   300.3   304.4  MPa at 0.005 a (304.2 with 5e-4)
+    punch          -52.7   -52.2   -51.2  MPa at 0.028 a (-50.9 with 5e-4)
+    plastic work   10.68   10.69   10.69  N mm / mm
     ============  ======  ======  ======
     """
     runs = [
@@ -271,7 +277,7 @@ def test_without_hardening_friction_the_corner_strain_grows_but_the_work_settles
 
 
 def test_the_finite_half_plane_costs_an_error_that_falls_with_its_size():
-    """Plastic work 7.65, 9.59, 10.58 in half-planes of 4, 8, 16 a (11.18 at 40, 11.38 at 80).
+    """Plastic work 7.72, 9.68, 10.68 in half-planes of 4, 8, 16 a (11.30 at 40, 11.50 at 80).
 
     What is missing halves when the size doubles, however the far sides are held: the force is
     carried by a finite width, whose mean strain adds to the friction. The default 40 a lacks
@@ -288,14 +294,11 @@ def test_the_finite_half_plane_costs_an_error_that_falls_with_its_size():
 def test_strain_settles_away_from_the_corner_and_not_at_it():
     """From elements of 0.002 a to half of these; the corner reaches over 0.005 a.
 
-    It goes from 0.0407 to 0.0383: strain falls as 1/r there, and the first points beyond the radius
+    It goes from 0.0407 to 0.0382: strain falls as 1/r there, and the first points beyond the radius
     lie by a part of an element farther or nearer.
     """
     load = {"load_ratio": 0.8571, "friction": 0.4, "hardening": "isotropic"}
-    runs = [
-        solved(PunchParameters(**USUAL | load | {"smallest_element": element}))
-        for element in (2e-3, 1e-3)
-    ]
+    runs = [solved(told(**load, smallest_element=element)) for element in (2e-3, 1e-3)]
     away = [run.audit().figures["audit_plastic_strain"] for run in runs]
     assert away[1] == pytest.approx(away[0], rel=0.1)
     coarse, fine = (max(yielded(run).values()) for run in runs)
@@ -304,11 +307,9 @@ def test_strain_settles_away_from_the_corner_and_not_at_it():
 
 
 def test_the_scene_records_what_the_solution_holds():
-    parameters = PunchParameters(
-        **USUAL | {"friction": 0.4, "hardening": "isotropic", "smallest_element": 4e-3}
-    )
+    parameters = told(friction=0.4, hardening="isotropic", smallest_element=4e-3)
     (record,) = SCENES["punch"].path(parameters, [0.5714], lambda share: None)
-    run = press(friction=0.4, hardening="isotropic", smallest_element=4e-3)
+    run = pressed(parameters)
     assert record.status is Status.OK
     assert record.scalars["residual_x_half_plane"] == pytest.approx(run.half_plane, rel=1e-6)
     assert record.scalars["residual_x_punch"] == pytest.approx(run.punch, rel=1e-6)
