@@ -61,9 +61,9 @@ def block(element: str = "quad8", load: Load | None = None, **own: Any) -> Body:
     return Body(name="block", mesh=mesh, material=STEEL, element=element, **own)
 
 
-def ring(load: Load) -> Body:
+def ring(load: Load, across: int = 10, around: int = 32) -> Body:
     """Return a whole ring, held on the lines x = 0 and y = 0, which stay straight."""
-    flat = grid(np.linspace(A, B, 11), np.linspace(0.0, 2 * np.pi, 33))
+    flat = grid(np.linspace(A, B, across + 1), np.linspace(0.0, 2 * np.pi, around + 1))
     mesh = merged(mapped(flat, lambda X: X[0] * np.stack([np.cos(X[1]), np.sin(X[1])])))
     lines = {"up": lambda x: abs(x[0]) < 1e-9, "across": lambda x: abs(x[1]) < 1e-9}
     return Body(
@@ -166,7 +166,7 @@ def test_a_condensed_body_has_its_force_per_volume() -> None:
 BODIES = {
     "weight": block(load=Weight(weight=0.5)),
     "turning shaft": block(load=Turning(level=3.0, plane=0.0), kinematics="axisymmetric"),
-    "turning ring": ring(Turning(level=0.01)),
+    "turning ring": ring(Turning(level=0.01), 5, 16),
 }
 
 

@@ -15,7 +15,7 @@ from solver.scenes.rolling_parameters import RollingParameters
 
 pytestmark = pytest.mark.solves
 
-COARSE = {"track": 24.0, "element_size": 3.0, "growth": 1.4, "press_steps": 3, "unload_steps": 2}
+COARSE = {"track": 18.0, "element_size": 3.0, "growth": 1.4, "press_steps": 3, "unload_steps": 2}
 
 
 def walked(passes=(1,), **changed):
@@ -32,7 +32,7 @@ def stress(system, outcome):
 @pytest.mark.parametrize(
     ("share", "changed"),
     [
-        (0.85, {"advance_step": 3.0}),
+        (0.85, {"advance_step": 3.0, "track": 24.0}),
         (0.85, {"advance_step": 1.5}),
         (0.85, {"advance_step": 1.5, "traction": 0.75}),
         (0.85, {"advance_step": 1.5, "heading": "backward", "traction": -0.5}),
@@ -50,7 +50,7 @@ def test_what_is_carried_along_saves_iterations_and_changes_no_result(share, cha
 
 
 def test_a_branch_with_predictions_is_bit_for_bit_a_run_by_itself():
-    both = {"track": 12.0, "advance_step": 1.5, "direction": "back_and_forth"}
+    both = {"track": 6.0, "advance_step": 1.5, "direction": "back_and_forth"}
     system, (one, two) = walked((1, 2), **both)
     for passes, together in ((1, one), (2, two)):
         own, (alone,) = walked((passes,), **both)

@@ -42,8 +42,9 @@ def test_a_ball_is_pressed_in_without_an_increment_cut(
     assert found.tally.cuts == 0
     assert found.audit().passed, found.audit().violations
     force = found.reaction("ball", "loaded")[1]
-    finer = pressed(friction, depth, 2 * steps).reaction("ball", "loaded")[1]
-    assert force == pytest.approx(finer, rel=0.01)
+    # the error of an increment is of its length: this differs by as much as twice the steps would
+    coarser = pressed(friction, depth, 2 * steps // 3).reaction("ball", "loaded")[1]
+    assert force == pytest.approx(coarser, rel=0.01)
 
 
 def test_a_strip_that_nothing_holds_any_more_stays_where_it_is() -> None:

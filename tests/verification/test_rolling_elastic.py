@@ -182,7 +182,7 @@ def test_given_creepage_makes_carters_force():
     free = rolled(4)
     wanted = float(free.creepage + creepage_of(free.parameters, 0.5))
     # force grows as the track that was rolled, over about 6 a, until creepage takes no more of it
-    run = rolled(4, widths=20, control="creepage", given_creepage=wanted)
+    run = rolled(2, widths=20, control="creepage", given_creepage=wanted)
     assert run.creepage == pytest.approx(wanted, rel=1e-9)
     p = run.parameters
     force = np.trapezoid(run.shear, run.x * p.half_width)

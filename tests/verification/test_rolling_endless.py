@@ -19,7 +19,8 @@ from solver.steady import rolling, search
 from solver.steady.passing import SolveBudget
 from tests.records import kept
 
-COARSE = {"element_size": 2.0, "growth": 1.3}
+COARSE = {"element_size": 3.0, "growth": 1.3}
+USUAL = {"element_size": 2.0}
 CASES = {
     "free": {},
     "driven": {"traction": -0.5, "hardening": "isotropic"},
@@ -149,9 +150,9 @@ def test_under_load_the_map_shows_the_load():
 
 
 def test_runs_of_one_path_are_those_computed_alone():
-    together = records((1, 2, 4), direction="back_and_forth")
-    assert [len(r.coordinates["pass"]) for r in together] == [1, 2, 4]
-    for record, passes in zip(together, (1, 2, 4), strict=True):
+    together = records((1, 3), direction="back_and_forth")
+    assert [len(r.coordinates["pass"]) for r in together] == [1, 3]
+    for record, passes in zip(together, (1, 3), strict=True):
         alone = roll(passes=passes, direction="back_and_forth")
         for name, (_, values) in record.fields.items():
             np.testing.assert_array_equal(values, alone.fields[name][1], err_msg=name)
@@ -253,10 +254,10 @@ def test_a_sequence_of_equal_passes_is_that_many_passes():
 
 def test_what_a_sequence_leaves_depends_on_its_order():
     light, heavy = {"load_ratio": 2.2, "traction": 0.3}, {"load_ratio": 3.0, "times": 2}
-    one, other = (roll(passes=3, sequence=s) for s in ((light, heavy), (heavy, light)))
+    one, other = (roll(**USUAL, passes=3, sequence=s) for s in ((light, heavy), (heavy, light)))
     assert [len(r.coordinates["pass"]) for r in (one, other)] == [3, 3]
     assert one.scalars["longitudinal_force"] == pytest.approx(0.0, abs=5.0)
-    alone = RollingParameters(**COARSE, load_ratio=2.2)
+    alone = RollingParameters(**USUAL, load_ratio=2.2)
     expected = 0.3 * 0.3 * alone.force
     assert other.scalars["longitudinal_force"] == pytest.approx(expected, rel=0.05)
     assert other.scalars["contact_half_width"] < 0.9 * one.scalars["contact_half_width"]
@@ -316,7 +317,7 @@ def test_a_run_without_a_steady_pass_is_rolled_by_increments_and_says_so(monkeyp
 
 
 HEAVY = {
-    "element_size": 7.5, "growth": 1.6, "load_ratio": 10.0,
+    "element_size": 9.0, "growth": 2.0, "load_ratio": 10.0,
     "hardening": "isotropic", "hardening_ratio": 0.1,
 }  # fmt: skip
 
@@ -347,16 +348,16 @@ def test_a_wheel_that_is_turned_by_more_than_full_slip_bears_spins():
 
 
 def test_what_hardens_has_no_limit_but_leaves_small_strain_theory():
-    """All five passes are made: each strains more, on and on."""
+    """All three passes are made: each strains more, on and on."""
     record = roll(
         element_size=9.0, growth=1.6, load_ratio=6.0, friction=0.05, traction=-0.9,
-        hardening="mixed", hardening_ratio=0.005, passes=5,
+        hardening="mixed", hardening_ratio=0.005, passes=3,
     )  # fmt: skip
     assert record.status is Status.OUTSIDE_THEORY
     assert "plastic strain reaches" in record.message
     assert "increments" not in record.message
     strain = record.fields["pass_max_plastic_strain"][1]
-    assert len(strain) == 5
+    assert len(strain) == 3
     assert 0.2 < strain[0] < 0.4
     assert (np.diff(strain) > 0.05).all()
 
@@ -378,7 +379,7 @@ def test_a_pass_that_is_not_found_ends_after_so_many_solves(monkeypatch):
 
 
 def test_a_coarser_mesh_that_takes_too_long_does_not_end_the_run(monkeypatch):
-    fields = {"load": "hertz", "friction": 0.05}
+    fields = USUAL | {"load": "hertz", "friction": 0.05}
     usual = roll(**fields)
     tried = []
 

@@ -221,10 +221,10 @@ def test_frictionless_limit_lies_between_3_7_and_4_3():
 
 
 def test_advance_a_pass_does_not_depend_on_the_length_of_the_track():
-    short, long = rolled(4.3, 6), rolled(4.3, 6, track=96.0)
+    short, long = rolled(4.3, 6), rolled(4.3, 4, track=96.0)
     for name in ("plastic_increment", "net_increment", "surface_advance"):
         values = of_passes(short, name), of_passes(long, name)
-        assert values[0][-1] == pytest.approx(values[1][-1], rel=0.15)
+        assert values[0][3] == pytest.approx(values[1][3], rel=0.15)
 
 
 def test_hardening_ends_ratchetting():
@@ -247,7 +247,8 @@ def test_friction_lowers_the_computed_limit():
 
 
 def test_with_high_friction_the_surface_yields_first():
-    record = rolled(2.0, 3, friction=0.5, traction=1.0, element_size=1.0, advance_step=2.0)
+    record = rolled(2.0, 3, friction=0.5, traction=1.0, element_size=1.0, advance_step=2.0,
+                    growth=2.0)  # fmt: skip
     assert record.scalars["highest_plastic_strain"] > 0
     assert record.scalars["depth_of_highest_plastic_strain"] < 0.15 * 8.0
 
@@ -262,7 +263,7 @@ def test_true_contact_shakes_down_below_the_limit_and_ratchets_less_above():
 
 
 def test_a_track_with_ends_decides_nothing_but_elastic():
-    ends = {"periodic": False, "track": 40.0}
+    ends = {"periodic": False, "track": 40.0, "growth": 2.0}
     assert state(rolled(3.0, 1, **ends)) is State.ELASTIC
     assert state(rolled(3.7, 3, **ends)) is State.UNDECIDED
 

@@ -148,7 +148,7 @@ def test_so_are_those_of_a_wheel(monkeypatch):
 def test_a_back_stress_without_recall_is_kinematic_hardening():
     prager, kinematic = chaboche((MODULUS, 0.0)), linear("kinematic")
     for one, other in zip(
-        *(passes(law, [1, -1, 1], parts=4) for law in (prager, kinematic)), strict=True
+        *(passes(law, [1, -1], parts=4) for law in (prager, kinematic)), strict=True
     ):
         for left, own in ((one.left, other.left), (one.left.top, other.left.top)):
             np.testing.assert_allclose(left.plastic_strain, own.plastic_strain, atol=1e-9)
@@ -166,7 +166,7 @@ def test_two_back_stresses_alike_are_one_of_twice_the_modulus():
 
 def test_recall_makes_a_load_ratchet_that_prager_s_rule_shakes_down():
     def nets(law):
-        found = passes(law, [1] * 12)
+        found = passes(law, [1] * 8)
         return [
             abs(one.after.plastic_strain - one.before.plastic_strain).max() for one in found[-4:]
         ]
@@ -326,9 +326,9 @@ from solver.scenes import SCENES
 from solver.scenes.rolling_parameters import RollingParameters
 
 p = RollingParameters(
-    element_size=3.0, growth=1.5, load="hertz", passes=2, hardening="threshold", threshold=30.0,
+    element_size=4.0, growth=1.5, load="hertz", hardening="threshold", threshold=30.0,
 )
-(record,) = SCENES["rolling"].path(p, [2], lambda share: None)
+(record,) = SCENES["rolling"].path(p, [1], lambda share: None)
 assert record.status.solved, record.message
 assert record.scalars["max_plastic_strain"] > 1e-3
 print(record.scalars["audit_law"] < 1e-6)

@@ -25,7 +25,7 @@ FREE = {
     "hardening": "chaboche", "back_stresses": ((60_000.0, 600.0), (4000.0, 20.0)),
 }  # fmt: skip
 """A law that the endless track asks from column to column, as increments do at their points."""
-LENGTHS = (80.0, 160.0, 320.0)
+LENGTHS = (64.0, 128.0, 256.0)
 YIELD = RollingParameters().yield_stress
 ENOUGH = Control(tolerances=Tolerances(residual=1e-4))
 """With a residual of 1e-8, stress of a track of 100 mm is the same to 0.002 MPa."""
