@@ -16,12 +16,29 @@ import pytest
 from solver.results.quantities import QUANTITIES
 from studies import Study
 from studies.errors import SceneError, StudyError, one_of
+from studies.scenes import building
 from studies.scenes.checking import RESERVED
 from studies.scenes.description import Description
 from studies.scenes.refusals import dotted
 from studies.scenes.scene import file_scene
 from tests.studies.scenes.conftest import blocks, built
 from tests.studies.scenes.mistakes import MISTAKES, put
+
+
+@pytest.fixture(autouse=True, scope="module")
+def meshed_once() -> Iterator[None]:
+    """Mesh a shape once for all tests: of a thousand scenes, few have one of their own."""
+    meshes: dict[str, Any] = {}
+    mesh_of = building.mesh_of
+
+    def once(shape: Any, cells: str) -> Any:
+        if (key := f"{cells} {shape!r}") not in meshes:
+            meshes[key] = mesh_of(shape, cells)
+        return meshes[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(building, "mesh_of", once)
+        yield
 
 
 @pytest.mark.parametrize("kind", MISTAKES)
