@@ -212,3 +212,11 @@ def test_one_number_for_each_label_is_drawn_of_the_one_that_is_selected() -> Non
         drawn(selection={"bodi": "rail"})
     with pytest.raises(StudyError, match="largest has one value a run: leave it out"):
         drawn(zoom=1.0)
+
+
+def test_an_axis_whose_points_differ_in_words_too_is_named_by_its_labels() -> None:
+    dataset = swept(frictions=[0.1]).rename(hardening="steel")
+    dataset = dataset.assign_coords(
+        steel=["A", "B"], hardening=("steel", LAWS), hardening_ratio=("steel", [0.02, 0.024])
+    )
+    assert legend_of(sweep_figure(dataset, "increments")) == ["A", "B"]
