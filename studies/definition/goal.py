@@ -449,7 +449,13 @@ def checked_goal(content: Any, scene: Scene) -> Goal:
     if len(kinds) > 1 or bool(kinds) != bool(of):
         allowed = f"needs of and one of {', '.join(_KINDS)}; or neither, for the limit load"
         raise StudyError("goal", dict(content), allowed)
-    low, high = _ends(given.get("between"), known[name])
+    try:
+        low, high = _ends(given.get("between"), known[name])
+    except StudyError as error:
+        if "parameter" in given:
+            raise
+        allowed = f"{error.allowed}, of {name}, as goal.parameter is left out"
+        raise StudyError(error.field, error.value, allowed) from None
     within = given.get("within", 0.01)
     if not is_number(within) or not 1e-6 <= within <= 0.5:
         raise StudyError("goal.within", within, "must be a number >= 1e-06 and <= 0.5")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from solver.results.shakedown import ShakedownState
 from studies.appearing import appearing
 from studies.definition.cases import Case
 from studies.definition.goal import ALREADY, FAILED, NEVER, PASSED, REFUSED, Search
@@ -68,7 +69,7 @@ def _outcome(study: Study, search: Search) -> tuple[str, str]:
     goal, reason = search.goal, search.reason
     name, first, last = goal.parameter, *goal.between
     if reason == PASSED or (reason == NO_EQUILIBRIUM[0] and not goal.of):
-        return OK, ""
+        return OK, _doubt(search)
     if reason in NO_EQUILIBRIUM:
         before = "; it comes before the goal" if goal.of else ""
         return (
@@ -90,6 +91,16 @@ def _outcome(study: Study, search: Search) -> tuple[str, str]:
         lacks = f"its run has no {goal.of}" if status == OK else row["message"]
         return ERROR if status == OK else status, f"at {name} = {search.high:.6g}: {lacks}"
     return MISSING, STOPPED
+
+
+def _doubt(search: Search) -> str:
+    """Return why an answer may be too low: its upper end is beyond for want of passes alone."""
+    name, high = search.goal.parameter, search.high
+    undecided = search.look(high).value == ShakedownState.UNDECIDED
+    if search.goal.of != "shakedown_state" or not undecided:
+        return ""
+    found = f"at {name} = {high:.6g} the state is undecided"
+    return f"{found}: the limit may be higher, compute more passes or cycles"
 
 
 def _told(row: Mapping[str, Any]) -> str:

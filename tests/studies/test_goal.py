@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -336,6 +337,26 @@ def test_a_search_without_an_answer_says_why(
         assert message in dataset["message"].item()
 
 
+@pytest.mark.parametrize(("beyond", "doubtful"), [(4, True), (3, False)])
+def test_a_shakedown_limit_below_an_undecided_run_has_a_warning(
+    store: Store, beyond: int, doubtful: bool
+) -> None:
+    goal = {"find": "shakedown_limit", "parameter": "load_ratio", "between": [1.0, 3.0]}
+    asked = Study.from_dict({"name": "limit", "scene": "raceway", "goal": goal})
+    assert asked.asks is not None
+    search = Search(asked.asks)
+    while wanted := search.wants:
+        scalars = {"shakedown_state": beyond if wanted[0] > 2.0 else 1}
+        row = {"id": str(wanted[0]), "status": "ok", "scalars": scalars, "message": ""}
+        search.tell(wanted[0], row)
+    store.save_study(asked)
+    asking = SimpleNamespace(places=[SimpleNamespace(program=search)])
+    found = answers(asked, store, cast("Asking", asking))
+    with open_study(found.path) as dataset:
+        assert dataset["status"].item() == "ok"
+        assert ("undecided: the limit may be higher" in dataset["message"].item()) == doubtful
+
+
 def test_a_path_that_fails_before_its_first_value_ends_its_search(store: Store) -> None:
     scene = Unmeshed(
         name="unmeshed", summary="a scene without a mesh", parameters=FakeParameters,
@@ -452,6 +473,7 @@ def test_the_estimate_is_the_most_that_the_search_may_take(store: Store, scene: 
         ({"parameter": "hardening"}, "goal.between[0]", "must be one of none"),
         ({"parameter": "half_width"}, "goal.parameter", "take it out of sweep.half_width"),
         ({"parameter": "passes"}, "goal.between[0]", "an integer"),
+        ({"between": [0.0, 1.0]}, "goal.between[0]", "of load_ratio, as goal.parameter is left"),
         ({"between": [1.0, 0.1]}, "goal.between", "its lowest value"),
         ({"between": [0.1]}, "goal.between", "[lowest, highest]"),
         ({"between": [0.1, 11.0]}, "goal.between[1]", "<= 10"),

@@ -27,6 +27,8 @@ from studies.views.plots.runs import Kind, absent, known_values, standing, style
 
 _MARKS = "osD^vPh*"
 _SIZE = (8.0, 4.6)
+_LEFT = 0.9
+"""Width of the labels left of the axes, where the caption begins [in]."""
 _ABREAST = 60
 """Largest number of letters of horizontal labels."""
 _FOOT = 0.03
@@ -94,7 +96,7 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
     if others or missing:
         add_legend(axes, [words(str(each.name)) for each in others])
     single = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] == 1]
-    below = wrapped(setting(dataset.squeeze(single)), _SIZE[0], 8)
+    below = wrapped(setting(dataset.squeeze(single)), _SIZE[0] - _LEFT, 8)
     name = capitalised(dataset[field].attrs.get("long_name", words(field)))
     axes.set_title(below, loc="left", fontsize=8, color="0.3")
     sheet.suptitle(name, x=0.01, ha="left", fontsize=11, weight="bold")

@@ -93,8 +93,14 @@ def plane_of(dataset: xr.Dataset, axis: str) -> list[str]:
 
 
 def _standing(dataset: xr.Dataset, axis: str) -> xr.DataArray:
-    """Return the first number that has different values at all points of an axis, or the axis."""
+    """Return the first number that has different values at all points of an axis, or the axis.
+
+    Where words differ too, a number would not tell what the points are.
+    """
     known = [dataset[name] for name, over in sweep_coordinates(dataset).items() if over == axis]
+    words = [each for each in known if each.name != axis and each.dtype.kind not in "fiu"]
+    if any(len(np.unique(each)) > 1 for each in words):
+        return dataset[axis]
     distinct = [
         each
         for each in known

@@ -212,3 +212,27 @@ def test_one_number_for_each_label_is_drawn_of_the_one_that_is_selected() -> Non
         drawn(selection={"bodi": "rail"})
     with pytest.raises(StudyError, match="largest has one value a run: leave it out"):
         drawn(zoom=1.0)
+
+
+def test_an_axis_whose_points_differ_in_words_too_is_named_by_its_labels() -> None:
+    dataset = swept(frictions=[0.1]).rename(hardening="steel")
+    dataset = dataset.assign_coords(
+        steel=["A", "B"], hardening=("steel", LAWS), hardening_ratio=("steel", [0.02, 0.024])
+    )
+    assert legend_of(sweep_figure(dataset, "increments")) == ["A", "B"]
+
+
+def test_a_long_caption_ends_within_the_sheet() -> None:
+    dataset = swept(frictions=[0.1])
+    dataset.attrs["parameters"] = json.dumps(
+        {"half_width": 43.5, "punch_height": 123.5, "half_plane_size": 512.5, "growth": 2.125,
+         "smallest_element": 0.0215, "yield_stress": 512.5}
+    )  # fmt: skip
+    sheet = sweep_figure(dataset, "increments")
+    sheet.canvas.draw()
+    (caption,) = [
+        each
+        for each in sheet.axes[0].get_children()
+        if "growth" in getattr(each, "get_text", str)()
+    ]
+    assert caption.get_window_extent().x1 <= sheet.bbox.x1
