@@ -148,40 +148,42 @@ def test_the_bytes_of_a_solver_include_its_factor(name: str) -> None:
     assert 8 * upper.nnz < beside_the_matrix < 8 * n**4
 
 
+def factors(*, collected: bool = True) -> set[int]:
+    """Return the factors that something holds; results of other tests may hold some."""
+    from solver.linear.pardiso import Pardiso
+
+    if collected:
+        gc.collect()
+    return {id(each) for each in gc.get_objects() if isinstance(each, Pardiso)}
+
+
+def walk(scene: str, value: float) -> None:
+    """Compute a run of a scene, and keep nothing of it."""
+    known = SCENES[scene]
+    for record in known.path(known.parameters(accuracy="draft"), [value], lambda share: None):
+        del record
+
+
 @pytest.mark.solves
 @pytest.mark.parametrize("scene, passes", [("punch", 0.3), ("rolling", 1)])
 def test_no_factor_outlives_a_path_and_what_is_kept(scene: str, passes: float) -> None:
-    from solver.linear.pardiso import Pardiso
-
-    def factors() -> list[Pardiso]:
-        gc.collect()
-        return [each for each in gc.get_objects() if isinstance(each, Pardiso)]
-
-    known, before = SCENES[scene], factors()  # results of other tests may hold some
-    parameters = known.parameters(accuracy="draft")
-    for record in known.path(parameters, [passes], lambda share: None):
-        del record
+    before = factors()
+    walk(scene, passes)
     release(0)
-    assert not {id(each) for each in factors()} - {id(each) for each in before}
+    assert not factors() - before
 
 
 @pytest.mark.solves
 def test_the_factors_of_a_prism_end_with_it() -> None:
     """No circle of references holds them until the garbage collector comes by."""
-    from solver.linear.pardiso import Pardiso
-
-    known = SCENES["raceway"]
-    gc.collect()
-    before = {id(each) for each in gc.get_objects() if isinstance(each, Pardiso)}
+    before = factors()
     gc.disable()
     try:
-        for record in known.path(known.parameters(accuracy="draft"), [1], lambda share: None):
-            del record
+        walk("raceway", 1)
         memory._evict(0)
-        left = {id(each) for each in gc.get_objects() if isinstance(each, Pardiso)}
+        assert not factors(collected=False) - before
     finally:
         gc.enable()
-    assert not left - before
 
 
 @pytest.mark.parametrize(
