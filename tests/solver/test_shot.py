@@ -42,7 +42,7 @@ def test_a_ball_is_pressed_in_without_an_increment_cut(
     assert found.tally.cuts == 0
     assert found.audit().passed, found.audit().violations
     force = found.reaction("ball", "loaded")[1]
-    # the error of an increment is of its length: this differs by as much as twice the steps would
+    # an error of first order differs by as much as with twice the steps, one of second by more
     coarser = pressed(friction, depth, 2 * steps // 3).reaction("ball", "loaded")[1]
     assert force == pytest.approx(coarser, rel=0.01)
 
