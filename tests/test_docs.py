@@ -53,7 +53,6 @@ LESS = {
     "elastic-punch.toml": {"friction": [0.0, 0.4]},
     "first-yield.toml": {"    { friction = 0.2": None, "between": [1.2, 1.9]},
     "refined-punch.toml": {"load_ratio": [0.6, 0.7], "friction": [0.2, 0.25]},
-    "punch-tests.toml": {"smallest_element": 0.1, "growth": 3.0},
     "wheel-rail.toml": {"passes": [1]},
     "wheel-rail-lateral.toml": {"lateral_position": [-7.5, -3.0], "traction": [-0.75, 0.75]},
     "shaft-hub.toml": {"friction": [0.0, 0.2], "loading": ["interference"]},
