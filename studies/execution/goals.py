@@ -95,11 +95,10 @@ def _outcome(study: Study, search: Search) -> tuple[str, str]:
 
 def _doubt(search: Search) -> str:
     """Return why an answer may be too low: its upper end is beyond for want of passes alone."""
-    name, high = search.goal.parameter, search.high
-    undecided = search.look(high).value == ShakedownState.UNDECIDED
-    if search.goal.of != "shakedown_state" or not undecided:
+    goal, high = search.goal, search.high
+    if goal.of != "shakedown_state" or search.look(high).value != ShakedownState.UNDECIDED:
         return ""
-    found = f"at {name} = {high:.6g} the state is undecided"
+    found = f"at {goal.parameter} = {high:.6g} the state is undecided"
     return f"{found}: the limit may be higher, compute more passes or cycles"
 
 
