@@ -110,13 +110,13 @@ xx = -30.0
 
 [[stages]]
 name = "pressed"
-increments = 3
-[[stages]]
-name = "lifted"
 increments = 2
 [[stages]]
+name = "lifted"
+increments = 1
+[[stages]]
 name = "again"
-increments = 3
+increments = 2
 
 [results]
 samples = 11
