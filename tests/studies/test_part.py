@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import fcntl
 import json
-import multiprocessing
 import os
 import signal
 import time
@@ -22,6 +21,7 @@ from studies.execution.part import run_part
 from studies.execution.task import PathTask, walk
 from studies.storage.claims import Claim, Claims
 from tests.studies.conftest import write_study
+from tests.studies.killed import FORK
 
 SWEEP = {"friction": [k / 50 for k in range(12)], "load_ratio": [0.25, 0.5]}
 GOAL = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0], "within": 0.1}
@@ -37,7 +37,6 @@ SWEPT = {
     "fit": {},
 }
 SIZES = {"": 24, "goal": 6, "refine": 15, "fit": 1}
-FORK = multiprocessing.get_context("fork")
 
 
 def study(folder: Path, seconds: float = 0.0, **content: Any) -> Study:
