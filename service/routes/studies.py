@@ -59,8 +59,8 @@ router = APIRouter(prefix="/studies", tags=["studies"], route_class=StrictRoute)
 EXAMPLE = {
     "name": "two-frictions",
     "scene": "punch",
-    "parameters": {"hardening": "isotropic"},
-    "sweep": {"load_ratio": [0.3, 0.5714], "friction": [0.0, 0.3]},
+    "parameters": {"smallest_element": 0.02, "growth": 2.0, "hardening": "isotropic"},
+    "sweep": {"load_ratio": [0.5714, 0.8571], "friction": [0.0, 0.3]},
 }
 
 PRIORITIES = range(-100, 101)

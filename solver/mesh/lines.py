@@ -32,12 +32,12 @@ def graded(length: float, smallest: float, ratio: float, largest: float) -> Arra
     if not ratio >= 1:
         raise ModelError("ratio", ratio, "must be at least 1")
     sizes: list[float] = []
-    total, size = 0.0, smallest
+    total, size, most = 0.0, smallest, max(largest, smallest)
     while total < length * (1 - 1e-9):
-        if len(sizes) == _MOST:
+        if len(sizes) == _MOST or length > 2 * _MOST * most:  # seen without adding a million
             allowed = f"must make at most {_MOST} elements along {length:g} mm"
             raise ModelError("size", smallest, allowed)
-        sizes.append(min(size, max(largest, smallest)))
+        sizes.append(min(size, most))
         total += sizes[-1]
         size *= ratio
     nodes = np.concatenate([[0.0], np.cumsum(sizes)])

@@ -77,7 +77,9 @@ def _visited(where: Where, value: Any, options: Options, visit: Visit) -> Any:
         return visit(where, value, unit) if unit is not None and is_quantity(value) else value
     if isinstance(value, Mapping):
         return {
-            key: _visited((*where, str(key)), each, _entry(options, value, key), visit)
+            key: each  # nothing is looked up for most entries
+            if is_number(each)
+            else _visited((*where, str(key)), each, _entry(options, value, key), visit)
             for key, each in value.items()
         }
     if isinstance(value, list | tuple) and not all(map(is_number, value)):

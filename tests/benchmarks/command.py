@@ -134,8 +134,8 @@ def of_steady(out: Path, *, quick: bool, repeats: int) -> list[str]:
     """Measure steady passes, draw them, and return their tables."""
     points = steady.measure(quick, repeats)
     lines = []
-    for load, measures in steady.MEASURES.items():
-        lines += of_load(out, "steady", load, points, measures, steady.SERIES)
+    for load in steady.loads(quick):
+        lines += of_load(out, "steady", load, points, steady.MEASURES[load], steady.SERIES)
     return lines
 
 
@@ -143,7 +143,7 @@ def of_rolling(out: Path, *, quick: bool, repeats: int) -> list[str]:
     """Measure rolling by increments, draw it, and return its tables."""
     points = rolling.measure(quick, repeats)
     lines = []
-    for load in rolling.loads(quick):
+    for load in steady.loads(quick):
         lines += of_load(out, "rolling", load, points, rolling.MEASURES, rolling.SERIES)
     return lines
 

@@ -15,7 +15,7 @@ import numpy as np
 from solver import SCENES, Record
 from solver.scenes.rolling_parameters import RollingParameters
 from tests.benchmarks.measure import Point, timed
-from tests.benchmarks.steady import LOADS, graded_by
+from tests.benchmarks.steady import LOADS, graded_by, loads
 
 BASE = RollingParameters(track=20.0)
 QUICK = {"track": 8.0, "advance_step": 4.0, "press_steps": 4, "unload_steps": 1}
@@ -36,11 +36,6 @@ class Case:
     setting: str
     changes: Mapping[str, float] = field(default_factory=dict)
     size: float = float("nan")
-
-
-def loads(quick: bool) -> tuple[str, ...]:
-    """Return the names of the loads that are measured."""
-    return ("free",) if quick else tuple(LOADS)
 
 
 def plan(quick: bool) -> tuple[Case, tuple[Case, ...]]:

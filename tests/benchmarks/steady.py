@@ -38,6 +38,11 @@ class Case:
     size: float = float("nan")
 
 
+def loads(quick: bool) -> tuple[str, ...]:
+    """Return the names of the loads that are measured."""
+    return ("free",) if quick else tuple(LOADS)
+
+
 def plan(quick: bool) -> tuple[Case, tuple[Case, ...]]:
     """Return the reference, and the cases."""
     h, parts = (4 / 3, 4) if quick else (0.25, 32)
@@ -64,10 +69,10 @@ def _cases(quick: bool) -> Iterator[Case]:
 def measure(quick: bool, repeats: int) -> list[Point]:
     """Return a point for every case; errors are those against the reference."""
     reference, cases = plan(quick)
-    exact = {load: _profile(_rolled(reference, load)) for load in LOADS}
+    exact = {load: _profile(_rolled(reference, load)) for load in loads(quick)}
     points = []
     for case in cases:
-        for load in LOADS:
+        for load in loads(quick):
             if not quick:
                 _rolled(case, load)  # mesh, factor and rim are shared by all runs of a study
             run = timed(lambda repeat, case=case, load=load: _rolled(case, load), repeats)

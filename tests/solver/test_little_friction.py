@@ -19,8 +19,9 @@ from tests.records import kept
 from tests.solver.test_contact_problem import instance
 
 COARSE = RollingParameters(
-    friction=0.0, track=6.0, element_size=4.0, advance_step=2.0, press_steps=3, growth=1.4
-)
+    friction=0.0, track=6.0, element_size=4.0, advance_step=2.0, press_steps=3, unload_steps=1,
+    growth=1.4,
+)  # fmt: skip
 
 
 @cache

@@ -15,7 +15,7 @@ from solver.scenes.rolling_parameters import RollingParameters
 
 pytestmark = pytest.mark.solves
 
-COARSE = {"track": 18.0, "element_size": 3.0, "growth": 1.4, "press_steps": 3, "unload_steps": 2}
+COARSE = {"track": 18.0, "element_size": 3.0, "growth": 1.8, "press_steps": 2, "unload_steps": 1}
 
 
 def walked(passes=(1,), **changed):

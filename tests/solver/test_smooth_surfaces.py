@@ -136,10 +136,10 @@ def test_many_small_steps_are_tended_to_at_first_order(surface):
             state = found.state
         return found.stress
 
-    exact = after(256)
-    off = [np.abs(after(n) - exact).mean() for n in (4, 16, 64)]
-    assert off[0] > 3 * off[1] > 9 * off[2]
-    assert off[2] < 0.01 * RE
+    exact = after(64)
+    off = [np.abs(after(n) - exact).mean() for n in (4, 16)]
+    assert off[0] > 3 * off[1]
+    assert off[1] < 0.01 * RE
 
 
 @pytest.mark.parametrize(("a", "state"), [(8.0, 4), (8.0, 6), (20.0, 6), (100.0, 6)])

@@ -120,7 +120,7 @@ def test_a_body_that_hardens_has_no_limit_load(ratio, elastic_punch):
     """Above the limit without hardening strains are huge: what fails is not equilibrium."""
     parameters = PUNCH.parameters(
         hardening="isotropic", hardening_ratio=ratio, friction=0.2, smallest_element=0.05,
-        growth=2.0, half_plane_size=4.0, elastic_punch=elastic_punch,
+        growth=3.0, half_plane_size=4.0, elastic_punch=elastic_punch, load_step=0.25,
     )  # fmt: skip
     (record,) = PUNCH.path(parameters, [1.1], lambda done: None)
     assert record.status.name != "LIMIT_LOAD", record.message

@@ -20,8 +20,9 @@ from solver.scenes.rolling_parameters import RollingParameters
 
 PRESSED = PunchParameters(accuracy="draft", friction=0.3, load_ratio=0.6)
 ROLLED = RollingParameters(
-    track=12.0, element_size=3.0, advance_step=3.0, growth=1.5, traction=0.5, passes=2
-)
+    track=12.0, element_size=3.0, advance_step=3.0, growth=1.8, press_steps=2, unload_steps=1,
+    traction=0.5, passes=2,
+)  # fmt: skip
 
 
 def corner(system):

@@ -62,7 +62,7 @@ def _all(count: int, make: Callable[[], list[Scene]]) -> Family:
 
 
 FAMILIES: dict[str, Family] = {
-    "punch": Family(range(punches.COUNT), 260, punches.scenes),
+    "punch": Family(punches.SHORT, 260, punches.scenes),
     "folded": _all(8, folded.scenes),
     "duplicate": _all(8, duplicate.scenes),
     "behind": _all(8, behind.scenes),
@@ -84,14 +84,14 @@ FAMILIES: dict[str, Family] = {
     "columns": Family(range(columns.COUNT), 120, columns.scenes),
     "wild": Family(range(wild.COUNT), 120, wild.scenes),
     "cycles": Family(range(cycles.COUNT), 40, cycles.scenes),
-    "track": Family(range(track.COUNT), 60, track.scenes),
+    "track": Family(track.SHORT, 60, track.scenes),
     "heat": Family(range(heat.COUNT), 120, heat.scenes),
     "fits": Family(range(fits.COUNT), 90, fits.scenes),
     "rigid": Family(range(rigid.COUNT), 60, rigid.scenes),
     "static": Family(range(static.COUNT), 48, static.scenes),
-    "endless": Family(range(endless.COUNT), 300, endless.scenes),
+    "endless": Family(endless.SHORT, 300, endless.scenes),
     "files": Family(range(files.COUNT), 200, files.scenes),
-    "prism": Family(range(prism.COUNT), 300, prism.scenes),
+    "prism": Family(prism.SHORT, 300, prism.scenes),
 }
 
 FOUND = ["prism-124", "files-18", "files-169", "rigid-11"]

@@ -129,8 +129,15 @@ def directory(path: Path) -> None:
     path.mkdir()
 
 
-@pytest.mark.parametrize("damage", [flip, Path.unlink, directory])
-@pytest.mark.parametrize("name", RESULTS)
+@pytest.mark.parametrize(
+    ("damage", "name"),
+    [
+        *((damage, "dataset.nc") for damage in (flip, Path.unlink, directory)),
+        (flip, "report.txt"),
+        (Path.unlink, "residual_stress_xx.png"),
+        (directory, "residual_stress_xx.png"),
+    ],
+)
 def test_a_result_that_is_damaged_or_gone_is_made_again(
     complete: tuple[Study, Store], again: Make, damage: Callable[[Path], None], name: str
 ) -> None:

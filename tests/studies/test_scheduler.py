@@ -104,14 +104,6 @@ def stage(tmp_path: Path) -> Iterator[Stage]:
         yield Stage(tmp_path, f"tcp://127.0.0.1:{free_port()}", started)
 
 
-@pytest.fixture
-def cluster(stage: Stage) -> tuple[str, Process]:
-    """Start a scheduler and one worker."""
-    scheduler = stage.scheduler()
-    stage.worker()
-    return stage.address, scheduler
-
-
 def answered(study: Study, store: Store, scheduler: Access | str, **options: Any) -> StudyOutcome:
     """Compute a study as soon as the scheduler answers."""
     deadline = time.monotonic() + 30
@@ -121,14 +113,6 @@ def answered(study: Study, store: Store, scheduler: Access | str, **options: Any
         except GridLost as error:
             if "no scheduler answers" not in str(error) or time.monotonic() > deadline:
                 raise
-
-
-def test_a_running_scheduler_computes_the_study(cluster: tuple[str, Process], store: Store) -> None:
-    address, _ = cluster
-    events: list[StudyEvent] = []
-    outcome = answered(fake_study(), store, address, on_event=events.append)
-    assert outcome.counts == {"ok": 4}
-    assert len([event for event in events if event.kind == "run"]) == 4
 
 
 def test_a_goal_is_searched_by_workers_that_find_the_scheduler_by_a_file(tmp_path: Path) -> None:
@@ -158,20 +142,19 @@ def test_a_file_without_a_scheduler_is_told(
         Access.of_file(tmp_path / "odd.json", None, None, None)
 
 
-def test_a_lost_scheduler_is_told_apart_from_failed_runs(
-    cluster: tuple[str, Process], store: Store
-) -> None:
-    address, scheduler = cluster
-    study = fake_study(sweep={"friction": [0.0, 0.1, 0.2]}, seconds=1.0)
+def test_a_lost_scheduler_is_told_apart_from_failed_runs(stage: Stage, store: Store) -> None:
+    scheduler = stage.scheduler()
+    stage.worker()
+    study = fake_study(sweep={"friction": [0.0, 0.1, 0.2]}, seconds=0.5)
 
     def kill_scheduler(event: StudyEvent) -> None:
         if event.kind == "run":
             scheduler.kill()
 
     with pytest.raises(GridLost), dask.config.set({ANSWERS: "3s"}):
-        answered(study, store, address, on_event=kill_scheduler)
+        answered(study, store, stage.address, on_event=kill_scheduler)
     assert {row["status"] for row in store.catalogue.runs()[0]} == {"ok"}
-    outcome = run_study(study, store, workers=1)
+    outcome = run_study(study, store, workers=0)
     assert outcome.counts == {"ok": 3}
     assert len(outcome.computed) < 3
 
@@ -222,22 +205,23 @@ def test_a_worker_that_does_not_see_the_directory_computes_nothing(
     assert not list(Path("out").rglob("token*"))
 
 
-def test_a_scheduler_without_workers_is_waited_for_aloud(
+def test_a_scheduler_computes_the_study_and_without_workers_is_waited_for_aloud(
     stage: Stage, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("studies.execution.watch._QUIET", 2.0)
     stage.scheduler()
-    told: list[str] = []
+    events: list[StudyEvent] = []
 
     def hear(event: StudyEvent) -> None:
-        if event.kind == "waiting":
-            told.append(event.message)
-            if len(told) == 1:
-                stage.worker()
+        if event.kind == "waiting" and not events:
+            stage.worker()
+        events.append(event)
 
     assert answered(fake_study(), store, stage.address, on_event=hear).counts == {"ok": 4}
+    told = [event.message for event in events if event.kind == "waiting"]
     assert told[0].startswith("no worker is connected to the scheduler")
     assert told[-1] == ""
+    assert len([event for event in events if event.kind == "run"]) == 4
 
 
 def test_certificates_in_files_open_a_scheduler_that_asks_for_them(

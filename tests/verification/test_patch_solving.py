@@ -20,7 +20,7 @@ from tests.verification.rolling_cases import moved, random_case, worst
 FRICTION = 0.3
 
 
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("seed", range(60))
 def test_random_contacts_are_found_and_meet_every_condition(seed: int) -> None:
     """Gap and slip of every tenth are summed up here anew; those of all meet the conditions."""
     patch, compliance, wheel, given = random_case(seed)

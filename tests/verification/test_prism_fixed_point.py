@@ -37,7 +37,7 @@ SPACING, INCREMENTS = 1.0, 2
 @cache
 def track() -> PrismTrack:
     """A coarse block with stations half an element apart: a brick of 2 mm has two of them."""
-    return block(2.0, 48.0, spacing=SPACING, far=50.0, growth=2.0)
+    return block(2.0, 48.0, spacing=SPACING, far=30.0, growth=2.0)
 
 
 @cache
@@ -122,7 +122,7 @@ def standing(law: Law) -> Standing:
 
 
 def test_bricks_with_the_plastic_strain_of_a_pass_have_its_strain() -> None:
-    """The difference is 0.45 % on elements of 2 mm, 0.37 % on 1 mm."""
+    """The difference is 0.52 % on elements of 2 mm, 0.37 % on 1 mm."""
     own, body = standing(PERFECT), bricks()
     u = body.solve(own.force(0) + body.forces(body.double_shear * own.plastic_strain(0)))
     strain = own.start.strain
@@ -131,7 +131,7 @@ def test_bricks_with_the_plastic_strain_of_a_pass_have_its_strain() -> None:
 
 @pytest.mark.parametrize(("law", "most"), [(PERFECT, 2.0), (HARDENS, 1.8)], ids=["perfect", "hard"])
 def test_a_pass_is_a_fixed_point_of_increments(law: Law, most: float) -> None:
-    """The first one changes 2 G ep by 23 and 21 MPa, two by 45 and 40."""
+    """The first one changes 2 G ep by 25 and 22 MPa, two by 49 and 43."""
     own, body = standing(law), bricks()
     now, off = own.start, []
     with one_thread():

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 def body() -> PrismTrack:
     """Elements and stations of 1 mm, in a block of 600 by 300 mm."""
-    return block(1.0, far=300.0, levels=2)
+    return block(1.0, far=300.0, growth=1.8, levels=2)
 
 
 def stress(track: PrismTrack, ellipse: HertzEllipse) -> Array:

