@@ -34,8 +34,8 @@ PUNCH: dict[str, Any] = {
     "load_step": 0.2, "hardening": "isotropic",
 }  # fmt: skip
 ROLLING: dict[str, Any] = {
-    "element_size": 3.0, "advance_step": 3.0, "growth": 1.5, "track": 12.0, "traction": 0.5,
-    "press_steps": 4,
+    "element_size": 3.0, "advance_step": 3.0, "growth": 1.5, "track": 9.0, "press_steps": 2,
+    "unload_steps": 1,
 }  # fmt: skip
 
 
@@ -287,9 +287,7 @@ MUTATIONS: dict[str, Mutation] = {
         fault=less_on_the_master(0.9, 1.0), breaks=("action_reaction",)
     ),
     "friction beyond its bound": Mutation(fault=friction_times(1.1), breaks=("friction_excess",)),
-    "contact that pulls": Mutation(
-        fault=glue, breaks=("tension",), scene="rolling", parameters={"traction": 0.0}
-    ),
+    "contact that pulls": Mutation(fault=glue, breaks=("tension",), scene="rolling"),
     "every second vertex overlooked": Mutation(fault=overlooked_contact, breaks=("overlap",)),
     "gaps that do not see the master": Mutation(
         fault=master_stands_still, breaks=("closed_gap", "overlap")

@@ -110,13 +110,13 @@ xx = -30.0
 
 [[stages]]
 name = "pressed"
-increments = 3
-[[stages]]
-name = "lifted"
 increments = 2
 [[stages]]
+name = "lifted"
+increments = 1
+[[stages]]
 name = "again"
-increments = 3
+increments = 2
 
 [results]
 samples = 11
@@ -156,11 +156,11 @@ PRESSED: dict[str, Any] = {
 }  # fmt: skip
 CHABOCHE: dict[str, Any] = {
     "hardening": "chaboche", "back_stresses": ((2e4, 100.0), (5e3, 10.0)), "load_ratio": 0.8,
-    "load_step": 0.1,
+    "load_step": 0.2,
 }  # fmt: skip
 LAYERED: dict[str, Any] = {
     "hardening": "layered", "curve": ((0.0, 350.0), (0.005, 430.0)), "load_ratio": 0.8,
-    "load_step": 0.1,
+    "load_step": 0.2,
 }  # fmt: skip
 TO_AND_FRO: dict[str, Any] = {
     "element_size": 3.0, "load": "hertz", "traction": 0.5, "direction": "back_and_forth",
@@ -506,7 +506,7 @@ MUTATIONS: dict[str, Mutation] = {
         fault=lost_at_a_branch("accumulated"),
         breaks=HISTORY,
         scene="branches",
-        parameters={"hardening": "mixed", "load_ratio": 0.8, "load_step": 0.1},
+        parameters={"hardening": "mixed", "load_ratio": 0.8, "load_step": 0.2},
     ),
     # steady passes
     "inflow of a second pass lost": _passed(

@@ -25,7 +25,7 @@ SET_DOWN = {"press_steps": 2, "unload_steps": 1}
 # than half the surface compression that it leaves after 20 mm.
 MESH = {"element_size": 1.5, "advance_step": 1.5, "track": 39.0, "growth": 1.3} | SET_DOWN
 # The locked wheel takes three times as many iterations, and what it does is coarse enough.
-LOCKED = {"element_size": 2.0, "advance_step": 2.0, "track": 24.0} | SET_DOWN
+LOCKED = {"element_size": 2.0, "advance_step": 2.0, "track": 12.0, "growth": 1.5} | SET_DOWN
 YIELD = RollingParameters().yield_stress
 UPPER = 12.0
 """Depth of what is compared as a whole [mm]: one and a half Hertz half-widths."""

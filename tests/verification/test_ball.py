@@ -17,10 +17,11 @@ BALL = scene_named("ball")
 RE, E, NU, R = 410.0, 2.0e5, 0.3, 10.0
 LOADED = {"unload_steps": 1}
 """For what is asked under load."""
+FINE = {"element_size": 1 / 16, "load_step": 0.1}
 
 
 def pressed(**own: Any) -> Record:
-    return record_of(BALL.parameters(**({"accuracy": "draft"} | own)))
+    return record_of(BALL.parameters(**({"accuracy": "draft", "load_step": 0.2} | own)))
 
 
 @cache
@@ -35,7 +36,7 @@ def record_of(parameters: Any) -> Record:
 )
 def test_an_elastic_ball_is_the_contact_of_hertz(yielding: str, stiffness: float) -> None:
     own = {"load_ratio": 1.4, "yielding": yielding, "ball_stiffness": stiffness} | LOADED
-    found = pressed(accuracy="standard", load_step=1.0, **own).scalars
+    found = pressed(load_step=1.0, **own).scalars
     modulus = E / (1 - NU**2) / (1 if yielding == "ball" else 1 + 1 / stiffness)
     force = np.pi**3 * R**2 * (1.4 * RE) ** 3 / (6 * modulus**2)
     a = (3 * force * R / (4 * modulus)) ** (1 / 3)
@@ -55,14 +56,14 @@ def test_the_half_space_first_yields_at_the_pressure_of_the_closed_form() -> Non
 
 
 def test_a_contact_that_yields_all_over_has_the_mean_pressure_of_an_indentation() -> None:
-    own: dict[str, Any] = {"load_ratio": 14.0, "ball_stiffness": 20.0, "load_step": 0.1}
-    found = pressed(accuracy="standard", **own, **LOADED).scalars
+    own: dict[str, Any] = {"load_ratio": 14.0, "ball_stiffness": 20.0} | FINE | LOADED
+    found = pressed(**own).scalars
     assert 2.8 * RE < found["mean_contact_pressure"] < 3.1 * RE
 
 
-@pytest.mark.parametrize("load_ratio", [1.66, 3.0, 4.5, 10.0])
+@pytest.mark.parametrize("load_ratio", [1.66, 3.0, 10.0])
 def test_a_ball_is_flattened_as_published(load_ratio: float) -> None:
-    own = {"load_ratio": load_ratio, "yielding": "ball", "element_size": 1 / 16} | LOADED
+    own = {"load_ratio": load_ratio, "yielding": "ball"} | FINE | LOADED
     found = pressed(**own).scalars
     published = PlasticBall(radius=R, youngs_modulus=E, poisson_ratio=NU, yield_stress=RE)
     w, force = found["approach"], found["force"]
@@ -93,8 +94,8 @@ def test_loaded_again_it_returns_to_the_same_point() -> None:
     for name, share in (("approach", 1e-4), ("contact_half_width", 1e-4), ("crater_depth", 1e-3)):
         assert often.scalars[name] == pytest.approx(once.scalars[name], rel=share)
     force, approach = (often.fields[f"increment_{name}"][1] for name in ("force", "approach"))
-    assert len(force) == cycles * (10 + 5) + 1
+    assert len(force) == cycles * (5 + 5) + 1
     # once unloaded the contact is elastic: it goes back the way it came
     down, up = (np.interp(200.0, force[part], approach[part])
-                for part in (slice(15, 9, -1), slice(15, 26)))  # fmt: skip
+                for part in (slice(10, 4, -1), slice(10, 16)))  # fmt: skip
     assert up == pytest.approx(down, rel=0.02)

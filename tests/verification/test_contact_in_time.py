@@ -82,7 +82,7 @@ def test_friction_of_an_oblique_press_hardly_depends_on_increments() -> None:
     counts from then on. From four increments to sixteen the error falls tenfold at least, as one of
     second order would; further it is that of the vertices, 1e-4. The figure has possible errors.
     """
-    exact = ratio(oblique(64))
+    exact = ratio(oblique(32))
     error = {n: abs(ratio(oblique(n)) / exact - 1) for n in (1, 4, 16)}
     assert 0.4 * FRICTION < exact < FRICTION
     assert error[1] < 0.006
@@ -132,7 +132,7 @@ def test_what_passes_has_the_shear_of_small_increments(
     of the friction acts; both passed their audit.
     """
     exact = leaned(slave, aside, 24).stages["loaded"].state.contacts[0]
-    for increments, most in ((1, claimed), (2, claimed), (4, claimed), (8, 0.02)):
+    for increments, most in ((1, claimed), (2, claimed), (8, 0.02)):
         found = leaned(slave, aside, increments)
         contact = found.stages["loaded"].state.contacts[0]
         error = np.abs(contact.tangential - exact.tangential).sum()
@@ -140,6 +140,7 @@ def test_what_passes_has_the_shear_of_small_increments(
         assert found.audit("loaded").passed
 
 
+@cache
 def dragged(slave: str, increments: int, *, resting: bool = False) -> Solution:
     """Press the cylinder on the plane, then drag it by 3 mm, three times the width of its contact.
 
@@ -168,7 +169,7 @@ def test_what_is_dragged_slides_by_coulomb_however_far_in_an_increment(slave: st
 
 def test_a_drag_is_divided_whatever_else_is_in_contact() -> None:
     """A block that rests beside it, and bears as much, does not dilute the way of the contact."""
-    alone, beside = dragged("plane", 2), dragged("plane", 2, resting=True)
+    alone, beside = dragged("plane", 1), dragged("plane", 1, resting=True)
     assert ratio(beside) == pytest.approx(FRICTION, rel=1e-6)
     assert beside.audit("loaded").passed
     assert len(beside.history) >= len(alone.history)
@@ -176,16 +177,14 @@ def test_a_drag_is_divided_whatever_else_is_in_contact() -> None:
 
 def test_a_drag_that_is_not_divided_does_not_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stepper, "_SHORTEST", 1.0)
-    audit = dragged("plane", 2).audit("loaded")
+    audit = dragged.__wrapped__("plane", 2).audit("loaded")
     assert any(text.startswith("audit_slip_resolution") for text in audit.violations)
 
 
 def test_an_unknown_time_of_touch_does_not_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     """All of the force of a single increment is on vertices that touched within it."""
     monkeypatch.setattr(stepper, "_SHORTEST", 1.0)
-    oblique.cache_clear()
-    audit = oblique(1).audit("loaded")
-    oblique.cache_clear()
+    audit = oblique.__wrapped__(1).audit("loaded")
     assert [text.split()[0] for text in audit.violations] == ["audit_touch_time"]
 
 

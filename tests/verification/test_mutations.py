@@ -84,10 +84,16 @@ def case() -> Case:
 
 @pytest.fixture(scope="module")
 def audited() -> Record:
-    """The record of a coarse run that has passed its audit, with fields at its nodes."""
+    """The record of a coarse run that has passed its audit, with fields at its nodes.
+
+    A file costs as many milliseconds as it has variables: numbers and minima that no fault touches
+    are left out.
+    """
     found = run("punch")
     assert found.status is Status.OK
-    return found.with_one_mesh()
+    numbers = {k: v for k, v in found.scalars.items() if not k.startswith("audit_")}
+    fields = {k: v for k, v in found.fields.items() if "residual_min" not in k}
+    return replace(found, scalars=numbers, fields=fields).with_one_mesh()
 
 
 @pytest.mark.parametrize("status", [Status.OK, Status.AUDIT_FAILED])

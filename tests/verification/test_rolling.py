@@ -105,12 +105,12 @@ def test_locked_wheel_slides_everywhere():
 # -- prescribed pressure -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("ratio", "yields"), [(3.09, False), (3.12, True)])
-def test_translated_hertz_pressure_first_yields_at_the_known_load(ratio, yields):
+@pytest.mark.parametrize(("ratio", "yields", "growth"), [(3.09, False, 1.03), (3.12, True, 1.1)])
+def test_translated_hertz_pressure_first_yields_at_the_known_load(ratio, yields, growth):
     """p0/k = 3.107 for von Mises at Poisson 0.3 (here bracketed within 1 %)."""
     record = roll(
         load="hertz", friction=0.0, load_ratio=ratio / np.sqrt(3), element_size=0.4,
-        growth=1.03, track=4.0, advance_step=2.0,
+        growth=growth, track=4.0, advance_step=2.0,
     )  # fmt: skip
     assert (record.scalars["max_plastic_strain"] > 0) is yields
     if not yields:
@@ -181,8 +181,7 @@ def test_von_mises_at_the_surface_is_the_strength_where_traction_makes_it_yield(
 
 # -- the advance of an increment ---------------------------------------------------------------
 
-DRIVEN = {"element_size": 2.0, "track": 12.0, "traction": -0.3}
-SHORT = DRIVEN | {"element_size": 3.0, "track": 8.0, "growth": 2.0}
+SHORT = {"element_size": 3.0, "track": 8.0, "growth": 2.0, "traction": -0.3}
 
 
 def test_advance_is_halved_until_residual_stress_settles():
@@ -203,36 +202,35 @@ def test_advance_is_halved_until_residual_stress_settles():
 
 
 def test_a_tolerance_that_cannot_be_met_is_told(monkeypatch):
-    monkeypatch.setattr(walker, "HALVINGS", 2)
-    fields = DRIVEN | {"element_size": 4.0, "growth": 2.0}
-    record = roll.__wrapped__(**fields, advance_step=6.0, advance_tolerance=1e-6)
-    assert record.scalars["advance"] == 6.0 / 2**2
+    monkeypatch.setattr(walker, "HALVINGS", 1)
+    record = roll.__wrapped__(**SHORT, advance_step=4.0, advance_tolerance=1e-6)
+    assert record.scalars["advance"] == 4.0 / 2
     assert record.scalars["advance_error"] > 1e-6 * record.parameters.yield_stress
     assert "above the tolerance" in record.message
 
 
 def test_advance_is_taken_as_given_without_a_tolerance():
-    record = roll(**DRIVEN, advance_step=2.0)
+    record = roll(**SHORT, advance_step=2.0)
     assert record.scalars["advance"] == 2.0
     assert np.isnan(record.scalars["advance_error"])
 
 
 def test_what_a_larger_advance_gave_stands_where_a_smaller_one_fails(monkeypatch):
-    fields = DRIVEN | {"element_size": 4.0, "growth": 2.0, "advance_step": 6.0}
+    fields = SHORT | {"advance_step": 4.0}
     advance = Stepper.reach
 
-    def fails_below_3_mm(self, point, target, **options):
+    def fails_below_2_mm(self, point, target, **options):
         # the wheel rolls from time 2, when it is set down and driven, to its release at 2 + track
         now = point.now.state.time
-        if 2.0 <= now < 2.0 + fields["track"] and 0.0 < target - now < 3.0:
+        if 2.0 <= now < 2.0 + fields["track"] and 0.0 < target - now < 2.0:
             raise PathEnded(NotConverged("stuck", 0.0, 1.0), point)
         return advance(self, point, target, **options)
 
-    monkeypatch.setattr(Stepper, "reach", fails_below_3_mm)
+    monkeypatch.setattr(Stepper, "reach", fails_below_2_mm)
     record = roll.__wrapped__(**fields, advance_tolerance=1e-6)
-    assert record.scalars["advance"] == 3.0
+    assert record.scalars["advance"] == 2.0
     assert np.array_equal(
-        profile(record, "xx"), profile(roll(**fields | {"advance_step": 3.0}), "xx")
+        profile(record, "xx"), profile(roll(**fields | {"advance_step": 2.0}), "xx")
     )
     assert "above the tolerance" in record.message
-    assert "one of 1.5 mm failed" in record.message
+    assert "one of 1 mm failed" in record.message

@@ -169,9 +169,7 @@ def test_stick_zone_of_equal_rollers_is_carters_and_at_the_leading_edge(traction
     assert trailing_end == pytest.approx(1 - 2 * sqrt(1 - abs(traction)), abs=0.25)
 
 
-@pytest.mark.parametrize(
-    ("traction", "steps"), [*((traction, 4) for traction in DRIVEN), (0.5, 8), (-0.5, 8)]
-)
+@pytest.mark.parametrize(("traction", "steps"), [*((traction, 4) for traction in DRIVEN), (0.5, 8)])
 def test_creepage_of_equal_rollers_is_carters_beyond_free_rolling(traction, steps):
     free, driven = (rolled(steps, traction=t) for t in (0.0, traction))
     exact = np.sign(traction) * creepage_of(free.parameters, abs(traction))
@@ -275,7 +273,7 @@ def test_free_creepage_tends_to_that_of_half_planes_with_the_load():
 @pytest.mark.parametrize(("stiffness", "widths"), [(1 / 3, 3.2), (3.0, _STEADY)])
 def test_shear_of_dissimilar_rollers_has_no_resultant_and_the_sign_of_minus_beta(stiffness, widths):
     """The stiffer wheel holds the track back from shortening: outward shear on the track."""
-    run = rolled(10, stiffness=stiffness, widths=widths)
+    run = rolled(7, stiffness=stiffness, widths=widths)
     assert abs(run.force) < 1e-4 * run.parameters.force
     exact = PEAK * Stuck.of(run.parameters).shear(run.x)
     for side in (-1, 1):
@@ -286,7 +284,7 @@ def test_shear_of_dissimilar_rollers_has_no_resultant_and_the_sign_of_minus_beta
 
 def test_shear_of_dissimilar_rollers_does_not_depend_on_ample_friction():
     each = ({}, {"friction": 0.9})  # 0.3 by default, a run that another test shares
-    some, ample = (rolled(10, stiffness=3.0, widths=_STEADY, **own) for own in each)
+    some, ample = (rolled(7, stiffness=3.0, widths=_STEADY, **own) for own in each)
     inside = np.abs(some.x) < 0.9
     assert ample.shear[inside] == pytest.approx(some.shear[inside], abs=0.002 * PEAK)
     assert ample.creepage == pytest.approx(some.creepage, rel=0.01)

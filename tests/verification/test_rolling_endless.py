@@ -150,9 +150,9 @@ def test_under_load_the_map_shows_the_load():
 
 
 def test_runs_of_one_path_are_those_computed_alone():
-    together = records((1, 3), direction="back_and_forth")
-    assert [len(r.coordinates["pass"]) for r in together] == [1, 3]
-    for record, passes in zip(together, (1, 3), strict=True):
+    together = records((1, 2), direction="back_and_forth")
+    assert [len(r.coordinates["pass"]) for r in together] == [1, 2]
+    for record, passes in zip(together, (1, 2), strict=True):
         alone = roll(passes=passes, direction="back_and_forth")
         for name, (_, values) in record.fields.items():
             np.testing.assert_array_equal(values, alone.fields[name][1], err_msg=name)

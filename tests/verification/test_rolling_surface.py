@@ -28,7 +28,7 @@ def scalars(element_size, traction=0.0):
     """The figures of one pass over a short track."""
     parameters = RollingParameters(
         element_size=element_size, growth=1.15**element_size, advance_step=2.0, track=20.0,
-        traction=traction,
+        press_steps=4, unload_steps=1, traction=traction,
     )  # fmt: skip
     (record,) = SCENES["rolling"].path(parameters, [1], lambda share: None)
     assert record.status is Status.OK, record.message
