@@ -107,7 +107,7 @@ def test_errors_of_thick_walls_fall_with_the_mesh_at_the_order_of_the_element(
 
 
 def test_a_level_of_accuracy_has_an_error_against_a_finer_run(written: Path) -> None:
-    """Draft against elements of two thirds the side, from 1 mm down and at the first row: some percent."""
+    """Draft against sides of two thirds, from 1 mm down and at the first row: some percent."""
     (draft,) = rows(written / "accuracy.csv").values()
     assert 1.0 < draft["error of largest"] < 15.0
 
