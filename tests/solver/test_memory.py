@@ -174,12 +174,13 @@ def test_no_factor_outlives_a_path_and_what_is_kept(scene: str, passes: float) -
 
 
 @pytest.mark.solves
-def test_the_factors_of_a_prism_end_with_it() -> None:
+@pytest.mark.parametrize("scene", ["raceway", "rolling"])
+def test_the_factors_of_a_pass_end_with_it(scene: str) -> None:
     """No circle of references holds them until the garbage collector comes by."""
     before = factors()
     gc.disable()
     try:
-        walk("raceway", 1)
+        walk(scene, 1)
         memory._evict(0)
         assert not factors(collected=False) - before
     finally:

@@ -151,14 +151,14 @@ class OfPass:
         moving: TravellingPressure | None,
         released: str,
     ) -> None:
+        def fields(name: str, stage: str) -> BodyFields:
+            del name
+            return PassFields(half_plane, found, loaded=stage != released)
+
         self._half_plane, self._found = half_plane, found
         self._moving, self._released = moving, released
-        self.fields = cache(self._fields)
+        self.fields = cache(fields)  # a bound method would hold itself: a circle
         self.plain = cache(lambda name: PlainBody(half_plane.full(name)))
-
-    def _fields(self, name: str, stage: str) -> BodyFields:
-        del name
-        return PassFields(self._half_plane, self._found, loaded=stage != self._released)
 
     def exact(self, stage: str) -> bool:
         """See `Recomputed`; under the load two strains differ, by `audit_steadiness`."""
