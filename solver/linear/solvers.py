@@ -103,10 +103,15 @@ class SuperLU:
 class PardisoSolver:
     """MKL PARDISO: Cholesky, and LDL' when a pivot is not positive."""
 
-    def __init__(self, upper: sparse.csr_array, kept: NDArray[np.int64]) -> None:
+    def __init__(
+        self,
+        upper: sparse.csr_array,
+        kept: NDArray[np.int64],
+        ordering: int = pardiso.DISSECTION,
+    ) -> None:
         self._upper = upper
         self._kept = kept
-        self._definite = pardiso.Pardiso(upper, kept)
+        self._definite = pardiso.Pardiso(upper, kept, ordering=ordering)
         self._indefinite: pardiso.Pardiso | None = None
         self._current = self._definite
 
@@ -267,6 +272,22 @@ def analyse(
     """
     kept = np.zeros(0, dtype=np.int64) if kept is None else kept
     return PardisoSolver(upper, kept) if chosen(name) == "pardiso" else SuperLU(upper, kept)
+
+
+def analyse_condensed(upper: sparse.csr_array, name: str = "auto") -> LinearSolver:
+    """Return a solver for matrices of which part of the unknowns are densely coupled.
+
+    PARDISO orders by minimum degree then: of a window of 13 600 unknowns in a half-plane a solve
+    takes half the time that it takes after nested dissection, and so does the analysis.
+
+    Raises
+    ------
+    ModelError : the solver named is unknown or not installed
+    """
+    none = np.zeros(0, dtype=np.int64)
+    if chosen(name) == "pardiso":
+        return PardisoSolver(upper, none, pardiso.MINIMUM_DEGREE)
+    return SuperLU(upper, none)
 
 
 def analyse_several(upper: sparse.csr_array, count: int, name: str = "auto") -> Factors:
