@@ -44,7 +44,7 @@ class CondensedTrack:
         taken = sparse.csr_array((self._outside.taken.ravel(), pairs), shape=(len(self.kept),) * 2)
         upper = sparse.csr_array(sparse.triu(K[self.kept][:, self.kept] - taken, format="csr"))
         upper.sort_indices()
-        self._window = linear.analyse_condensed(upper)
+        self._window = linear.analyse(upper, coupled=True)
         self._window.factorise(upper.data)
 
     def place(self, unknowns: NDArray[np.int64]) -> NDArray[np.int64]:
