@@ -33,8 +33,9 @@ def graded(length: float, smallest: float, ratio: float, largest: float) -> Arra
         raise ModelError("ratio", ratio, "must be at least 1")
     sizes: list[float] = []
     total, size, most = 0.0, smallest, max(largest, smallest)
+    too_long = length > 2 * _MOST * most  # known without adding a million
     while total < length * (1 - 1e-9):
-        if len(sizes) == _MOST or length > 2 * _MOST * most:  # seen without adding a million
+        if too_long or len(sizes) == _MOST:
             allowed = f"must make at most {_MOST} elements along {length:g} mm"
             raise ModelError("size", smallest, allowed)
         sizes.append(min(size, most))
