@@ -91,7 +91,7 @@ FAMILIES: dict[str, Family] = {
     "static": Family(range(static.COUNT), 48, static.scenes),
     "endless": Family(endless.SHORT, 300, endless.scenes),
     "files": Family(range(files.COUNT), 200, files.scenes),
-    "prism": Family(prism.SHORT, 300, prism.scenes),
+    "prism": Family(range(prism.COUNT), 300, prism.scenes),
 }
 
 FOUND = ["prism-124", "files-18", "files-169", "rigid-11"]

@@ -23,8 +23,7 @@ from tests.stability.trial import Scene, tells
 Given = dict[str, Any]
 Parameters = WheelRailParameters | RacewayParameters
 
-SHORT = (0, 1, 2, 4, 5, 6, 7)
-"""Scenes of the test suite: every rule but a mixed one, which the linear ones of it make up."""
+COUNT = 8
 SEED = 1985
 RULES = ("none", "isotropic", "kinematic", "mixed", "voce", "table", "chaboche", "layered")
 GROWING = ("none", "isotropic", "voce", "table")
@@ -342,7 +341,7 @@ def changed(given: Given) -> str:
     return ("rail: " if "cant" in given else "raceway: ") + ", ".join(told)
 
 
-def scenes(count: int) -> list[Scene]:
+def scenes(count: int = COUNT) -> list[Scene]:
     """Return the passes."""
     rng = np.random.default_rng(SEED)
     made = [given_of(number, rng) for number in range(count)]
