@@ -86,17 +86,17 @@ PROBLEMS: Mapping[str, Problem] = {
     ),
 }
 
-_LITTLE_FINER = {"element_size": _ENDLESS.mesh_width / 12}
+_SOMEWHAT_FINER = {"element_size": _ENDLESS.mesh_width / 12}
 
 
 def measure(quick: bool, repeats: int) -> list[Point]:
-    """Return a point for every level of every problem; draft against little finer where quick."""
+    """Return a point for every level of every problem; quick: draft against somewhat finer."""
     points = []
     for name, problem in PROBLEMS.items():
         if quick and name != "rolling, endless":
             continue
         levels = problem.levels[: 1 if quick else None]
-        finest = _LITTLE_FINER if quick else problem.finest
+        finest = _SOMEWHAT_FINER if quick else problem.finest
         exact = problem.stress(anew(problem.scene, replace(problem.parameters, **finest)))
         for level in levels:
             own = at_level(problem.parameters, level)
