@@ -45,6 +45,10 @@ _ROUNDS = 4
 """Number of times windows may grow in an increment."""
 
 
+class FailedInWindows(IncrementFailed):
+    """The increment failed in windows; that proves no limit load, and whole bodies may converge."""
+
+
 def narrowed(
     system: System,
     before: Converged,
@@ -57,8 +61,8 @@ def narrowed(
 ) -> Converged | None:
     """Return an increment from ``start`` to ``time`` that was solved in windows.
 
-    None if nothing yields, if windows would be large, if a body comes loose, if links act outside
-    of windows, or if the increment fails in them.
+    None if nothing yields, if windows would be large, if a body comes loose, or if links act
+    outside of windows. Raises `FailedInWindows` if the increment fails in them.
 
     Parameters
     ----------
@@ -109,8 +113,8 @@ def narrowed(
                 return None
             windows = (None,) * len(windows)
             continue
-        except IncrementFailed:
-            return None
+        except IncrementFailed as failure:
+            raise FailedInWindows(str(failure)) from failure
         if _loose(system, found):
             return None
         count += (found.iterations, found.pivoted, found.blended)

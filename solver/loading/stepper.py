@@ -18,7 +18,7 @@ from solver.linear.threads import one_thread
 from solver.loading.energy import worked
 from solver.loading.history import lost
 from solver.loading.increment import Increment
-from solver.loading.narrowing import narrowed
+from solver.loading.narrowing import FailedInWindows, narrowed
 from solver.loading.outcome import IncrementFailed, PathEnded, Point, Tally, Yielded
 from solver.loading.prediction import MEMORY, Predictor
 from solver.loading.program import ROUNDING
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from solver.contact.system import System
     from solver.loading.control import Control
 
+    Failed = tuple[float, IncrementFailed]
     Report = Callable[[], None]
     Watch = Callable[[Converged], Any]
 
@@ -153,33 +154,33 @@ class Stepper:
         rotate with its surface. An increment that fails is halved. One that resolves contact too
         coarsely is halved too, but kept if its halves fail; later increments grow again.
 
-        The shortest increment may fail so close to a limit load that nothing proves it. An earlier,
-        longer one that failed at an excluded load close ahead then proves it.
+        Whole bodies are used where windows of them fail only in the shortest increment, because the
+        half of a longer one mostly converges.
         """
         begin = point.now.state.time
         turn = max((part.turn(begin, target) for part in self.system.parts), default=0.0)
         whole = (target - begin) / max(1, math.ceil(turn / _TURN - ROUNDING))
         size = _StepSize(whole, self.control.max_cuts)
         known, coarse = point.now.timing, None
-        beyond: tuple[float, IncrementFailed] | None = None
+        failed: list[Failed] = []
         while (now := point.now.state.time) != target:
             close = abs(target - now) <= abs(size.step) * (1 + ROUNDING)
             time = target if close else now + size.step
             try:
                 converged = self._increment(
-                    point, time, contact=contact or time != target, patient=size.shortest
+                    point,
+                    time,
+                    contact=contact or time != target,
+                    patient=size.shortest,
+                    whole=size.shortest or coarse is not None,
                 )
             except IncrementFailed as failure:
-                if failure.why.excludes and failure.why.limit:
-                    beyond = time, failure
+                failed.append((time, failure))
                 if coarse is None:
                     tally = replace(point.tally, cuts=point.tally.cuts + 1)
                     point = replace(point, tally=self._timed(tally), past=())
                     if not size.failed(time - now):
-                        attempted, why = time, failure
-                        near = beyond and abs(beyond[0] - now) <= _NEAR * abs(time - now)
-                        if beyond and near and not failure.why.limit:
-                            attempted, why = beyond
+                        attempted, why = self._decisive(point, failed)
                         raise PathEnded(self._ended(why, point, attempted), point) from why
                     continue
                 converged = coarse
@@ -190,8 +191,8 @@ class Stepper:
                     coarse = converged
                     continue
             size.converged(converged.state.time - now)
-            if beyond and abs(target - converged.state.time) <= abs(target - beyond[0]):
-                beyond = None
+            left = abs(target - converged.state.time)
+            failed = [each for each in failed if abs(target - each[0]) < left]
             past = (*point.past[1 - MEMORY :], point.now.state)
             point, coarse = self._after(point, self._worked(point.now, converged), past), None
             if converged.beyond_end:
@@ -201,8 +202,34 @@ class Stepper:
             self._report()
         return point
 
-    def _increment(self, point: Point, time: float, *, contact: bool, patient: bool) -> Converged:
+    def _decisive(self, point: Point, failed: Sequence[Failed]) -> Failed:
+        """Return the failed attempt that proves a limit load, else the last one.
+
+        The shortest increment may fail so close to a limit load that nothing proves it. A longer
+        one, to an excluded load close ahead, then does.
+        """
+        now = point.now.state.time
+        *longer, (time, last) = failed
+        for attempted, failure in reversed(longer):
+            if last.why.limit or abs(attempted - now) > _NEAR * abs(time - now):
+                break
+            known = failure
+            if isinstance(failure, FailedInWindows):
+                try:
+                    self._increment(point, attempted, contact=True, patient=False, whole=True)
+                except IncrementFailed as again:
+                    known = again
+            if known.why.excludes and known.why.limit:
+                return attempted, known
+        return time, last
+
+    def _increment(
+        self, point: Point, time: float, *, contact: bool, patient: bool, whole: bool
+    ) -> Converged:
         """Return the increment to a time or raise `IncrementFailed`.
+
+        It is solved in windows of the bodies; with whole bodies, if windows do not serve, or if
+        they fail and ``whole`` is set.
 
         If straight surfaces have moved too far for small sliding in it, it is repeated with finite
         sliding; the first solution is kept if that does not converge.
@@ -214,18 +241,23 @@ class Stepper:
 
         def solved(start: State, guess: State | None) -> Converged:
             if contact:
-                with one_thread():
-                    near = narrowed(
-                        self.system,
-                        point.now,
-                        start,
-                        time,
-                        guess=guess,
-                        patient=patient,
-                        tolerances=tolerances,
-                    )
-                if near is not None:
-                    return near
+                try:
+                    with one_thread():
+                        near = narrowed(
+                            self.system,
+                            point.now,
+                            start,
+                            time,
+                            guess=guess,
+                            patient=patient,
+                            tolerances=tolerances,
+                        )
+                except FailedInWindows:
+                    if not whole:
+                        raise
+                else:
+                    if near is not None:
+                        return near
             return Increment(
                 self.system,
                 start,

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from solver.contact.system import System
+from solver.errors import LimitLoad
 from solver.fem.window import Region, Windowed
 from solver.linear.solvers import Singular
-from solver.loading import narrowing
+from solver.loading import narrowing, stepper
 from solver.loading.control import Control
 from solver.loading.increment import Increment
+from solver.loading.outcome import IncrementFailed
 from solver.loading.walker import Walker
 from solver.scenes.punch import PUNCH, PunchParameters
 from solver.scenes.rolling import ROLLING
@@ -136,3 +138,42 @@ def test_windows_change_the_result_by_less_than_the_tolerance(scene, run, monkey
     body = system.names[-1]
     stress = [system.response(body, o.points["unloaded"]).stress for o in (windowed, whole)]
     assert np.abs(stress[0] - stress[1]).max() < 1e-4
+
+
+@pytest.mark.solves
+@pytest.mark.parametrize("load_ratio", [0.6, 1.3])
+def test_whole_bodies_follow_failed_windows_in_the_shortest_increment(load_ratio, monkeypatch):
+    """The limit load is told even so."""
+    failed, whole = [], set()
+
+    class Fails(Increment):
+        def approach(self):
+            failed.append((self.start.time, self.time))
+            raise IncrementFailed("does not converge")
+
+    class Whole(Increment):
+        def solve(self):
+            whole.add((self.start.time, self.time))
+            return super().solve()
+
+    run = replace(PRESSED, load_ratio=load_ratio, smallest_element=0.1, growth=2.0)
+    system = System(PUNCH.model(run))
+    (plain,) = Walker(system, Control()).walk([PUNCH.program(run)])
+    monkeypatch.setattr(narrowing, "Increment", Fails)
+    monkeypatch.setattr(stepper, "Increment", Whole)
+    (found,) = Walker(system, Control(max_cuts=2)).walk([PUNCH.program(run)])
+    assert type(found.error) is type(plain.error)
+    each: dict[float, list[float]] = {}
+    for start, time in failed:
+        each.setdefault(start, []).append(time)
+    halved = [(start, *times) for start, times in each.items() if len(times) == 3]
+    assert halved
+    if found.error is None:
+        for start, longest, half, shortest in halved:
+            assert [(start, time) in whole for time in (longest, half, shortest)] == [0, 0, 1]
+        body = system.names[-1]
+        stress = [system.response(body, o.points["unloaded"]).stress for o in (plain, found)]
+        assert np.abs(stress[0] - stress[1]).max() < 10
+    else:
+        assert isinstance(found.error, LimitLoad)
+        assert plain.error.reached == pytest.approx(found.error.reached, abs=0.03)
