@@ -60,8 +60,8 @@ if TYPE_CHECKING:
     Vectors = tuple[NDArray[np.float64], ...]
 
 _BLENDS = (0.0, 1e-3, 0.02, 0.1, 0.3, 1.0)
-_SHORT, _STIFF = 0.1, 3
-"""Line search share below which a step is short, and the first blend tried after two short ones."""
+_SHORT = 0.1
+"""Line search share below which a step is short; each after the first asks for the next blend."""
 _PATIENCE = 15
 """Number of iterations without a smaller residual after which an increment has failed."""
 _DIVERGED = 1e4
@@ -198,8 +198,8 @@ class Increment:
                     blended=self._blended,
                 )
             elastic_first = iteration == 0 and self.elastic_first
-            first = _STIFF if crawled > 1 else int(self._softened)
-            first = len(_BLENDS) - 1 if elastic_first else first
+            first = max(crawled - 1, int(self._softened))
+            first = len(_BLENDS) - 1 if elastic_first else min(first, len(_BLENDS) - 1)
             try:
                 step = self._step(residuals, responses, candidates, _BLENDS[first:])
             except IncrementFailed as failure:
