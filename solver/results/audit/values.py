@@ -174,8 +174,7 @@ class PassFields:
         X = self.plain.points
         k = len(total) - len(self._found.before.depth)
         depth = self._found.before.depth
-        row = np.abs(-X[1] - depth[:, None]).argmin(axis=0)
-        column = np.abs(X[0] - x[:, None]).argmin(axis=0)
+        row, column = _nearest(depth, -X[1]), _nearest(x, X[0])
         near = _SAME_DEPTH * depth[0]
         here = np.abs(-X[1] - depth[row]) < near
         outside = np.nan
@@ -287,3 +286,10 @@ class Located:
         each = np.where(np.isnan(at) & (np.abs(self._shape) < _INSIDE), 0.0, at * self._shape)
         out[..., self._at] = each.sum(axis=-2)
         return out
+
+
+def _nearest(places: Array, at: Array) -> NDArray[np.int64]:
+    """Return the number of the nearest place (n,) for each position in ``at``."""
+    different, first = np.unique(places, return_index=True)
+    middles = (different[1:] + different[:-1]) / 2
+    return np.asarray(first[np.searchsorted(middles, at)])
