@@ -173,18 +173,20 @@ class Frame:
             )
 
     def fill(self, file: h5py.File, run: h5py.File, at: tuple[int, ...]) -> None:
-        """Write the fields of one run in their place."""
+        """Write the fields of one run in their place, compressed as in its file where that fits."""
         places = cache(partial(self._places, run))
         for name, (inner, _) in self.fields.items():
             if name in run:
+                target = file[NO_COORDINATE + name if name in self.ragged else name]
+                in_order = all(places(each) == list(range(len(places(each)))) for each in inner)
+                if in_order and _chunk_copied(run[name], target, at):
+                    continue
                 values = _values(run[name])
                 values = values.reshape(values.shape[values.ndim - len(inner) :])
-                found = list(map(places, inner))
-                if any(each != list(range(len(each))) for each in found):  # other labels in between
+                if not in_order:  # other labels in between
                     whole = np.full(tuple(map(self._extent, inner, values.shape)), np.nan)
-                    whole[np.ix_(*found)] = values
+                    whole[np.ix_(*map(places, inner))] = values
                     values = whole
-                target = file[NO_COORDINATE + name if name in self.ragged else name]
                 target[(*at, *map(slice, values.shape))] = values
 
     def write_small(self, file: h5py.File) -> None:
@@ -272,13 +274,17 @@ def _created(
     """
     scales = [file[dimension] for dimension in dimensions]
     text, absent = kind.kind == "O", _absent(name, kind)
+    made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    if dimensions and not text:  # before compression, as netCDF does in the files of runs
+        made.set_fletcher32()
+        storage = {"chunks": True} | storage
     variable = file.create_dataset(
         name,
         tuple(map(len, scales)),
         dtype=h5py.string_dtype() if text else kind,
         fillvalue=None if text else absent,
-        fletcher32=bool(dimensions) and not text,
         track_order=True,
+        dcpl=made,
         **storage,
     )
     for axis, scale in zip(variable.dims, scales, strict=True):
@@ -287,6 +293,24 @@ def _created(
         variable.attrs["_FillValue"] = np.array([absent], dtype=kind)
     variable.attrs.update(attributes)
     return variable
+
+
+def _chunk_copied(source: h5py.Dataset, target: h5py.Dataset, at: tuple[int, ...]) -> bool:
+    """Copy the chunk of a run as it is stored, if both store it alike; return whether they do."""
+    inner = source.ndim + len(at) - target.ndim  # its number of usual dimensions
+    whole = source.shape == source.chunks and source.id.get_num_chunks() == 1
+    chunk = (*(1,) * len(at), *source.shape[inner:])
+    if not whole or target.chunks != chunk or _stored(source) != _stored(target):
+        return False
+    mask, content = source.id.read_direct_chunk((0,) * source.ndim)
+    target.id.write_direct_chunk((*at, *(0,) * (target.ndim - len(at))), content, mask)
+    return True
+
+
+def _stored(variable: h5py.Dataset) -> list[Any]:
+    """Return the kind of a variable's numbers and the filters of its chunks."""
+    made = variable.id.get_create_plist()
+    return [variable.dtype, *(made.get_filter(k)[:3] for k in range(made.get_nfilters()))]
 
 
 def _absent(name: str, kind: np.dtype[Any]) -> Any:
