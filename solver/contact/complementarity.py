@@ -251,8 +251,10 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
         if problem.frictional:
             sliding = (status != OPEN) & rough
             reached = np.abs(F[n:]) >= bound * (1 - 1e-9)
-            status[sliding & reached & (F[n:] < 0)] = FORWARD
-            status[sliding & reached & (F[n:] > 0)] = BACKWARD
+            slip = (problem.offset + problem.W @ F + problem.turned @ q)[n:]
+            ahead = np.where(bound > 0, -F[n:], slip)  # without a force the slip says which way
+            status[sliding & reached & (ahead > 0)] = FORWARD
+            status[sliding & reached & (ahead < 0)] = BACKWARD
         on = np.where(status > STICK, lines.piece(N), 0)
         found = _active_sets(problem, status, on)
         if found is not None:

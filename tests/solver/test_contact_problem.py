@@ -253,6 +253,26 @@ def test_lemke_says_so_where_there_is_no_solution():
     assert not solved
 
 
+def test_a_point_that_friction_lifts_slips_the_way_it_moves_where_its_bound_was_zero():
+    """Stick pulls, open overlaps, and passes hold a bound of zero and one that opens the point.
+
+    A second point stays closed.
+    """
+    one = np.array([[1.0, 0.9], [0.9, 1.0]])
+    problem = ContactProblem(
+        W=np.kron(one, np.diag([1.0, 0.0])) + np.kron(np.eye(2), np.diag([0.0, 1.0])),
+        offset=np.array([-1.0, -1.0, -5.0, 0.0]),
+        lines=lines(2, 1.3),
+        A=np.zeros((4, 0)),
+        balance=np.zeros(0),
+    )
+    found = solve_contact(problem, np.array([STICK, STICK]))
+    assert found is not None
+    normal = 1 / (1 + 1.3 * 0.9)
+    np.testing.assert_allclose(found.forces, [normal, 1.0, 1.3 * normal, 0.0], atol=1e-12)
+    assert found.status.tolist() == [BACKWARD, STICK]
+
+
 def test_two_points_at_one_place_do_not_hold_a_body_that_may_tilt():
     problem = ContactProblem(
         W=np.array(
