@@ -61,7 +61,8 @@ if TYPE_CHECKING:
 
 _BLENDS = (0.0, 1e-3, 0.02, 0.1, 0.3, 1.0)
 _SHORT = 0.1
-"""Line search share below which a step is short; each after the first asks for the next blend."""
+"""Line search share below which a step is short. Each after the first asks for the next blend, the
+last of which, the elastic stiffness, stays in reserve."""
 _PATIENCE = 15
 """Number of iterations without a smaller residual after which an increment has failed."""
 _DIVERGED = 1e4
@@ -199,7 +200,7 @@ class Increment:
                 )
             elastic_first = iteration == 0 and self.elastic_first
             first = max(crawled - 1, int(self._softened))
-            first = len(_BLENDS) - 1 if elastic_first else min(first, len(_BLENDS) - 1)
+            first = len(_BLENDS) - 1 if elastic_first else min(first, len(_BLENDS) - 2)
             try:
                 step = self._step(residuals, responses, candidates, _BLENDS[first:])
             except IncrementFailed as failure:

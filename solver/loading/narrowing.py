@@ -61,8 +61,9 @@ def narrowed(
 ) -> Converged | None:
     """Return an increment from ``start`` to ``time`` that was solved in windows.
 
-    None if nothing yields, if windows would be large, if a body comes loose, or if links act
-    outside of windows. Raises `FailedInWindows` if the increment fails in them.
+    None if windows do not serve: nothing yields, they would be large or grow too often, a body
+    comes loose, links act outside of them, or whole bodies are not in balance. Raises
+    `FailedInWindows` if the increment fails in them.
 
     Parameters
     ----------

@@ -16,6 +16,7 @@ from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.fem.fields import elastic_energy
 from solver.linear.threads import one_thread
 from solver.loading.energy import worked
+from solver.loading.flow import SoftestStep
 from solver.loading.history import lost
 from solver.loading.increment import Increment
 from solver.loading.narrowing import FailedInWindows, narrowed
@@ -30,8 +31,10 @@ if TYPE_CHECKING:
     from solver.contact.state import ContactState, Timing
     from solver.contact.system import System
     from solver.loading.control import Control
+    from solver.loading.slide import Slide
 
-    Failed = tuple[float, IncrementFailed]
+    Attempt = tuple[float, SoftestStep | Slide | None]
+    """Time of an increment that failed, and why; None if it failed in windows alone."""
     Report = Callable[[], None]
     Watch = Callable[[Converged], Any]
 
@@ -154,36 +157,43 @@ class Stepper:
         rotate with its surface. An increment that fails is halved. One that resolves contact too
         coarsely is halved too, but kept if its halves fail; later increments grow again.
 
-        Whole bodies are used where windows of them fail only in the shortest increment, because the
-        half of a longer one mostly converges.
+        Where windows of the bodies fail, whole bodies follow only in the shortest increment, and in
+        the halves of a coarse one: the half of another one mostly converges in windows.
         """
         begin = point.now.state.time
         turn = max((part.turn(begin, target) for part in self.system.parts), default=0.0)
-        whole = (target - begin) / max(1, math.ceil(turn / _TURN - ROUNDING))
-        size = _StepSize(whole, self.control.max_cuts)
+        step = (target - begin) / max(1, math.ceil(turn / _TURN - ROUNDING))
+        size = _StepSize(step, self.control.max_cuts)
         known, coarse = point.now.timing, None
-        failed: list[Failed] = []
+        failed: list[Attempt] = []
         while (now := point.now.state.time) != target:
             close = abs(target - now) <= abs(size.step) * (1 + ROUNDING)
             time = target if close else now + size.step
+            shortest = size.shortest(time - now)
             try:
                 converged = self._increment(
                     point,
                     time,
                     contact=contact or time != target,
-                    patient=size.shortest,
-                    whole=size.shortest or coarse is not None,
+                    patient=shortest,
+                    whole=shortest or coarse is not None,
                 )
             except IncrementFailed as failure:
-                failed.append((time, failure))
+                in_windows = isinstance(failure, FailedInWindows)
+                failed.append((time, None if in_windows else failure.why))
                 if coarse is None:
                     tally = replace(point.tally, cuts=point.tally.cuts + 1)
                     point = replace(point, tally=self._timed(tally), past=())
-                    if not size.failed(time - now):
-                        attempted, why = self._decisive(point, failed)
-                        raise PathEnded(self._ended(why, point, attempted), point) from why
-                    continue
-                converged = coarse
+                    if size.failed(time - now):
+                        continue
+                    end = self._longer(point, failed)
+                    if not isinstance(end, Converged):
+                        point = replace(point, tally=self._timed(point.tally))
+                        raise PathEnded(self._ended(failure, point, *end), point) from failure
+                    converged = end
+                    size.resumed(converged.state.time - now)
+                else:
+                    converged = coarse
             else:
                 # the forces of the coarse increment show how large they become
                 known = converged.timing.beside(known)
@@ -202,26 +212,36 @@ class Stepper:
             self._report()
         return point
 
-    def _decisive(self, point: Point, failed: Sequence[Failed]) -> Failed:
-        """Return the failed attempt that proves a limit load, else the last one.
+    def _longer(
+        self, point: Point, failed: Sequence[Attempt]
+    ) -> Converged | tuple[float, SoftestStep | Slide]:
+        """Return what longer increments say of the shortest one, which has failed too.
 
-        The shortest increment may fail so close to a limit load that nothing proves it. A longer
-        one, to an excluded load close ahead, then does.
+        It may have failed so close to a limit load that nothing proves it. A longer one, to an
+        excluded load close ahead, then does. Those that failed in windows alone are solved again,
+        with whole bodies: the path goes on with one that converges.
         """
         now = point.now.state.time
         *longer, (time, last) = failed
-        for attempted, failure in reversed(longer):
-            if last.why.limit or abs(attempted - now) > _NEAR * abs(time - now):
-                break
-            known = failure
-            if isinstance(failure, FailedInWindows):
-                try:
-                    self._increment(point, attempted, contact=True, patient=False, whole=True)
-                except IncrementFailed as again:
-                    known = again
-            if known.why.excludes and known.why.limit:
-                return attempted, known
-        return time, last
+        why = last or SoftestStep()
+        if why.limit:
+            return time, why
+        for attempted, known in reversed(longer):
+            if abs(attempted - now) > _NEAR * abs(time - now):
+                continue
+            found = known or self._with_whole_bodies(point, attempted)
+            if isinstance(found, Converged):
+                return found
+            if found.excludes and found.limit:
+                return attempted, found
+        return time, why
+
+    def _with_whole_bodies(self, point: Point, time: float) -> Converged | SoftestStep | Slide:
+        """Return the increment to a time, or why it fails also with whole bodies."""
+        try:
+            return self._increment(point, time, contact=True, patient=False, whole=True)
+        except IncrementFailed as failure:
+            return failure.why
 
     def _increment(
         self, point: Point, time: float, *, contact: bool, patient: bool, whole: bool
@@ -239,7 +259,7 @@ class Stepper:
 
         tolerances = self.control.tolerances
 
-        def solved(start: State, guess: State | None) -> Converged:
+        def solved(start: State, guess: State | None, whole: bool = whole) -> Converged:
             if contact:
                 try:
                     with one_thread():
@@ -274,7 +294,7 @@ class Stepper:
         if following is None:
             return converged
         try:
-            return solved(following, None)
+            return solved(following, None, whole=True)
         except IncrementFailed:
             return converged
 
@@ -330,12 +350,14 @@ class Stepper:
     def _watched(self, history: tuple[Any, ...], now: Converged) -> tuple[Any, ...]:
         return (*history, self._watch(now)) if self._watch else history
 
-    def _ended(self, failure: IncrementFailed, point: Point, attempted: float) -> NotConverged:
+    def _ended(
+        self, failure: IncrementFailed, point: Point, attempted: float, why: SoftestStep | Slide
+    ) -> NotConverged:
         reached = point.now.state.time
         way = f"between {self.place(reached)} and {self.place(attempted)}"
         growing = any(part.grows(reached, attempted) for part in self.system.parts)
-        if failure.why.limit and growing:
-            return LimitLoad(f"no equilibrium {way}: {failure.why}", reached, attempted)
+        if why.limit and growing:
+            return LimitLoad(f"no equilibrium {way}: {why}", reached, attempted)
         hint = spent(self.system, point.now.state)
         return NotConverged(f"the increment {way} failed: {failure}{hint}", reached, attempted)
 
@@ -359,10 +381,9 @@ class _StepSize:
         self._whole, self._least = whole, abs(whole) / 2**cuts
         self._grows = False
 
-    @property
-    def shortest(self) -> bool:
+    def shortest(self, step: float) -> bool:
         """Whether an increment of this size cannot be halved again."""
-        return abs(self.step) < 2 * self._least * (1 - ROUNDING)
+        return abs(step) < 2 * self._least * (1 - ROUNDING)
 
     def failed(self, step: float) -> bool:
         """Halve a step after a failure; return whether the half is permitted."""
@@ -376,6 +397,10 @@ class _StepSize:
         self.step, self._grows = step / 2, True
         self._least = min(self._least, abs(self.step))  # a larger step that fails returns to this
         return True
+
+    def resumed(self, step: float) -> None:
+        """Go on with a step that converged after all shorter ones had failed."""
+        self.step = step
 
     def converged(self, step: float) -> None:
         """Double the next step, if steps may grow."""

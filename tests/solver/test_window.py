@@ -173,7 +173,31 @@ def test_whole_bodies_follow_failed_windows_in_the_shortest_increment(load_ratio
             assert [(start, time) in whole for time in (longest, half, shortest)] == [0, 0, 1]
         body = system.names[-1]
         stress = [system.response(body, o.points["unloaded"]).stress for o in (plain, found)]
-        assert np.abs(stress[0] - stress[1]).max() < 10
+        assert np.abs(stress[0] - stress[1]).max() < 10  # other increments
     else:
         assert isinstance(found.error, LimitLoad)
-        assert plain.error.reached == pytest.approx(found.error.reached, abs=0.03)
+        assert plain.error.reached == pytest.approx(found.error.reached, abs=0.03)  # a quarter step
+
+
+@pytest.mark.solves
+def test_a_longer_increment_leads_on_where_the_shortest_fails(monkeypatch):
+    """Windows fail always, whole bodies in halved increments: only the longer ones are left."""
+    tried = {}
+
+    class Fails(Increment):
+        def approach(self):
+            tried.setdefault(self.start.time, self.time)
+            raise IncrementFailed("does not converge")
+
+    class Whole(Increment):
+        def solve(self):
+            if self.time != tried.get(self.start.time, self.time):
+                raise IncrementFailed("does not converge")
+            return super().solve()
+
+    run = replace(PRESSED, smallest_element=0.1, growth=2.0)
+    monkeypatch.setattr(narrowing, "Increment", Fails)
+    monkeypatch.setattr(stepper, "Increment", Whole)
+    (found,) = Walker(System(PUNCH.model(run)), Control(max_cuts=1)).walk([PUNCH.program(run)])
+    assert tried and found.error is None
+    assert found.tally.cuts >= 2 * len(tried)
