@@ -79,6 +79,7 @@ def whole_matrix(
     dofs: NDArray[np.int64], matrices: NDArray[np.float64], n: int
 ) -> sparse.csr_array:
     """Return the matrix (n, n) of all elements on all unknowns."""
-    rows = np.broadcast_to(dofs[:, :, None], matrices.shape)
-    columns = np.broadcast_to(dofs[:, None, :], matrices.shape)
+    at = dofs.astype(np.int32)  # SciPy keeps the kind of index, and what is cut from it has it too
+    rows = np.broadcast_to(at[:, :, None], matrices.shape)
+    columns = np.broadcast_to(at[:, None, :], matrices.shape)
     return sparse.csr_array((matrices.ravel(), (rows.ravel(), columns.ravel())), shape=(n, n))

@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 
 CONTACT = 2.0
 """Ratio of half the length of the surface that may come into contact to the half-width."""
+_BLOCKS = 8
+"""Number of parts in which the compliance of the surface is solved for: all displacements at once
+would take as much memory as all else of a track."""
 
 
 class Track:
@@ -146,12 +149,17 @@ class Track:
         """Positions of the surface's unknowns among those of the window."""
         return self.operator.place(self.surface.dofs)
 
+    def under(self, forces: Array) -> Array:
+        """Return displacements (m,) or (m, k) for forces (n,) or (n, k) on the surface [mm]."""
+        every = np.zeros((len(self.operator.kept), *forces.shape[1:]))
+        every[self.at_surface] = forces
+        return self.operator.solve(every)
+
     @cached_property
-    def response(self) -> Array:
-        """Displacements (m, n) of the window for forces on the n unknowns of the surface [mm/N]."""
-        forces = np.zeros((len(self.operator.kept), len(self.at_surface)))
-        forces[self.at_surface, np.arange(len(self.at_surface))] = 1.0
-        return self.operator.solve(forces)
+    def compliance(self) -> Array:
+        """Displacements (n, n) of the surface's unknowns for forces on them [mm/N]."""
+        each = np.array_split(np.eye(len(self.at_surface)), _BLOCKS, axis=1)
+        return np.hstack([self.under(forces)[self.at_surface] for forces in each])
 
     @cached_property
     def surface(self) -> Surface:

@@ -114,7 +114,7 @@ class RollingWheel:
         self._creepage = creepage
         surface = track.surface
         self._length = float(np.ptp(surface.X[0]) / len(surface.edges))
-        self._compliance = track.response[track.at_surface], rim.compliance
+        self._compliance = track.compliance, rim.compliance
         self._flowed = flowed(surface, +1), flowed(rim.surface, -1)
         self._rolled = rim.rolled(self._length)
         self._up = np.tile([0.0, 1.0], rim.surface.X.shape[1])
@@ -162,12 +162,12 @@ class RollingWheel:
             if no contact forces are found
         """
         track = self._track
-        surface, at, response = track.surface, track.at_surface, track.response
+        surface, at = track.surface, track.at_surface
         geometry, problem, found = self._solve(u[at])
 
         def along(change: Array) -> Array:
             forces, _ = change_of(problem, found, geometry.moves[0] @ change[at])
-            return np.asarray(change + response @ (geometry.rows[0].T @ forces))
+            return np.asarray(change + track.under(geometry.rows[0].T @ forces))
 
         every = np.zeros((2, len(surface.vertices)))
         every[:, geometry.at] = found.forces.reshape(2, -1)
@@ -178,7 +178,7 @@ class RollingWheel:
         turns = self._drive is not None
         return RollingContact(
             force=self._nodal(self._known.on_track),
-            u=u + response @ self._known.on_track,
+            u=u + track.under(self._known.on_track),
             along=along,
             x=surface.X[0, surface.vertices],
             normal=every[0],
