@@ -179,7 +179,7 @@ def _active_sets(
         if found is None:
             return None
         F, q, rest = found
-        motion = problem.offset + problem.W @ F + problem.turned @ q
+        motion = problem.moved(F, q)
         if rest.any():
             stopped = _stopped(status, motion, problem.turned @ rest)
             if stopped is None:
@@ -251,7 +251,7 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
         if problem.frictional:
             sliding = (status != OPEN) & rough
             reached = np.abs(F[n:]) >= bound * (1 - 1e-9)
-            slip = (problem.offset + problem.W @ F + problem.turned @ q)[n:]
+            slip = problem.moved(F, q)[n:]
             ahead = np.where(bound > 0, -F[n:], slip)  # without a force the slip says which way
             status[sliding & reached & (ahead > 0)] = FORWARD
             status[sliding & reached & (ahead < 0)] = BACKWARD
@@ -279,7 +279,7 @@ def _holds(problem: ContactProblem, F: NDArray[np.float64], q: NDArray[np.float6
     every rotation that keeps its open points open is a solution.
     """
     n, (force, length) = problem.n, problem.scales
-    motion = problem.offset + problem.W @ F + problem.turned @ q
+    motion = problem.moved(F, q)
     N, met = F[:n], np.minimum(F[:n] / force, motion[:n] / length)
     off = np.concatenate([met, (problem.A.T @ F + problem.balance) / force])
     if problem.frictional:

@@ -55,6 +55,10 @@ class ContactProblem:
         """G, or A if absent."""
         return self.A if self.G is None else self.G
 
+    def moved(self, F: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return gap and slip (m,) with forces F (m,) and rigid motions q (k,) [mm]."""
+        return self.offset + self.W @ F + self.turned @ q
+
     @property
     def n(self) -> int:
         """Number of contact points."""

@@ -173,7 +173,7 @@ class RollingWheel:
         every[:, geometry.at] = found.forces.reshape(2, -1)
         gap, bound = np.full((2, len(surface.vertices)), np.nan)
         bound[geometry.at] = problem.lines.least(found.forces[: len(geometry.at)])
-        moved = problem.offset + problem.W @ found.forces + problem.A @ found.rigid
+        moved = problem.moved(found.forces, found.rigid)
         gap[geometry.at] = moved[: len(geometry.at)]
         turns = self._drive is not None
         return RollingContact(
