@@ -260,8 +260,9 @@ class Stepper:
         tolerances = self.control.tolerances
 
         def solved(start: State, guess: State | None, whole: bool = whole) -> Converged:
-            if contact:
-                try:
+            near = None
+            try:
+                if contact:
                     with one_thread():
                         near = narrowed(
                             self.system,
@@ -272,12 +273,11 @@ class Stepper:
                             patient=patient,
                             tolerances=tolerances,
                         )
-                except FailedInWindows:
-                    if not whole:
-                        raise
-                else:
-                    if near is not None:
-                        return near
+            except FailedInWindows:
+                if not whole:
+                    raise
+            if near is not None:
+                return near
             return Increment(
                 self.system,
                 start,
