@@ -63,7 +63,10 @@ def parser() -> argparse.ArgumentParser:
     one = add("report", commands.report)
     one.add_argument("path", type=_place, metavar="DIR|DATASET")
     _study(one)
-    one.add_argument("--out", "-o", type=_path, default=Path("report.html"), metavar="HTML")
+    one.add_argument(
+        "--out", "-o", type=_path, default=Path("report.html"), metavar="HTML",
+        help="default: %(default)s",
+    )  # fmt: skip
 
     for more in (_add_pictures, _add_cluster, _add_numbers, _add_access, _add_remote):
         more(add)
@@ -137,7 +140,10 @@ def _add_window(one: argparse.ArgumentParser) -> None:
 
 def _add_run(one: argparse.ArgumentParser) -> None:
     one.add_argument("study", type=_path, metavar="STUDY.toml")
-    one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
+    one.add_argument(
+        "--out", type=_path, default=Path("out"), metavar="DIR",
+        help="folder of all results, which studies share (default: %(default)s)",
+    )  # fmt: skip
     one.add_argument(
         "--workers", type=_integer(0, 1024),
         help="processes; 0: this one (default: one per core, 0 for a study of some seconds)",
@@ -171,7 +177,10 @@ def _add_run(one: argparse.ArgumentParser) -> None:
 def _add_cluster(add: Callable[..., argparse.ArgumentParser]) -> None:
     one = add("slurm", commands.slurm)
     one.add_argument("study", type=_path, metavar="STUDY.toml")
-    one.add_argument("--out", type=_path, default=Path("out"), metavar="DIR")
+    one.add_argument(
+        "--out", type=_path, default=Path("out"), metavar="DIR",
+        help="folder of all results, which studies share (default: %(default)s)",
+    )  # fmt: skip
     one.add_argument("--tasks", type=_integer(1, 10**6), default=16, help="default: %(default)s")
     one.add_argument("--time", default="04:00:00", help="limit of a task (default: %(default)s)")
     one.add_argument("--memory", default="2G", help="of a task (default: %(default)s)")
@@ -275,7 +284,7 @@ def _add_remote(add: Callable[..., argparse.ArgumentParser]) -> None:
         else:
             one.add_argument("id")
         if name == "fetch":
-            one.add_argument("--out", type=_path, metavar="FILE")
+            one.add_argument("--out", type=_path, metavar="FILE", help="default: ID.nc")
 
 
 def _path(text: str) -> Path:

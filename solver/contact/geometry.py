@@ -128,6 +128,11 @@ def _cross(a: Array, b: Array) -> Array:
     return np.asarray(a[0] * b[1] - a[1] * b[0])
 
 
+def _beside(points: Array, normals: Array, others: Array) -> Array:
+    """Return the distances (n, m) of other points (2, m) from the lines through points (2, n)."""
+    return np.stack([-normals[1], normals[0]], axis=-1) @ others - _cross(normals, points)[:, None]
+
+
 def _near(start: Array, end: Array) -> tuple[Numbers, ...]:
     """Return the edges that a line may cross, given its signed distances from their ends.
 
@@ -146,7 +151,7 @@ def _project_on_slave(
 ) -> tuple[Numbers, Array]:
     """Return edges, and xi on them, where the slave's normal passes through a point."""
     ends = x[:, slave.edges[:, :2].T]
-    edge, point = _near(*_cross(normals[..., None], ends[..., None] - points[:, None, None]))
+    edge, point = _near(*(_beside(ends[:, k], normals[:, k], points) for k in (0, 1)))
     offset = _from(points[:, point], powers[..., edge])
     n0, n1 = normals[:, 0, edge], normals[:, 1, edge]
     beside = np.zeros((offset.shape[1] + 1, len(edge)))  # the normal is linear along an edge
@@ -178,7 +183,7 @@ def _nearest(
     An edge faces a point if the normals are opposite within 75 degrees, at any distance in front
     of the slave, and up to ``reach`` [mm] behind it, where the bodies overlap.
     """
-    passing = _cross(normals[:, :, None], x[:, None, master.vertices] - points[:, :, None])
+    passing = _beside(points, normals, x[:, master.vertices])
     point, edge = _near(passing[:, :-1], passing[:, 1:])
     chord = x[:, master.edges[edge, 1]] - x[:, master.edges[edge, 0]]
     opposed = _cross(chord, normals[:, point]) > _OPPOSED * np.linalg.norm(chord, axis=0)
@@ -286,12 +291,12 @@ def _integrate(
     first = (np.arange(len(ways))[:, None] * rows + vertex.T[:, None])[..., None, None]
     sides = []
     for surface, own, at, sign in ((slave, edge, xi, -1.0), (master, partner, eta, 1.0)):
-        N, size = sign * shape_functions(at, surface.edges.shape[1]), len(surface.nodes)
-        nodes = surface.edges[own][:, None, None, None]
-        place = 2 * (first * size + nodes) + np.arange(2)[:, None]
-        value = along @ N[:, None, None]  # piece, way, vertex, axis, node
-        each = np.bincount(place.ravel(), value.ravel(), 2 * len(ways) * rows * size)
-        sides.append(each.reshape(len(ways), rows, 2 * size))
+        N, size = sign * shape_functions(at, surface.edges.shape[1]), 2 * len(surface.nodes)
+        unknowns = 2 * surface.edges[own][:, None] + np.arange(2)[:, None]
+        place = first * size + unknowns[:, None, None]  # piece, way, vertex, axis, node
+        value = along.reshape(len(edge), 4 * len(ways), len(_GAUSS_XI)) @ N
+        each = np.bincount(place.ravel(), value.ravel(), len(ways) * rows * size)
+        sides.append(each.reshape(len(ways), rows, size))
     both = (hats[0] * hats[1] * area).sum(axis=-1)
     return Pairing(
         area=np.where(covered, whole, 0.0),

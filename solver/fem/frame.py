@@ -69,5 +69,6 @@ class MovingFrame:
 
         ``passing`` (2, n) is the derivative of the positions by the arc, in the frame.
         """
-        by_arc = (nodal * (self.turned(q) @ passing).T).sum(axis=(1, 2))
-        return np.hstack([nodal.sum(axis=1), by_arc[:, None]])
+        n = nodal.shape[1]
+        moves = np.column_stack([np.tile(np.eye(2), (n, 1)), (self.turned(q) @ passing).T.ravel()])
+        return np.asarray(nodal.reshape(len(nodal), 2 * n) @ moves)

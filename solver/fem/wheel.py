@@ -100,7 +100,8 @@ class Wheel(Substructure):
         d, q = u[surface.dofs].reshape(-1, 2).T, u[self._hub :]
         hub = self.frame.rows(q, nodal, self.passing(surface, d))
         hub[:gaps, _TURN] = 0.0
-        rows = np.hstack([(nodal @ self.frame.turned(q)).reshape(block.shape), hub])
+        rim = nodal.reshape(-1, 2) @ self.frame.turned(q)
+        rows = np.hstack([rim.reshape(block.shape), hub])
         return np.append(surface.dofs, self._hub + np.arange(3)), rows
 
     def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:

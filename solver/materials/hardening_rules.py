@@ -202,7 +202,8 @@ class _Measured:
             raise ModelError(
                 "curve", self.curve,
                 f"must be points [plastic strain, stress in MPa] with {word} hardening: the "
-                "first [0, yield_stress], strain increasing, stress not falling",
+                f"first [0, yield_stress] = [0, {yield_stress:g}], strain increasing, stress not "
+                "falling",
             )  # fmt: skip
         return strain, stress
 

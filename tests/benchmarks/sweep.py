@@ -46,7 +46,8 @@ class Content:
 
     def written(self, folder: Path) -> Path:
         """Return the study file, written into a folder."""
-        lines = ['name = "measured"', f'scene = "{self.scene}"', "[parameters]"]
+        lines = ['name = "measured"', f'scene = "{self.scene}"']
+        lines += ['allow = ["large_strain"]', "[parameters]"]  # time alone is measured
         lines += [f"{name} = {json.dumps(value)}" for name, value in self.parameters.items()]
         lines += ["[sweep]", *(f"{name} = {list(each)}" for name, each in self.sweep.items())]
         path = folder / "study.toml"
