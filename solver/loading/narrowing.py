@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     Yields = list[NDArray[np.bool_] | None]
 
-_LAYERS = 3
+_LAYERS = 5
 """Number of layers of elements around those that yield, in a new window."""
 _LARGE = 0.5
 """Ratio of the elements of a window to those of the body; above it a window saves too little."""
