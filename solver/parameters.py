@@ -47,9 +47,12 @@ def by_accuracy(description: str, *, needs: Needs | None = None) -> Any:
 def unmet(parameters: Any, name: str) -> str:
     """Return what a parameter needs to have an effect, as text; empty if it has one.
 
-    If the class has a property ``block``, the parameters of each pass, an effect in one is enough.
+    If the class has a property ``block``, the parameters of each pass, an effect in one is enough;
+    the entries of its ``sequence`` give those of their passes.
     """
     several = isinstance(getattr(type(parameters), "block", None), property)
+    if several and parameters.sequence and all(name in entry for entry in parameters.sequence):
+        return "needs an entry of sequence without it"
     each = [_unmet(own, name) for own in (parameters.block if several else (parameters,))]
     return each[0] if all(each) else ""
 

@@ -19,7 +19,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.parameters import Friction, described
+from solver.parameters import Friction, Other, described
 from solver.parts import Parts
 
 if TYPE_CHECKING:
@@ -176,6 +176,7 @@ class Coulomb(FrictionLaw):
         0.0,
         "ratio of the largest contact shear to the shear yield stress of the weaker body; 0 sets "
         "no limit",
+        needs={"friction": Other(0.0), "cohesion": Other(0.0)},
     )
     cohesion: Annotated[float, Interval(ge=0.0, le=1e7), Unit("MPa")] = described(
         0.0, "contact shear beyond friction * pressure; no more than the pressure itself"

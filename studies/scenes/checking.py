@@ -89,6 +89,20 @@ def wrong_parameters(scene: tables.SceneFile, used: set[str]) -> Iterator[StudyE
             yield StudyError(f"{field}.default", default, f"must be one of its choices: {listed}")
 
 
+def wrong_needs(scene: tables.SceneFile) -> Iterator[StudyError]:
+    """Yield what declared parameters need and cannot be met."""
+    for name, each in scene.declared.items():
+        for other, of in each.needs.items():
+            values = (of.other_than,) if isinstance(of, tables.OtherThan) else of
+            field, known = f"parameters.{name}.needs", scene.declared.get(other)
+            if known is None:
+                yield StudyError(field, other, one_of(other, scene.declared))
+                continue
+            for value in values:
+                if known.choices and value not in known.choices:
+                    yield StudyError(f"{field}.{other}", value, one_of(value, known.choices))
+
+
 def wrong_accuracies(scene: tables.SceneFile) -> Iterator[StudyError]:
     """Yield mistakes in the numbers that ``accuracy`` sets, and parameters that have no default."""
     for name, each in scene.parameters.items():

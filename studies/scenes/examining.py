@@ -13,6 +13,7 @@ from studies.scenes.checking import (
     failed_checks,
     unmet_needs,
     wrong_accuracies,
+    wrong_needs,
     wrong_parameters,
 )
 from studies.scenes.description import Description
@@ -46,7 +47,7 @@ def examined(description: Description, *, built: bool) -> tables.SceneFile:
     found = description.readable(description.declared)
     mistakes = found.mistakes
     if found.tables:
-        others = [*wrong_parameters(found.tables, description.used())]
+        others = [*wrong_parameters(found.tables, description.used()), *wrong_needs(found.tables)]
         others += contradictions(found.tables, description.meshes)
         others += too_long(description, found.tables)
         if not {where[0] for where in found.own} & {"accuracy", "parameters"}:

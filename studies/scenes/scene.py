@@ -295,9 +295,9 @@ def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
     own: dict[str, tuple[Any, Any]] = {
         name: (
             _annotated_type(each),
-            by_accuracy(each.description)
+            by_accuracy(each.description, needs=each.needed)
             if levels and name in levels.standard
-            else described(_default(each), each.description),
+            else described(_default(each), each.description, needs=each.needed),
         )
         for name, each in declared.items()
     }

@@ -28,7 +28,7 @@ from solver.errors import ModelError
 from solver.mesh.lines import closer
 from solver.model.link import Components
 from solver.model.loads import LOADS, Load
-from solver.parameters import Accuracy, Coordinate, Length, Stress
+from solver.parameters import Accuracy, Coordinate, Length, Needs, Other, Stress
 from solver.parts import Declared, declared
 from solver.results.outputs import outputs
 from solver.results.requested import (
@@ -489,10 +489,17 @@ else:
 # -- parameters and the whole file ---------------------------------------------------------------
 
 
+class OtherThan(SceneTable):
+    """Any value of a parameter but this one."""
+
+    other_than: bool | int | float | str
+
+
 class ParameterTable(SceneTable):
     """A declared parameter: its default, range or choices, unit and meaning.
 
-    `AccuracyTable` sets a parameter without a default.
+    `AccuracyTable` sets a parameter without a default. One that ``needs`` others has an effect only
+    if one of them has one of the values given.
     """
 
     default: bool | int | float | str | None = None
@@ -500,6 +507,9 @@ class ParameterTable(SceneTable):
     choices: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     unit: Annotated[str, StringConstraints(max_length=40)] = "1"
     description: Annotated[str, StringConstraints(max_length=400)] = ""
+    needs: dict[Label, tuple[bool | int | float | str, ...] | OtherThan] = Field(
+        default_factory=dict
+    )
 
     @classmethod
     def unit_of(cls, name: str, given: Mapping[str, Any]) -> str | None:
@@ -507,6 +517,14 @@ class ParameterTable(SceneTable):
         unit = given.get("unit", "1")
         own = name == "range" or (name == "default" and "choices" not in given)
         return unit if own and isinstance(unit, str) else None
+
+    @property
+    def needed(self) -> Needs:
+        """What it needs, as a Python scene declares it."""
+        return {
+            name: Other(of.other_than) if isinstance(of, OtherThan) else of
+            for name, of in self.needs.items()
+        }
 
 
 class AccuracyTable(SceneTable):

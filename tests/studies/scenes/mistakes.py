@@ -154,6 +154,16 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "parameters.rule.default",
         "one of its choices",
     ),
+    "needs an unknown parameter": (
+        put("parameters", "wide", "needs", {"mus": [0.3]}),
+        "parameters.wide.needs",
+        "must be one of",
+    ),
+    "needs no choice": (
+        put("parameters", "wide", "needs", {"rule": {"other_than": "nones"}}),
+        "parameters.wide.needs.rule",
+        "did you mean none",
+    ),
     "name taken": (
         put("outputs", {"plastic_work": {"of": "mises", "stage": "pressed", "body": "lower"}}),
         "outputs.plastic_work",
