@@ -9,6 +9,7 @@ import pytest
 
 from solver.fem.error import ErrorPoints
 from solver.fem.fields import Sampler, recovery
+from solver.results.audit import contact_error
 from solver.results.audit.report import estimated_error
 from solver.tensors import SQRT2
 from studies.scenes.registry import scene_named
@@ -174,3 +175,16 @@ def under_a_rigid_punch(smallest_element):
     )
     (record,) = scene.path(given, [getattr(given, scene.branch)], lambda done: None)
     return record.scalars["audit_error_contact"]
+
+
+def test_pressure_that_is_rounding_has_no_error(monkeypatch):
+    """As where stages of the user's own unload a contact: 1e-14 MPa are left of it."""
+    solution = hertz_line.press(1.5)
+    assert solution.audit().figures["audit_error_contact"] > 0.1
+    acting = contact_error.contact_pressure
+    monkeypatch.setattr(
+        contact_error,
+        "contact_pressure",
+        lambda *which: tuple(1e-12 * each for each in acting(*which)),
+    )
+    assert solution.audit().figures["audit_error_contact"] == 0.0
