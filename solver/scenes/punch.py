@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
@@ -190,7 +190,9 @@ def model(parameters: PunchParameters) -> Model:
 
 def program(parameters: PunchParameters) -> Program:
     """Return the loading history: the pressure is raised, then removed with the punch."""
-    return load_and_release(parameters.load_ratio, parameters.load_step, parameters.unload_steps)
+    p = parameters
+    pressed = load_and_release(p.load_ratio, p.load_step, p.unload_steps)
+    return replace(pressed, place="load_ratio {:.6g}".format)
 
 
 def effort(parameters: PunchParameters, load_ratios: Sequence[float]) -> Effort:
