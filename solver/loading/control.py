@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from solver.errors import ModelError
+from solver.kinds import check_kinds
 from solver.loading.program import Program, load_and_release
 
 
@@ -55,6 +56,7 @@ class PathControl(Control):
     unload_steps: int = 5
 
     def __post_init__(self) -> None:
+        check_kinds(PathControl, self)
         if not self.load_step > 0:
             raise ModelError("load_step", self.load_step, "must be positive")
         if self.unload_steps < 1:

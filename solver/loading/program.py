@@ -12,6 +12,7 @@ from itertools import groupby, pairwise, takewhile
 from typing import TYPE_CHECKING
 
 from solver.errors import ModelError
+from solver.kinds import check_kinds
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -50,6 +51,7 @@ class Stage:
     cycle: int = 0
 
     def __post_init__(self) -> None:
+        check_kinds(Stage, self, f"{self.name}.")
         if self.steps < 1:
             raise ModelError(f"{self.name}.steps", self.steps, "must be at least 1")
         if not self.step >= 0:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
 from solver.errors import ModelError
+from solver.kinds import check_kinds
 from solver.materials.elasticity import Elasticity
 from solver.materials.hardening import LinearHardening
 from solver.materials.law import Law
@@ -51,6 +52,7 @@ class Material(Law):
     isotropic_fraction: float = 0.5
 
     def __post_init__(self) -> None:
+        check_kinds(Material, self)
         if not (math.isfinite(self.youngs_modulus) and self.youngs_modulus > 0):
             raise ModelError("youngs_modulus", self.youngs_modulus, "must be positive [MPa]")
         if not 0 <= self.poisson_ratio < 0.5:

@@ -10,17 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
-from solver.materials import PlaneStress
+from solver.kinds import check_kinds
+from solver.materials import Law, PlaneStress
+from solver.model.amplitude import Amplitude
 from solver.model.kinematics import KINEMATICS, Kinematics
-from solver.model.loads import Pressure
+from solver.model.loads import Load, Pressure
+from solver.model.motion import Axle, TravellingPressure
 
 if TYPE_CHECKING:
     from skfem import Mesh
-
-    from solver.materials import Law
-    from solver.model.amplitude import Amplitude
-    from solver.model.loads import Load
-    from solver.model.motion import Axle, TravellingPressure
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,9 +63,12 @@ class Body:
 
     def __post_init__(self) -> None:
         # scikit-fem takes a third of a second to import, and is needed only when a body is made
+        from skfem import Mesh
+
         from solver.mesh.check import check_mesh
         from solver.mesh.elements import element_type
 
+        check_kinds(Body, self, Mesh=Mesh)
         if self.kinematics not in KINEMATICS:
             raise ModelError(
                 "kinematics", self.kinematics, "must be one of " + ", ".join(KINEMATICS)

@@ -19,6 +19,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
+from solver.kinds import check_kinds
 from solver.parameters import Friction, Other, described
 from solver.parts import Parts
 
@@ -183,6 +184,7 @@ class Coulomb(FrictionLaw):
     )
 
     def __post_init__(self) -> None:
+        check_kinds(Coulomb, self)
         if not (np.isfinite(self.friction) and self.friction >= 0):
             raise ModelError("friction", self.friction, "must be finite and at least 0")
         if not (np.isfinite(self.cohesion) and self.cohesion >= 0):

@@ -9,6 +9,7 @@ from typing import Annotated, Literal, get_args
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
+from solver.kinds import check_kinds
 
 Components = Literal["x", "y", "xy", "normal", "tangential"]
 Side = tuple[str, str]
@@ -44,6 +45,7 @@ class Link:
     distributed: bool = False
 
     def __post_init__(self) -> None:
+        check_kinds(Link, self)
         if self.components not in get_args(Components):
             allowed = f"must be one of {', '.join(get_args(Components))}"
             raise ModelError("components", self.components, allowed)

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from solver.errors import ModelError
+from solver.kinds import check_kinds
 from solver.materials.doubts import doubts
+from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.friction import Coulomb, FrictionLaw
 from solver.model.link import Link
 from solver.model.rigid import Pushed, RigidBody
 from solver.model.singular import SingularPoint
-
-if TYPE_CHECKING:
-    from solver.model.amplitude import Amplitude
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +67,7 @@ class ContactPair:
     presence: Amplitude | None = None
 
     def __post_init__(self) -> None:
+        check_kinds(ContactPair, self)
         if self.presence is not None and (least := float(np.min(self.presence.value))) < 0:
             raise ModelError("presence", least, "must not be negative")
         if not self.shear_limit > 0:
@@ -127,6 +127,7 @@ class Model:
     singular: tuple[SingularPoint, ...] = ()
 
     def __post_init__(self) -> None:
+        check_kinds(Model, self)
         names = [body.name for body in self.bodies] + [body.name for body in self.rigid]
         if not self.bodies or len(set(names)) < len(names):
             raise ModelError("bodies", names, "must be at least one, with different names")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
+from solver.kinds import check_kinds
 from solver.materials.rigid import Rigid
 from solver.model.loads import Load
 
@@ -119,6 +120,7 @@ class RigidBody:
     thickness: float = 1.0
 
     def __post_init__(self) -> None:
+        check_kinds(RigidBody, self)
         for name, curve in self.surfaces.items():
             curve.check(name)
         if not np.isfinite(self.centre).all():
@@ -127,8 +129,6 @@ class RigidBody:
             raise ModelError("thickness", self.thickness, "must be positive [mm]")
         for name in ("x", "y", "rotation"):
             motion = getattr(self, name)
-            if not isinstance(motion, Moved | Pushed):
-                raise ModelError(name, motion, "must be Moved or Pushed")
             if not np.isfinite(motion.value):
                 raise ModelError(name, motion.value, "must be finite")
             if isinstance(motion, Pushed) and np.isnan(motion.locked):

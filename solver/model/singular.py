@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
+from solver.kinds import check_kinds
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,6 +32,7 @@ class SingularPoint:
     radius: float
 
     def __post_init__(self) -> None:
+        check_kinds(SingularPoint, self)
         if len(self.at) != 2 or not np.isfinite(self.at).all():
             raise ModelError("at", self.at, "must be two finite numbers [mm]")
         if not (np.isfinite(self.radius) and self.radius > 0):

@@ -12,11 +12,13 @@ import numpy as np
 
 from solver.contact.system import System
 from solver.errors import ModelError
+from solver.kinds import require
 from solver.loading.control import Control, PathControl
 from solver.loading.outcome import Tally
-from solver.loading.program import ROUNDING, Lap, Program
+from solver.loading.program import ROUNDING, Lap, Program, Stage
 from solver.loading.stepper import Stepper
 from solver.loading.walker import Walker
+from solver.model.model import Model
 from solver.results import saved
 from solver.results.audit.pairs import untouched
 from solver.results.audit.report import Audit, audit
@@ -36,14 +38,14 @@ if TYPE_CHECKING:
     from solver.contact.state import Converged
     from solver.fem.frame import RigidMotion
     from solver.loading.cycle import Cycle
-    from solver.loading.program import Stage
     from solver.model.body import Body
-    from solver.model.model import Model
     from solver.model.rigid import RigidBody
+    from solver.results.body_fields import BodyValues
     from solver.results.shakedown import Shakedown
 
 
 _LOG = logging.getLogger("solver")
+_STAGES = tuple[Stage, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,20 +86,28 @@ class Solution:
             raise ModelError("stage", stage, f"must be one of {', '.join(self.stages)}")
         return self.stages[stage]
 
+    def _known(self, body: str) -> str:
+        if body not in self.system.names:
+            raise ModelError("body", body, f"must be one of {', '.join(self.system.names)}")
+        return body
+
+    def _at_nodes(self, body: str, stage: str) -> BodyValues:
+        return self._fields.at_nodes(self._at(stage), self._known(body))
+
     def nodes(self, body: str) -> NDArray[np.float64]:
         """Return node positions (2, n_nodes) of a body [mm]."""
-        return self.system.full(body).X
+        return self.system.full(self._known(body)).X
 
     def displacement(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
         """Return nodal displacements (2, n_nodes) [mm]."""
-        return self.system.displacement(body, self._at(stage).state).reshape(-1, 2).T
+        return self.system.displacement(self._known(body), self._at(stage).state).reshape(-1, 2).T
 
     def stress(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
         """Return recovered nodal stress (4, n_nodes), components xx, yy, zz, xy [MPa].
 
         Unloaded, this is the residual stress.
         """
-        return self._fields.at_nodes(self._at(stage), body).stress
+        return self._at_nodes(body, stage).stress
 
     def initial_stress(self, body: str) -> tuple[NDArray[np.float64], ...]:
         """Return positions (2, n) [mm], initial stress as given and in equilibrium (4, n) [MPa].
@@ -105,7 +115,7 @@ class Solution:
         They belong to the integration points; components are xx, yy, zz, xy. The difference is the
         stress that brings the body into equilibrium before any load.
         """
-        system = self.system
+        system, body = self.system, self._known(body)
         begun = Stepper(system, Control())
         rest = begun.rest(begun.balanced(system.initial())).now
         x = system.positions(body)
@@ -116,7 +126,7 @@ class Solution:
 
     def plastic_strain(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
         """Return the recovered equivalent plastic strain at the nodes (n_nodes,)."""
-        return self._fields.at_nodes(self._at(stage), body).plastic_strain
+        return self._at_nodes(body, stage).plastic_strain
 
     def strain(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
         """Return the recovered nodal strain (4, n_nodes), components xx, yy, zz, xy.
@@ -124,11 +134,11 @@ class Solution:
         It is that of the displacements: elastic, plastic and of heat together. In plane stress zz
         is the strain of the thickness.
         """
-        return self._fields.at_nodes(self._at(stage), body).strain
+        return self._at_nodes(body, stage).strain
 
     def plastic_tensor(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
         """Return the recovered nodal plastic strain (4, n_nodes), components xx, yy, zz, xy."""
-        return self._fields.at_nodes(self._at(stage), body).plastic_tensor
+        return self._at_nodes(body, stage).plastic_tensor
 
     def at(
         self, body: str, places: ArrayLike, stage: str = "unloaded"
@@ -143,9 +153,7 @@ class Solution:
         X = np.asarray(places, dtype=float)
         if X.ndim != 2 or len(X) != 2:
             raise ModelError("places", X.shape, "must be positions (2, n) [mm]")
-        if body not in self.system.names:
-            raise ModelError("body", body, f"must be one of {', '.join(self.system.names)}")
-        (found,) = self._fields.at_places(Places(body, X), [self._at(stage)])
+        (found,) = self._fields.at_places(Places(self._known(body), X), [self._at(stage)])
         return found._asdict()
 
     def contact(self, pair: int = 0, stage: str = "loaded") -> ContactResult:
@@ -155,6 +163,10 @@ class Solution:
         ``slip``, ``closed`` and ``sticking``, see `ContactResult`; ``length`` is the length of
         contact.
         """
+        count = len(self.system.interfaces)
+        if not isinstance(pair, int | np.integer) or pair not in range(-count, count):
+            allowed = f"must be from 0 to {count - 1}" if count else "the model has no contacts"
+            raise ModelError("pair", pair, allowed)
         return contact_result(self.system, self._at(stage), pair)
 
     def motion(self, body: str, stage: str = "loaded") -> RigidMotion:
@@ -227,7 +239,7 @@ class Solution:
 def solve(
     model: Model,
     *,
-    load: float = 1.0,
+    load: float | None = None,
     stages: Sequence[Stage] = (),
     until: Literal["shaken_down"] | None = None,
     control: PathControl | None = None,
@@ -238,7 +250,7 @@ def solve(
 
     Parameters
     ----------
-    load : load factor: multiple of all loads of the model
+    load : load factor: multiple of all loads of the model; by default 1
     stages : stages to solve instead of ``load``, for loads with amplitudes, which are functions of
         time; the solution then has the states at their ends. Those of one `Stage.cycle` follow one
         another, and have the same names in the next
@@ -261,6 +273,12 @@ def solve(
     NotConverged
         if an increment failed although an equilibrium may exist
     """
+    given = ("model", model, Model), ("load", load, float | None), ("stages", stages, _STAGES)
+    for name, value, kind in (*given, ("control", control, PathControl | None)):
+        require(name, value, kind)
+    if load is not None and stages:
+        raise ModelError("load", load, "must not be given beside stages")
+    load = 1.0 if load is None else load
     if not (np.isfinite(load) and load > 0):
         raise ModelError("load", load, "must be positive and finite")
     if until not in (None, "shaken_down"):

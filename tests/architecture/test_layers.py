@@ -14,7 +14,7 @@ from tests.architecture.sources import ROOT, modules
 LAYERS = {
     # from the ground up; a module may import from its own layer and from those before it
     "solver": (
-        "version", "errors", "parameters", "parts", "memory", "tensors", "linear", "mesh",
+        "version", "errors", "parameters", "kinds", "parts", "memory", "tensors", "linear", "mesh",
         "materials", "model", "fem", "contact", "loading", "steady", "prism", "results", "scenes",
     ),
     "studies": (
