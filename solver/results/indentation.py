@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-FORCE = declare("force", "force on the ball under load", "N")
+FORCE = declare("force", "force of the contact on the ball, along its axis, under load", "N")
 APPROACH = declare("approach", "displacement of the ball's centre under load", "mm")
 MEAN_CONTACT_PRESSURE = declare("mean_contact_pressure", "force per contact area under load", "MPa")
 CRATER_DEPTH = declare(
@@ -68,7 +68,7 @@ class Indentation:
         order = np.argsort(x)
         patches = contact_patches(x[order], contact.gap[order], contact.normal[order] > 0)
         return {
-            INCREMENT_FORCE: float(contact.normal.sum()),
+            INCREMENT_FORCE: self._force(system, converged),
             INCREMENT_APPROACH: self._approach(system, converged),
             INCREMENT_RADIUS: patches[-1][1] if patches else 0.0,
         }
@@ -98,6 +98,11 @@ class Indentation:
         u = run.system.displacement(name, converged.state)[2 * nodes + 1]
         centre = self._approach(run.system, converged) if name == self.body else 0.0
         return np.asarray(np.interp(run.view.s, body.X[0, nodes], u) - centre)
+
+    def _force(self, system: Any, converged: Any) -> float:
+        """Return the force of the contact on the ball along its axis [N]."""
+        forces = converged.contact_forces[system.all_names.index(self.body)]
+        return abs(float(forces.reshape(-1, 2)[:, 1].sum()))
 
     def _approach(self, system: Bodies, converged: Solved) -> float:
         """Return the displacement of the ball's centre towards the other body [mm]."""
