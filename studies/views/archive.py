@@ -20,6 +20,7 @@ from studies.storage.dataset import attributes_of
 from studies.views.audited import worst
 from studies.views.columns import unit_text, value_text
 from studies.views.figures import FIGURES, group_of
+from studies.views.left_out import BY_ACCURACY, set_by_accuracy
 from studies.views.picking import one_run, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import line_fields, map_fields, sweep_fields, usual_field
 from studies.views.plots.lines import line_figure
@@ -123,17 +124,22 @@ def _axis(dataset: xr.Dataset, name: str) -> dict[str, str]:
 
 
 def _fixed(dataset: xr.Dataset) -> list[dict[str, str]]:
-    """Return name, meaning, unit and value of what all runs share: given, or axes of one value."""
+    """Return name, meaning, unit and value of what all runs share: given, or axes of one value.
+
+    Of what is left out it is the number that `accuracy` set, or its range.
+    """
     given = json.loads(dataset.attrs.get("parameters", "{}"))
     given |= {n: dataset[n].item() for n in sweep_axes(dataset) if dataset.sizes[n] == 1}
     scene = str(dataset.attrs["scene"])
     known = parameters_of(scene_named(scene)) if scene in known_names() else {}
+    left_out = set_by_accuracy(dataset)
     return [
         {
             "name": name,
             "words": known[name].description.replace("`", "") if name in known else "",
             "unit": unit_text(known[name].unit) if name in known else "",
-            "value": "none" if value in (None, [], "") else _exact(value),
+            "value": left_out[name] if name in left_out else _exact(value),
+            "set": BY_ACCURACY if name in left_out else "",
         }
         for name, value in given.items()
     ]
@@ -141,6 +147,8 @@ def _fixed(dataset: xr.Dataset) -> list[dict[str, str]]:
 
 def _exact(value: Any) -> str:
     """Return a value as it was given; of a table what it is."""
+    if value in (None, [], ""):
+        return "none"
     return f"{value:.10g}" if isinstance(value, float) else value_text(value)
 
 
