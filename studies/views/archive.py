@@ -45,6 +45,9 @@ COLUMNS = 9
 LINES = ("residual_profile", "line_stress", "contact_pressure")
 """Lines of the chosen run that are drawn, where it has them."""
 
+ESTIMATED = "audit_error_residual"
+"""The estimated error of residual stress."""
+
 DECADES = 6
 """Length of a meter: it begins at the limit over ten to this power."""
 
@@ -84,6 +87,7 @@ def archive(dataset: xr.Dataset) -> str:
         footnote=FOOTNOTE.strip(),
         messages=messages(dataset).strip(),
         audit=[*_audit(dataset)],
+        error=_error(dataset),
         made=_made(attrs),
         id=attrs.get("id", ""),
     )
@@ -207,6 +211,22 @@ def _audit(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
             "percent": round(100.0 * min(max(decades / DECADES, 0.0), 1.0), 1),
             "place": place_of(dataset, np.unravel_index(each.at, status.shape)),
         }
+
+
+def _error(dataset: xr.Dataset) -> dict[str, str]:
+    """Return the largest estimated error of residual stress, and its run; empty if none is known.
+
+    It has no limit, so that it is no figure of `worst`.
+    """
+    if ESTIMATED not in dataset or not dataset[ESTIMATED].notnull().any():
+        return {}
+    values = dataset[ESTIMATED].transpose(*sweep_axes(dataset)).to_numpy()
+    at = np.unravel_index(np.nanargmax(values), values.shape)
+    return {
+        "name": ESTIMATED,
+        "percent": f"{100.0 * values[at]:.3g}",
+        "place": place_of(dataset, at),
+    }
 
 
 def _made(attrs: Mapping[Any, Any]) -> dict[str, str]:

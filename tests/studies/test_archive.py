@@ -6,6 +6,7 @@ import base64
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -57,6 +58,16 @@ def test_it_has_the_numbers_of_the_data_set(dataset: xr.Dataset) -> None:
     if view.audit:
         assert f"<code>{view.audit[0].name}</code>" in text
     assert "<h2>How it was computed</h2>" in text and dataset.attrs["solver_source"] in text
+
+
+def test_the_largest_estimated_error_of_residual_stress_is_told(dataset: xr.Dataset) -> None:
+    words = "estimated relative error of residual stress in the energy norm, caused by the mesh,"
+    estimated = xr.full_like(dataset["increments"], np.nan, dtype=float)
+    assert words not in archive(dataset.assign(audit_error_residual=estimated))
+    estimated[{"load_ratio": 0, "friction": 1}] = 0.2853
+    estimated[{"load_ratio": 1, "friction": 0}] = 0.0711
+    page = archive(dataset.assign(audit_error_residual=estimated))
+    assert f"{words} is at most 28.5 % (run at load_ratio = 0.3, friction = 0.4)." in page
 
 
 def test_failed_runs_are_told_and_texts_are_texts(dataset: xr.Dataset) -> None:
