@@ -7,6 +7,7 @@ import math
 import re
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -54,12 +55,14 @@ DECADES = 6
 _DPI = 130
 
 
-def archive(dataset: xr.Dataset) -> str:
+def archive(dataset: xr.Dataset, path: Path | str = "dataset.nc") -> str:
     """Return a study as an HTML document: what was computed, pictures, runs, audit, versions.
 
     Parameters
     ----------
     dataset : its data set, as `open_study` gives it
+    path : where the reader finds the data set, as it is written: a path that was given relative to
+        a folder says nothing of the machine
     """
     axes = [name for name in sweep_axes(dataset) if dataset.sizes[name] > 1]
     table = run_cells(dataset)
@@ -90,6 +93,7 @@ def archive(dataset: xr.Dataset) -> str:
         error=_error(dataset),
         made=_made(attrs),
         id=attrs.get("id", ""),
+        path=path.as_posix() if isinstance(path, Path) else path,
     )
 
 

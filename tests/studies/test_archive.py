@@ -35,6 +35,21 @@ def test_the_file_needs_nothing_else(computed: tuple[Study, Store], tmp_path: Pa
     assert study.id in text
 
 
+def test_it_tells_where_the_data_set_is_as_it_was_given(
+    computed: tuple[Study, Store], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, store = computed
+    target, whole = tmp_path / "report.html", store.dataset_path(study.id)
+    monkeypatch.chdir(store.directory.parent)
+    own = f"{store.directory.name}/studies/{study.id}/dataset.nc"
+    places = {store.directory.name: own, f"{store.directory.name}/fake": own, str(whole): whole}
+    for given, told in places.items():
+        assert main(["report", given, "-o", str(target)]) == 0
+        assert f'open_study("{told}")' in target.read_text()
+        assert (str(store.directory) in target.read_text()) == (told is whole)
+        assert Path(told).is_file()
+
+
 def test_a_file_that_is_no_study_is_refused_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
