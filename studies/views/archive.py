@@ -220,9 +220,10 @@ def _audit(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
 def _error(dataset: xr.Dataset) -> dict[str, str]:
     """Return the largest estimated error of residual stress, and its run; empty if none is known.
 
-    It has no limit, so that it is no figure of `worst`.
+    It has no limit, so that it is no figure of `worst`. Zero is that of bodies without residual
+    stress.
     """
-    if ESTIMATED not in dataset or not dataset[ESTIMATED].notnull().any():
+    if ESTIMATED not in dataset or not (dataset[ESTIMATED] > 0.0).any():
         return {}
     values = dataset[ESTIMATED].transpose(*sweep_axes(dataset)).to_numpy()
     at = np.unravel_index(np.nanargmax(values), values.shape)
