@@ -332,10 +332,11 @@ def view(options: argparse.Namespace) -> int:
 def report(options: argparse.Namespace) -> int:
     """Write a study as one HTML file that needs no server: pictures, table, audit, versions."""
     from studies.views.archive import archive
-    from studies.views.reading import open_study
+    from studies.views.reading import find_study, open_study
 
-    with open_study(options.path) as dataset, _written("--out", options.out) as part:
-        part.write_text(archive(dataset), encoding="utf-8")
+    path = find_study(options.path) if isinstance(options.path, Path) else options.path
+    with open_study(path) as dataset, _written("--out", options.out) as part:
+        part.write_text(archive(dataset, path), encoding="utf-8")
     print(f"wrote {options.out}")
     return OK
 

@@ -7,6 +7,7 @@ import math
 import re
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from studies.storage.dataset import attributes_of
 from studies.views.audited import worst
 from studies.views.columns import unit_text, value_text
 from studies.views.figures import FIGURES, group_of
+from studies.views.left_out import BY_ACCURACY, set_by_accuracy
 from studies.views.picking import one_run, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import line_fields, map_fields, sweep_fields, usual_field
 from studies.views.plots.lines import line_figure
@@ -44,18 +46,23 @@ COLUMNS = 9
 LINES = ("residual_profile", "line_stress", "contact_pressure")
 """Lines of the chosen run that are drawn, where it has them."""
 
+ESTIMATED = "audit_error_residual"
+"""The estimated error of residual stress."""
+
 DECADES = 6
 """Length of a meter: it begins at the limit over ten to this power."""
 
 _DPI = 130
 
 
-def archive(dataset: xr.Dataset) -> str:
+def archive(dataset: xr.Dataset, path: Path | str = "dataset.nc") -> str:
     """Return a study as an HTML document: what was computed, pictures, runs, audit, versions.
 
     Parameters
     ----------
     dataset : its data set, as `open_study` gives it
+    path : where the reader finds the data set, as it is written: a path that was given relative to
+        a folder says nothing of the machine
     """
     axes = [name for name in sweep_axes(dataset) if dataset.sizes[name] > 1]
     table = run_cells(dataset)
@@ -83,8 +90,10 @@ def archive(dataset: xr.Dataset) -> str:
         footnote=FOOTNOTE.strip(),
         messages=messages(dataset).strip(),
         audit=[*_audit(dataset)],
+        error=_error(dataset),
         made=_made(attrs),
         id=attrs.get("id", ""),
+        path=path.as_posix() if isinstance(path, Path) else path,
     )
 
 
@@ -123,17 +132,22 @@ def _axis(dataset: xr.Dataset, name: str) -> dict[str, str]:
 
 
 def _fixed(dataset: xr.Dataset) -> list[dict[str, str]]:
-    """Return name, meaning, unit and value of what all runs share: given, or axes of one value."""
+    """Return name, meaning, unit and value of what all runs share: given, or axes of one value.
+
+    Of what is left out it is the number that `accuracy` set, or its range.
+    """
     given = json.loads(dataset.attrs.get("parameters", "{}"))
     given |= {n: dataset[n].item() for n in sweep_axes(dataset) if dataset.sizes[n] == 1}
     scene = str(dataset.attrs["scene"])
     known = parameters_of(scene_named(scene)) if scene in known_names() else {}
+    left_out = set_by_accuracy(dataset)
     return [
         {
             "name": name,
             "words": known[name].description.replace("`", "") if name in known else "",
             "unit": unit_text(known[name].unit) if name in known else "",
-            "value": "none" if value in (None, [], "") else _exact(value),
+            "value": left_out[name] if name in left_out else _exact(value),
+            "set": BY_ACCURACY if name in left_out else "",
         }
         for name, value in given.items()
     ]
@@ -141,6 +155,8 @@ def _fixed(dataset: xr.Dataset) -> list[dict[str, str]]:
 
 def _exact(value: Any) -> str:
     """Return a value as it was given; of a table what it is."""
+    if value in (None, [], ""):
+        return "none"
     return f"{value:.10g}" if isinstance(value, float) else value_text(value)
 
 
@@ -199,6 +215,23 @@ def _audit(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
             "percent": round(100.0 * min(max(decades / DECADES, 0.0), 1.0), 1),
             "place": place_of(dataset, np.unravel_index(each.at, status.shape)),
         }
+
+
+def _error(dataset: xr.Dataset) -> dict[str, str]:
+    """Return the largest estimated error of residual stress, and its run; empty if none is known.
+
+    It has no limit, so that it is no figure of `worst`. Zero is that of bodies without residual
+    stress.
+    """
+    if ESTIMATED not in dataset or not (dataset[ESTIMATED] > 0.0).any():
+        return {}
+    values = dataset[ESTIMATED].transpose(*sweep_axes(dataset)).to_numpy()
+    at = np.unravel_index(np.nanargmax(values), values.shape)
+    return {
+        "name": ESTIMATED,
+        "percent": f"{100.0 * values[at]:.3g}",
+        "place": place_of(dataset, at),
+    }
 
 
 def _made(attrs: Mapping[Any, Any]) -> dict[str, str]:

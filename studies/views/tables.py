@@ -17,6 +17,7 @@ from studies.definition.vocabulary import LABEL_ATTRIBUTES, OK
 from studies.storage.ugrid import owns
 from studies.views.columns import aligned, in_blocks, stacked, unit_text, value_text
 from studies.views.figures import FIGURES
+from studies.views.left_out import BY_ACCURACY, set_by_accuracy
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*[A-Za-z_])")
@@ -215,7 +216,11 @@ def run_details(dataset: xr.Dataset) -> str:
     """Return the parameters, outcome and figures of a single run."""
     lines = [["scene", dataset.attrs["scene"]]]
     swept = {name: dataset[name].item() for name in sweep_coordinates(dataset)}
-    lines += [[name, value_text(value)] for name, value in (_parameters(dataset) | swept).items()]
+    left_out = set_by_accuracy(dataset)
+    for name, value in (_parameters(dataset) | swept).items():
+        own = left_out.get(name)
+        text = value_text(value) if own is None else f"{own} {BY_ACCURACY}".lstrip()
+        lines.append([name, text])
     lines.append(["status", _figure(dataset["status"])])
     if message := str(dataset["message"].item()):
         lines.append(["message", message])

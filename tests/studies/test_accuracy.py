@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from solver import SCENES
 from solver.errors import ModelError
@@ -15,7 +16,11 @@ from studies import Store, Study, open_netcdf, open_study, run_study
 from studies.definition.parameters import completed, defaults, parameters_of, scene_schema
 from studies.errors import StudyError
 from studies.scenes.registry import scene_named
+from studies.storage.provenance import provenance
+from studies.views.archive import archive
+from studies.views.left_out import set_by_accuracy
 from studies.views.plots.captions import setting
+from studies.views.tables import run_details
 
 pytestmark = pytest.mark.usefixtures("one_worker")
 
@@ -120,3 +125,37 @@ def test_a_sweep_of_accuracy_stores_the_numbers_of_each_run(tmp_path: Path) -> N
         ("draft", draft.element_size, draft.growth), ("draft", draft.element_size, 1.3),
         ("standard", own.element_size, own.growth), ("standard", own.element_size, 1.3),
     }  # fmt: skip
+
+
+def uncomputed(sweep: dict[str, list[Any]], **attrs: Any) -> xr.Dataset:
+    """Return the data set of a study of punches, without results."""
+    study = Study.from_dict({"name": "n", "scene": "punch", "sweep": sweep})
+    shape = tuple(map(len, sweep.values()))
+    outcome = {name: (tuple(sweep), np.full(shape, "ok")) for name in ("status", "message")}
+    made = provenance("n", study.problem, study.fixed)
+    return xr.Dataset(outcome, coords=sweep, attrs=made | attrs)
+
+
+def test_tables_and_reports_tell_the_numbers_that_were_left_out() -> None:
+    """Of several runs their range; none of another solver's, or if a run does not tell its load."""
+    usual = {"load_ratio": [0.5], "friction": [0.1]}
+    told = run_details(uncomputed({"accuracy": ["draft"], **usual})).splitlines()
+    assert [each.split(maxsplit=1)[1] for each in told if "by accuracy" in each] == [
+        "0.005 by accuracy", "1.6 by accuracy", "0.1 by accuracy",
+    ]  # fmt: skip
+    cell = '<th scope="row">{}</th><td class="right">{}</td><td class="unit"> {}</td>'
+    several = uncomputed({"accuracy": ["draft", "fine"], "growth": [1.3, 1.5]})
+    page = archive(several)
+    assert cell.format("smallest element", "0.0001 to 0.005", "by accuracy") in page
+    assert "<td>1.3, 1.5 " in page
+    assert set_by_accuracy(uncomputed(usual)) == {
+        "smallest_element": "0.0005", "growth": "1.4", "load_step": "0.05",
+    }  # fmt: skip
+    other = uncomputed(usual, solver_source="another")
+    searched = uncomputed(usual)
+    known = json.loads(searched.attrs["parameters"])
+    del known["yield_stress"]
+    searched.attrs["parameters"] = json.dumps(known)
+    for unknown in (other, searched):
+        assert set(set_by_accuracy(unknown).values()) == {""}
+    assert cell.format("growth", "", "by accuracy") in archive(other)

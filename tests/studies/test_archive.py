@@ -6,6 +6,7 @@ import base64
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -34,6 +35,21 @@ def test_the_file_needs_nothing_else(computed: tuple[Study, Store], tmp_path: Pa
     assert study.id in text
 
 
+def test_it_tells_where_the_data_set_is_as_it_was_given(
+    computed: tuple[Study, Store], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, store = computed
+    target, whole = tmp_path / "report.html", store.dataset_path(study.id)
+    monkeypatch.chdir(store.directory.parent)
+    own = f"{store.directory.name}/studies/{study.id}/dataset.nc"
+    places = {store.directory.name: own, f"{store.directory.name}/fake": own, str(whole): whole}
+    for given, told in places.items():
+        assert main(["report", given, "-o", str(target)]) == 0
+        assert f'open_study("{told}")' in target.read_text()
+        assert (str(store.directory) in target.read_text()) == (told is whole)
+        assert Path(told).is_file()
+
+
 def test_a_file_that_is_no_study_is_refused_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -57,6 +73,17 @@ def test_it_has_the_numbers_of_the_data_set(dataset: xr.Dataset) -> None:
     if view.audit:
         assert f"<code>{view.audit[0].name}</code>" in text
     assert "<h2>How it was computed</h2>" in text and dataset.attrs["solver_source"] in text
+
+
+def test_the_largest_estimated_error_of_residual_stress_is_told(dataset: xr.Dataset) -> None:
+    words = "estimated relative error of residual stress in the energy norm, caused by the mesh,"
+    estimated = xr.full_like(dataset["increments"], np.nan, dtype=float)
+    for none in (estimated, xr.zeros_like(estimated)):  # not audited; without residual stress
+        assert words not in archive(dataset.assign(audit_error_residual=none))
+    estimated[{"load_ratio": 0, "friction": 1}] = 0.2853
+    estimated[{"load_ratio": 1, "friction": 0}] = 0.0711
+    page = archive(dataset.assign(audit_error_residual=estimated))
+    assert f"{words} is at most 28.5 % (run at load_ratio = 0.3, friction = 0.4)." in page
 
 
 def test_failed_runs_are_told_and_texts_are_texts(dataset: xr.Dataset) -> None:

@@ -36,6 +36,8 @@ _LITTLE = 0.01
 """Share of the end of the colours below which a direction means nothing."""
 _TEXT = 3.2
 """Least length of the lines around a map [in]."""
+_ABOVE = 8.0
+"""Place of the words above a map: between are marks of its edge, where it ends there [pt]."""
 
 
 def map_figure(
@@ -147,7 +149,7 @@ def _mark_edges(axes: Axes, run: xr.Dataset, box: Box) -> None:
     if ends:
         axes.plot(
             ends, [0.0] * len(ends), linestyle="none", marker=CARETDOWN, color="k",
-            label="edge of contact under load",
+            label="edge of contact under load", clip_on=False,  # the map may end at the surface
         )  # fmt: skip
         axes.legend(loc="upper right", framealpha=0.9, edgecolor="none", fontsize=8)
 
@@ -270,7 +272,7 @@ def entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> 
     shown = values.drop_vars("component", errors="ignore").to_dataset(name="values")
     below = axes.set_title(
         wrapped(setting(shown.assign_attrs(run.attrs)), width, 8),
-        loc="left", fontsize=8, color="0.3", pad=5.0,
+        loc="left", fontsize=8, color="0.3", pad=_ABOVE,
     )  # fmt: skip
     axes.annotate(
         f"{wrapped(capitalised(quantity), width, 12)} {symbol(values)}".rstrip(), (0.0, 1.0),

@@ -13,6 +13,7 @@ from matplotlib.collections import LineCollection, QuadMesh
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
+from matplotlib.text import Text
 
 from solver.scenes import SCENES
 from studies import Store, Study, StudyError, open_netcdf, open_study
@@ -157,6 +158,25 @@ def test_a_window_below_the_surface_shows_that_part_alone() -> None:
     axes, _ = mesh_of(map_figure(run, "quantity", window=(2.0, 6.0, -8.0, -4.0)))
     assert axes.get_ylim() == (-8.5, -3.5)
     assert not axes.lines, "the edge of contact lies outside"
+
+
+@pytest.mark.parametrize("last", [0.0, 4.0])
+def test_the_edges_of_contact_are_seen_where_the_map_ends_at_the_surface(last: float) -> None:
+    """They are on screen as in the legend, below the words above the map."""
+    y = np.linspace(-8.0, last, 200)  # its highest cell ends 0.03 above
+    axes, _ = mesh_of(map_figure(grid_map(np.arange(-8.0, 9.0), y, "xx"), "quantity"))
+    (marks,) = axes.lines
+    assert marks.get_xdata().tolist() == [-4.0, 4.0]
+    canvas = FigureCanvasAgg(axes.figure)
+    canvas.draw()
+    drawn = np.asarray(canvas.buffer_rgba())[::-1, :, :3]
+    point = canvas.figure.dpi / 72.0
+    for across, up in axes.transData.transform([(-4.0, 0.0), (4.0, 0.0)]):
+        above = int(np.ceil(up + 3.0 * point))
+        assert (drawn[above, int(across - point) : int(across + point)] < 40).all()
+    title = axes.get_title(loc="left")
+    (words,) = (each for each in axes.findobj(Text) if each.get_text() == title)
+    assert up + 4.0 * point < words.get_window_extent().y0
 
 
 def test_of_several_stages_the_last_is_drawn_and_told() -> None:
