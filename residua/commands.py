@@ -222,6 +222,8 @@ def table(options: argparse.Namespace) -> int:
     at = found.chosen(options.sort)
     for condition in options.where:
         at = at[found.meeting(condition)[at]]
+    if options.where and not at.size:
+        raise StudyError("where", ", ".join(options.where), "no run meets this")
     columns = [found.column(name) for name in dict.fromkeys(options.columns or found.columns)]
     pieces = FORMS["json" if options.json else "csv"].write(columns, at)
     if options.out is None:

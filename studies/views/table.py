@@ -16,6 +16,7 @@ import numpy as np
 
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
+from studies.definition.vocabulary import STATUSES
 from studies.errors import StudyError, one_of
 from studies.storage.dataset import attributes_of
 from studies.views.columns import unit_text
@@ -128,7 +129,8 @@ class RunTable:
         Raises
         ------
         StudyError
-            if it is no condition, there is no such column, or the two cannot be compared
+            if it is no condition, there is no such column, the two cannot be compared, or it names
+            a word that no run has; a status that no run has is one all the same
         """
         match = _CONDITION.fullmatch(condition)
         if match is None:
@@ -144,11 +146,17 @@ class RunTable:
             if match["sign"] not in {"=", "!="}:
                 allowed = f"{match['name']} has words: compare them by = or !="
                 raise StudyError("where", condition, allowed)
-            return np.asarray(compared(column.values.astype(str), match["value"]))
+            said = column.values.astype(str)
+            words = dict.fromkeys([*said.tolist(), *(STATUSES if column.name == STATUS else ())])
+            if match["value"] not in words:
+                allowed = f"{match['value']!r} {one_of(match['value'], words)}"
+                raise StudyError("where", condition, allowed)
+            return np.asarray(compared(said, match["value"]))
         try:
             value = float(match["value"])
         except ValueError:
-            raise StudyError("where", condition, f"{match['value']!r} must be a number") from None
+            allowed = one_of(match["value"], codes) if codes else "must be a number"
+            raise StudyError("where", condition, f"{match['value']!r} {allowed}") from None
         same = np.isclose(column.values, value, rtol=SAME, atol=0.0)
         return np.asarray(compared(np.where(same, value, column.values), value))
 
