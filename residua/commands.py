@@ -379,7 +379,10 @@ def cancel(service: Any, options: argparse.Namespace) -> str:
 
 def fetch(service: Any, options: argparse.Namespace) -> str:
     """Save the data set of a study on a running service."""
-    return f"wrote {service.study(options.id).fetch(options.out or Path(f'{options.id}.nc'))}"
+    path = options.out or Path(f"{options.id}.nc")
+    with _written("--out", path) as part:
+        service.study(options.id).fetch(part)
+    return f"wrote {path}"
 
 
 @contextmanager

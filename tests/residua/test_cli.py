@@ -436,7 +436,11 @@ def test_the_client_submits_watches_fetches_and_cancels(
     assert capsys.readouterr().out.split() == ["running", "40", "%"]
     target = tmp_path / "got.nc"
     assert main(["fetch", study_id, "--url", url, "--out", str(target)]) == 0
-    assert target.read_bytes() == b"data"
+    assert target.read_bytes() == b"data" and [*tmp_path.glob("got*")] == [target]
+    capsys.readouterr()
+    target = tmp_path / "absent" / "got.nc"
+    assert main(["fetch", study_id, "--url", url, "--out", str(target)]) == 2
+    assert "cannot be written: No such file" in capsys.readouterr().err
     assert main(["cancel", study_id, "--url", url]) == 0
 
 
