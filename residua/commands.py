@@ -344,18 +344,21 @@ def report(options: argparse.Namespace) -> int:
 
 def remote(options: argparse.Namespace) -> int:
     """Talk to a running service."""
-    import httpx
-
     from residua.keys import api_key
-    from studies.client import Client, Refused
+    from studies.client import Client, NoAnswer, Refused
 
+    key = api_key(options.api_key_file)
     try:
-        with Client(options.url, api_key(options.api_key_file)) as service:
+        client = Client(options.url, key)
+    except StudyError as error:
+        raise error.renamed(lambda name: f"--{name}") from None
+    try:
+        with client as service:
             print(options.talk(service, options))
     except Refused as error:
         return complain(error, BAD_INPUT)
-    except (httpx.HTTPError, httpx.InvalidURL) as error:
-        return complain(f"{options.url}: {error}", FAILED)
+    except NoAnswer as error:
+        return complain(error, FAILED)
     return OK
 
 

@@ -453,7 +453,13 @@ def test_the_client_says_what_the_service_refused(
     assert main(["status", "2" * 32, "--url", url]) == 2
     assert capsys.readouterr().err == "residua: no such study\n"
     assert main(["status", "2" * 32, "--url", "http://127.0.0.1:1"]) == 1
-    assert "http://127.0.0.1:1" in capsys.readouterr().err
+    assert "residua: http://127.0.0.1:1 does not answer: " in capsys.readouterr().err
+    for wrong_url in ("localhost:8765", "http://", "ftp://localhost"):
+        assert main(["status", "2" * 32, "--url", wrong_url]) == 2
+        told = f"residua: --url = {wrong_url!r}: must begin with http:// or https://"
+        assert told in capsys.readouterr().err
+    assert main(["status", "2" * 32, "--url", "http://localhost:x"]) == 2
+    assert "--url = 'http://localhost:x': must be a URL" in capsys.readouterr().err
     assert main(["submit", "absent.toml", "--url", url]) == 2
 
 
