@@ -369,22 +369,24 @@ def submit(service: Any, options: argparse.Namespace) -> str:
 
 def status(service: Any, options: argparse.Namespace) -> str:
     """Print the state of a study on a running service."""
-    state = service.study(options.id).detail()
+    state = service.find(options.id).detail()
     stage = f"  {state['stage']}" if state.get("stage") else ""
     return f"{state['status']}  {state['progress']:g} %{stage}"
 
 
 def cancel(service: Any, options: argparse.Namespace) -> str:
     """Stop a study on a running service."""
-    service.study(options.id).cancel()
-    return f"cancelled {options.id}"
+    study = service.find(options.id)
+    study.cancel()
+    return f"cancelled {study.id}"
 
 
 def fetch(service: Any, options: argparse.Namespace) -> str:
     """Save the data set of a study on a running service."""
-    path = options.out or Path(f"{options.id}.nc")
+    study = service.find(options.id)
+    path = options.out or Path(f"{study.id}.nc")
     with _written("--out", path) as part:
-        service.study(options.id).fetch(part)
+        study.fetch(part)
     return f"wrote {path}"
 
 

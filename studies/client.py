@@ -20,10 +20,11 @@ import httpx
 
 from studies.appearing import appearing
 from studies.definition.files import read_study
+from studies.definition.identity import is_id
 from studies.definition.study import Study
 from studies.definition.sweep import labels
 from studies.definition.vocabulary import OK
-from studies.errors import StudyError
+from studies.errors import MOST_NAMES, StudyError
 from studies.scenes.description import Description
 from studies.scenes.scene import FileScene
 from studies.toml import toml_file
@@ -111,6 +112,25 @@ class Client:
     def study(self, study_id: str) -> RemoteStudy:
         """Return a study that the service has; that it does is found when it is used."""
         return RemoteStudy(self, study_id)
+
+    def find(self, named: str) -> RemoteStudy:
+        """Return the study with an id, or the one that has a name.
+
+        Raises
+        ------
+        StudyError
+            if no study has the name, or several have it
+        """
+        if is_id(named):
+            return self.study(named)
+        found = self.studies(name=named, limit=MOST_NAMES)
+        if len(found) == 1:
+            return found[0]
+        allowed = "must be the id of a study, 32 hexadecimal digits, or the name of one"
+        if found:
+            ids = ", ".join(each.id for each in found)
+            allowed = f"several studies have this name: give an id, such as {ids}"
+        raise StudyError("id", named, allowed)
 
     def studies(self, **which: str | int) -> list[RemoteStudy]:
         """Return studies, the latest first: of a ``status``, ``tag``, ``scene`` or ``text``."""

@@ -42,6 +42,7 @@ def test_a_study_is_submitted_watched_and_opened(
 ) -> None:
     assert done.detail()["status"] == "successful"
     assert done.id in {each.id for each in client.studies(text="by-client", limit=9)}
+    assert client.find("by-client").id == client.find(done.id).id == done.id
     stored = open_study(service.data / "studies" / done.id / "dataset.nc")
     xr.testing.assert_equal(done.open(lazy=False), stored)
     xr.testing.assert_equal(done.open().load(), stored)
