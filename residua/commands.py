@@ -47,6 +47,9 @@ def run(options: argparse.Namespace) -> int:
         return OK
     if options.part:
         return _part(study, options)
+    if options.workers is not None and (options.scheduler or options.scheduler_file):
+        allowed = "must be left out with a scheduler: its workers compute"
+        raise StudyError("--workers", options.workers, allowed)
     certificates = options.tls_ca, options.tls_cert, options.tls_key
     access = options.scheduler and Access(options.scheduler, *certificates)
     if options.scheduler_file:
