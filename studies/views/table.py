@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.definition.vocabulary import STATUSES
-from studies.errors import StudyError, one_of
+from studies.errors import StudyError, nearest, one_of
 from studies.storage.dataset import attributes_of
 from studies.views.columns import unit_text
 
@@ -74,10 +74,12 @@ class RunTable:
     ----------
     axes : name of each axis of the sweep, with its values or labels; the last runs fastest
     columns : all columns by name: the sweep, status, numbers, audit, id, message
+    wide : dimensions of each variable with more than a number a run, which is no column
     """
 
     axes: Mapping[str, Sequence[Any]]
     columns: Mapping[str, Column]
+    wide: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -93,7 +95,7 @@ class RunTable:
     def column(self, name: str, field: str = "columns") -> Column:
         """Return a column; raise `StudyError` if there is none of this name."""
         if name not in self.columns:
-            raise StudyError(field, name, one_of(name, self.columns))
+            raise StudyError(field, name, one_number(name, self.columns, self.wide))
         return self.columns[name]
 
     def chosen(self, sort: str = "", where: Mapping[str, str] | None = None) -> np.ndarray:
@@ -137,7 +139,8 @@ class RunTable:
             allowed = "must be NAME<VALUE, with <, <=, >, >=, = or !="
             raise StudyError("where", condition, allowed)
         if match["name"] not in self.columns:
-            raise StudyError("where", condition, one_of(match["name"], self.columns))
+            allowed = one_number(match["name"], self.columns, self.wide)
+            raise StudyError("where", condition, allowed)
         column, compared = self.columns[match["name"]], _COMPARED[match["sign"]]
         codes = {name: code for code, name in column.flags.items()}
         if match["value"] in codes:
@@ -159,6 +162,17 @@ class RunTable:
             raise StudyError("where", condition, f"{match['value']!r} {allowed}") from None
         same = np.isclose(column.values, value, rtol=SAME, atol=0.0)
         return np.asarray(compared(np.where(same, value, column.values), value))
+
+
+def one_number(name: str, known: Iterable[str], wide: Mapping[str, Sequence[str]]) -> str:
+    """Return what is allowed in place of a variable that is none of the ``known``.
+
+    Those of ``wide`` have more than a number a run: then it tells their dimensions.
+    """
+    if name not in wide:
+        return one_of(name, known)
+    over = f"{name} is over {', '.join(wide[name])}"
+    return f"{over}: must be a variable with one number a run{nearest(name, known)}"
 
 
 def varied(table: RunTable) -> list[Column]:
