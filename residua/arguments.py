@@ -282,7 +282,7 @@ def _add_remote(add: Callable[..., argparse.ArgumentParser]) -> None:
         if name == "submit":
             one.add_argument("study", type=_path, metavar="STUDY.toml")
         else:
-            one.add_argument("id")
+            one.add_argument("id", metavar="ID|NAME", help="of the study")
         if name == "fetch":
             one.add_argument("--out", type=_path, metavar="FILE", help="default: ID.nc")
 

@@ -47,6 +47,9 @@ def run(options: argparse.Namespace) -> int:
         return OK
     if options.part:
         return _part(study, options)
+    if options.workers is not None and (options.scheduler or options.scheduler_file):
+        allowed = "must be left out with a scheduler: its workers compute"
+        raise StudyError("--workers", options.workers, allowed)
     certificates = options.tls_ca, options.tls_cert, options.tls_key
     access = options.scheduler and Access(options.scheduler, *certificates)
     if options.scheduler_file:
@@ -222,6 +225,8 @@ def table(options: argparse.Namespace) -> int:
     at = found.chosen(options.sort)
     for condition in options.where:
         at = at[found.meeting(condition)[at]]
+    if options.where and not at.size:
+        raise StudyError("where", ", ".join(options.where), "no run meets this")
     columns = [found.column(name) for name in dict.fromkeys(options.columns or found.columns)]
     pieces = FORMS["json" if options.json else "csv"].write(columns, at)
     if options.out is None:
@@ -343,18 +348,21 @@ def report(options: argparse.Namespace) -> int:
 
 def remote(options: argparse.Namespace) -> int:
     """Talk to a running service."""
-    import httpx
-
     from residua.keys import api_key
-    from studies.client import Client, Refused
+    from studies.client import Client, NoAnswer, Refused
 
+    key = api_key(options.api_key_file)
     try:
-        with Client(options.url, api_key(options.api_key_file)) as service:
+        client = Client(options.url, key)
+    except StudyError as error:
+        raise error.renamed(lambda name: f"--{name}") from None
+    try:
+        with client as service:
             print(options.talk(service, options))
     except Refused as error:
         return complain(error, BAD_INPUT)
-    except (httpx.HTTPError, httpx.InvalidURL) as error:
-        return complain(f"{options.url}: {error}", FAILED)
+    except NoAnswer as error:
+        return complain(error, FAILED)
     return OK
 
 
@@ -365,20 +373,25 @@ def submit(service: Any, options: argparse.Namespace) -> str:
 
 def status(service: Any, options: argparse.Namespace) -> str:
     """Print the state of a study on a running service."""
-    state = service.study(options.id).detail()
+    state = service.find(options.id).detail()
     stage = f"  {state['stage']}" if state.get("stage") else ""
     return f"{state['status']}  {state['progress']:g} %{stage}"
 
 
 def cancel(service: Any, options: argparse.Namespace) -> str:
     """Stop a study on a running service."""
-    service.study(options.id).cancel()
-    return f"cancelled {options.id}"
+    study = service.find(options.id)
+    study.cancel()
+    return f"cancelled {study.id}"
 
 
 def fetch(service: Any, options: argparse.Namespace) -> str:
     """Save the data set of a study on a running service."""
-    return f"wrote {service.study(options.id).fetch(options.out or Path(f'{options.id}.nc'))}"
+    study = service.find(options.id)
+    path = options.out or Path(f"{study.id}.nc")
+    with _written("--out", path) as part:
+        study.fetch(part)
+    return f"wrote {path}"
 
 
 @contextmanager

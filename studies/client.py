@@ -20,9 +20,11 @@ import httpx
 
 from studies.appearing import appearing
 from studies.definition.files import read_study
+from studies.definition.identity import is_id
 from studies.definition.study import Study
 from studies.definition.sweep import labels
 from studies.definition.vocabulary import OK
+from studies.errors import MOST_NAMES, StudyError
 from studies.scenes.description import Description
 from studies.scenes.scene import FileScene
 from studies.toml import toml_file
@@ -43,6 +45,10 @@ class Refused(Exception):
     """The service answered with an error; the text says why, one line for each reason."""
 
 
+class NoAnswer(Exception):
+    """No service answers; the text has its URL and the reason."""
+
+
 class Client:
     """A running service.
 
@@ -50,9 +56,15 @@ class Client:
     ----------
     url : its root, such as ``http://localhost:8000``
     key : API key, if the service requires one
+
+    Raises
+    ------
+    StudyError
+        for a URL that is none
     """
 
     def __init__(self, url: str, key: str | None = None) -> None:
+        _check_url(url)
         self.url = url.rstrip("/")
         self.headers = {"authorization": f"Bearer {key}"} if key else {}
         self._client = httpx.Client(base_url=self.url, timeout=_WAIT, headers=self.headers)
@@ -101,6 +113,25 @@ class Client:
         """Return a study that the service has; that it does is found when it is used."""
         return RemoteStudy(self, study_id)
 
+    def find(self, named: str) -> RemoteStudy:
+        """Return the study with an id, or the one that has a name.
+
+        Raises
+        ------
+        StudyError
+            if no study has the name, or several have it
+        """
+        if is_id(named):
+            return self.study(named)
+        found = self.studies(name=named, limit=MOST_NAMES)
+        if len(found) == 1:
+            return found[0]
+        allowed = "must be the id of a study, 32 hexadecimal digits, or the name of one"
+        if found:
+            ids = ", ".join(each.id for each in found)
+            allowed = f"several studies have this name: give an id, such as {ids}"
+        raise StudyError("id", named, allowed)
+
     def studies(self, **which: str | int) -> list[RemoteStudy]:
         """Return studies, the latest first: of a ``status``, ``tag``, ``scene`` or ``text``."""
         found = self.told("GET", "/studies", params=which)["items"]
@@ -125,10 +156,13 @@ class Client:
         ------
         Refused
             if the service answers with an error
+        NoAnswer
+            if none answers
         """
         until = time.monotonic() + _WAIT
         while True:
-            answer = self._client.request(method, path, **content)
+            with self._answering():
+                answer = self._client.request(method, path, **content)
             if method != "GET" or not _later(answer, until):
                 return _accepted(answer)
 
@@ -145,10 +179,18 @@ class Client:
         """Give an answer that is read piece by piece; errors as `ask`."""
         until = time.monotonic() + _WAIT
         while True:
-            with self._client.stream("GET", path) as answer:
+            with self._answering(), self._client.stream("GET", path) as answer:
                 if not _later(answer, until):
                     yield _accepted(answer)
                     return
+
+    @contextlib.contextmanager
+    def _answering(self) -> Iterator[None]:
+        """Raise `NoAnswer`, which tells the URL, if the connection fails."""
+        try:
+            yield
+        except (httpx.HTTPError, httpx.InvalidURL) as error:
+            raise NoAnswer(f"{self.url} does not answer: {error}") from error
 
 
 class RemoteStudy:
@@ -314,6 +356,16 @@ class _Screen:
         """Leave the line."""
         if not self._show and self._shown and self._stream.isatty():
             print(file=self._stream)
+
+
+def _check_url(url: str) -> None:
+    try:
+        given = httpx.URL(url)
+    except httpx.InvalidURL as error:
+        raise StudyError("url", url, f"must be a URL: {error}") from None
+    if given.scheme not in ("http", "https") or not given.host:
+        allowed = "must begin with http:// or https://, and name a host"
+        raise StudyError("url", url, allowed)
 
 
 def _notebook() -> Any:

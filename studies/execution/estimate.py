@@ -23,6 +23,7 @@ from studies.definition.study import Study
 from studies.definition.vocabulary import OK, SOLVED
 from studies.errors import StudyError
 from studies.execution.bundles import most_together, setup_of
+from studies.execution.limits import LOADED
 from studies.execution.pace import pace_of
 from studies.storage.store import Store
 
@@ -33,8 +34,6 @@ _BYTES, _COMBINED = 1.1e6, 1.8
 """Size of a run's file if none is known; factor for the data set of a study beside the files."""
 _FIELDS = 100
 """Bytes per unknown that kept fields add to a run's file, if none is known: 55 to 185."""
-_LOADED = 2.1e8
-"""Bytes of a worker that has loaded all libraries."""
 _TOLD = 2.0
 """Factor of the low and high estimates where the scene tells the seconds."""
 _BATCH = 500
@@ -219,7 +218,7 @@ def memory_needed(study: Study) -> int:
 
 def _of_a_worker(effort: Effort, kept: int) -> int:
     """Return the most bytes of a worker that walks such a path, and keeps so many of others."""
-    return round(_LOADED + effort.memory + min(effort.memory, kept))
+    return round(LOADED + effort.memory + min(effort.memory, kept))
 
 
 def _shared(each: list[list[float]]) -> float:

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from solver.memory import bytes_in
 from studies.errors import StudyError
 
+LOADED = 210_000_000
+"""Bytes of a worker that has loaded all libraries."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
@@ -25,7 +28,7 @@ class Limits:
     Raises
     ------
     StudyError
-        if a time is not above zero, or `memory` is not a size
+        if a time is not above zero, or `memory` is not a size or less than `LOADED`
     """
 
     stall_seconds: float | None = 900.0
@@ -38,8 +41,13 @@ class Limits:
             value = getattr(self, name)
             if value is not None and not value > 0.0:
                 raise StudyError(name, value, "must be greater than 0")
-        if self.memory is not None and not bytes_in(self.memory):
+        if self.memory is None:
+            return
+        if not (size := bytes_in(self.memory)):
             raise StudyError("memory", self.memory, "must be a size such as 500MB or 2GB")
+        if size < LOADED:
+            allowed = f"must be at least {LOADED / 1e6:.0f}MB, which a worker needs for libraries"
+            raise StudyError("memory", self.memory, f"{allowed}, and more for its runs")
 
     def check_without_workers(self) -> None:
         """Refuse limits that need workers, because there are none; the usual ones are let pass.

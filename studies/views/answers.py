@@ -13,10 +13,12 @@ from solver.parameters import is_number
 from studies.definition.parameters import Parameter, parameters_of
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
-from studies.errors import StudyError, one_of
+from studies.errors import StudyError
 from studies.storage.store import Store
 from studies.views.picking import sweep_axes
+from studies.views.plots.fields import wide_fields
 from studies.views.predict import predict
+from studies.views.table import one_number
 
 RUN = "run"
 """Way of an answer that is no prediction: there is a run at its place."""
@@ -80,7 +82,7 @@ def answer(
         if each.dtype.kind == "f" and each.dims == tuple(axes)
     ]
     if of not in numbers:
-        raise StudyError("of", of, one_of(of, numbers))
+        raise StudyError("of", of, one_number(of, numbers, wide_fields(dataset)))
     if within is not None and not (is_number(within) and within >= 0.0):
         raise StudyError("within", within, "must be a number >= 0")
     found = predict(dataset, of, by=by, **at)

@@ -9,12 +9,12 @@ import numpy as np
 import xarray as xr
 
 from studies.definition.vocabulary import OK
-from studies.errors import StudyError, one_of
+from studies.errors import StudyError
 from studies.views.columns import in_blocks, stacked, value_text
 from studies.views.numbers import table_of
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
-from studies.views.plots.fields import sweep_fields
-from studies.views.table import STATUS
+from studies.views.plots.fields import sweep_fields, wide_fields
+from studies.views.table import STATUS, one_number
 
 
 def best_runs(
@@ -45,7 +45,8 @@ def best_runs(
     """
     known = sweep_fields(dataset)
     if of not in known or of == "status":
-        raise StudyError("of", of, one_of(of, [name for name in known if name != "status"]))
+        others = [name for name in known if name != "status"]
+        raise StudyError("of", of, one_number(of, others, wide_fields(dataset)))
     table = table_of(dataset)
     left = (table.columns[STATUS].values == OK) & ~np.isnan(table.columns[of].values)
     for text in where:

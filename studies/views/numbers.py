@@ -9,7 +9,7 @@ import xarray as xr
 from studies.views.columns import unit_text
 from studies.views.figures import group_of
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
-from studies.views.plots.fields import sweep_fields
+from studies.views.plots.fields import sweep_fields, wide_fields
 from studies.views.table import STATUS, Column, RunTable
 
 
@@ -19,7 +19,8 @@ def table_of(dataset: xr.Dataset) -> RunTable:
     Its columns are what distinguishes the runs, the status, and all variables with one value a run.
     """
     axes = {name: dataset[name].to_numpy().tolist() for name in sweep_axes(dataset)}
-    return RunTable(axes=axes, columns={each.name: each for each in _columns(dataset)})
+    columns = {each.name: each for each in _columns(dataset)}
+    return RunTable(axes=axes, columns=columns, wide=wide_fields(dataset))
 
 
 def _columns(dataset: xr.Dataset) -> Iterator[Column]:

@@ -27,7 +27,8 @@ from studies.views.chaos import DEGREES, Chaos, Numbers, bears, fitted
 from studies.views.columns import aligned, or_none, value_text
 from studies.views.grids import parameters_over, point_axes
 from studies.views.picking import flags, select, sweep_axes
-from studies.views.plots.fields import sweep_fields
+from studies.views.plots.fields import sweep_fields, wide_fields
+from studies.views.table import one_number
 
 METHODS = ("chaos", "delta", "pawn", "rbd_fast")
 """The fit of this module, and methods of the library SALib."""
@@ -84,7 +85,7 @@ def sensitivity(
     chosen = select(dataset, selection or {})
     known = [name for name in sweep_fields(chosen) if not flags(chosen[name])]
     if of not in known:
-        raise StudyError("of", of, one_of(of, known))
+        raise StudyError("of", of, one_number(of, known, wide_fields(chosen)))
     scales, places, values = _sampled(chosen, of)
     attrs: dict[str, Any] = {
         **{key: chosen[of].attrs[key] for key in ("long_name", "units") if key in chosen[of].attrs},

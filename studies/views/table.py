@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
-from studies.errors import StudyError, one_of
+from studies.definition.vocabulary import STATUSES
+from studies.errors import StudyError, nearest, one_of
 from studies.storage.dataset import attributes_of
 from studies.views.columns import unit_text
 
@@ -73,10 +74,12 @@ class RunTable:
     ----------
     axes : name of each axis of the sweep, with its values or labels; the last runs fastest
     columns : all columns by name: the sweep, status, numbers, audit, id, message
+    wide : dimensions of each variable with more than a number a run, which is no column
     """
 
     axes: Mapping[str, Sequence[Any]]
     columns: Mapping[str, Column]
+    wide: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -92,7 +95,7 @@ class RunTable:
     def column(self, name: str, field: str = "columns") -> Column:
         """Return a column; raise `StudyError` if there is none of this name."""
         if name not in self.columns:
-            raise StudyError(field, name, one_of(name, self.columns))
+            raise StudyError(field, name, one_number(name, self.columns, self.wide))
         return self.columns[name]
 
     def chosen(self, sort: str = "", where: Mapping[str, str] | None = None) -> np.ndarray:
@@ -128,14 +131,16 @@ class RunTable:
         Raises
         ------
         StudyError
-            if it is no condition, there is no such column, or the two cannot be compared
+            if it is no condition, there is no such column, the two cannot be compared, or it names
+            a word that no run has; a status that no run has is one all the same
         """
         match = _CONDITION.fullmatch(condition)
         if match is None:
             allowed = "must be NAME<VALUE, with <, <=, >, >=, = or !="
             raise StudyError("where", condition, allowed)
         if match["name"] not in self.columns:
-            raise StudyError("where", condition, one_of(match["name"], self.columns))
+            allowed = one_number(match["name"], self.columns, self.wide)
+            raise StudyError("where", condition, allowed)
         column, compared = self.columns[match["name"]], _COMPARED[match["sign"]]
         codes = {name: code for code, name in column.flags.items()}
         if match["value"] in codes:
@@ -144,13 +149,30 @@ class RunTable:
             if match["sign"] not in {"=", "!="}:
                 allowed = f"{match['name']} has words: compare them by = or !="
                 raise StudyError("where", condition, allowed)
-            return np.asarray(compared(column.values.astype(str), match["value"]))
+            said = column.values.astype(str)
+            words = dict.fromkeys([*said.tolist(), *(STATUSES if column.name == STATUS else ())])
+            if match["value"] not in words:
+                allowed = f"{match['value']!r} {one_of(match['value'], words)}"
+                raise StudyError("where", condition, allowed)
+            return np.asarray(compared(said, match["value"]))
         try:
             value = float(match["value"])
         except ValueError:
-            raise StudyError("where", condition, f"{match['value']!r} must be a number") from None
+            allowed = one_of(match["value"], codes) if codes else "must be a number"
+            raise StudyError("where", condition, f"{match['value']!r} {allowed}") from None
         same = np.isclose(column.values, value, rtol=SAME, atol=0.0)
         return np.asarray(compared(np.where(same, value, column.values), value))
+
+
+def one_number(name: str, known: Iterable[str], wide: Mapping[str, Sequence[str]]) -> str:
+    """Return what is allowed in place of a variable that is none of the ``known``.
+
+    Those of ``wide`` have more than a number a run: then it tells their dimensions.
+    """
+    if name not in wide:
+        return one_of(name, known)
+    over = f"{name} is over {', '.join(wide[name])}"
+    return f"{over}: must be a variable with one number a run{nearest(name, known)}"
 
 
 def varied(table: RunTable) -> list[Column]:

@@ -13,6 +13,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 import xarray as xr
@@ -399,6 +400,9 @@ class FakeService(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         if self.path.endswith("/dataset.nc"):
             self.answer(200, b"data")
+        elif self.path.startswith("/studies?"):
+            ids = {"one": "1", "two": "12"}.get(parse_qs(urlsplit(self.path).query)["name"][0], "")
+            self.answer(200, {"items": [{"id": each * 32} for each in ids]})
         elif self.path.partition("?")[0].endswith("1" * 32):
             self.answer(200, {"status": "running", "progress": 40})
         else:
@@ -436,8 +440,21 @@ def test_the_client_submits_watches_fetches_and_cancels(
     assert capsys.readouterr().out.split() == ["running", "40", "%"]
     target = tmp_path / "got.nc"
     assert main(["fetch", study_id, "--url", url, "--out", str(target)]) == 0
-    assert target.read_bytes() == b"data"
+    assert target.read_bytes() == b"data" and [*tmp_path.glob("got*")] == [target]
+    capsys.readouterr()
+    target = tmp_path / "absent" / "got.nc"
+    assert main(["fetch", study_id, "--url", url, "--out", str(target)]) == 2
+    assert "cannot be written: No such file" in capsys.readouterr().err
     assert main(["cancel", study_id, "--url", url]) == 0
+    capsys.readouterr()
+    assert main(["cancel", "one", "--url", url]) == 0
+    assert capsys.readouterr().out == f"cancelled {study_id}\n"
+    assert main(["status", "two", "--url", url]) == 2
+    assert f"several studies have this name: give an id, such as {study_id}, 2" in (
+        capsys.readouterr().err
+    )
+    assert main(["fetch", "11111", "--url", url]) == 2
+    assert "id = '11111': must be the id of a study, 32 hex" in capsys.readouterr().err
 
 
 def test_the_client_says_what_the_service_refused(
@@ -449,7 +466,13 @@ def test_the_client_says_what_the_service_refused(
     assert main(["status", "2" * 32, "--url", url]) == 2
     assert capsys.readouterr().err == "residua: no such study\n"
     assert main(["status", "2" * 32, "--url", "http://127.0.0.1:1"]) == 1
-    assert "http://127.0.0.1:1" in capsys.readouterr().err
+    assert "residua: http://127.0.0.1:1 does not answer: " in capsys.readouterr().err
+    for wrong_url in ("localhost:8765", "http://", "ftp://localhost"):
+        assert main(["status", "2" * 32, "--url", wrong_url]) == 2
+        told = f"residua: --url = {wrong_url!r}: must begin with http:// or https://"
+        assert told in capsys.readouterr().err
+    assert main(["status", "2" * 32, "--url", "http://localhost:x"]) == 2
+    assert "--url = 'http://localhost:x': must be a URL" in capsys.readouterr().err
     assert main(["submit", "absent.toml", "--url", url]) == 2
 
 

@@ -16,8 +16,8 @@ import xarray as xr
 
 from service.pages.form import as_python
 from solver.results.audit.figures import LIMITS
-from studies import Client, Study, open_study, summary
-from studies.client import Refused, RemoteStudy, _Screen
+from studies import Client, Study, StudyError, open_study, summary
+from studies.client import NoAnswer, Refused, RemoteStudy, _Screen
 from studies.scenes.scene import read_scene
 from tests.architecture.sources import ROOT
 from tests.service.servers import Server, fake_study
@@ -42,6 +42,7 @@ def test_a_study_is_submitted_watched_and_opened(
 ) -> None:
     assert done.detail()["status"] == "successful"
     assert done.id in {each.id for each in client.studies(text="by-client", limit=9)}
+    assert client.find("by-client").id == client.find(done.id).id == done.id
     stored = open_study(service.data / "studies" / done.id / "dataset.nc")
     xr.testing.assert_equal(done.open(lazy=False), stored)
     xr.testing.assert_equal(done.open().load(), stored)
@@ -109,6 +110,16 @@ def test_what_is_no_service_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(client, "ask", lambda *_, **__: page)
     with pytest.raises(Refused, match="localhost:1/x does not answer as a service"):
         client.study("0" * 32).detail()
+
+
+def test_the_url_that_does_not_answer_is_told(tmp_path: Path) -> None:
+    client = Client("http://localhost:1")
+    with pytest.raises(NoAnswer, match="localhost:1 does not answer"):
+        client.submit(fake_study("x"))
+    with pytest.raises(NoAnswer, match="localhost:1 does not answer"):
+        client.study("0" * 32).fetch(tmp_path / "a.nc")
+    with pytest.raises(StudyError, match="url = 'localhost:1': must begin with http://"):
+        Client("localhost:1")
 
 
 def test_the_view_of_a_study_is_short_and_the_same_here_and_there(

@@ -55,6 +55,7 @@ def test_points_and_words_are_told_and_compared(
     [
         ("peak_contact", [], "did you mean peak_contact_pressure"),
         ("status", [], "must be one of"),
+        ("residual_stress", [], "over component, y, x: must be a variable with one number a run"),
         (OF, ["friction"], "must be NAME<VALUE"),
         (OF, ["frictoin<1"], "did you mean friction"),
         (OF, ["friction<low"], "'low' must be a number"),

@@ -70,6 +70,13 @@ def test_what_is_asked_for_is_written_in_order(
         (["--where", "friction"], "must be NAME<VALUE"),
         (["--where", "hardening<none"], "compare them by = or !="),
         (["--where", "friction<low"], "'low' must be a number"),
+        (["--where", "hardening=non"], "'non' must be one of none; did you mean none?"),
+        (["--where", "hardening!=non"], "did you mean none?"),
+        (["--where", "status=okk"], "'okk' must be one of ok, "),
+        (["--where", "status=error"], "no run meets this"),
+        (["--where", "friction>=0", "friction<0"], "'friction>=0, friction<0': no run meets this"),
+        (["--where", "residual_stress>3"], "residual_stress is over component, y, x: must be a"),
+        (["--columns", "residual_stress"], "residual_stress is over component, y, x: must be a"),
         (["--sort", "size"], "sort = 'size'"),
     ],
 )

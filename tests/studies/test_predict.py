@@ -164,7 +164,7 @@ def test_a_refinement_is_predicted_in_its_cells_and_the_run_of_a_place_is_exact(
         again = answer(dataset, asked, store, OF, at, within=0.0)
         assert (again.by, again.error, again.enough) == ("run", 0.0, True)
         assert again.value == pytest.approx(exact)
-        with pytest.raises(StudyError, match="of = 'residual_stress': must be one of"):
+        with pytest.raises(StudyError, match="residual_stress is over component, y, x: must"):
             answer(dataset, asked, store, "residual_stress", at)
 
 

@@ -44,6 +44,16 @@ def sweep_fields(dataset: xr.Dataset) -> list[str]:
     ]
 
 
+def wide_fields(dataset: xr.Dataset) -> dict[str, list[str]]:
+    """Return the dimensions, beside the sweep, of the variables with more than a value per run."""
+    sweep = {*sweep_axes(dataset)}
+    return {
+        str(name): [str(dim) for dim in each.dims if dim not in sweep]
+        for name, each in dataset.data_vars.items()
+        if sweep < {*each.dims}
+    }
+
+
 def labelled_fields(dataset: xr.Dataset) -> list[str]:
     """Return the variables with one number per run and label, such as body or component."""
     sweep = {*sweep_axes(dataset)}
