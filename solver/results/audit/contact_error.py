@@ -53,7 +53,7 @@ def contact_error(system: System, converged: Converged) -> float:
         if name not in recovered:
             points = ErrorPoints(system.full(name))
             recovered[name] = points.at_nodes(system.response(name, converged).stress)
-        if at_vertices.max() <= _ROUNDING * np.nanmax(np.abs(recovered[name])):
+        if at_vertices.max() <= _ROUNDING * np.nan_to_num(np.abs(recovered[name])).max():
             continue
         chain = system.chain(name, boundary)
         if name == pair.slave[0]:
