@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import typing
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from functools import cache
 from types import NoneType, UnionType
@@ -56,7 +56,8 @@ def _fits(value: Any, hint: Any) -> bool:
     if of in (Union, UnionType):
         return any(_fits(value, part) for part in parts)
     if of is tuple:
-        if not isinstance(value, Collection) or isinstance(value, str | Mapping):
+        several = getattr(value, "ndim", 0) or isinstance(value, Sequence)
+        if not several or isinstance(value, str):
             return False
         each = parts[:1] * len(value) if parts[-1] is Ellipsis else parts
         return len(value) == len(each) and all(map(_fits, value, each))

@@ -276,6 +276,7 @@ def solve(
     given = ("model", model, Model), ("load", load, float | None), ("stages", stages, _STAGES)
     for name, value, kind in (*given, ("control", control, PathControl | None)):
         require(name, value, kind)
+    stages = tuple(stages)
     if load is not None and stages:
         raise ModelError("load", load, "must not be given beside stages")
     load = 1.0 if load is None else load
@@ -293,7 +294,7 @@ def solve(
             raise ModelError("until", until, "needs stages with a cycle")
         _check_ends(model, list(last.values()))
     control = control or PathControl(load_step=load / 20)
-    program = Program(laps=(Lap(tuple(stages)),)) if stages else control.program(load)
+    program = Program(laps=(Lap(stages),)) if stages else control.program(load)
     for body in () if stages else model.bodies:
         if any(load.amplitude is not None and load.varies for load in body.every_load):
             allowed = "must be absent without stages: solve then increases a load factor"

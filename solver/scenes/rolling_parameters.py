@@ -102,13 +102,9 @@ class RollingParameters(WheelParameters):
         f"advance is halved until it is smaller, at most {HALVINGS} times; 0 keeps advance_step",
     )
     press_steps: Annotated[int, Interval(ge=1, le=1000)] = described(
-        8,
-        "increments of setting down, and of applying the moment, on a track of given length",
-        needs={"track": Other(ENDLESS)},
+        8, "increments of setting down, and of applying the moment"
     )
-    unload_steps: Annotated[int, Interval(ge=1, le=1000)] = described(
-        4, "increments of unloading, on a track of given length", needs={"track": Other(ENDLESS)}
-    )
+    unload_steps: Annotated[int, Interval(ge=1, le=1000)] = described(4, "increments of unloading")
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes

@@ -101,6 +101,8 @@ def wrong_needs(scene: tables.SceneFile) -> Iterator[StudyError]:
             for value in values:
                 if known.choices and value not in known.choices:
                     yield StudyError(f"{field}.{other}", value, one_of(value, known.choices))
+                elif not known.choices and isinstance(value, str):
+                    yield StudyError(f"{field}.{other}", value, "must be a number")
 
 
 def wrong_accuracies(scene: tables.SceneFile) -> Iterator[StudyError]:

@@ -507,9 +507,9 @@ class ParameterTable(SceneTable):
     choices: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     unit: Annotated[str, StringConstraints(max_length=40)] = "1"
     description: Annotated[str, StringConstraints(max_length=400)] = ""
-    needs: dict[Label, tuple[bool | int | float | str, ...] | OtherThan] = Field(
-        default_factory=dict
-    )
+    needs: dict[
+        Label, Annotated[tuple[bool | int | float | str, ...], Field(min_length=1)] | OtherThan
+    ] = Field(default_factory=dict)
 
     @classmethod
     def unit_of(cls, name: str, given: Mapping[str, Any]) -> str | None:

@@ -436,7 +436,6 @@ def test_a_swept_parameter_that_changes_some_runs_is_taken() -> None:
         ("rolling", {"advance_step": 2.0}, "advance_step = 2.0: .*needs track other than endless"),
         ("rolling", {"load": "hertz"}, "friction = 0.2: .*load = contact or traction other than 0"),
         ("raceway", {"force": 300.0}, "force = 300.0: .*needs load_by = force"),
-        ("rolling", {"unload_steps": 8}, "unload_steps = 8: .*needs track other than endless"),
         ("punch", {"shear_limit": 0.5}, "shear_limit = 0.5: .*needs friction other than 0 or coh"),
         ("ball", {"load": 500.0, "load_ratio": 3.0}, "load_ratio = 3.0: .*needs load = 0"),
         ("elastic_punch", {"eta": 2.0}, "eta = 2.0: .*needs punch_groove other than 0"),

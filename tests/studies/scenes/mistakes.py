@@ -159,6 +159,11 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "parameters.wide.needs",
         "must be one of",
     ),
+    "needs text of a number": (
+        put("parameters", "wide", "needs", {"mu": ["0.3"]}),
+        "parameters.wide.needs.mu",
+        "must be a number",
+    ),
     "needs no choice": (
         put("parameters", "wide", "needs", {"rule": {"other_than": "nones"}}),
         "parameters.wide.needs.rule",
