@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -226,7 +227,8 @@ def test_a_copy_of_the_directory_is_restored_with_studies_that_ran_and_waited(
     wait_until(lambda: mortal.study(ran)["counts"].get("ok"))
     assert mortal.study(waited)["status"] == "accepted"
     elsewhere = Server(tmp_path / "elsewhere", settings=mortal.settings)
-    shutil.copytree(mortal.data, elsewhere.data)
+    with suppress(shutil.Error):  # a journal may be gone when its turn comes; the rest is copied
+        shutil.copytree(mortal.data, elsewhere.data)
     mortal.kill()
     kept = len(list((elsewhere.data / "runs").glob("*.nc")))
     assert 4 < kept < 8
