@@ -86,6 +86,13 @@ def _study(one: argparse.ArgumentParser) -> None:
     )
 
 
+def _results(one: argparse.ArgumentParser) -> None:
+    one.add_argument(
+        "--out", type=_path, default=Path("out"), metavar="DIR",
+        help="folder of all results, which studies share (default: %(default)s)",
+    )  # fmt: skip
+
+
 def _add_pictures(add: Callable[..., argparse.ArgumentParser]) -> None:
     one = add("draw", commands.draw)
     one.add_argument(
@@ -140,10 +147,7 @@ def _add_window(one: argparse.ArgumentParser) -> None:
 
 def _add_run(one: argparse.ArgumentParser) -> None:
     one.add_argument("study", type=_path, metavar="STUDY.toml")
-    one.add_argument(
-        "--out", type=_path, default=Path("out"), metavar="DIR",
-        help="folder of all results, which studies share (default: %(default)s)",
-    )  # fmt: skip
+    _results(one)
     one.add_argument(
         "--workers", type=_integer(0, 1024),
         help="processes; 0: this one (default: one per core, 0 for a study of some seconds)",
@@ -177,10 +181,7 @@ def _add_run(one: argparse.ArgumentParser) -> None:
 def _add_cluster(add: Callable[..., argparse.ArgumentParser]) -> None:
     one = add("slurm", commands.slurm)
     one.add_argument("study", type=_path, metavar="STUDY.toml")
-    one.add_argument(
-        "--out", type=_path, default=Path("out"), metavar="DIR",
-        help="folder of all results, which studies share (default: %(default)s)",
-    )  # fmt: skip
+    _results(one)
     one.add_argument("--tasks", type=_integer(1, 10**6), default=16, help="default: %(default)s")
     one.add_argument("--time", default="04:00:00", help="limit of a task (default: %(default)s)")
     one.add_argument("--memory", default="2G", help="of a task (default: %(default)s)")

@@ -64,11 +64,10 @@ class MovingFrame:
         x, y = X - self.centre[:, None]
         return np.stack([-y, x]) / self.radius
 
-    def rows(self, q: Array, nodal: Array, passing: Array) -> Array:
-        """Return derivative rows (m, 3) on the unknowns, from rows (m, n, 2) on displacements.
+    def rows(self, q: Array, block: Array, passing: Array) -> Array:
+        """Return derivative rows (m, 3) on the unknowns, from rows (m, 2 n) on displacements.
 
         ``passing`` (2, n) is the derivative of the positions by the arc, in the frame.
         """
-        n = nodal.shape[1]
-        moves = np.column_stack([np.tile(np.eye(2), (n, 1)), (self.turned(q) @ passing).T.ravel()])
-        return np.asarray(nodal.reshape(len(nodal), 2 * n) @ moves)
+        shifts = np.tile(np.eye(2), (passing.shape[1], 1))
+        return np.asarray(block @ np.column_stack([shifts, (self.turned(q) @ passing).T.ravel()]))

@@ -138,8 +138,7 @@ class RigidPart(Part):
     ) -> tuple[NDArray[np.int64], Array]:
         """Return the three unknowns and derivative rows (n_rows, 3) on them."""
         del gaps
-        nodal = block.reshape(len(block), block.shape[1] // 2, 2)
-        return np.arange(3), self.frame.rows(u, nodal, self.frame.passing(surface.X))
+        return np.arange(3), self.frame.rows(u, block, self.frame.passing(surface.X))
 
     def moved(self, u: Array, time: float) -> Array:
         """Return ``u`` with prescribed motions at their values for a time."""

@@ -96,11 +96,10 @@ class Wheel(Substructure):
         compensates the difference of the lever arms; on a mesh with ten points in contact its error
         is 1e-4 of force times radius, enough to turn a wheel that is held by less friction.
         """
-        nodal = block.reshape(len(block), block.shape[1] // 2, 2)
         d, q = u[surface.dofs].reshape(-1, 2).T, u[self._hub :]
-        hub = self.frame.rows(q, nodal, self.passing(surface, d))
+        hub = self.frame.rows(q, block, self.passing(surface, d))
         hub[:gaps, _TURN] = 0.0
-        rim = nodal.reshape(-1, 2) @ self.frame.turned(q)
+        rim = block.reshape(-1, 2) @ self.frame.turned(q)
         rows = np.hstack([rim.reshape(block.shape), hub])
         return np.append(surface.dofs, self._hub + np.arange(3)), rows
 

@@ -27,7 +27,7 @@ def test_a_frame_takes_along_what_is_displaced_in_it() -> None:
 
 def test_rows_are_derivatives_of_the_motion() -> None:
     nodal = np.random.default_rng(1).normal(size=(4, 3, 2))
-    rows, h = FRAME.rows(Q, nodal, FRAME.passing(X)), 1e-6
+    rows, h = FRAME.rows(Q, nodal.reshape(4, -1), FRAME.passing(X)), 1e-6
     for k, step in enumerate(h * np.eye(3)):
         moved = FRAME.displacements(Q + step, X) - FRAME.displacements(Q - step, X)
         change = np.einsum("mnd,dn->m", nodal, moved) / (2 * h)
