@@ -190,6 +190,7 @@ class _Heap:
         if self._libc is None:
             gc.collect()
             return
+        self._after = min(self._after, self._in_use)  # what was freed since may grow again
         if self._in_use > self._after + _GROWN:
             gc.collect()
             self._after = self._in_use

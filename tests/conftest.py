@@ -28,6 +28,11 @@ os.environ["OMP_NUM_THREADS"] = "1"
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
+_SOLVED = ("tests.verification", "tests.solver", "tests.stability.kinds", "tests.stability.test_")
+"""Starts of the names of modules whose caches hold solved problems."""
+_BETWEEN = 100_000_000
+"""Bytes of set-ups that the solver may keep from one file of tests to the next."""
+
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
@@ -83,16 +88,22 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
 def nothing_solved_outlives_its_module() -> Iterator[None]:
     """Clear caches of solved problems, which hold factors of hundreds of megabytes.
 
-    What the solver keeps beyond its limit is dropped, and memory that is free is given back.
+    Of what the solver keeps little stays, and memory that is free is given back.
     """
     yield
-    for name, module in list(sys.modules.items()):
-        if name.startswith(("tests.verification", "tests.solver")):
-            for value in list(vars(module).values()):
-                if hasattr(value, "cache_clear") and value.__module__.startswith("tests."):
-                    value.cache_clear()
+    solved = [
+        value
+        for name, module in list(sys.modules.items())
+        if name.startswith(_SOLVED)
+        for value in vars(module).values()
+        if hasattr(value, "cache_info") and value.__module__.startswith("tests.")
+    ]
+    if full := [each for each in solved if each.cache_info().currsize]:
+        for each in full:
+            each.cache_clear()
+        gc.collect()
     if memory := sys.modules.get("solver.memory"):
-        memory.release(memory.most_kept())
+        memory.release(_BETWEEN)
 
 
 @pytest.fixture(autouse=True, scope="session")

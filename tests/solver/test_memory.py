@@ -213,3 +213,21 @@ def test_free_memory_returns_to_the_system() -> None:
     release()
     assert resident() < before + 40 * MB
     del last
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is not measured elsewhere")
+def test_a_circle_of_references_is_freed_although_more_was_held_before() -> None:
+    before = np.ones(20 * MB)
+    release()
+    del before
+    release()
+    one, other = Held(60), Held(1)
+    one.other, other.other = other, one  # type: ignore[attr-defined]
+    freed = weakref.ref(one)
+    gc.disable()
+    try:
+        del one, other
+        release()
+        assert freed() is None
+    finally:
+        gc.enable()
