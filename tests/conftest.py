@@ -30,8 +30,6 @@ sys.dont_write_bytecode = False
 
 _SOLVED = ("tests.verification", "tests.solver", "tests.stability.kinds", "tests.stability.test_")
 """Starts of the names of modules whose caches hold solved problems."""
-_BETWEEN = 100_000_000
-"""Bytes of set-ups that the solver may keep from one file of tests to the next."""
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -88,7 +86,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
 def nothing_solved_outlives_its_module() -> Iterator[None]:
     """Clear caches of solved problems, which hold factors of hundreds of megabytes.
 
-    Of what the solver keeps little stays, and memory that is free is given back.
+    The solver keeps nothing either, and memory that is free is given back.
     """
     yield
     solved = [
@@ -103,7 +101,7 @@ def nothing_solved_outlives_its_module() -> Iterator[None]:
             each.cache_clear()
         gc.collect()
     if memory := sys.modules.get("solver.memory"):
-        memory.release(_BETWEEN)
+        memory.release(0)
 
 
 @pytest.fixture(autouse=True, scope="session")

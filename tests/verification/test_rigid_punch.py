@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from solver.memory import release
 from solver.results.record import Status
 from studies.scenes.registry import scene_named
 from tests.reference.flat_punch_friction import stick_width
@@ -23,6 +24,7 @@ def pressed(**own: Any) -> dict[str, float]:
     parameters = RIGID_PUNCH.parameters(**own)
     (record,) = RIGID_PUNCH.path(parameters, [parameters.mean_pressure], lambda fraction: None)
     assert record.status is Status.OK, record.message
+    release(0)  # hundreds of megabytes for each mesh
     return dict(record.scalars)
 
 
