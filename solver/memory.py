@@ -35,8 +35,9 @@ SETTING, USUAL = "RESIDUA_KEPT_MEMORY", "300MB"
 """Environment variable with the most that a process keeps, such as ``"2GB"``, and its default."""
 _SIZE = re.compile(r"(\d+(?:\.\d+)?) ?([kMGT]?)(i?)B")
 _GROWN, _FREE = 32_000_000, 128_000_000
-"""Bytes by which a process has grown, above which it is searched for what can be freed; free bytes
-above which memory is given to the system. Below, both would cost more than they gain."""
+"""Bytes by which a process has grown, beside what it keeps, above which it is searched for what can
+be freed; free bytes above which memory is given to the system. Below, both would cost more than
+they gain."""
 
 
 def bytes_in(text: str) -> int | None:
@@ -116,11 +117,11 @@ def release(most: int | None = None) -> None:
     most : number of bytes; by default `most_kept`, or more if the path that has ended used more:
         the next path of a study most often has the same set-up
     """
-    _evict(most_kept() if most is None else most, spare=most is None)
+    held = _evict(most_kept() if most is None else most, spare=most is None)
     with _LOCK:
         _KEPT[_PATH] = None
         _KEPT.move_to_end(_PATH)
-    _HEAP.tidy()
+    _HEAP.tidy(held)
 
 
 def bytes_of(*values: object) -> list[int]:
@@ -129,8 +130,11 @@ def bytes_of(*values: object) -> list[int]:
     return [_measured(value, seen) for value in values]
 
 
-def _evict(most: int, *, spare: bool = False) -> None:
-    """Drop values that do not fit beside those used later; spare those used since `release`."""
+def _evict(most: int, *, spare: bool = False) -> int:
+    """Drop values that do not fit beside those used later; return the bytes of those that stay.
+
+    Those used since `release` stay in any case if it is to `spare` them.
+    """
     with _LOCK:
         keys, total = list(reversed(_KEPT)), 0
         sizes = bytes_of(*((key, _KEPT[key]) for key in keys))
@@ -141,6 +145,7 @@ def _evict(most: int, *, spare: bool = False) -> None:
                 del _KEPT[key]
             else:
                 total += size
+    return total
 
 
 def _measured(value: object, seen: set[int]) -> int:
@@ -176,24 +181,27 @@ class _Heap:
 
     def __init__(self) -> None:
         self._libc: ctypes.CDLL | None = ctypes.CDLL(None)
-        self._after = 0
+        self._least = 0
         try:
             self._libc.mallinfo2.restype = _Usage
         except AttributeError:  # another C library, which gives memory back by itself
             self._libc = None
 
-    def tidy(self) -> None:
+    def tidy(self, held: int) -> None:
         """Free what only circles of references hold, and give free memory to the system.
 
-        Both cost as much as a small run, and are left out where they gain little.
+        Both cost as much as a small run, and are left out where they gain little: circles are
+        searched for when the bytes in use, beside those ``held`` on purpose, have grown since they
+        were least.
         """
         if self._libc is None:
             gc.collect()
             return
-        self._after = min(self._after, self._in_use)  # what was freed since may grow again
-        if self._in_use > self._after + _GROWN:
+        beside = self._in_use - held
+        if beside > self._least + _GROWN:
             gc.collect()
-            self._after = self._in_use
+            self._least = beside = self._in_use - held
+        self._least = min(self._least, beside)
         if self._libc.mallinfo2().fordblks > _FREE:
             self._libc.malloc_trim(0)
 

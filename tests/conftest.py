@@ -89,17 +89,11 @@ def nothing_solved_outlives_its_module() -> Iterator[None]:
     The solver keeps nothing either, and memory that is free is given back.
     """
     yield
-    solved = [
-        value
-        for name, module in list(sys.modules.items())
-        if name.startswith(_SOLVED)
-        for value in vars(module).values()
-        if hasattr(value, "cache_info") and value.__module__.startswith("tests.")
-    ]
-    if full := [each for each in solved if each.cache_info().currsize]:
-        for each in full:
-            each.cache_clear()
-        gc.collect()
+    for name, module in list(sys.modules.items()):
+        if name.startswith(_SOLVED):
+            for value in list(vars(module).values()):
+                if hasattr(value, "cache_clear") and value.__module__.startswith("tests."):
+                    value.cache_clear()
     if memory := sys.modules.get("solver.memory"):
         memory.release(0)
 

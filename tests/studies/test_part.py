@@ -83,13 +83,16 @@ def test_parts_compute_each_run_once_although_two_are_killed(
 
     while len(runs(out)) < 4:
         time.sleep(0.02)
-    # at once: else the second might take over the path of the first, which is then blamed
-    for each in parts[:2]:
-        os.kill(each.pid, signal.SIGSTOP)
-        os.waitid(os.P_PID, each.pid, os.WSTOPPED | os.WEXITED | os.WNOWAIT)
-    for each in parts[:2]:
-        os.kill(each.pid, signal.SIGKILL)
-        each.join()
+    # both are stopped before one is killed: else the second might take over the path of the first
+    # and die with it too, and a path with two deaths is blamed
+    try:
+        for each in parts[:2]:
+            os.kill(each.pid, signal.SIGSTOP)
+            os.waitid(os.P_PID, each.pid, os.WSTOPPED | os.WEXITED | os.WNOWAIT)
+    finally:
+        for each in parts[:2]:
+            each.kill()
+            each.join()
     for each in parts[2:]:
         each.join(60)
         assert each.exitcode == 0

@@ -221,8 +221,8 @@ class AuditedPair:
             f"{slave} moved {left_out.way:.2g} mm along {master}, mostly at ({left_out.x:z.4g}, "
             f"{left_out.y:z.4g}): {left_out.sides:.2g} sides of an element, "
             f"{left_out.length:.1%} of the length of contact; gaps differ by {left_out.off:.1%} of "
-            "the elastic approach. Small sliding neglects this; a pair of a model of "
-            'your own follows it with sliding = "finite"'
+            "the elastic approach. Small sliding neglects this: where the pair is "
+            'your own, in a scene file or a model, give it sliding = "finite"'
         )
 
     @cached_property
