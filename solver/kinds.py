@@ -62,12 +62,10 @@ def _fits(value: Any, hint: Any) -> bool:
         each = parts[:1] * len(value) if parts[-1] is Ellipsis else parts
         return len(value) == len(each) and all(map(_fits, value, each))
     if of is Mapping:
-        return isinstance(value, Mapping) and _fits(tuple(value.items()), _items(parts))
+        return isinstance(value, Mapping) and all(
+            _fits(key, parts[0]) and _fits(each, parts[1]) for key, each in value.items()
+        )
     return isinstance(value, of or hint)
-
-
-def _items(parts: tuple[Any, ...]) -> Any:
-    return tuple[tuple[parts], ...]  # type: ignore[valid-type]
 
 
 def _words(hint: Any) -> str:
