@@ -52,26 +52,26 @@ def fading_return(
 
     With the back stresses X at the beginning of the increment, flow has the direction of
 
-        xi(dp) = s - sum of X / (1 + gamma dp)
+        xi(dp) = s - sum of X exp(-gamma dp)
 
-    and ``sqrt(3/2) |xi| = R(p + dp) + (3 G + sum of C / (1 + gamma dp)) dp`` gives dp.
+    and ``sqrt(3/2) |xi| = R(p + dp) + 3 G dp + sum of C / gamma (1 - exp(-gamma dp))`` gives dp.
     """
     constants = [(rule.modulus, rule.recall) for rule in rules]
     C, gamma = np.reshape(constants, (-1, 2)).T[:, :, None]
 
     def relative(growth: Array) -> tuple[Array, Array, Array]:
-        fade = 1 + gamma * growth
-        xi = s - (back / fade[:, None]).sum(axis=0)
-        turn = (back * (gamma / fade**2)[:, None]).sum(axis=0)
-        return fade, xi, turn
+        faded = np.exp(-gamma * growth)
+        xi = s - (back * faded[:, None]).sum(axis=0)
+        turn = (back * (gamma * faded)[:, None]).sum(axis=0)
+        return faded, xi, turn
 
     def excess(growth: Array) -> tuple[Array, Array]:
-        fade, xi, turn = relative(growth)
+        faded, xi, turn = relative(growth)
         q, p = von_mises(xi), accumulated + growth
-        stiff = 3 * G + (C / fade).sum(axis=0)
-        slope = 3 * G + (C / fade**2).sum(axis=0) + curve.slope(p)
+        raised = sum(rule.in_tension(growth) for rule in rules)
+        slope = 3 * G + (C * faded).sum(axis=0) + curve.slope(p)
         slope -= 1.5 * (xi * turn).sum(axis=0) / q
-        return q - curve.flow_stress(p) - stiff * growth, -slope
+        return q - curve.flow_stress(p) - 3 * G * growth - raised, -slope
 
     nothing = np.zeros(s.shape[1])
     first, _ = excess(nothing)
@@ -83,8 +83,9 @@ def fading_return(
     _, xi, turn = relative(growth)
     size = np.sqrt((xi**2).sum(axis=0))
     u, slope = xi / size, -excess(growth)[1]
-    flow = growth * u / SQRT23
-    grown = back + 2 / 3 * C[..., None] * flow
+    normal = u / SQRT23
+    pairs = zip(rules, back, strict=True)
+    moved = [rule.evolve(X, growth, normal) for rule, X in pairs]
 
     aside = turn - (u * turn).sum(axis=0) * u
     along = u[:, None] * u[None]
@@ -98,7 +99,7 @@ def fading_return(
             + 3 * G / slope * along
         )
     )
-    return FlowStep(growth, flow, grown / (1 + gamma * growth)[:, None], softening)
+    return FlowStep(growth, growth * normal, np.reshape(moved, back.shape), softening)
 
 
 def general_return(

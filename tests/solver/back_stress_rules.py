@@ -25,8 +25,8 @@ class Plain(BackStress):
         return self.limit * -np.expm1(-self.recall * p)
 
     def evolve(self, old, growth, normal):
-        grown = old + 2 / 3 * self.modulus * growth * normal
-        return grown / (1 + self.recall * growth)
+        fade = np.exp(-self.recall * growth)
+        return old * fade + 2 / 3 * self.limit * (1 - fade) * normal
 
     def recalled(self, X, N):
         """What the rate loses over dp."""
@@ -45,10 +45,9 @@ class BurletCailletaud(Plain):
 
     def evolve(self, old, growth, normal):
         n = normal / np.sqrt((normal**2).sum(axis=0))
-        grown = old + 2 / 3 * self.modulus * growth * normal
-        along = (grown * n).sum(axis=0) * n
-        fade = self.recall * growth
-        return (grown - along) / (1 + self.share * fade) + along / (1 + fade)
+        along = (old * n).sum(axis=0) * n
+        aside = (old - along) * np.exp(-self.share * self.recall * growth)
+        return aside + super().evolve(along, growth, normal)
 
     def recalled(self, X, N):
         along = 2 / 3 * (X * N).sum(axis=0) * N
