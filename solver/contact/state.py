@@ -195,6 +195,9 @@ class Converged:
     separated : whether the bodies were separated in the increment
     energy : work since the lap began
     timing : how well contact was resolved in time since then
+    added : error of stress that the length of the increment adds, over the yield stress
+    missed : for each part, the sum of these errors since the path began (n_components, n_points)
+        [MPa]; None where nothing has flowed
     lost : difference between the beginning of this increment and the end of the previous one
     windows : for each part, the region of the window in which it was solved, if in any
     """
@@ -214,5 +217,7 @@ class Converged:
     separated: bool = False
     energy: Energy = field(default_factory=Energy)
     timing: Timing = field(default_factory=Timing)
+    added: float = 0.0
+    missed: tuple[NDArray[np.float64] | None, ...] = ()
     lost: float = 0.0
     windows: tuple[Region | None, ...] = ()

@@ -161,9 +161,11 @@ class Discretisation(Nodes, Part):
         """Return the internal variables of the body before any load."""
         return self.body.law.initial(self.weights.size, self.B.shape[2])
 
-    def strain(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return Mandel strain (4, n_points) for displacements (n,)."""
-        flat = np.matmul(self._flat_B, u[self.dofs][:, :, None])
+    def strain(
+        self, u: NDArray[np.float64], elements: NDArray[np.bool_] | slice = slice(None)
+    ) -> NDArray[np.float64]:
+        """Return Mandel strain (4, n_points) for displacements (n,), of all or some elements."""
+        flat = np.matmul(self._flat_B[elements], u[self.dofs[elements]][:, :, None])
         return np.asarray(flat.reshape(-1, self.B.shape[2]).T)
 
     def law(self, time: float) -> Law:

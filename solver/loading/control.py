@@ -8,6 +8,11 @@ from solver.errors import ModelError
 from solver.kinds import check_kinds
 from solver.loading.program import Program, load_and_release
 
+INCREMENT_ERROR = 0.003
+"""Largest error of stress, over the yield stress, that the length of an increment may add: the sum
+over the increments of a load is then one or two percent. Smaller ones take the time of more
+increments, in proportion to the root of the error."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerances:
@@ -33,10 +38,13 @@ class Control:
     Attributes
     ----------
     max_cuts : how often an increment may be halved before the run ends with an error
+    increment_error : largest error of stress, over the yield stress, that the length of an
+        increment may add before it is divided: see `solver.loading.integration`
     tolerances : of an increment
     """
 
     max_cuts: int = 4
+    increment_error: float = INCREMENT_ERROR
     tolerances: Tolerances = field(default_factory=Tolerances)
 
 
@@ -49,6 +57,7 @@ class PathControl(Control):
     load_step : increments of loading end at its multiples, in load factor
     unload_steps : number of equal increments from full load to zero; the last separates the bodies
     max_cuts : how often an increment may be halved before the run ends with an error
+    increment_error : see `Control`
     tolerances : of an increment
     """
 

@@ -19,6 +19,7 @@ from solver.loading.energy import worked
 from solver.loading.flow import SoftestStep
 from solver.loading.history import lost
 from solver.loading.increment import Increment
+from solver.loading.integration import integrated
 from solver.loading.narrowing import FailedInWindows, narrowed
 from solver.loading.outcome import IncrementFailed, PathEnded, Point, Tally, Yielded
 from solver.loading.prediction import MEMORY, Predictor
@@ -49,7 +50,7 @@ _UNTIMED = 0.02
 _PASSAGE = 0.5
 """Ratio of a contact's motion in an increment to its width; above it an increment is divided."""
 _SHORTEST = 2.0**-6
-"""Shortest fraction into which an increment is divided for these two reasons."""
+"""Shortest fraction into which an increment is divided for these reasons, or for its error."""
 
 
 class Stepper:
@@ -147,15 +148,17 @@ class Stepper:
             begun = self.begin(state, time, point.tally)
             history, met = (*point.history, *begun.history), point.met | begun.met
             timing = point.now.timing.then(begun.now.timing)
-            return replace(begun, now=replace(begun.now, timing=timing), history=history, met=met)
+            now = replace(begun.now, timing=timing, missed=point.now.missed)
+            return replace(begun, now=now, history=history, met=met)
         return replace(point, now=replace(point.now, state=replace(state, time=time)), past=())
 
     def reach(self, point: Point, target: float, *, contact: bool = True) -> Point:
         """Return the point at time ``target`` or raise `PathEnded`.
 
         An increment in which a rigid body rotates too far is divided, because friction forces
-        rotate with its surface. An increment that fails is halved. One that resolves contact too
-        coarsely is halved too, but kept if its halves fail; later increments grow again.
+        rotate with its surface. An increment that fails is halved. One that resolves contact or the
+        turn of plastic flow too coarsely is divided too, but kept if its parts fail; later
+        increments grow again.
 
         Where windows of the bodies fail, whole bodies follow only in the shortest increment, and in
         the halves of a coarse one: the half of another one mostly converges in windows.
@@ -164,6 +167,10 @@ class Stepper:
         turn = max((part.turn(begin, target) for part in self.system.parts), default=0.0)
         step = (target - begin) / max(1, math.ceil(turn / _TURN - ROUNDING))
         size = _StepSize(step, self.control.max_cuts)
+        before, most = point.now, self.control.increment_error
+        if before.added:
+            scale = abs(step / (before.state.time - before.start.time))
+            size.divided(step, _halvings(before.added * scale**2, most))
         known, coarse = point.now.timing, None
         failed: list[Attempt] = []
         while (now := point.now.state.time) != target:
@@ -195,12 +202,14 @@ class Stepper:
                 else:
                     converged = coarse
             else:
+                converged = integrated(self.system, point.now, converged)
                 # the forces of the coarse increment show how large they become
                 known = converged.timing.beside(known)
-                if _coarse(known) and size.divided(time - now):
+                halvings = max(int(_coarse(known)), _halvings(converged.added, most))
+                if size.divided(time - now, halvings):
                     coarse = converged
                     continue
-            size.converged(converged.state.time - now)
+            size.converged(converged.state.time - now, grows=4 * converged.added <= most)
             left = abs(target - converged.state.time)
             failed = [each for each in failed if abs(target - each[0]) < left]
             past = (*point.past[1 - MEMORY :], point.now.state)
@@ -390,11 +399,13 @@ class _StepSize:
         self.step, self._grows = step / 2, False
         return abs(self.step) >= self._least * (1 - ROUNDING)
 
-    def divided(self, step: float) -> bool:
-        """Halve a step that may grow again, if the half is permitted; return whether it is."""
-        if abs(step) / 2 < _SHORTEST * abs(self._whole) * (1 - ROUNDING):
+    def divided(self, step: float, halvings: int) -> bool:
+        """Halve a step that may grow again, as often as is permitted; return whether any is."""
+        while halvings and abs(step) / 2**halvings < _SHORTEST * abs(self._whole) * (1 - ROUNDING):
+            halvings -= 1
+        if not halvings:
             return False
-        self.step, self._grows = step / 2, True
+        self.step, self._grows = step / 2**halvings, True
         self._least = min(self._least, abs(self.step))  # a larger step that fails returns to this
         return True
 
@@ -402,10 +413,15 @@ class _StepSize:
         """Go on with a step that converged after all shorter ones had failed."""
         self.step = step
 
-    def converged(self, step: float) -> None:
+    def converged(self, step: float, *, grows: bool) -> None:
         """Double the next step, if steps may grow."""
-        if self._grows:
+        if self._grows and grows:
             self.step = min(2 * step, self._whole, key=abs)
+
+
+def _halvings(error: float, most: float) -> int:
+    """Return how often to halve an increment whose error is of second order in its length."""
+    return math.ceil(math.log(error / most, 4) - ROUNDING) if error > most else 0
 
 
 def _coarse(timing: Timing) -> bool:

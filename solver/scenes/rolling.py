@@ -253,6 +253,7 @@ ROLLING = Scene(
     costs=(cost, progress),
     trace=Trace.of,
     refinement=refinement,
+    increment_error=0.02,  # as the mesh of `accuracy` is worth
     effort=effort,
     warnings=warnings,
     advice=advice,

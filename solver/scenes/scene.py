@@ -9,7 +9,7 @@ from itertools import tee
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 from solver.errors import LimitLoad, TooLong
-from solver.loading.control import Control
+from solver.loading.control import INCREMENT_ERROR, Control
 from solver.loading.outcome import Outcome
 from solver.loading.program import Program, walked
 from solver.loading.refinement import StepRefinement
@@ -91,6 +91,8 @@ class Scene:
     until : (parameters) -> whether repeated stages end when their shakedown state is decided
     watch : (parameters, samples, converged increment) -> data stored for it in ``outcome.history``
     refinement : (parameters) -> how increments are halved, or None for those of the program
+    increment_error : largest error of stress, over the yield stress, that the length of an
+        increment may add before it is divided: see `Control`
     effort : (parameters, values of ``branch``) -> work of the loading path, in microseconds or, if
         it needs a mesh, once for each `setup`; without it a study is estimated from its runs alone
     setup : (parameters) -> what an expensive set-up depends on, which a process keeps for its next
@@ -120,6 +122,7 @@ class Scene:
     until: Callable[[Any], bool] | None = None
     watch: Callable[[Any, Samples, Any], Any] | None = None
     refinement: Callable[[Any], StepRefinement | None] | None = None
+    increment_error: float = INCREMENT_ERROR
     effort: Callable[[Any, Sequence[float]], Effort] | None = None
     setup: Callable[[Any], Hashable] | None = None
     warnings: Callable[[FinishedRun], tuple[str, ...]] | None = None
@@ -274,7 +277,7 @@ def by_increments(
         report = partial(monitor, 0.0)  # how much is still to be asked for is not known
     walker = Walker(
         system,
-        Control(),
+        Control(increment_error=scene.increment_error),
         trace=partial(scene.trace, samples) if scene.trace else None,
         refinement=scene.refinement(last) if scene.refinement else None,
         until=partial(decided, laws=system.laws) if scene.until and scene.until(last) else None,

@@ -124,6 +124,7 @@ def _scene_of(description: Description, scene: tables.SceneFile) -> FileScene:
         quantities=tuple(q for number in numbers_of(scene) for q in number.quantities),
         source=description.digest,
         allow=scene.allow,
+        increment_error=scene.increment_error,
         description=description,
     )
 

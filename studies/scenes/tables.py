@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from pydantic import Field, StringConstraints, create_model
 
 from solver.errors import ModelError
+from solver.loading.control import INCREMENT_ERROR
 from solver.mesh.lines import closer
 from solver.model.link import Components
 from solver.model.loads import LOADS, Load
@@ -584,6 +585,7 @@ class SceneFile(SceneTable):
     links: tuple[LinkTable, ...] = ()
     singular: tuple[SingularTable, ...] = ()
     allow: tuple[Literal["large_strain"], ...] = ()
+    increment_error: Annotated[float, Interval(ge=1e-5, le=1.0)] = INCREMENT_ERROR
     loads: tuple[AnyLoad, ...] = ()
     stages: tuple[StageTable, ...] = ()
     repeat: RepeatTable | None = None

@@ -19,9 +19,7 @@ from solver import (
     Temperature,
     solve,
 )
-from solver.materials import PlaneStress
 from solver.mesh import grid, mapped
-from solver.results.audit.law import increment_error
 from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.report import audit
 from solver.scenes.punch import PunchParameters, model
@@ -147,33 +145,6 @@ def test_finite_sliding_follows_the_bodies():
     # the hump has too few elements for its contact, which is not what is looked at here
     assert {text.split()[0] for text in check.violations} <= {"audit_contact_resolution"}
     assert check.figures["audit_closed_gap"] < 1e-4
-
-
-# -- the error of an increment -------------------------------------------------------------------
-
-MATERIAL = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
-PLANE = [MATERIAL, MATERIAL.in_plane_stress(), PlaneStress(MATERIAL)]
-
-
-@pytest.mark.parametrize("law", PLANE, ids=["plane strain", "projected", "wrapped"])
-def test_the_error_of_an_increment_falls_with_its_size(law):
-    """Stress turns along the way: one step of backward Euler is of first order."""
-    start = np.array([[3e-3], [-1e-3], [0.0], [0.0]])
-    state = law.respond(start, law.initial(1, 4)).state
-    errors = []
-    for size in (1e-3, 5e-4, 2.5e-4):
-        strain = start + np.array([[0.0], [0.0], [0.0], [size]])
-        stress = law.respond(strain, state).stress
-        errors.append(increment_error(law, (start, strain), stress, state))
-    assert errors[0] > 1e-3
-    assert errors[0] > 1.5 * errors[1] > 2.25 * errors[2]
-
-
-def test_a_proportional_increment_has_no_error():
-    strain = np.array([[4e-3], [-4e-3], [0.0], [0.0]])
-    state = MATERIAL.initial(1, 4)
-    stress = MATERIAL.respond(strain, state).stress
-    assert increment_error(MATERIAL, (np.zeros((4, 1)), strain), stress, state) < 1e-12
 
 
 # -- work ------------------------------------------------------------------------------------------

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.system import LEAST
-from solver.results.audit.law import increment_error
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,9 +19,6 @@ if TYPE_CHECKING:
     from solver.results.audit.plain import PlainBody
 
     Array = NDArray[np.float64]
-
-_SAMPLE = 200
-"""Number of flowing points at which an increment is repeated in smaller steps."""
 
 
 class AuditedBody:
@@ -179,15 +175,3 @@ class AuditedBody:
         broken = law.misfit(self._reached, self.stress, self._before, after)
         beyond = law.yield_value(self.stress, after)
         return float(broken.max(initial=0.0)), float(beyond.max(initial=0.0))
-
-    def increment_error(self) -> float:
-        """Return the change of stress by smaller steps over the yield stress, at flowing points."""
-        law, after = self._law, self._response.state
-        if not self.meshed or law.elastic:
-            return 0.0
-        flowing = np.flatnonzero(after.accumulated > self._before.accumulated)
-        if not len(flowing):
-            return 0.0
-        some = flowing[:: max(1, len(flowing) // _SAMPLE)]
-        strains = self._strain(self._converged.start)[:, some], self._reached[:, some]
-        return increment_error(law.at(some), strains, self.stress[:, some], self._before.at(some))

@@ -24,8 +24,8 @@ _DECLARED = [
     ),
     declare(
         "audit_increment_error",
-        "ratio of the change of stress, if the last increment is divided by four, to the yield "
-        "stress",
+        "ratio of the estimated error of stress that the length of all increments makes, root mean "
+        "square where plastic strain grew, to the yield stress",
     ),
     declare(
         "audit_overlap", "mean overlap of the deformed bodies, or mean gap where they press", "mm"
@@ -122,6 +122,7 @@ LIMITS = {
     "audit_links": 1e-3,
     "audit_law": 1e-6,
     "audit_yield": 1e-6,
+    "audit_increment_error": 0.1,
     "audit_slip": 0.03,
     "audit_touch_time": 0.1,
     "audit_slip_resolution": 0.5,

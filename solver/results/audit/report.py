@@ -10,6 +10,7 @@ import numpy as np
 from solver.contact.pressure import contact_pressure
 from solver.contact.system import LEAST
 from solver.fem.error import error_estimate
+from solver.loading.integration import missed
 from solver.results.audit.bodies import AuditedBody
 from solver.results.audit.contact_error import contact_error
 from solver.results.audit.figures import LIMITS
@@ -101,7 +102,7 @@ def audit(
         "audit_action_reaction": action_reaction(system, bodies, pairs, loaded),
         "audit_law": broken,
         "audit_yield": beyond,
-        "audit_increment_error": _largest(*(body.increment_error() for body in bodies)),
+        "audit_increment_error": _largest(*(missed(system, converged) for converged in states)),
         **{name: _largest(0.0, *(pair.figures[name] for pair in pairs)) for name in names},
         "audit_links": _largest(*(links_error(system, converged) for converged in states)),
         "audit_energy": _energy_error(system, bodies, loaded),

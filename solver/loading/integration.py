@@ -1,0 +1,69 @@
+"""The error of stress that an increment adds because plastic flow turns within it.
+
+Flow has one direction in an increment. Two halves of the increment, along the same strain, let it
+turn once: the difference of their stress estimates the error. It is of second order in the length
+of an increment; the sum over a path is of first order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.fem.discretisation import Discretisation
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.contact.state import Converged
+    from solver.contact.system import System
+
+    Array = NDArray[np.float64]
+
+
+def integrated(system: System, before: Converged, now: Converged) -> Converged:
+    """Return an increment with the error that it adds, and the sum since the path began."""
+    sums, added = list(before.missed or (None,) * len(system.parts)), 0.0
+    for k, part in enumerate(system.parts):
+        grown = now.responses[k].state.accumulated - now.start.plastic[k].accumulated
+        if not (isinstance(part, Discretisation) and grown.any()):
+            continue
+        own = _missed(part, now, k, grown > 0)
+        added = max(added, _mean(part, own, grown > 0))
+        had = sums[k]
+        sums[k] = own if had is None else had + own
+    return replace(now, missed=tuple(sums), added=added)
+
+
+def missed(system: System, now: Converged) -> float:
+    """Return the error of stress of all increments so far, over the yield stress: see `_mean`."""
+    each = zip(system.parts, now.missed, now.state.plastic, strict=False)
+    return max(
+        (
+            _mean(part, error, plastic.accumulated > 0)
+            for part, error, plastic in each
+            if error is not None and isinstance(part, Discretisation)
+        ),
+        default=0.0,
+    )
+
+
+def _missed(part: Discretisation, now: Converged, number: int, flows: NDArray[np.bool_]) -> Array:
+    """Return what two halves of an increment add to the stress (n_components, n_points) [MPa]."""
+    within = np.asarray(flows.reshape(part.weights.shape).any(axis=1))
+    points = np.flatnonzero(np.repeat(within, part.weights.shape[1]))
+    ends = (now.start.time, now.start.u[number]), (now.state.time, now.state.u[number])
+    start, end = (part.strain(u, within) - part.eigenstrain(time)[:, points] for time, u in ends)
+    law, before = part.law(now.state.time).at(points), now.start.plastic[number].at(points)
+    half = law.respond((start + end) / 2, before).state
+    found = np.zeros_like(now.responses[number].stress)
+    found[:, points] = law.respond(end, half).stress - now.responses[number].stress[:, points]
+    return found
+
+
+def _mean(part: Discretisation, error: Array, flows: NDArray[np.bool_]) -> float:
+    """Return the root mean square over the volume that flows, over the yield stress."""
+    square = 1.5 * (error**2).sum(axis=0) @ part.volumes / part.volumes[flows].sum()
+    return float(np.sqrt(square)) / part.body.law.yield_stress

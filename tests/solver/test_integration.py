@@ -1,0 +1,169 @@
+"""The error that the length of increments makes: estimated, kept small, limited."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import (
+    Amplitude,
+    Body,
+    ContactPair,
+    Material,
+    Model,
+    PathControl,
+    Solution,
+    Stage,
+    solve,
+)
+from solver.materials import ArmstrongFrederick, Chaboche, Elasticity, Law
+from solver.materials.curves import Voce
+from solver.mesh import grid
+from solver.model.loads import Displacement, Load, Temperature, Traction
+from solver.model.rigid import RigidBody, RigidSurface
+
+ELASTIC = Elasticity(youngs_modulus=2e5, poisson_ratio=0.3)
+PLAIN = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
+LINEAR = replace(PLAIN, yield_stress=200.0, hardening="kinematic", hardening_ratio=0.024)
+pytestmark = pytest.mark.solves
+GIVEN = PathControl(increment_error=np.inf)
+"""Takes increments as they are given."""
+
+
+def bar(material: Law, *loads: Load, kinematics: str = "plane_stress") -> Model:
+    """Return one element that is pulled along y, its lower side held along y."""
+    body = Body(
+        name="bar",
+        mesh=grid(np.array([0.0, 1.0]), np.array([0.0, 1.0])),
+        material=material,
+        kinematics=kinematics,
+        supports={"bottom": "xy"} if kinematics == "plane_strain" else {"left": "x", "bottom": "y"},
+        loads=loads,
+    )
+    return Model(bodies=(body,))
+
+
+def sheared(steps: int, control: PathControl | None = None) -> Solution:
+    """Return an element that is stretched into plastic flow, and then sheared."""
+    stretched = Amplitude([0, 1], [0, 1])
+    loads = (
+        Displacement(boundary="top", y=4e-3, amplitude=stretched),
+        Displacement(boundary="top", x=6e-3, amplitude=Amplitude([1, 2], [0, 1])),
+    )
+    stages = (Stage(name="up", target=1.0, steps=steps), Stage(name="on", target=2.0, steps=steps))
+    return solve(bar(PLAIN, *loads, kinematics="plane_strain"), stages=stages, control=control)
+
+
+def stress(found: Solution) -> np.ndarray:
+    """Return the Mandel stress of the bar at its end."""
+    return found.system.response("bar", found.stages["on"]).stress
+
+
+def test_the_estimate_is_of_the_size_of_the_error_and_falls_with_the_increments():
+    wanted = stress(sheared(160, GIVEN))
+    figures, errors = [], []
+    for steps in (2, 4, 8):
+        found = sheared(steps, GIVEN)
+        figures.append(found.audit("on").figures["audit_increment_error"])
+        off = stress(found) - wanted
+        errors.append(np.sqrt(1.5 * (off**2).sum(axis=0).mean()) / PLAIN.yield_stress)
+    ratios = np.array(figures) / errors
+    assert (ratios > 0.2).all() and (ratios < 2.0).all()
+    assert figures[0] > figures[1] > figures[2] > 0
+
+
+def test_increments_too_long_for_the_turn_of_the_flow_are_divided_or_fail_the_audit():
+    wanted = stress(sheared(160, GIVEN))
+    given, divided = sheared(1, GIVEN), sheared(1)
+    assert len(given.tally.iterations) == 2 < len(divided.tally.iterations)
+    off = [np.abs(stress(each) - wanted).max() for each in (given, divided)]
+    assert off[0] > 0.1 * PLAIN.yield_stress > 0.04 * PLAIN.yield_stress > off[1]
+    assert "audit_increment_error" in given.audit("on").violations[0]
+    assert divided.audit("on").passed
+
+
+def test_proportional_flow_is_exact_in_one_increment_and_is_not_divided():
+    load = Displacement(boundary="top", x=6e-3, y=0.0, amplitude=Amplitude([0, 1], [0, 1]))
+    model = bar(LINEAR, load, kinematics="plane_strain")
+    found = solve(model, stages=(Stage(name="up", target=1.0),))
+    assert len(found.tally.iterations) == 1
+    assert found.audit("up").figures["audit_increment_error"] < 1e-12
+
+
+@pytest.mark.parametrize("steps", [1, 5])
+def test_a_bar_ratchets_by_the_closed_form_in_any_number_of_increments(steps: int):
+    """The back stress goes from s1 + Re to s2 - Re and back along exponentials."""
+    C, gamma, Re, high, low = 50_000.0, 300.0, 200.0, 320.0, -280.0
+    law = Chaboche(
+        elasticity=ELASTIC,
+        curve=Voce(yield_stress=Re),
+        back_stresses=(ArmstrongFrederick(C, gamma),),
+    )
+    times = np.arange(7)
+    cycled = Amplitude(times, np.where(times % 2, high, low) * (times > 0))
+    stages = [Stage(name=f"{k}", target=float(k), steps=steps) for k in range(1, len(times))]
+    found = solve(bar(law, Traction(boundary="top", y=1.0, amplitude=cycled)), stages=stages)
+    strains = [found.displacement("bar", str(k))[1].max() for k in (3, 5)]
+    limit = (C / gamma) ** 2
+    wanted = np.log((limit - (low + Re) ** 2) / (limit - (high - Re) ** 2)) / gamma
+    assert strains[1] - strains[0] == pytest.approx(wanted, rel=1e-3)
+
+
+@pytest.mark.parametrize("law", [LINEAR, replace(LINEAR, hardening="isotropic")])
+def test_shear_after_tension_under_given_stress_is_right_to_three_percent(law: Material):
+    """Strain under given stress shows errors of stress, over a slope of 2 % of Young's modulus."""
+    loads = (
+        Traction(boundary="top", y=220.0, amplitude=Amplitude([0, 1], [0, 1])),
+        *(
+            Traction(boundary=boundary, amplitude=Amplitude([1, 2], [0, 1]), **{axis: sign * 80.0})
+            for boundary, axis, sign in (("top", "x", 1), ("right", "y", 1), ("bottom", "x", -1))
+        ),
+    )
+
+    def shear(steps: int, control: PathControl | None = None) -> float:
+        stages = (Stage(name="up", target=1.0), Stage(name="on", target=2.0, steps=steps))
+        model = bar(law, *loads)
+        found = solve(model, stages=stages, control=control)
+        return float(np.ptp(found.displacement("bar", "on")[0]))
+
+    wanted = shear(160, GIVEN)
+    assert abs(shear(2, GIVEN) / wanted - 1) > 0.04
+    assert shear(2) == pytest.approx(wanted, rel=0.03)
+
+
+def test_a_heated_block_between_plates_has_the_force_of_many_increments_with_one():
+    block = Body(
+        name="block",
+        mesh=grid(np.linspace(-4, 4, 10), np.linspace(0, 5, 7)),
+        material=replace(PLAIN, yield_stress=400.0, hardening="isotropic", hardening_ratio=0.02),
+        kinematics="plane_stress",
+        loads=(
+            Temperature(rise=200.0, expansion=1.2e-5, amplitude=Amplitude([0, 1, 2], [0, 1, 0.3])),
+        ),
+    )
+    plates = tuple(
+        RigidBody(
+            name=name,
+            surfaces={"face": RigidSurface(points=np.array([[-x, x], [y, y]]))},
+            centre=(0.0, y),
+        )
+        for name, x, y in (("top", 6.0, 5.0), ("bottom", -6.0, 0.0))
+    )
+    pairs = tuple(
+        ContactPair(slave=("block", side), master=(side, "face"), friction=1.0)
+        for side in ("top", "bottom")
+    )
+    model = Model(bodies=(block,), rigid=plates, contacts=pairs)
+
+    def force(steps: int, control: PathControl | None = None) -> float:
+        stages = [
+            Stage(name=name, target=t, steps=steps) for name, t in (("hot", 1.0), ("cold", 2.0))
+        ]
+        state = solve(model, stages=stages, control=control).stages["cold"].state
+        return float(state.contacts[0].normal.sum())
+
+    wanted = force(40, GIVEN)
+    assert force(2, GIVEN) < 0.98 * wanted
+    assert force(1) == pytest.approx(wanted, rel=0.01)
