@@ -26,9 +26,10 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Push = Callable[[Array, Array], Array | None]
 
-_ACCURATE, _HALVINGS = 1e-9, 40
+_ACCURATE, _HALVINGS, _MOST = 1e-9, 40, 100_000
 """Error of the nodal force of a part of an edge, over the largest nodal force, above which the part
-is halved, and how often at most: tractions may bend and jump."""
+is halved: tractions may bend and jump; how often at most, and up to which number of parts. Values
+that are rounding everywhere are smooth nowhere."""
 _SAME = 1e-9
 """Ratio of a difference to the larger of two prescribed values; below it they are equal."""
 
@@ -278,7 +279,7 @@ def _tractions(part: Nodes, boundary: str, push: Push, points: int = 0) -> Array
     for left in reversed(range(1 if points else _HALVINGS)):
         found = pushed(row, start, width, *gauss)
         halved = np.zeros(len(row), dtype=bool)
-        if left:
+        if left and len(row) < _MOST:
             off = np.abs(found - pushed(row, start, width, *LOBATTO))
             largest = largest or np.abs(found).max(initial=0.0)
             halved = off.max(axis=(0, 2)) > _ACCURATE * largest

@@ -197,7 +197,9 @@ class Builder:
                 locked = self.scene.end_of(motion.locked) if motion.locked else math.inf
                 motions[axis] = Pushed(value=motion.pushed, amplitude=amplitude, locked=locked)
             else:
-                motions[axis] = Moved(value=motion.moved or 0.0, amplitude=amplitude)
+                moved = motion.moved or 0.0
+                moved = math.radians(moved) if axis == "rotation" else moved
+                motions[axis] = Moved(value=moved, amplitude=amplitude)
         return self.attempt(
             f"rigid.{name}",
             lambda: RigidBody(

@@ -50,9 +50,10 @@ def test_shear_traction_on_all_sides_is_pure_shear() -> None:
     mesh = grid(np.linspace(0.0, 10.0, 6), np.linspace(0.0, 2.0, 3))
     held = mesh.with_boundaries({"corner": lambda x: (x[0] == 0) & (x[1] < 1e-9 + 1)})
     body = replace(bar(loads=shear), mesh=held, supports={"corner": "xy"})
-    stress = loaded(body).stress("bar", "loaded")
-    far = loaded(body).nodes("bar")[0] > 6.0
-    assert stress[3, far] == pytest.approx(80.0, rel=1e-3)
+    found = loaded(body)
+    far = found.nodes("bar")[0] > 6.0
+    assert found.stress("bar", "loaded")[3, far] == pytest.approx(80.0, rel=1e-3)
+    assert found.strain("bar", "loaded")[3, far] == pytest.approx(80.0 * (1 + NU) / E, rel=1e-3)
 
 
 @pytest.mark.parametrize("material", [ELASTIC, STEEL])

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from solver import LimitLoad, Model, ModelError, PathControl, Solution, solve
+from solver.fem.discretisation import Discretisation
 from solver.fem.loads import nodal_forces
 from solver.materials import Elasticity, TrescaMaterial, Voce
 from solver.model.body import Body
@@ -133,6 +134,15 @@ def test_a_plane_disc_rotates_about_an_axis_across_its_plane() -> None:
     assert solution.audit().passed
 
 
+@pytest.mark.parametrize("axis", ["y", "z"])
+def test_a_centrifugal_force_is_that_of_the_mass_at_its_centroid(axis: Literal["y", "z"]) -> None:
+    load = Centrifugal(density=DENSITY, speed=900.0, axis=axis, centre=(-3.0, 7.0))
+    body = block("block", np.linspace(2, 10, 5), np.linspace(0, 4, 3), loads=(load,))
+    force = nodal_forces(Discretisation(body)).at(1.0).reshape(-1, 2).sum(axis=0)
+    exact = DENSITY * 8 * 4 * 900.0**2 * np.array([6.0 + 3.0, (2.0 - 7.0) * (axis == "z")])
+    np.testing.assert_allclose(force, exact, rtol=1e-12, atol=1e-12)
+
+
 def test_a_column_bears_its_weight() -> None:
     """Quadratic elements hold a linear stress exactly; a body force of this size is the same."""
     height, weight = 50.0, DENSITY * 9806.65
@@ -181,6 +191,16 @@ def test_a_pressure_may_bend_and_jump(pressure: Callable[[Array], Array], force:
     assert solution.audit().passed
     nodal = nodal_forces(solution.system.full("block")).at(1.0)
     assert -nodal[1::2].sum() == pytest.approx(force * body.thickness, rel=1e-7)
+
+
+def test_a_pressure_that_is_zero_but_for_rounding_is_integrated_at_few_points() -> None:
+    def zero(x: Array) -> Array:
+        assert x.shape[1] < 10**6
+        return 100 * (x[0] - 0.3)
+
+    body = block("block", np.linspace(0, 0.3, 4), np.linspace(0, 0.7, 4), supports={"left": "xy"},
+                 loads=(Pressure(boundary="right", value=zero),))  # fmt: skip
+    assert np.abs(nodal_forces(Discretisation(body)).at(1.0)).max() < 1e-12
 
 
 @pytest.mark.parametrize(

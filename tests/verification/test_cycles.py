@@ -13,6 +13,7 @@ from solver.results.shakedown import ShakedownState
 from studies.scenes.description import Description
 from studies.scenes.scene import file_scene
 from tests.architecture.sources import ROOT
+from tests.studies.scenes.conftest import blocks
 
 FILE = ROOT / "data" / "scenes" / "bree.toml"
 YIELD, E = 300.0, 2e5
@@ -112,3 +113,23 @@ def test_repeated_stages_are_those_written_one_by_one() -> None:
     flat["loads"] = [tables["loads"][0], tables["loads"][1] | {"amplitude": amplitude}]
     found = [computed(each).scalars["growth"] for each in (tables, flat)]
     assert found[0] == found[1] != 0.0
+
+
+def test_the_work_that_a_cycle_turns_into_heat_is_the_area_of_its_loop() -> None:
+    """A block pressed on another one is dragged to and fro; most of the work is friction."""
+    tables = blocks()
+    tables["kinematics"] = "plane_stress"
+    del tables["bodies"]["upper"]["supports"], tables["loads"], tables["outputs"]
+    factors = {"pressed": 0, "to": 1, "fro": -1}
+    tables["rigid"] = {
+        "plate": {"y": {"pushed": -800.0}, "x": {"moved": 0.04, "amplitude": factors}}
+    }
+    tables["links"] = [{"slave": "upper.top", "rigid": "plate"}]
+    tables["stages"] += [{"name": name, "increments": 10} for name in ("to", "fro")]
+    tables["repeat"] = {"stages": ["to", "fro"], "times": 3}
+    fields = computed(tables).fields
+    force, way = (fields[name][1][-1] for name in ("reaction_x", "motion_x"))
+    last = slice(-21, None)
+    loop = float(np.trapezoid(force[last], way[last]))
+    assert loop > 0.85 * 4 * 0.04 * 0.2 * 800.0
+    assert fields["cycle_dissipation"][1][-1] == pytest.approx(loop, rel=1e-6)

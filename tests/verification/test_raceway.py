@@ -146,7 +146,9 @@ def test_the_scene_is_a_pass_of_the_given_ellipse() -> None:
     with one_thread():
         found = passing(track, law, PatchPassing(load), track.virgin(law))
     strain = float(found.after.accumulated.max())
+    depth = -float(track.points[1, found.after.accumulated.argmax()])
     assert record.scalars["max_plastic_strain"] == strain > 0.005
+    assert record.scalars["depth_of_max_plastic_strain"] == pytest.approx(depth, rel=1e-9)
     assert record.scalars["longitudinal_force"] == pytest.approx(0.1 * hertz.force, rel=1e-9)
 
 
@@ -167,6 +169,8 @@ def test_a_locked_ball_slips_everywhere_and_drags_the_raceway() -> None:
         assert each["longitudinal_force"] == pytest.approx(
             0.2 * rolled(load_ratio=1.2).parameters.ellipse.force, rel=1e-6
         )
+    slip = rolled(load="contact", **given).fields["patch_slip_x"][1]
+    assert np.nanmedian(slip) == pytest.approx(-1.0, abs=0.02)
     assert locked["highest_mises"] == pytest.approx(hertz["highest_mises"], rel=0.03)
 
 

@@ -122,6 +122,15 @@ def test_a_load_that_goes_back_leaves_the_mirror_image():
     assert there.scalars["longitudinal_force"] == -back.scalars["longitudinal_force"] > 100
 
 
+def test_the_surface_advances_by_the_plastic_shear_below_it():
+    """Behind the load there is no shear stress: engineering shear is the slope of displacement."""
+    record = roll(traction=0.5, heading="forward")
+    shear = 2 * record.fields["plastic_flow_profile"][1][0, 0, 3]
+    advance = record.fields["pass_surface_advance"][1][0]
+    assert advance == pytest.approx(np.trapezoid(shear, record.coordinates["depth"]), rel=0.01)
+    assert record.fields["pass_net_shear"][1][0] == pytest.approx(shear.max(), rel=1e-9)
+
+
 def test_the_state_is_uniform_along_the_track_and_that_of_the_profile():
     record = roll()
     residual = record.fields["residual_stress"][1]

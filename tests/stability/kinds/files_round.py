@@ -254,7 +254,7 @@ def rolled(number: int, rng: Rng) -> Draw:
         "free": {"pushed": 0.0},
         "driven": {"pushed": moment, "amplitude": {"on": 0.0, "to": 1.0, "fro": 1.0}},
         "locked": {},
-        "guided": {"moved": -way / p.radius, "amplitude": factors},
+        "guided": {"moved": -math.degrees(way / p.radius), "amplitude": factors},
     }[how]
     x = {"moved": way, "amplitude": factors}
     names = tuple(factors)
