@@ -58,8 +58,8 @@ class Zone:
     Raises
     ------
     ModelError
-        if a length is not positive, a side exceeds half of the width or the depth, or more rows
-        are to be divided than there are
+        if a length is not positive, a side exceeds half of the width or one in depth the depth, or
+        more rows are to be divided than there are
     """
 
     at: float
@@ -74,8 +74,7 @@ class Zone:
         for name in lengths:
             if not 0 < getattr(self, name) < math.inf:
                 raise ModelError(name, getattr(self, name), "must be positive [mm]")
-        most = min(self.half_width, self.depth)
-        for name in lengths[2:]:
+        for name, most in (("size", self.half_width), (lengths[-1], self.depth)):
             if getattr(self, name) > most:
                 raise ModelError(name, getattr(self, name), f"must be at most {most:g} [mm]")
         if not 0 <= self.split <= self._whole:

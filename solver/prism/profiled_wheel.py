@@ -1,7 +1,8 @@
 """A wheel of revolution that rolls along a surface: its gap, and its rigid slip.
 
 The surface is a prism along x, so that its normals lie in planes across. The wheel may be yawed:
-its axle is turned about y, and with it its shape.
+its axle is turned about y, and with it its shape. The track may be a ring of revolution: its own
+gap to the straight prism is then part of the gap, and its turning part of the slip.
 """
 
 from __future__ import annotations
@@ -50,6 +51,8 @@ class ProfiledWheel:
     middle : position z of the vertical axis of yaw and spin [mm]
     yaw : angle by which the wheel is turned about y: a positive one turns its heading from x
         towards -z [rad]
+    track_radius : radius of the track along x at y = 0 [mm]: inf where it is straight, positive
+        where it bulges towards the wheel, negative where it is hollow
     """
 
     profile: Callable[[Array], Array]
@@ -57,13 +60,17 @@ class ProfiledWheel:
     elasticity: Elasticity
     middle: float = 0.0
     yaw: float = 0.0
+    track_radius: float = np.inf
 
     def __post_init__(self) -> None:
-        """Raise `ModelError` for a radius that is not positive, or a yaw of a quarter turn."""
+        """Raise `ModelError` for radii that do not fit, or a yaw of a quarter turn."""
         if not self.radius > 0:
             raise ModelError("radius", self.radius, "must be positive")
         if not abs(self.yaw) < np.pi / 4:
             raise ModelError("yaw", self.yaw, "must lie between -pi/4 and pi/4")
+        if not (self.track_radius > 0 or -self.track_radius > self.radius):
+            allowed = f"must be positive, or below {-self.radius:g}"
+            raise ModelError("track_radius", self.track_radius, allowed)
 
     def lowest(self, z: Array) -> Array:
         """Return the position x (...) where the wheel is lowest over a line along x at ``z`` [mm].
@@ -87,17 +94,20 @@ class ProfiledWheel:
     def surface(self, x: Array, z: Array) -> Array:
         """Return the height y (...) of the wheel's surface over places, inf where it is not [mm].
 
-        Raises `ModelError` for places beyond the radius.
+        Over a ring it is the height above the ring, from the straight surface. Raises `ModelError`
+        for places beyond the radius.
         """
-        radius = self.radius - np.asarray(self.profile(self._axial(x, z)), dtype=float)
+        rise = np.asarray(self.profile(self._axial(x, z)), dtype=float)
+        here = np.isfinite(rise)
+        rise = np.where(here, rise, 0.0)
         across = np.cos(self.yaw) * x - np.sin(self.yaw) * (z - self.middle)
-        here = np.isfinite(radius)
-        below = np.where(here, radius, self.radius) ** 2 - across**2
-        if not (below > 0).all():
-            reach = float(np.where(here, radius, np.inf).min())
+        below, ring = (self.radius - rise) ** 2 - across**2, np.abs(self.track_radius + rise)
+        if not ((below > 0) & (ring > np.abs(x))).all():
+            reach = float(np.where(here, np.minimum(self.radius - rise, ring), np.inf).min())
             allowed = f"stations must lie within {reach:g} of x = 0"
             raise ModelError("ahead", float(np.abs(x).max()), allowed)
-        return np.asarray(np.where(here, self.radius - np.sqrt(below), np.inf))
+        curved = x**2 / (ring + np.sqrt(ring**2 - x**2)) * np.sign(self.track_radius)
+        return np.asarray(np.where(here, self.radius - np.sqrt(below) + curved, np.inf))
 
     def above(self, x: Array, z: Array, y: Array, angle: Array) -> tuple[Array, Array, float]:
         """Return what lies above places on a surface, along its normals.
@@ -184,12 +194,14 @@ class ProfiledWheel:
         h, sin, cos = grid.spacing, np.sin(grid.angle), np.cos(grid.angle)
         x, z = grid.x[:, None], grid.z - self.middle
         gap, arc = self._at(grid)
+        turn, path = 1 / self.track_radius, grid.hats.mean @ grid.surface[1]  # of a ring
         ahead, aside = np.cos(self.yaw), np.sin(self.yaw)
         # the velocity of the wheel's surface over w R, about the axle (aside, 0, ahead)
         along, up, across = ahead * arc, (ahead * x - aside * z) / self.radius, -aside * arc
         turned = up * sin + across * cos
         rest = np.zeros((grid.stations, len(z), 3))
-        rest[..., 0], rest[..., 1], rest[..., 2] = h * (along - 1), gap, h * turned
+        rest[..., 0], rest[..., 1] = h * (along - 1 - turn * path), gap
+        rest[..., 2] = h * (turned + turn * x * sin)
         motions = np.zeros((4, *rest.shape))
         motions[0, ..., 1] = cos
         motions[1, ..., 0], motions[1, ..., 2] = -h * along, -h * turned

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-MOST_LONG = 10.0
-"""Largest ratio of the semi-axes that `HertzEllipse.of` finds."""
+_LONGEST = 1e6
+"""Largest ratio of the semi-axes that is found; a longer ellipse gets it."""
 _HALVINGS = 60
-_MEANS = 6
+_MEANS = 9
 """Steps of the arithmetic-geometric mean; they converge quadratically."""
 
 
@@ -40,8 +40,8 @@ class HertzEllipse:
         *,
         peak_pressure: float | None = None,
         force: float | None = None,
-    ) -> HertzEllipse | None:
-        """Return the contact for a peak pressure or a force; None if it is longer than `MOST_LONG`.
+    ) -> HertzEllipse:
+        """Return the contact for a peak pressure or a force.
 
         Parameters
         ----------
@@ -50,8 +50,6 @@ class HertzEllipse:
         """
         long, short = max(radii), min(radii)
         ratio = _ratio(long / short)
-        if ratio is None:
-            return None
         K, D = _integrals(ratio)
         steepness = modulus / (2 * long * ratio * D)  # p0 over the longer semi-axis
         if peak_pressure is None:
@@ -66,24 +64,32 @@ class HertzEllipse:
         )  # fmt: skip
 
     @property
+    def ratio(self) -> float:
+        """The longer over the shorter semi-axis."""
+        return max(self.a / self.b, self.b / self.a)
+
+    @property
     def force(self) -> float:
         """Force [N]."""
         return 2 / 3 * math.pi * self.a * self.b * self.peak_pressure
 
 
-def _ratio(radii: float) -> float | None:
+def radii_of(ratio: float) -> float:
+    """Return the ratio of relative radii, at least 1, of an ellipse with this ratio of semi-axes.
+
+    Either ratio of the semi-axes, longer over shorter or shorter over longer, gives the same.
+    """
+    short = min(ratio, 1 / ratio)
+    K, D = _integrals(short)
+    return (K - D) / (short**2 * D)
+
+
+def _ratio(radii: float) -> float:
     """Return the shorter over the longer semi-axis for the ratio of radii, at least 1."""
-    low, high = 1 / MOST_LONG, 1.0
-
-    def of_radii(ratio: float) -> float:
-        K, D = _integrals(ratio)
-        return (K - D) / (ratio**2 * D)
-
-    if radii > of_radii(low):
-        return None
+    low, high = 1 / _LONGEST, 1.0
     for _ in range(_HALVINGS):
         middle = math.sqrt(low * high)
-        low, high = (middle, high) if of_radii(middle) > radii else (low, middle)
+        low, high = (middle, high) if radii_of(middle) > radii else (low, middle)
     return high
 
 

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 _AHEAD, _BEHIND, _LENGTH = 2.2, 2.6, 7.0
 """The window ahead and behind, and the length after which waves repeat, over half the length where
 the load is expected to act."""
+_WIDE = 4 / 3
+"""Least length after which waves repeat, over half the width of the zone: the far field takes the
+loads beyond it by their resultants alone. The pressure of a Hertz ellipse with a ratio of semi-axes
+of 25 then has an error of 0.1 %; with half the length it has 1.4 %, with a third 4 %."""
 _LEAST = 4
 """Least number of elements in half a zone or reach."""
 _UPPER = 0.35
@@ -72,6 +76,7 @@ class PrismWindow:
     Attributes
     ----------
     columns, elements : elements of the zone that may yield, along its surface and in all
+    half_width : half the width of the zone, along its surface [mm]
     spacing : distance of stations [mm]
     reach : half the length where the load is expected to act [mm]; it may act as far as the window
         allows, since yielding makes a contact longer ahead
@@ -79,13 +84,19 @@ class PrismWindow:
 
     columns: int
     elements: int
+    half_width: float
     spacing: float
     reach: float
 
     @property
     def length(self) -> float:
         """Length after which waves repeat, an even number of stations [mm]."""
-        return 2 * self._stations(_LENGTH / 2) * self.spacing
+        return 2 * self._waves * self.spacing
+
+    @property
+    def _waves(self) -> int:
+        """Number of stations in half the length after which waves repeat."""
+        return self._stations(max(_LENGTH, _WIDE * self.half_width / self.reach) / 2)
 
     @property
     def size(self) -> PrismSize:
@@ -94,7 +105,7 @@ class PrismWindow:
             columns=self.columns,
             elements=self.elements,
             window=self._stations(_AHEAD) + self._stations(_BEHIND) + 1,
-            waves=self._stations(_LENGTH / 2) + 1,
+            waves=self._waves + 1,
         )
 
     def track(

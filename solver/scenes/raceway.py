@@ -43,9 +43,10 @@ HERTZ_APPROACH = declare(
     "hertz_approach", "approach of the bodies in the elastic Hertz contact of half-spaces", "mm"
 )
 _ALONG, _ACROSS, _DOWN = 1.6, 2.0, 2.4
-"""Half the length and half the width of maps over a and b, and their depth over the root of a b."""
+"""Half the length and half the width of maps over a and b, and their depth over
+`RacewayParameters.below`."""
 _PIXELS = 24
-"""Positions of maps per semi-axis, and over the root of a b in depth."""
+"""Positions of maps per semi-axis, and per `RacewayParameters.below` in depth."""
 
 
 def method(parameters: RacewayParameters) -> Method:
@@ -60,14 +61,14 @@ def method(parameters: RacewayParameters) -> Method:
 def view(parameters: RacewayParameters) -> View:
     """Return the positions of results, which depend on the ellipse and not on the mesh."""
     a, b = parameters.size
-    mean, wide = np.sqrt(a * b), _ACROSS * b
+    below, wide = parameters.below, _ACROSS * b
     along, across = round(_ALONG * _PIXELS), round(_ACROSS * _PIXELS)
     down = round(_DOWN * _PIXELS)
     return View(
         x=np.linspace(-_ALONG * a, _ALONG * a, 2 * along + 1),
-        y=np.linspace(-_DOWN * mean, 0.0, down + 1),
+        y=np.linspace(-_DOWN * below, 0.0, down + 1),
         z=np.linspace(-wide, wide, 2 * across + 1),
-        depth=np.linspace(0.0, _DOWN * mean, down + 1),
+        depth=np.linspace(0.0, _DOWN * below, down + 1),
         station=b / 2 * np.array([-1.0, 0.0, 1.0]),
         s=np.zeros(0),
         profile_body="raceway",

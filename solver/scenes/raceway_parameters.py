@@ -11,7 +11,7 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.parameters import Fraction, Length, Other, Ratio, Stress, described
-from solver.scenes.hertz_ellipse import MOST_LONG, HertzEllipse
+from solver.scenes.hertz_ellipse import HertzEllipse, radii_of
 from solver.scenes.prism_parameters import PrismParameters
 
 ELEMENTS: Mapping[str, int] = {"draft": 4, "standard": 6, "fine": 10}
@@ -22,9 +22,11 @@ BESIDE = 1.5
 """Half the width of the zone that may yield, along the surface, over b."""
 _STEEPEST = math.radians(60.0)
 """Largest slope of ball, roller and groove in the zone [rad]."""
+MOST_LONG = 25.0
+"""Largest ratio of the semi-axes; a longer contact is a line."""
 _LONGEST = 0.2
-"""Largest ratio of the semi-axis along the raceway to the radius: the ball or roller must be above
-all stations at which it may touch."""
+"""Largest ratio of the semi-axis along the raceway to the relative radius: the ball or roller must
+be above all stations at which it may touch."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,15 +55,32 @@ class RacewayParameters(PrismParameters):
         "Coulomb friction coefficient",
         needs={"load": ("contact",), "traction": Other(0.0)},
     )
-    radius: Length = described(
-        10.0, "radius R of the ball or roller in the plane of rolling; the raceway is straight"
-    )
+    radius: Length = described(10.0, "radius of the ball or roller in the plane of rolling")
     crown_radius: Annotated[
         Annotated[float, Interval(gt=0.0, le=1e6)] | Literal["same"], Unit("mm")
-    ] = described("same", "radius of the ball or roller across the raceway; same: a ball")
+    ] = described(
+        "same", "radius of the ball or roller across the raceway; same: a ball, this is `radius`"
+    )
+    ring_radius: Annotated[
+        Annotated[float, Interval(ge=-1e6, le=1e6)] | Literal["straight"], Unit("mm")
+    ] = described(
+        "straight",
+        "radius of the raceway along the rolling direction, at the lowest line of its groove: "
+        "positive for an inner ring, negative for an outer ring, which is hollow",
+    )
     groove_radius: Annotated[
-        Annotated[float, Interval(gt=0.0, le=1e6)] | Literal["flat"], Unit("mm")
-    ] = described("flat", "radius of the groove across the raceway; flat: without a groove")
+        Annotated[float, Interval(gt=0.0, le=1e6)] | Literal["flat", "conformity"], Unit("mm")
+    ] = described(
+        "flat",
+        "radius of the groove across the raceway; flat: without a groove; conformity: "
+        "`conformity` gives it",
+    )
+    conformity: Annotated[float, Interval(gt=0.5, le=100.0), Unit("1")] = described(
+        0.52,
+        "radius of the groove over the diameter of the ball, of a roller over twice its "
+        "`crown_radius`",
+        needs={"groove_radius": ("conformity",)},
+    )
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
@@ -70,21 +89,34 @@ class RacewayParameters(PrismParameters):
             value = getattr(self, name)
             if self.load == "hertz" and value != usual:
                 raise ModelError(name, value, f"must be {usual}: load = hertz has no wheel")
-        if self.groove_radius != "flat" and not self.groove_radius > self.across:
+        if not (self.ring > 0 or -self.ring > self.radius):
+            allowed = f"must be positive, or below {-self.radius:g} for a hollow raceway"
+            raise ModelError("ring_radius", self.ring_radius, allowed)
+        if not self.groove > self.across:
             allowed = f"must be greater than {self.across:g}, the radius across the ball or roller"
             raise ModelError("groove_radius", self.groove_radius, allowed)
         self._check_ellipse()
 
     def _check_ellipse(self) -> None:
         """Raise `ModelError` if the elastic Hertz contact is too long or too wide."""
-        if self._found is None:
-            name, value = ("crown_radius", self.crown_radius)
-            if self.groove_radius != "flat":
-                name, value = "groove_radius", self.groove_radius
-            allowed = f"must make an ellipse whose semi-axes have a ratio of at most {MOST_LONG:g}"
-            raise ModelError(name, value, allowed)
+        ratio, wide = self.ellipse.ratio, self.ellipse.b > self.ellipse.a
+        if ratio > MOST_LONG:
+            relative = self.rolling * radii_of(MOST_LONG) ** (1 if wide else -1)
+            name, limit, least = "crown_radius", relative, not wide
+            if self.groove < math.inf and relative > self.across:
+                by_conformity = self.groove_radius == "conformity"
+                name = "conformity" if by_conformity else "groove_radius"
+                limit, least = 1 / (1 / self.across - 1 / relative), wide
+                limit /= 2 * self.across if by_conformity else 1
+            digit = 10.0 ** (math.floor(math.log10(limit)) - 4)
+            limit = digit * (math.ceil if least else math.floor)(limit / digit)
+            raise ModelError(
+                name, getattr(self, name),
+                f"must be {'at least' if least else 'at most'} {limit:.5g}: the semi-axes of its "
+                f"Hertz ellipse have a ratio of {ratio:.3g}; the largest is {MOST_LONG:g}",
+            )  # fmt: skip
         sizes = (
-            ("along x", self.size[0], _LONGEST * self.radius),
+            ("along x", self.size[0], _LONGEST * self.rolling),
             ("across", self.size[1], self.room / BESIDE),
         )
         for way, axis, most in sizes:
@@ -100,7 +132,21 @@ class RacewayParameters(PrismParameters):
     @property
     def groove(self) -> float:
         """Radius of the groove, inf without one [mm]."""
-        return math.inf if self.groove_radius == "flat" else float(self.groove_radius)
+        if self.groove_radius == "flat":
+            return math.inf
+        if self.groove_radius == "conformity":
+            return 2 * self.conformity * self.across
+        return float(self.groove_radius)
+
+    @property
+    def ring(self) -> float:
+        """Radius of the raceway along x, inf if it is straight [mm]."""
+        return math.inf if self.ring_radius == "straight" else float(self.ring_radius)
+
+    @property
+    def rolling(self) -> float:
+        """Relative radius of ball or roller and raceway along x [mm]."""
+        return 1 / (1 / self.radius + 1 / self.ring)
 
     @property
     def room(self) -> float:
@@ -109,25 +155,28 @@ class RacewayParameters(PrismParameters):
         return most if self.groove == math.inf else self.groove * math.asin(most / self.groove)
 
     @property
-    def _found(self) -> HertzEllipse | None:
+    def ellipse(self) -> HertzEllipse:
+        """The elastic Hertz contact."""
         own = {
             "load_ratio": {"peak_pressure": self.load_ratio * self.yield_stress},
             "force": {"force": self.force},
         }
-        radii = self.radius, 1 / (1 / self.across - 1 / self.groove)
+        radii = self.rolling, 1 / (1 / self.across - 1 / self.groove)
         return HertzEllipse.of(radii, self.contact_modulus, **own[self.load_by])
-
-    @property
-    def ellipse(self) -> HertzEllipse:
-        """The elastic Hertz contact."""
-        found = self._found
-        assert found is not None
-        return found
 
     @property
     def size(self) -> tuple[float, float]:
         """Semi-axes to which mesh and results are made, rounded so that runs share them [mm]."""
         return float(f"{self.ellipse.a:.3g}"), float(f"{self.ellipse.b:.3g}")
+
+    @property
+    def below(self) -> float:
+        """Scale of depth [mm]: the root of a b, at most twice the shorter semi-axis.
+
+        The stress of a contact that is nearly a line falls with depth over its shorter semi-axis.
+        """
+        a, b = self.size
+        return min(math.sqrt(a * b), 2 * min(a, b))
 
     @property
     def elements(self) -> int:

@@ -31,7 +31,8 @@ _BLOCK = 32.0
 """Depth and half the width of the block over the longer semi-axis: stress in the zone is within
 0.05 % of p0 of that in a half-space, as the mean; 16 makes 0.15 %, 64 makes 0.02 %."""
 _DEPTH, _REACH = 1.8, 1.2
-"""Depth of the zone over the root of a b, and half the length where the load may act over a."""
+"""Depth of the zone over `RacewayParameters.below`, and half the length where the load may act over
+a."""
 _LEVELS = 2
 """Levels of the far field: the last one is 64 times 8 a long, and the block is held at its foot."""
 _GROOVE, _STEEPEST = 1.6, math.radians(75.0)
@@ -76,8 +77,9 @@ class RacewayGeometry:
         """Where the raceway may yield."""
         zone = self.zone
         return PrismWindow(
-            columns=zone.columns, elements=zone.elements, spacing=self.spacing, reach=self.reach
-        )
+            columns=zone.columns, elements=zone.elements, half_width=zone.half_width,
+            spacing=self.spacing, reach=self.reach,
+        )  # fmt: skip
 
 
 def geometry(parameters: RacewayParameters, reach: float = 1.0) -> RacewayGeometry:
@@ -105,10 +107,10 @@ def geometry(parameters: RacewayParameters, reach: float = 1.0) -> RacewayGeomet
         block=_BLOCK * max(a, b),
         groove=groove,
         half_width=half_width,
-        depth=whole(reach * _DEPTH * math.sqrt(a * b), layer),
+        depth=whole(reach * _DEPTH * p.below, layer),
         size=size,
         layer=layer,
-        split=split_rows(p, math.sqrt(a * b), layer),
+        split=split_rows(p, p.below, layer),
         spacing=spacing,
         reach=whole(reach * _REACH * a, spacing),
     )
@@ -169,6 +171,7 @@ class RolledRaceway:
             profile=crowned(p.across, p.across).height,
             radius=p.radius,
             elasticity=p.wheel_elasticity,
+            track_radius=p.ring,
         )
         return RollingPatch(
             track.grid, track.compliance, wheel, friction=p.friction, force=ellipse.force,

@@ -93,8 +93,9 @@ class RailGeometry:
         """Where the rail may yield."""
         own = mesh_of(self)
         return PrismWindow(
-            columns=own.columns, elements=own.elements, spacing=self.spacing, reach=self.reach
-        )
+            columns=own.columns, elements=own.elements, half_width=self.half_width,
+            spacing=self.spacing, reach=self.reach,
+        )  # fmt: skip
 
 
 def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometry:

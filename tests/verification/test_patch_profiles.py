@@ -114,6 +114,43 @@ def test_the_gap_is_the_distance_along_the_normal() -> None:
     assert gap.min() < 1e-3 < 0.015 < exact.max()
 
 
+@pytest.mark.parametrize("ring", [24.05, -35.95])
+def test_a_ball_rolls_in_the_groove_of_a_ring(ring: float) -> None:
+    """Gap and slip are those of the bodies that turn, a ball and a torus (Heathcote's slip).
+
+    Both surfaces move by w times the distance from their axis; they have one speed at y = 0.
+    """
+    radius, groove = 5.95, 6.07
+    angle = np.linspace(-0.5, 0.5, 41)
+    grid = PatchGrid(
+        z=groove * np.sin(angle), y=groove * (1 - np.cos(angle)), angle=angle,
+        spacing=0.05, ahead=0.5, stations=21,
+    )  # fmt: skip
+    wheel = ProfiledWheel(
+        profile=lambda z: radius - np.sqrt(radius**2 - z**2), radius=radius, elasticity=STEEL,
+        track_radius=ring,
+    )  # fmt: skip
+    rest, _ = wheel.rolling(grid)
+    x, y = grid.x[:, None], grid.y
+    torus = np.sign(ring) * np.sqrt((ring + y) ** 2 - x**2) - ring  # over the same z
+    vertical = radius - np.sqrt(radius**2 - grid.z**2 - x**2) - torus
+    inside = slice(1, -1)
+    gap = (vertical * np.cos(angle))[:, inside]  # along the normal
+    assert rest[:, inside, 1] == pytest.approx(gap, rel=0.02, abs=2e-5)
+    rise = radius - np.sqrt(radius**2 - grid.z**2)
+    slip = -rise / radius - y / ring
+    along = np.broadcast_to(slip[inside], rest[:, inside, 0].shape)
+    assert rest[:, inside, 0] / grid.spacing == pytest.approx(along, rel=0.03, abs=2e-4)
+    across = x * np.sin(angle) * (1 / radius + 1 / ring)
+    assert rest[:, inside, 2] / grid.spacing == pytest.approx(across[:, inside], abs=1e-6)
+
+
+@pytest.mark.parametrize("ring", [0.0, -5.0, np.nan])
+def test_a_ring_that_the_ball_does_not_fit_in_is_refused(ring: float) -> None:
+    with pytest.raises(ModelError, match=r"track_radius = .*: must be positive, or below -5"):
+        ProfiledWheel(profile=np.zeros_like, radius=5.0, elasticity=STEEL, track_radius=ring)
+
+
 def test_a_yawed_wheel_touches_behind_on_its_flange_and_slips_across() -> None:
     """By R tan(slope) tan(yaw), as its heading turns away from the flange; creepage grows there.
 
