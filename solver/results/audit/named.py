@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -11,12 +11,13 @@ from solver.results.audit.compared import AREA, LEAST_STRAIN, LIMIT, MEASURED, C
 from solver.results.audit.links import linked
 from solver.results.audit.plain import load_factor
 from solver.results.audit.sources import between
+from solver.results.audit.tractions import COVERED
 from solver.results.audit.values import Located, at_nodes
 from solver.results.body_fields import BODY_FIELDS, STORED
 from solver.tensors import AXES, components
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -34,6 +35,25 @@ _LEAST_LENGTH = 1e-9
 _PARTS = {name: k for names in (components(6), AXES) for k, name in enumerate(names)}
 _ROUNDED = 1e-9
 """Largest difference of two equal times of the program."""
+
+
+class _Sought(NamedTuple):
+    """Values (n,) of which a number is taken, and their positions (n_axes, n).
+
+    Attributes
+    ----------
+    partly : values at the vertices of a slave, with those whose hats face the master in part:
+        their means, and whether they count, depend on the projection; the second are those that
+        count for sure. Empty if there are none
+    share : see `Compared.add`
+    least : least scale of the values; of surfaces that move as one
+    """
+
+    values: Array
+    X: Array
+    partly: Sequence[Array]
+    share: float = 1.0
+    least: float = 0.0
 
 
 class NamedPlacesCheck:
@@ -199,49 +219,83 @@ class NamedPlacesCheck:
             self._value(number)
             return
         kind, _, part = number.of.partition(".")
-        recorded, share = self._record.scalars[number.name], 1.0
         if number.contact is not None:
-            found = self._source.tractions(
-                self._places.contacts.index(number.contact), number.stage
-            )
-            values, X, s = _on_slave(found, kind), found.X, found.s
-            share = self._share(found, kind)
-            if number.is_resultant:
-                level = self._run.outcome.points[number.stage].state.force_scale
-                self._out.add(number.name, recorded, found.force(kind), level)
+            sought = self._sought(number, kind)
+            if sought is None:
                 return
-            if kind in ("pressure", "shear") and np.isnan(values[found.closed]).any():
-                return
-            if (kind, number.take) == ("pressure", "extent"):
-                share = LIMIT / MEASURED if found.measured else 1.0
-                self._out.add(number.name, recorded, found.length, s[-1], share)
-                return
-            values = np.where(np.isnan(values) & ~found.closed, 0.0, values) if kind in (
-                "pressure", "shear") else values  # fmt: skip
         else:
             values, X = self._values(number, number.stage, kind, part)
             if number.minus:
                 values = values - self._values(number, number.minus, kind, part)[0]
-            s = _lengths(X)
-        scale = self._scale(kind, values)
-        if not np.isfinite(values).any():
+            sought = _Sought(values, X, ())
+        if not np.isfinite(sought.values).any():
             return
+        scale = max(sought.least, self._scale(kind, sought.values))
+        recorded = self._record.scalars[number.name]
         if number.take in ("maximum", "minimum"):
-            own = np.nanmax(values) if number.take == "maximum" else np.nanmin(values)
-            self._out.add(number.name, recorded, own, scale, share)
-            place = [self._record.scalars[f"{number.name}_{axis}"] for axis in AXES[: len(X)]]
-            off = np.hypot.reduce(X - np.array(place)[:, None])
-            there = values[off <= off.min() * (1 + 1e-9) + 1e-12 * np.abs(X).max()]
-            near = np.abs(there[np.isfinite(there)] - own).min(initial=np.inf)
-            self._out.add(f"{number.name}_x", near, 0.0, scale, share)
-            self._out.add(f"{number.name}_x", off.min(), 0.0, max(s[-1], self._least["gap"]))
-            return
-        values = np.nan_to_num(values)
+            self._extreme(number, sought, recorded, scale)
+        else:
+            self._whole(number, sought, recorded, scale, self._least[kind])
+
+    def _sought(self, number: RequestedNumber, kind: str) -> _Sought | None:
+        """Return the values of a contact; None if the number is compared, or cannot be."""
+        found = self._source.tractions(
+            self._places.contacts.index(str(number.contact)), number.stage
+        )
+        recorded, share = self._record.scalars[number.name], self._share(found, kind)
+        if number.is_resultant:
+            level = self._run.outcome.points[number.stage].state.force_scale
+            self._out.add(number.name, recorded, found.force(kind), level)
+            return None
+        values = _on_slave(found, kind)
+        if kind in ("gap", "slip"):
+            partly = [_of_gaps(found, kind, least) for least in (0.0, 2 * COVERED)]
+            return _Sought(values, found.X, () if found.whole.all() else partly, share, found.way)
+        if np.isnan(values[found.closed]).any():
+            return None
+        if (kind, number.take) == ("pressure", "extent"):
+            share = LIMIT / MEASURED if found.measured else 1.0
+            self._out.add(number.name, recorded, found.length, found.s[-1], share)
+            return None
+        values = np.where(np.isnan(values) & ~found.closed, 0.0, values)
+        return _Sought(values, found.X, (), share)
+
+    def _extreme(
+        self, number: RequestedNumber, sought: _Sought, recorded: float, scale: float
+    ) -> None:
+        """Compare a maximum or minimum, and the value at its place."""
+        values, X, partly, share, _ = sought
+        name = f"{number.name}_x"
+        place = [self._record.scalars[f"{number.name}_{axis}"] for axis in AXES[: len(X)]]
+        off = np.hypot.reduce(X - np.array(place)[:, None])
+        self._out.add(name, off.min(), 0.0, max(_lengths(X)[-1], self._least["gap"]))
+        at = off <= off.min() * (1 + 1e-9) + 1e-12 * np.abs(X).max()
+        sign = 1.0 if number.take == "maximum" else -1.0
+        own = float(np.nanmax(sign * values))
+        if len(partly) and np.isnan(values[at]).all():  # it may lie beyond those that are known
+            own = max(own, sign * recorded)
+            values, share = np.where(at, partly[0], values), LIMIT / MEASURED
+        near = np.abs(values[at & np.isfinite(values)] - sign * own).min(initial=np.inf)
+        self._out.add(number.name, recorded, sign * own, scale, share)
+        self._out.add(name, near, 0.0, scale, share)
+
+    def _whole(
+        self, number: RequestedNumber, sought: _Sought, recorded: float, scale: float, least: float
+    ) -> None:
+        """Compare an integral or an extent."""
+        s, share = _lengths(sought.X), LIMIT / MEASURED if len(sought.partly) else sought.share
+        each = [np.nan_to_num(one) for one in sought.partly or [sought.values]]
         if number.take == "integral":
-            whole, most = (float((v[1:] + v[:-1]) @ np.diff(s) / 2) for v in (values, abs(values)))
-            self._out.add(number.name, recorded, whole, max(most, self._least[kind] * s[-1]), share)
-            return
-        self._out.add(number.name, recorded, _above_zero(values, s), s[-1], share)
+            found = [float((one[1:] + one[:-1]) @ np.diff(s) / 2) for one in each]
+            size = abs(each[0])
+            level = float((size[1:] + size[:-1]) @ np.diff(s) / 2)
+            level = max(level, max(sought.least, least) * s[-1])
+        else:  # where a value touches zero, rounding decides how far it is above
+            off, level = scale * LIMIT / share, s[-1]
+            found = [_above_zero(one + shift, s) for one in each for shift in (-off, off)]
+            share = 1.0
+        own = np.clip(recorded, min(found), max(found))
+        self._out.add(number.name, recorded, own, level, share)
 
     def _value(self, number: RequestedNumber) -> None:
         """Compare a value at the end of a stage with the course, which is compared itself."""
@@ -314,8 +368,16 @@ def _on_slave(found: Tractions, kind: str) -> Array:
         return np.where(found.known, found.pressure(moved=moved), np.nan)
     if kind == "shear":
         return np.where(found.known, -found.shear(moved=False), np.nan)
-    touching = found.touching
-    return np.where(found.known, touching.gap if kind == "gap" else touching.way, np.nan)
+    return np.where(found.whole, _of_gaps(found, kind, COVERED), np.nan)
+
+
+def _of_gaps(found: Tractions, kind: str, share: float) -> Array:
+    """Return gap or slip at the vertices of a slave (n,), NaN where no master faces their hats.
+
+    ``share`` is the part of a hat above which it counts as facing the master.
+    """
+    values = found.touching.gap if kind == "gap" else found.touching.way
+    return np.where(found.share > share, values, np.nan)
 
 
 def _above_zero(values: Array, s: Array) -> float:

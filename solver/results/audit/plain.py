@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from solver.fem.cells import smooth_cells
 from solver.fem.surface import edges_of
 from solver.materials.heated import Heated
-from solver.mesh.edges import shape_functions
+from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.mesh.elements import element_type
 from solver.tensors import SQRT2, to_mandel, to_tensor
 
@@ -250,8 +250,8 @@ class PlainBody:
         """Return the resultant [N] of the loads at a time and its first moments [N mm] (3, 2).
 
         First moments are force times x and force times y, from the centre of the body. A pressure p
-        on a chord from A to B gives the force p times depth times length of AB, against the outward
-        normal; an edge has many chords.
+        gives the force p times depth times length, against the outward normal, at the Gauss points
+        of many pieces of each edge.
         """
         total = np.zeros((3, 2))
         for load, own in zip(self.body.every_load, self._on_body, strict=True):
@@ -282,13 +282,14 @@ class PlainBody:
         total, whole = np.zeros((3, 2)), 0.0
         for left in reversed(range(_HALVINGS)):
 
-            def at(share: float) -> Array:
-                shapes = shape_functions(start + share * width, edges.shape[-1])  # noqa: B023
+            def at(share: float, of: Any = shape_functions) -> Array:
+                shapes = of(start + share * width, edges.shape[-1])  # noqa: B023
                 return np.asarray((edges[:, row] * shapes).sum(axis=-1))  # noqa: B023
 
-            along, forces = at(1.0) - at(0.0), []
-            for x in map(at, (*_GAUSS, *_INSIDE)):
-                force = load.push(x, along)
+            forces = []
+            for share in (*_GAUSS, *_INSIDE):
+                x = at(share)
+                force = load.push(x, width * at(share, shape_derivatives))
                 if force is None:
                     return total
                 forces.append(self._depth(x) * np.broadcast_to(force, x.shape))

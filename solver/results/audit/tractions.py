@@ -24,6 +24,8 @@ _LEVEL = 1e-6
 """Ratio of the decrease of squared pressure over an edge to its maximum; less counts as zero."""
 _WHOLE = 1e-6
 """Share of a vertex's hat that may lie beyond the master although the vertex faces it."""
+COVERED = 1e-3
+"""Share of a vertex's hat up to which the vertex does not face the master, as in the solver."""
 
 
 class Tractions:
@@ -81,13 +83,25 @@ class Tractions:
         return self._surfaces.finite or self._surfaces.curved
 
     @cached_property
+    def whole(self) -> NDArray[np.bool_]:
+        """Whether the hat of a vertex faces the master completely or not at all.
+
+        The part of another hat that faces it depends on the projection.
+        """
+        return np.asarray((self.share > 1 - _WHOLE) | (self.share < _WHOLE))
+
+    @property
+    def share(self) -> Array:
+        """Shares of the hats (n,) that face the master."""
+        return self.touching.area / self._area
+
+    @cached_property
     def known(self) -> NDArray[np.bool_]:
         """Whether the hats of a vertex and its neighbours face the master completely or not at all.
 
-        The area of a part of a hat depends on the projection.
+        Pressure and shear are means over the hats of neighbours.
         """
-        share = self.touching.area / self._area
-        whole = (share > 1 - _WHOLE) | (share < _WHOLE)
+        whole = self.whole
         return whole & np.append(whole[1:], True) & np.append(True, whole[:-1])
 
     def force(self, kind: str) -> float:
