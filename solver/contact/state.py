@@ -196,8 +196,8 @@ class Converged:
     energy : work since the lap began
     timing : how well contact was resolved in time since then
     added : error of stress that the length of the increment adds, over the yield stress
-    missed : for each part, the sum of these errors since the path began (n_components, n_points)
-        [MPa]; None where nothing has flowed
+    missed : for each part, what is left of these errors since the path began (n_components,
+        n_points) [MPa]; None where nothing has flowed
     lost : difference between the beginning of this increment and the end of the previous one
     windows : for each part, the region of the window in which it was solved, if in any
     """

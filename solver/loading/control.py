@@ -8,7 +8,7 @@ from solver.errors import ModelError
 from solver.kinds import check_kinds
 from solver.loading.program import Program, load_and_release
 
-INCREMENT_ERROR = 0.003
+INCREMENT_ERROR = 0.006
 """Largest error of stress, over the yield stress, that the length of an increment may add: the sum
 over the increments of a load is then one or two percent. Smaller ones take the time of more
 increments, in proportion to the root of the error."""

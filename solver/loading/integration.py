@@ -1,8 +1,8 @@
 """The error of stress that an increment adds because plastic flow turns within it.
 
 Flow has one direction in an increment. Two halves of the increment, along the same strain, let it
-turn once: the difference of their stress estimates the error. It is of second order in the length
-of an increment; the sum over a path is of first order.
+turn once, and have half of the error: twice the difference of their stress estimates it. It is of
+second order in the length of an increment; what all increments of a path leave is of first order.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def integrated(system: System, before: Converged, now: Converged) -> Converged:
-    """Return an increment with the error that it adds, and the sum since the path began."""
+    """Return an increment with the error that it adds, and what those of the path so far leave."""
     sums, added = list(before.missed or (None,) * len(system.parts)), 0.0
     for k, part in enumerate(system.parts):
         grown = now.responses[k].state.accumulated - now.start.plastic[k].accumulated
@@ -33,7 +33,7 @@ def integrated(system: System, before: Converged, now: Converged) -> Converged:
         own = _missed(part, now, k, grown > 0)
         added = max(added, _mean(part, own, grown > 0))
         had = sums[k]
-        sums[k] = own if had is None else had + own
+        sums[k] = own if had is None else _carried(part, now, k, had) + own
     return replace(now, missed=tuple(sums), added=added)
 
 
@@ -51,16 +51,31 @@ def missed(system: System, now: Converged) -> float:
 
 
 def _missed(part: Discretisation, now: Converged, number: int, flows: NDArray[np.bool_]) -> Array:
-    """Return what two halves of an increment add to the stress (n_components, n_points) [MPa]."""
+    """Return twice what two halves of an increment add to stress (n_components, n_points) [MPa]."""
     within = np.asarray(flows.reshape(part.weights.shape).any(axis=1))
     points = np.flatnonzero(np.repeat(within, part.weights.shape[1]))
     ends = (now.start.time, now.start.u[number]), (now.state.time, now.state.u[number])
     start, end = (part.strain(u, within) - part.eigenstrain(time)[:, points] for time, u in ends)
     law, before = part.law(now.state.time).at(points), now.start.plastic[number].at(points)
     half = law.respond((start + end) / 2, before).state
-    found = np.zeros_like(now.responses[number].stress)
-    found[:, points] = law.respond(end, half).stress - now.responses[number].stress[:, points]
+    at_once = now.responses[number].stress
+    found = np.zeros_like(at_once)
+    found[:, points] = 2 * (law.respond(end, half).stress - at_once[:, points])
     return found
+
+
+def _carried(part: Discretisation, now: Converged, number: int, error: Array) -> Array:
+    """Return what an increment leaves of an error of stress at its beginning [MPa].
+
+    Along a given strain it acts as a change of strain: flow, which brings stress to the yield
+    surface, lessens it.
+    """
+    response = now.responses[number]
+    points = np.flatnonzero(response.yielding)
+    strain = part.law(now.state.time).at(points).elastic_strain(error[:, points])
+    left = error.copy()
+    left[:, points] = np.einsum("ijp,jp->ip", response.tangent[:, :, points], strain)
+    return left
 
 
 def _mean(part: Discretisation, error: Array, flows: NDArray[np.bool_]) -> float:

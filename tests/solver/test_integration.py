@@ -50,7 +50,7 @@ def sheared(steps: int, control: PathControl | None = None) -> Solution:
     stretched = Amplitude([0, 1], [0, 1])
     loads = (
         Displacement(boundary="top", y=4e-3, amplitude=stretched),
-        Displacement(boundary="top", x=6e-3, amplitude=Amplitude([1, 2], [0, 1])),
+        Displacement(boundary="top", x=1e-2, amplitude=Amplitude([1, 2], [0, 1])),
     )
     stages = (Stage(name="up", target=1.0, steps=steps), Stage(name="on", target=2.0, steps=steps))
     return solve(bar(PLAIN, *loads, kinematics="plane_strain"), stages=stages, control=control)
@@ -70,7 +70,7 @@ def test_the_estimate_is_of_the_size_of_the_error_and_falls_with_the_increments(
         off = stress(found) - wanted
         errors.append(np.sqrt(1.5 * (off**2).sum(axis=0).mean()) / PLAIN.yield_stress)
     ratios = np.array(figures) / errors
-    assert (ratios > 0.2).all() and (ratios < 2.0).all()
+    assert (ratios > 0.5).all() and (ratios < 1.5).all()
     assert figures[0] > figures[1] > figures[2] > 0
 
 
