@@ -23,7 +23,8 @@ from studies import Store, Study, StudyError
 from studies.definition.parameters import read_values
 from studies.errors import SceneError
 from studies.scenes.description import Description, file_names
-from studies.scenes.meshfile import FORMATS, TABLE, MeshFile
+from studies.scenes.formats import FORMATS
+from studies.scenes.meshfile import TABLE, MeshFile
 from studies.scenes.registry import scene_named
 from studies.scenes.scene import FileScene, read_scene
 from studies.scenes.table import FILE_NAME
