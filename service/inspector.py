@@ -150,7 +150,9 @@ class Inspector:
 
 def inspected(files: Mapping[str, bytes], seconds: float) -> Answer:
     """Return what a copy of this process, which has loaded what a scene needs, finds in files."""
+    import h5py  # noqa: F401
     import meshio  # noqa: F401
+    import netCDF4  # noqa: F401
 
     import solver.contact.system
     import solver.results.samples  # noqa: F401

@@ -1,7 +1,6 @@
 """Tensor grids, and operations on meshes: map, join, remove cells, name boundaries.
 
-A body takes any scikit-fem mesh with named boundaries, also one read with ``skfem.Mesh.load``
-(meshio).
+A body takes any scikit-fem mesh with named boundaries, also one of `studies.scenes.meshfile`.
 """
 
 from __future__ import annotations

@@ -118,7 +118,8 @@ class MeshFile:
         """
         mesh = self.mesh(None)
         if mesh.elem.refdom.nnodes != 4:
-            raise ModelError("mesh", self.name, "must have quadrilaterals")
+            allowed = "must have quadrilaterals alone: in gmsh set Mesh.SubdivisionAlgorithm = 1"
+            raise ModelError("mesh", self.name, allowed)
         known = mesh.boundaries or {}
         for name in (RUNNING, FOOT):
             if name not in known:
