@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import tomllib
+
 import numpy as np
 import pytest
 from skfem import Mesh
 
 from solver.errors import ModelError
+from solver.results.record import Status
+from studies.scenes.description import Description
 from studies.scenes.meshfile import OUTLINE, MeshFile
+from studies.scenes.scene import file_scene
 
 NODES = """*Heading
  two squares side by side, *** of 1 mm
@@ -249,3 +254,58 @@ def test_a_mesh_in_another_plane_is_refused_by_its_name(
     text = "\n".join(["*NODE", *rows, "*ELEMENT, TYPE=S4", "1, 1, 2, 3, 4"])
     with pytest.raises(ModelError, match=told):
         deck(text).mesh(None)
+
+
+EDGE = """
+name = "edge"
+summary = "a wall of a deck in single precision"
+[parameters.push]
+default = 10.0
+range = [0.1, 100]
+description = "pressure"
+[materials.steel]
+youngs_modulus = 2e5
+poisson_ratio = 0.3
+[bodies.wall]
+material = "steel"
+mesh = "deck.inp"
+supports = { low = "xy" }
+[[loads]]
+body = "wall"
+kind = "pressure"
+boundary = "high"
+value = "$push"
+[[stages]]
+name = "pressed"
+increments = 1
+[results.points]
+corner = { body = "wall", at = [0.005, 0.007] }
+[results.lines.edge]
+body = "wall"
+start = [0.005, 0.001]
+end = [0.005, 0.007]
+[outputs.least]
+of = "stress.yy"
+take = "minimum"
+line = "edge"
+stage = "pressed"
+"""
+
+
+@pytest.mark.solves
+def test_results_at_the_edges_that_a_deck_rounds_are_those_of_the_body() -> None:
+    """Abaqus writes 0.005 as 0.00499999989; a place on the edge is inside, and its audit agrees."""
+    x, y = (np.float32(np.linspace(*ends)) for ends in ((0.005, 0.006, 11), (0.001, 0.007, 5)))
+    rows = [f"{11 * j + i + 1}, {x[i]:.9g}, {y[j]:.9g}" for j in range(5) for i in range(11)]
+    assert rows[-11].startswith("45, 0.00499999989, 0.00700000022")
+    cells = []
+    for k in range(40):
+        a = k // 10 * 11 + k % 10 + 1
+        cells.append(f"{k + 1}, {a}, {a + 1}, {a + 12}, {a + 11}")
+    sets = ["*NSET, NSET=low, GENERATE", "1, 11", "*NSET, NSET=high, GENERATE", "45, 55"]
+    text = "\n".join(["*NODE", *rows, "*ELEMENT, TYPE=CPE4", *cells, *sets])
+    scene = file_scene(Description("edge.toml", tomllib.loads(EDGE), {"deck.inp": deck(text)}))
+    (record,) = scene.path(scene.parameters(), [None], lambda share: None)
+    assert record.status is Status.OK, record.message
+    assert np.isfinite(record.fields["point_stress"][1]).all()
+    assert record.scalars["least"] < -10.0
