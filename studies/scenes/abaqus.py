@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple, NoReturn
@@ -60,9 +60,10 @@ class _Block(NamedTuple):
     data: list[tuple[int, list[str]]]
 
 
-_Member = tuple[int, str, int | range, str]
-"""Line, instance, and a number, or a range of numbers of which some may not exist. In a surface the
-label of an edge, "" for all edges on the outside."""
+_Members = dict[tuple[str, int | range, str], int]
+"""Instance, a number, or a range of numbers of which some may not exist, and in a surface the label
+of an edge, "" for all edges on the outside -> the line. No member is there twice: sets of sets that
+repeat one another would grow without bound."""
 
 
 @dataclass(slots=True)
@@ -71,7 +72,7 @@ class _Set:
 
     name: str
     internal: bool
-    members: list[_Member] = field(default_factory=list)
+    members: _Members = field(default_factory=dict)
 
 
 def read_deck(text: str) -> MeshData:
@@ -230,7 +231,7 @@ class _Deck:
             x = _numbers(line, fields[1:], 3)
             if self.nodes.setdefault(key, x) != x:
                 _refuse(line, f"node {key[1]} has other coordinates before")
-            members.append((line, *key, ""))
+            members[*key, ""] = line
 
     def _elements(self, block: _Block) -> None:
         kind = self._given(block, "TYPE").upper()
@@ -251,13 +252,13 @@ class _Deck:
                 _refuse(first, f"element {number} is there before")
             ends = [self._key(k, self.instance, each) for k, each in nodes[:count]]
             self.elements[key] = kind, ends, first
-            members.append((first, *key, ""))
+            members[*key, ""] = first
             found = []
 
-    def _of(self, kind: str, block: _Block, name: str | None) -> list[_Member]:
-        """Return the members of a set, to which more may be added; without a name a list apart."""
+    def _of(self, kind: str, block: _Block, name: str | None) -> _Members:
+        """Return the members of a set, to which more may be added; without a name some apart."""
         if not name:
-            return []
+            return {}
         new = _Set(name, "INTERNAL" in block.given)
         return self.sets[kind].setdefault((self.instance, name.upper()), new).members
 
@@ -266,14 +267,14 @@ class _Deck:
         before, _, number = text.rpartition(".")
         return _bare(before).upper() or instance, _number(line, number)
 
-    def _members(self, kind: str, line: int, instance: str, text: str) -> list[_Member]:
+    def _members(self, kind: str, line: int, instance: str, text: str) -> _Members:
         """Return a node or an element, or the members of a set that is there already."""
         if text.rpartition(".")[2].isdigit():
-            return [(line, *self._key(line, instance, text), "")]
+            return {(*self._key(line, instance, text), ""): line}
         before, _, name = text.upper().rpartition(".")
         for key in ((instance, _bare(text).upper()), (_bare(before) or instance, _bare(name))):
             if key in self.sets[kind]:
-                return list(self.sets[kind][key].members)
+                return dict(self.sets[kind][key].members)
         _refuse(line, f"there is no {kind} {text} before")
 
     def _set(self, block: _Block) -> None:
@@ -285,16 +286,17 @@ class _Deck:
         if kind == "NSET" and "ELSET" in block.given:
             of = self._members("ELSET", block.line, instance, block.given["ELSET"])
             for key in _keys(of, self.elements, "element"):
-                members += [(block.line, *node, "") for node in self.elements[key][1]]
+                members |= {(*node, ""): block.line for node in self.elements[key][1]}
         for line, fields in block.data:
             each = [text for text in fields if text]
             if "GENERATE" not in block.given:
-                members += [m for text in each for m in self._members(kind, line, instance, text)]
+                for text in each:
+                    members |= self._members(kind, line, instance, text)
                 continue
             first, last, step = [*(_number(line, text) for text in each), 1, 1][:3]
             if not 2 <= len(each) <= 3 or step < 1:
                 _refuse(line, "must have a first and a last number, and a step >= 1")
-            members.append((line, instance, range(first, last + 1, step), ""))
+            members[instance, range(first, last + 1, step), ""] = line
 
     def _surface(self, block: _Block) -> None:
         kind = block.given.get("TYPE", "ELEMENT").upper()
@@ -306,7 +308,7 @@ class _Deck:
         for line, (one, *rest) in block.data:
             label = rest[0].upper() if rest and not on_nodes else ""
             of = self._members("NSET" if on_nodes else "ELSET", line, self.instance, one)
-            members += [(line, instance, numbers, label) for _, instance, numbers, _ in of]
+            members |= {(instance, numbers, label): line for instance, numbers, _ in of}
 
     def mesh(self) -> MeshData:
         """Return the mesh of what was read."""
@@ -358,23 +360,23 @@ class _Deck:
             nodes,
         )
 
-    def _named(self, kind: str) -> dict[str, list[_Member]]:
+    def _named(self, kind: str) -> dict[str, _Members]:
         """Return the sets of a kind by their names; see `read_deck`."""
         sets = self.sets[kind]
-        found: dict[str, list[_Member]] = {}
+        found: dict[str, _Members] = {}
         plain: dict[str, str] = {}
         for (instance, key), one in sets.items():
             names = [f"{self.instances[instance]}.{one.name}"] if instance else []
             if not instance or ("", key) not in sets:
                 names.append(plain.setdefault(key, one.name))
             for name in names if not one.internal else ():
-                found.setdefault(name, []).extend(one.members)
+                found.setdefault(name, {}).update(one.members)
         return found
 
-    def _edges(self, members: list[_Member]) -> Iterator[tuple[Key, Key]]:
+    def _edges(self, members: _Members) -> Iterator[tuple[Key, Key]]:
         """Return the ends of the edges of a surface."""
-        for line, instance, numbers, label in members:
-            for key in _keys([(line, instance, numbers, "")], self.elements, "element"):
+        for (instance, numbers, label), line in members.items():
+            for key in _keys({(instance, numbers, ""): line}, self.elements, "element"):
                 kind, ends, _ = self.elements[key]
                 solid = _PLANE.fullmatch(kind)
                 if not solid:
@@ -414,9 +416,9 @@ def _spelt(key: Key) -> str:
     return ".".join(str(each) for each in key if each != "")
 
 
-def _keys(members: Iterable[_Member], known: Mapping[Key, object], what: str) -> Iterator[Key]:
+def _keys(members: _Members, known: Mapping[Key, object], what: str) -> Iterator[Key]:
     """Return the nodes or elements that members are; raise for one that does not exist."""
-    for line, instance, numbers, _ in members:
+    for (instance, numbers, _), line in members.items():
         if isinstance(numbers, int):
             if (instance, numbers) not in known:
                 _refuse(line, f"{what} {_spelt((instance, numbers))} does not exist")

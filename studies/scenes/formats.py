@@ -64,6 +64,12 @@ def read_mesh(name: str, data: bytes) -> MeshData:
         raise ModelError("mesh", name, f"cannot be read: {reason}") from None
 
 
+def load_readers() -> None:
+    """Import what reads files, so that copies of this process find it loaded."""
+    for library in ("h5py", "meshio", "netCDF4"):
+        importlib.import_module(library)
+
+
 def _abaqus(data: bytes) -> MeshData:
     return read_deck(data.decode("utf-8-sig", errors="replace"))
 

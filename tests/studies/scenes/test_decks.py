@@ -94,6 +94,12 @@ def test_nodes_of_a_set_of_elements_and_free_edges() -> None:
     assert edges(mesh, "S") == [(1.5, 0.0), (1.5, 1.0), (2.0, 0.5)], "not the edge in common"
 
 
+def test_sets_that_repeat_one_another_do_not_grow() -> None:
+    """Each line would double the members of the set."""
+    text = "*NSET, NSET=low\n1, 2\n" + "low, low\n" * 60
+    assert edges(deck(NODES + SQUARES + text).mesh(None), "low") == [(0.5, 0.0)]
+
+
 def test_a_surface_goes_before_a_set_of_nodes_of_its_name() -> None:
     data = "*SURFACE, NAME=Top\n1, S3\n*NSET, NSET=Top\n4, 5, 6\n"
     assert edges(deck(NODES + SQUARES + data).mesh(None), "Top") == [(0.5, 1.0)]
