@@ -379,8 +379,11 @@ class _Deck:
             for key in _keys({(instance, numbers, ""): line}, self.elements, "element"):
                 kind, ends, _ = self.elements[key]
                 solid = _PLANE.fullmatch(kind)
-                if not solid:
+                if not ends:
                     _refuse(line, f"element {_spelt(key)} is {kind}, which has no edges")
+                if not solid:  # it is an edge itself
+                    yield ends[0], ends[-1]
+                    continue
                 edges = _around(ends)
                 letter = "S" if solid[1][0] in "CD" and solid[1] != "DS" else "E"
                 if not label:

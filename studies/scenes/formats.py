@@ -118,9 +118,9 @@ def _gmsh(data: bytes) -> MeshData:
 
 def _nastran(data: bytes) -> MeshData:
     """Return the mesh of bulk data, which may stand without the lines before and behind it."""
-    text = data.decode("utf-8", errors="replace")
+    text = data.decode("utf-8", errors="replace").upper()
     for line, row in enumerate(text.splitlines(), start=1):
-        word = row.upper().partition(",")[0][:8].strip()
+        word = row.partition(",")[0][:8].strip()
         coordinates = (
             row.split(",")[2:3] if "," in row else [row[24:40] if "*" in word else row[16:24]]
         )
@@ -206,7 +206,9 @@ def _groups(
         names = family["GRO/NOM"][()] if "GRO" in family else ()
         rows = np.flatnonzero(own == family.attrs["NUM"])
         for name in names if len(rows) else ():
-            found.append((bytes(np.array(name, dtype=np.uint8)).decode().strip("\0 "), rows))
+            found.append(
+                (bytes(np.array(name, dtype=np.uint8)).decode(errors="replace").strip("\0 "), rows)
+            )
     return found
 
 

@@ -80,6 +80,7 @@ def test_a_block_without_a_name_does_not_shift_the_others() -> None:
     "*SURFACE, NAME=Top, TYPE=NODE\n4\n5,\n6, 1.\n",
     "*ELSET, ELSET=both\nLeft, 2\n*SURFACE, NAME=Top\nboth, S3\n",
     "*ELEMENT, TYPE=T2D2, ELSET=Top\n7, 4, 5\n8, 5, 6\n",
+    "*ELEMENT, TYPE=R2D2, ELSET=of\n7, 4, 5\n8, 5, 6\n*SURFACE, NAME=Top\nof, SNEG\n",
 ])  # fmt: skip
 def test_a_boundary_in_every_form(data: str) -> None:
     mesh = deck(NODES + SQUARES + data + "*STEP\n*NSET, NSET=Top\n1, 2\n").mesh(None)
@@ -227,6 +228,7 @@ def test_collapsed_quadrilaterals_and_triangles_make_a_body_of_triangles() -> No
     ("*NSET, NSET=A, GENERATE\n1, 3, 0\n", "line 18: must have a first and a last number"),
     ("*NSET, NSET=A, INSTANCE=I\n1\n", "line 17: there is no instance I"),
     ("*SURFACE, NAME=A\n1, S5\n", "line 18: S5 must be an edge of a CPS4: S1, S2, S3, S4"),
+    ("*ELEMENT, TYPE=MASS\n9, 1\n*SURFACE, NAME=A\n9, S1\n", "line 20: element 9 is MASS, which"),
     ("*SURFACE, NAME=A, COMBINE=UNION\nB, C\n", "line 17: the parameter COMBINE"),
     ("*PART, NAME=A\n*NODE\n", r"line 17: \*PART has no end"),
     ("*INSTANCE, NAME=A, PART=B\n", "line 17: there is no part B"),

@@ -91,15 +91,14 @@ def of_abaqus(mesh: meshio.Mesh, path: Path) -> None:
 
 
 def of_med(mesh: meshio.Mesh, path: Path) -> None:
+    """Write families of two groups each; the base is one of nodes."""
     core, rim, inner, base = (block.data for block in mesh.cells)
-    cells = [
-        (mesh.cells[0].type, np.vstack([core, rim])),
-        (mesh.cells[2].type, np.vstack([inner, base])),
-    ]
-    tags = [np.repeat([-1, -2], [len(a), len(b)]) for a, b in ((core, rim), (inner, base))]
-    tags[1] -= 2
-    made = meshio.Mesh(mesh.points, cells, cell_data={"cell_tags": tags})
-    made.cell_tags = {-k: ["all", name] for k, name in enumerate(NAMES, 1)}
+    cells = [(mesh.cells[0].type, np.vstack([core, rim])), (mesh.cells[2].type, inner)]
+    families = [np.repeat([-1, -2], [len(core), len(rim)]), np.full(len(inner), -3)]
+    made = meshio.Mesh(mesh.points, cells, cell_data={"cell_tags": families})
+    made.cell_tags = {-k: ["all", name] for k, name in enumerate(NAMES[:3], 1)}
+    made.point_data["point_tags"] = np.isin(np.arange(len(mesh.points)), base).astype(int)
+    made.point_tags = {1: ["low", NAMES[3]]}
     made.write(path)
 
 
