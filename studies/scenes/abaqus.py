@@ -224,7 +224,7 @@ class _Deck:
 
     def _nodes(self, block: _Block) -> None:
         if block.given.get("SYSTEM", "R").upper() != "R":
-            _refuse(block.line, _REFUSED["SYSTEM"].replace("is", "SYSTEM is", 1))
+            _refuse(block.line, f"SYSTEM {_REFUSED['SYSTEM']}")
         members = self._of("NSET", block, block.given.get("NSET"))
         for line, fields in block.data:
             key = self.instance, _number(line, fields[0])
@@ -269,12 +269,12 @@ class _Deck:
 
     def _members(self, kind: str, line: int, instance: str, text: str) -> _Members:
         """Return a node or an element, or the members of a set that is there already."""
-        if text.rpartition(".")[2].isdigit():
-            return {(*self._key(line, instance, text), ""): line}
         before, _, name = text.upper().rpartition(".")
         for key in ((instance, _bare(text).upper()), (_bare(before) or instance, _bare(name))):
             if key in self.sets[kind]:
                 return dict(self.sets[kind][key].members)
+        if name.isdigit():
+            return {(*self._key(line, instance, text), ""): line}
         _refuse(line, f"there is no {kind} {text} before")
 
     def _set(self, block: _Block) -> None:
@@ -320,12 +320,11 @@ class _Deck:
                 if end not in index:
                     _refuse(line, f"node {_spelt(end)} does not exist")
             if ends:
-                shape = _CELLS[len(ends)] if _PLANE.fullmatch(kind) else "line"
+                plane = _PLANE.fullmatch(kind)
+                shape = _CELLS[len(ends)] if plane else "line"
                 rows = cells.setdefault(shape, [])
                 place[key] = shape, len(rows)
-                rows.append(
-                    [index[end] for end in (ends if shape != "line" else ends[:: len(ends) - 1])]
-                )
+                rows.append([index[end] for end in (ends if plane else ends[:: len(ends) - 1])])
         blocks = [(shape, np.array(rows)) for shape, rows in cells.items()]
         number = {shape: k for k, shape in enumerate(cells)}
         sets: dict[str, dict[int, list[int]]] = {}

@@ -72,6 +72,7 @@ def test_a_block_without_a_name_does_not_shift_the_others() -> None:
     "*NSET, NSET=Top, GENERATE\n4, 6, 1\n",
     "*NSET, NSET=Top, GENERATE\n4, 99\n",
     "*NSET, GENERATE, NSET=Top, UNSORTED\n 4, 6 ,\n",
+    "*NSET, NSET=some.1\n4, 5\n*NSET, NSET=Top\nSome.1, 6\n",
     "*NSET, NSET=some\n4\n*NSET, NSET=Top\n some, 5,\n6\n",
     '*NSET, NSET="Top"\n4, 5, 6\n',
     "*NSET,\n NSET=Top\n4,5,6\n",
