@@ -20,9 +20,9 @@ steel = Material(
     hardening_ratio=0.024,
 )
 
-# A mesh is any scikit-fem mesh of quadrilaterals or triangles with named boundaries.
-# skfem.Mesh.load reads meshes of Gmsh, Abaqus and others. Here x = 0 is a line of symmetry, so half
-# of each body is enough.
+# A mesh is any scikit-fem mesh of quadrilaterals or triangles with named boundaries. `MeshFile` of
+# studies.scenes.meshfile reads files of gmsh, Abaqus and others. Here x = 0 is a line of symmetry,
+# so half of each body is enough.
 pad_mesh = MeshQuad.init_tensor(np.linspace(0, 10, 21), np.linspace(0, 10, 11)).with_boundaries(
     {"axis": lambda x: x[0] == 0, "foot": lambda x: x[1] == 0, "top": lambda x: x[1] == 10}
 )

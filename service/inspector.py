@@ -23,7 +23,8 @@ from studies import Store, Study, StudyError
 from studies.definition.parameters import read_values
 from studies.errors import SceneError
 from studies.scenes.description import Description, file_names
-from studies.scenes.meshfile import FORMATS, TABLE, MeshFile
+from studies.scenes.formats import FORMATS, load_readers
+from studies.scenes.meshfile import TABLE, MeshFile
 from studies.scenes.registry import scene_named
 from studies.scenes.scene import FileScene, read_scene
 from studies.scenes.table import FILE_NAME
@@ -149,12 +150,11 @@ class Inspector:
 
 def inspected(files: Mapping[str, bytes], seconds: float) -> Answer:
     """Return what a copy of this process, which has loaded what a scene needs, finds in files."""
-    import meshio  # noqa: F401
-
     import solver.contact.system
     import solver.results.samples  # noqa: F401
     import studies.scenes.building  # noqa: F401
 
+    load_readers()
     with scratch() as folder:
         for name, data in files.items():
             (folder / name).write_bytes(data)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
+from solver.mesh.rounding import ROUNDED
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -102,7 +104,8 @@ def _locate(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """Return element, point number and reference coordinates of the points inside the body."""
     corners = part.X[:, part.basis.element_dofs]
-    slack = 1e-9 + 0.05 * (corners.max(axis=1) - corners.min(axis=1))
+    extent = np.ptp(corners, axis=1)
+    slack = 1e-9 + 0.05 * extent
     low, high = corners.min(axis=1) - slack, corners.max(axis=1) + slack
     element, point = _within(low, high, x)
     if not len(element):
@@ -113,7 +116,8 @@ def _locate(
     else:
         miss = np.maximum(-local.min(axis=0), local.sum(axis=0) - 1.0)
     order = np.lexsort((miss, point))
-    order = order[miss[order] < _INSIDE]
+    rounded = ROUNDED * np.ptp(part.X, axis=1).max() / extent.min(axis=0)  # of the side of each
+    order = order[miss[order] < np.maximum(_INSIDE, rounded)[element[order]]]
     _, first_of = np.unique(point[order], return_index=True)
     best = order[first_of]
     return element[best], point[best], np.clip(local[:, best], 0.0, 1.0)

@@ -9,6 +9,7 @@ from skfem import CellBasis
 
 from solver.errors import ModelError
 from solver.mesh.elements import element_type
+from solver.mesh.rounding import ROUNDED
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -67,7 +68,7 @@ class Nodes:
         near, far = (nodes[np.argsort(self.X[1, nodes])] for nodes in (near, far))
         apart = self.X[:, far] - self.X[:, near] if len(far) == len(near) else np.ones((2, 1))
         period = float(apart[0].mean())
-        if not (np.abs(apart - [[period], [0.0]]) < 1e-9 * abs(period)).all() or period <= 0:
+        if not (np.abs(apart - [[period], [0.0]]) < ROUNDED * abs(period)).all() or period <= 0:
             allowed = "the second must be a copy of the first, one period along +x"
             raise ModelError("periodic", self.body.periodic, allowed)
         travelling = self.body.travelling

@@ -18,6 +18,7 @@ from solver.fem.operators import Fixed
 from solver.fem.part import Part
 from solver.fem.surface import Surface
 from solver.linear.solvers import Begun
+from solver.mesh.rounding import ROUNDED
 from solver.model.rigid import Moved, Pushed, RigidBody
 
 if TYPE_CHECKING:
@@ -26,10 +27,6 @@ if TYPE_CHECKING:
     from solver.materials import PlasticState, Response
 
     Array = NDArray[np.float64]
-
-
-_AXIS = 1e-9
-"""Ratio of the distance from the axis to the size of the body; below it a point is on the axis."""
 
 
 class Unmoved:
@@ -112,7 +109,7 @@ class RigidPart(Part):
         nodes = self._first[boundary] + np.arange(count)
         X = self.nodes[:, nodes]
         depth = None if self._axisymmetric else self.body.thickness
-        on_axis = (np.abs(X[0, [0, -1]]) < _AXIS * self.frame.radius) & self._axisymmetric
+        on_axis = (np.abs(X[0, [0, -1]]) < ROUNDED * self.frame.radius) & self._axisymmetric
         start, end = (on and not axis for on, axis in zip(curve.goes_on, on_axis, strict=True))
         return Surface(nodes, np.stack(ends, axis=1), X, depth, (start, end))
 

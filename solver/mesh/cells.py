@@ -40,10 +40,45 @@ def mesh_of_cells(points: Array, cells: Numbers, corners: int) -> tuple[Mesh, Nu
     for k in range(corners, 2 * corners):  # both number the sides from the first corner
         at[:, dofs[k]] = points[cells[:, k]].T
     if corners == 4:
-        X = points[cells].transpose(2, 1, 0)
-        middle = X[:, 8] if cells.shape[1] == 9 else X[:, 4:8].sum(1) / 2 - X[:, :4].sum(1) / 4
-        at[:, dofs[8]] = middle
+        at[:, dofs[8]] = _middles(points, cells).T
     return curved(doflocs=at, t=bent.t, sort_t=False, validate=False), number
+
+
+def triangles_of(points: Array, cells: Numbers) -> tuple[Array, Numbers]:
+    """Return quadrilaterals as triangles: the points, and two cells for each, in its order.
+
+    The shorter diagonal divides a quadrilateral; its middle is a new point if there are middles.
+    """
+    sides, n = cells[:, :4], len(points)
+    span = np.hypot(*(points[sides] - points[np.roll(sides, -2, axis=1)]).T)
+    turn = (np.arange(4) + (span[1] < span[0])[:, None]) % 4  # the diagonal goes from 0 to 2
+    a, b, c, d = np.take_along_axis(sides, turn, axis=1).T
+    if cells.shape[1] == 4:
+        halves = [[a, b, c], [a, c, d]]
+    else:
+        ab, bc, cd, da = np.take_along_axis(cells[:, 4:8], turn, axis=1).T
+        points = np.concatenate([points, _middles(points, cells)])
+        middle = n + np.arange(len(cells))
+        halves = [[a, b, c, ab, bc, middle], [a, c, d, middle, cd, da]]
+    return points, np.array(halves).transpose(2, 0, 1).reshape(2 * len(cells), -1)
+
+
+def collapsed(cells: Numbers) -> tuple[Numbers, Numbers]:
+    """Return which quadrilaterals have two corners at one point (n,), and their triangles."""
+    same = cells[:, :4] == np.roll(cells[:, :4], -1, axis=1)
+    which = np.flatnonzero(same.any(axis=1))
+    side = same[which].argmax(axis=1)[:, None]
+    kept = (side + np.arange(1, 4)) % 4  # the corners behind the collapsed side
+    kept = kept if cells.shape[1] == 4 else np.hstack([kept, 4 + kept])
+    return which, np.take_along_axis(cells[which], kept, axis=1)
+
+
+def _middles(points: Array, cells: Numbers) -> Array:
+    """Return the middles (n, 2) of quadrilaterals with middles of sides."""
+    if cells.shape[1] == 9:
+        return np.asarray(points[cells[:, 8]])
+    X = points[cells]
+    return np.asarray(X[:, 4:8].sum(1) / 2 - X[:, :4].sum(1) / 4)
 
 
 def facets_of(mesh: Mesh, edges: Numbers) -> Numbers:

@@ -1,7 +1,6 @@
 """Tensor grids, and operations on meshes: map, join, remove cells, name boundaries.
 
-A body takes any scikit-fem mesh with named boundaries, also one read with ``skfem.Mesh.load``
-(meshio).
+A body takes any scikit-fem mesh with named boundaries, also one of `studies.scenes.meshfile`.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
+from solver.mesh.rounding import ROUNDED, in_box
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -69,7 +69,8 @@ def within(
             allowed = f"must name boundaries of the mesh: {', '.join(known) or 'it has none'}"
             raise ModelError(f"boundaries.{name}.of", other, allowed)
     facets = np.unique(np.concatenate([np.asarray(known[other]) for other in of]))
-    inside = _in_box(mesh.p[:, mesh.facets[:, facets]].mean(axis=1), x, y)
+    size = float(np.ptp(mesh.p, axis=1).max())
+    inside = in_box(mesh.p[:, mesh.facets[:, facets]].mean(axis=1), (x, y), size)
     if not inside.any():
         raise ModelError(f"boundaries.{name}", {"x": x, "y": y}, "has no facet in its box")
     return mesh.with_boundaries({name: facets[inside]})
@@ -92,7 +93,8 @@ def marked(
     ModelError
         if the box has no element
     """
-    inside = np.flatnonzero(_in_box(mesh.p[:, mesh.t].mean(axis=1), x, y))
+    size = float(np.ptp(mesh.p, axis=1).max())
+    inside = np.flatnonzero(in_box(mesh.p[:, mesh.t].mean(axis=1), (x, y), size))
     if not len(inside):
         box = ", ".join(
             f"{a} = {span[0]:g} to {span[1]:g}"
@@ -101,18 +103,6 @@ def marked(
         )
         raise ModelError(f"regions.{name}", box, "has no element in its box")
     return replace(mesh, _subdomains={**(mesh.subdomains or {}), name: inside})
-
-
-def _in_box(
-    places: NDArray[np.float64],
-    x: tuple[float, float] | None,
-    y: tuple[float, float] | None,
-) -> NDArray[np.bool_]:
-    inside = np.ones(places.shape[1], dtype=bool)
-    for at, span in zip(places, (x, y), strict=True):
-        if span is not None:
-            inside &= (at >= span[0]) & (at <= span[1])
-    return inside
 
 
 def renamed(mesh: Mesh, names: Mapping[str, str]) -> Mesh:
@@ -138,7 +128,7 @@ def without(mesh: Mesh, name: str, x: tuple[float, float], y: tuple[float, float
         if no cell lies inside, none outside, or a cell lies across a side
     """
     (low, high), corners = np.array([x, y], dtype=float).T[:, :, None], mesh.p[:, mesh.t]
-    slack = _SAME * float(np.ptp(mesh.p, axis=1).max())
+    slack = ROUNDED * float(np.ptp(mesh.p, axis=1).max())
     least, most = corners.min(axis=1), corners.max(axis=1)
     inside = ((least > low - slack) & (most < high + slack)).all(axis=0)
     touched = ((least < high - slack) & (most > low + slack)).all(axis=0)

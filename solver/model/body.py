@@ -67,6 +67,7 @@ class Body:
 
         from solver.mesh.check import check_mesh
         from solver.mesh.elements import element_type
+        from solver.mesh.rounding import with_zeros
 
         check_kinds(Body, self, Mesh=Mesh)
         if self.kinematics not in KINEMATICS:
@@ -80,11 +81,13 @@ class Body:
         if self.mesh.t.shape[0] != corners:
             raise ModelError(
                 "element", self.element, f"needs cells of {corners} corners; the mesh of body "
-                f"{self.name!r} has {self.mesh.t.shape[0]}",
+                f"{self.name!r} has {self.mesh.t.shape[0]} ; a file with triangles has no others",
             )  # fmt: skip
         check_mesh(self.mesh, self.name, element)
         if self.kinematics == "axisymmetric" and self.mesh.p[0].min() < 0:
-            raise ModelError("mesh", self.mesh.p[0].min(), "an axisymmetric body needs x >= 0")
+            object.__setattr__(self, "mesh", with_zeros(self.mesh))
+            if self.mesh.p[0].min() < 0:
+                raise ModelError("mesh", self.mesh.p[0].min(), "an axisymmetric body needs x >= 0")
         for boundary in self.supports:
             self.facets(boundary, "supports")
         for load in self.every_load:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.errors import ModelError
+from solver.mesh.rounding import ROUNDED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -19,9 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
-
-_ROUNDED = 1e-9
-"""Ratio of a distance to the size of the table; up to it a position outside counts as inside."""
 
 
 def columns_of(text: str, names: Sequence[str]) -> dict[str, Array]:
@@ -151,7 +149,7 @@ class Tabulated:
         own = np.asarray(self.x if axis == 0 else self.y, dtype=float)
         order = np.argsort(own)
         own, values = own[order], values[order]
-        beyond = _ROUNDED * float(np.ptp(own))
+        beyond = ROUNDED * float(np.ptp(own))
 
         def along(x: Array) -> Array:
             inside = (x[axis] >= own[0] - beyond) & (x[axis] <= own[-1] + beyond)
@@ -175,7 +173,7 @@ class Tabulated:
             found = np.asarray(linear(x.T))
             near = np.isnan(found)
             if near.any():  # rounding may put a position on the rim outside
-                found[near] = linear((x + _ROUNDED * (middle - x)).T[near])
+                found[near] = linear((x + ROUNDED * (middle - x)).T[near])
             return found
 
         return between

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver.mesh.rounding import ROUNDED
 from solver.parameters import Length, check, described
 from solver.results.contact_result import contact_patches
 from solver.results.outputs import output
@@ -41,8 +42,6 @@ INCREMENT_APPROACH = declare(
 INCREMENT_RADIUS = declare(
     "increment_radius", "radius of the contact after each increment", "mm", dims=_EACH
 )
-_ON_AXIS = 1e-9
-"""Ratio of the distance from the axis to the radius, up to which a node is on the axis."""
 
 
 @output("indentation", "contact", "s", "profile", "surfaces", "release")
@@ -107,7 +106,7 @@ class Indentation:
     def _approach(self, system: Bodies, converged: Solved) -> float:
         """Return the displacement of the ball's centre towards the other body [mm]."""
         X = system.full(self.body).X
-        axis = np.flatnonzero(np.abs(X[0]) <= _ON_AXIS * self.radius)
+        axis = np.flatnonzero(np.abs(X[0]) <= ROUNDED * self.radius)
         axis = axis[np.argsort(X[1, axis])]
         moved = system.displacement(self.body, converged.state)[2 * axis + 1]
         y = X[1, axis]

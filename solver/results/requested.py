@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from solver.errors import ModelError
+from solver.mesh.rounding import in_box
 from solver.parameters import Coordinate
 from solver.results.body_fields import BODY_FIELDS, BodyField
 from solver.results.invariants import component, known_components
@@ -245,13 +246,12 @@ class RequestedNumber:
             values = found[AXES.index(part)] if of_axis else component(found, part)
         else:
             values = found
-        inside = np.ones(X.shape[1], dtype=bool)
-        for k, span in enumerate((self.x, self.y, self.z)):
+        spans = (self.x, self.y, self.z)
+        for k, span in enumerate(spans[len(X) :], start=len(X)):
             if span is not None:
-                if k >= len(X):
-                    allowed = f"must be left out: places of this body have {', '.join(AXES[:k])}"
-                    raise ModelError(f"{self.name}.{AXES[k]}", span, allowed)
-                inside &= (X[k] >= span[0]) & (X[k] <= span[1])
+                allowed = f"must be left out: places of this body have {', '.join(AXES[:k])}"
+                raise ModelError(f"{self.name}.{AXES[k]}", span, allowed)
+        inside = in_box(X, spans, float(np.ptp(X, axis=1).max()))
         return np.where(inside, values, np.nan), X
 
     def _check(self, known: tuple[str, ...]) -> None:

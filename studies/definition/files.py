@@ -11,7 +11,8 @@ from typing import Any
 
 from solver.errors import ModelError
 from studies.errors import StudyError
-from studies.scenes.meshfile import FORMATS, MeshFile
+from studies.scenes.formats import FORMATS
+from studies.scenes.meshfile import MeshFile
 from studies.toml import CASE, read_bytes, read_toml
 
 _MAY_NAME_FILES, _OF_POINTS = ("parameters", "points", "sweep"), (".csv", ".txt")

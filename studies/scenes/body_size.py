@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.errors import ModelError
+from solver.mesh.rounding import in_box
 from solver.mesh.shapes import few
 from solver.scenes.effort import node_layout
 from studies.scenes import tables
@@ -144,8 +145,6 @@ class _Rectangles:
         """Return the edges whose middles lie in a box, each once."""
         found = np.unique(np.concatenate(edges), axis=0)
         i, j = np.divmod(found, len(self._y))
-        inside = np.ones(len(found), dtype=bool)
-        for at, span in ((self._x[i].mean(axis=1), box.x), (self._y[j].mean(axis=1), box.y)):
-            if span is not None:
-                inside &= (at >= span[0]) & (at <= span[1])
-        return np.asarray(found[inside])
+        middles = np.stack([self._x[i].mean(axis=1), self._y[j].mean(axis=1)])
+        size = max(np.ptp(self._x), np.ptp(self._y))
+        return np.asarray(found[in_box(middles, (box.x, box.y), size)])

@@ -1,31 +1,32 @@
-"""The files beside a scene file: meshes of bodies, read by meshio, and tables of values."""
+"""The files beside a scene file: meshes of bodies, and tables of values."""
 
 from __future__ import annotations
 
-import contextlib
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.memory import kept
-from solver.mesh.cells import facets_of, mesh_of_cells
+from solver.mesh.cells import collapsed, facets_of, mesh_of_cells, triangles_of
+from solver.mesh.rounding import ROUNDED, with_zeros
 from solver.mesh.section_mesh import FOOT, RUNNING, SectionMesh
 from solver.model.tabulated import Tabulated, columns_of
+from studies.scenes.formats import read_mesh
 from studies.scenes.meshdata import MeshData
-from studies.scratch import scratch
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
     from skfem import Mesh
 
+    Array = NDArray[np.float64]
+    Numbers = NDArray[np.int64]
+
 OUTLINE = "outline"
 """Boundary of every mesh: all edges with an element on one side only."""
-
-FORMATS = (".msh", ".vtk", ".vtu", ".mesh", ".bdf", ".nas")
-"""Endings of mesh files in formats that do not refer to other files."""
 
 TABLE = ".csv"
 """Ending of a file with a table of values."""
@@ -38,11 +39,11 @@ MOST_LINES = 100_000
 
 _CELLS = {"quad": 4, "quad8": 4, "quad9": 4, "triangle": 3, "triangle6": 3}
 """Cells of meshio that a body may have -> number of their corners."""
+_TRIANGLE = {"quad": "triangle", "quad8": "triangle6", "quad9": "triangle6"}
+"""Quadrilaterals -> the triangles into which they are divided."""
 _LINES = ("line", "line3")
 _POINTS = {"quad": 4, "quad8": 8, "quad9": 9, "triangle": 3, "triangle6": 6, "line": 2, "line3": 3}
 """Numbers of the points of these cells and lines."""
-_NUMBERS = ("gmsh:physical", "medit:ref", "nastran:ref")
-"""Cell data of meshio that hold the number of the set of each cell."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -117,7 +118,8 @@ class MeshFile:
         """
         mesh = self.mesh(None)
         if mesh.elem.refdom.nnodes != 4:
-            raise ModelError("mesh", self.name, "must have quadrilaterals")
+            allowed = "must have quadrilaterals alone: in gmsh set Mesh.SubdivisionAlgorithm = 1"
+            raise ModelError("mesh", self.name, allowed)
         known = mesh.boundaries or {}
         for name in (RUNNING, FOOT):
             if name not in known:
@@ -140,8 +142,6 @@ def _mesh(name: str, data: bytes, arrays: bytes, part: str | None) -> Mesh:
         raise ModelError("mesh", name, "must have finite points")
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise ModelError("mesh", name, "must have points of two or three coordinates")
-    if points.shape[1] == 3 and np.ptp(points[:, 2]) > 0:
-        raise ModelError("mesh", name, "must lie in a plane: its z differ")
     for kind, each in blocks:
         if each.ndim != 2 or each.shape[1] != _POINTS.get(kind, each.shape[1]):
             raise ModelError("mesh", name, f"has a {kind} of another number of points")
@@ -158,7 +158,8 @@ def _mesh(name: str, data: bytes, arrays: bytes, part: str | None) -> Mesh:
     if not plane:
         listed = ", ".join(sorted({kind for kind, _ in blocks})) or "none"
         raise ModelError("mesh", name, f"must have cells {', '.join(_CELLS)}; it has {listed}")
-    taken = {k: np.arange(len(blocks[k][1])) for k in plane}
+    first = np.cumsum([0, *(len(cells) for _, cells in blocks)])  # number of the first of a block
+    chosen = {k: np.arange(len(blocks[k][1])) for k in plane}
     if part is not None:
         parts = {key for key, own in sets.items() if any(_rows(own, k).size for k in plane)}
         if part not in parts:
@@ -167,71 +168,101 @@ def _mesh(name: str, data: bytes, arrays: bytes, part: str | None) -> Mesh:
                 part,
                 f"must be a part of {name}: {', '.join(sorted(parts)) or 'it has none'}",
             )
-        taken = {k: _rows(sets[part], k) for k in plane}
-    chosen = {k: blocks[k][1][own] for k, own in taken.items() if len(own)}
-    if not chosen:
+        chosen = {k: _rows(sets[part], k) for k in plane}
+    taken = [
+        (blocks[k][0], blocks[k][1][own], first[k] + own) for k, own in chosen.items() if len(own)
+    ]
+    if not taken:
         raise ModelError("mesh", name, f"must have cells {', '.join(_CELLS)}; it has none")
-    kind, *others = sorted({blocks[k][0] for k in chosen})
-    if others:
-        raise ModelError(
-            "mesh", name, f"a body must have cells of one kind, not {', '.join((kind, *others))}"
-        )
-    mesh, number = mesh_of_cells(points[:, :2], np.vstack(list(chosen.values())), _CELLS[kind])
+    points, body = _of_one_kind(name, points, taken)
+    _check_plane(name, points[body.cells])
+    mesh, number = mesh_of_cells(points[:, :2], body.cells, _CELLS[body.kind])
+    mesh = with_zeros(mesh)
     lines = {k: cells[:, :2] for k, (kind, cells) in enumerate(blocks) if kind in _LINES}
     mesh = mesh.with_boundaries(_boundaries(mesh, number, lines, sets, nodes))
-    regions = {
-        name: np.flatnonzero(np.concatenate([np.isin(taken[k], _rows(own, k)) for k in chosen]))
-        for name, own in sets.items()
-    }
+    regions = {}
+    for key, own in sets.items():
+        inside = np.zeros(first[-1], dtype=bool)
+        for k in plane:
+            inside[first[k] + _rows(own, k)] = True
+        regions[key] = np.unique(body.place[inside[body.numbers]])
     return replace(mesh, _subdomains={name: own for name, own in regions.items() if len(own)})
 
 
-@kept
-def _read(name: str, data: bytes) -> MeshData:
-    import meshio
+class _BodyCells(NamedTuple):
+    """Cells of one kind, and the places in them of cells of the file.
 
-    with scratch() as folder:
-        path = folder / f"mesh{''.join(Path(name).suffixes[-1:])}"
-        path.write_bytes(data)
-        try:
-            with contextlib.redirect_stdout(None), contextlib.redirect_stderr(None):
-                return _arrays(meshio.read(path))  # meshio prints remarks
-        except SystemExit:  # meshio exits if it does not know a format
-            reason = "its format is not known"
-        except MemoryError:
-            raise
-        except IndexError:
-            reason = "a cell or a set names a point that is not there"
-        except Exception as error:  # a damaged file may raise any
-            reason = str(error).replace(str(path), name) or type(error).__name__
-    raise ModelError("mesh", name, f"cannot be read: {reason}")
+    A cell may be twice in the file, in two groups of gmsh, and be two of these.
+    """
 
+    kind: str
+    cells: Numbers
+    numbers: Numbers
+    place: Numbers
 
-def _arrays(found: Any) -> MeshData:
-    return MeshData(
-        points=np.asarray(found.points, dtype=float),
-        cells=[(block.type, np.asarray(block.data)) for block in found.cells],
-        sets=_sets(found),
-        nodes={name: np.asarray(own, dtype=np.int64) for name, own in found.point_sets.items()},
-    )
+    @classmethod
+    def of(cls, kind: str, cells: Numbers, numbers: Numbers) -> Self:
+        """Return cells in their order, each once."""
+        _, first, same = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+        order = np.sort(first)
+        return cls(kind, cells[order], numbers, np.searchsorted(order, first[same.ravel()]))
+
+    def joined(self, others: Self) -> Self:
+        """Return these cells, and others of the same kind behind them."""
+        return self._replace(
+            cells=np.vstack([self.cells, others.cells]),
+            numbers=np.concatenate([self.numbers, others.numbers]),
+            place=np.concatenate([self.place, len(self.cells) + others.place]),
+        )
 
 
-def _sets(found: Any) -> dict[str, dict[int, Any]]:
-    """Return the cells of each set by block; the name of a set without one is its number."""
-    sets = {
-        name: {
-            k: np.asarray(rows, dtype=np.int64) for k, rows in enumerate(each) if rows is not None
-        }
-        for name, each in found.cell_sets.items()
-        if not name.startswith("gmsh:")
-    }
-    names = {tuple(map(int, each)): name for name, each in found.field_data.items()}
-    for key in set(_NUMBERS) & found.cell_data.keys():
-        for k, (block, numbers) in enumerate(zip(found.cells, found.cell_data[key], strict=True)):
-            for number in np.unique(numbers):
-                name = names.get((int(number), block.dim), str(number))
-                sets.setdefault(name, {}).setdefault(k, np.flatnonzero(numbers == number))
-    return sets
+def _of_one_kind(
+    name: str, points: Array, taken: Iterable[tuple[str, Numbers, Numbers]]
+) -> tuple[Array, _BodyCells]:
+    """Return the cells of a body, of one kind, and the points with those that are new.
+
+    Quadrilaterals with two corners at one point are triangles; among triangles the others are
+    divided into triangles too.
+    """
+    found: dict[str, _BodyCells] = {}
+    for kind, cells, numbers in taken:
+        split = [(kind, cells, numbers)]
+        if _CELLS[kind] == 4:
+            which, triangles = collapsed(cells)
+            own = np.delete(cells, which, axis=0), np.delete(numbers, which)
+            split = [(kind, *own), (_TRIANGLE[kind], triangles, numbers[which])]
+        for each, rows, at in split:
+            if len(rows):
+                new = _BodyCells.of(each, rows, at)
+                found[each] = found[each].joined(new) if each in found else new
+    for kind in _TRIANGLE.keys() & found.keys():
+        if found.keys() == {kind, _TRIANGLE[kind]}:
+            quads = found.pop(kind)
+            points, halves = triangles_of(points, quads.cells)
+            place = np.concatenate([2 * quads.place, 2 * quads.place + 1])
+            new = _BodyCells(_TRIANGLE[kind], halves, np.tile(quads.numbers, 2), place)
+            found[new.kind] = found[new.kind].joined(new)
+    if len(found) > 1:
+        listed = ", ".join(sorted(found))
+        allowed = f"a body must have cells that are all straight or all quadratic, not {listed}"
+        raise ModelError("mesh", name, allowed)
+    (body,) = found.values()
+    return points, body
+
+
+def _check_plane(name: str, used: Array) -> None:
+    """Refuse a mesh that does not lie in the xy plane, to the rounding of its coordinates."""
+    span = np.ptp(used.reshape(-1, used.shape[-1]), axis=0)
+    flat = span <= ROUNDED * span.max()
+    if len(span) == 2 or flat[2]:
+        return
+    found = f"its z differ by {span[2]:g} mm"
+    if flat.any():
+        found = f"it lies in the {'yz' if flat[0] else 'xz'} plane; turn it in the mesher"
+    raise ModelError("mesh", name, f"must lie in the xy plane: {found}")
+
+
+_read = kept(read_mesh)
 
 
 def _exist(numbers: NDArray[np.int64], rows: NDArray[Any]) -> bool:

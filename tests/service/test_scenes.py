@@ -21,12 +21,41 @@ from studies.scenes.scene import read_scene
 from studies.views.summary import summary_of
 from tests.service.servers import Server
 from tests.studies.scenes.conftest import BLOCKS
+from tests.studies.scenes.test_formats import FORMS, ring
 
 pytestmark = pytest.mark.usefixtures("one_worker")
 
 SCENES = Path(__file__).parents[2] / "data/scenes"
 PIN, MESH = (SCENES / "pin.toml").read_bytes(), (SCENES / "pin.msh").read_bytes()
 ALLOWED = f"must be read within 60 s and {BYTES / 2**30:.3g} GiB of memory"
+RING = """
+name = "ring"
+summary = "a part of a ring"
+[parameters.push]
+default = 1.0
+range = [0.1, 9.0]
+description = "pressure"
+[materials.steel]
+youngs_modulus = 2e5
+poisson_ratio = 0.3
+[bodies.ring]
+material = "steel"
+mesh = "FILE"
+part = "PART"
+supports = { low = "xy" }
+[bodies.ring.boundaries]
+low = { of = ["outline"], y = [-0.1, 0.0] }
+inside = { of = ["outline"], x = [0.0, 0.98], y = [0.01, 0.3] }
+[[loads]]
+body = "ring"
+kind = "pressure"
+boundary = "inside"
+value = "$push"
+[[stages]]
+name = "pressed"
+increments = 1
+[results]
+"""
 SWEEP = {"clearance": [0.01, 0.02], "friction": [0.0]}
 
 
@@ -61,6 +90,21 @@ def test_a_table_of_values_is_posted_with_its_scene(service: Server) -> None:
     assert other != answer.json()["id"]
     wrong = post(service, strip, peened_csv=b"z,xx\n0,1\n").json()["errors"]
     assert [each["field"] for each in wrong] == ["loads[0].xx.file"]
+
+
+@pytest.mark.parametrize("form", ["inp", "med", "exodus", "vtu"])
+def test_mesh_files_of_other_formats_are_posted(service: Server, tmp_path: Path, form: str) -> None:
+    """A service reads every format that the command reads, and draws its mesh."""
+    name, write, kind, (core, *_) = FORMS[form]
+    write(ring(kind), tmp_path / name)
+    scene = RING.replace("FILE", name).replace("PART", core)
+    (tmp_path / "scene.toml").write_text(scene)
+    mesh = (tmp_path / name).read_bytes()
+    answer = post(service, scene.encode(), **{name.replace(".", "_"): mesh})
+    assert answer.status_code == 201, answer.text
+    assert answer.json()["id"] == read_scene(tmp_path / "scene.toml").id
+    drawn = service.client.get(f"/scenes/{answer.json()['id']}/draw.png")
+    assert drawn.headers["content-type"] == "image/png", drawn.text
 
 
 def test_a_browser_posts_a_scene_and_gets_the_form_of_its_studies(

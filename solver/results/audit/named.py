@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from solver.mesh.rounding import in_box
 from solver.model.rigid import Moved, RigidBody
 from solver.results.audit.compared import AREA, LEAST_STRAIN, LIMIT, MEASURED, Compared, some
 from solver.results.audit.links import linked
@@ -335,10 +336,8 @@ class NamedPlacesCheck:
             values = nodal if places is None else places.of(nodal)
             values = _part(values, part) if part else np.maximum(values, 0.0)
             X = fields.plain.part.X if X is None else X
-        inside = np.ones(X.shape[1], dtype=bool)
-        for at, span in zip(X, (number.x, number.y, number.z), strict=False):
-            if span is not None and number.line is None:
-                inside &= (at >= span[0]) & (at <= span[1])
+        spans = (number.x, number.y, number.z) if number.line is None else ()
+        inside = in_box(X, spans, float(np.ptp(X, axis=1).max()))
         return np.where(inside, values, np.nan), X
 
 

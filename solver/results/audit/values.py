@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.mesh.rounding import ROUNDED
 from solver.results.audit.plain import PlainBody
 from solver.tensors import SQRT2
 
@@ -252,8 +253,8 @@ class Located:
         part, X = plain.part, plain.in_plane(X)
         dofs, mapping, shape = part.basis.element_dofs, part.basis.mapping, part.basis.elem.lbasis
         corners = plain.in_plane(part.X)[:, dofs]
-        low, high = corners.min(axis=1), corners.max(axis=1)
-        slack = _SLACK * (high - low) + 1e-9
+        low, high, extent = corners.min(axis=1), corners.max(axis=1), np.ptp(corners, axis=1)
+        slack = _SLACK * extent + 1e-9
         low, high = low - slack, high + slack
         near = (X[0][:, None] >= low[0]) & (X[0][:, None] <= high[0])
         near &= (X[1][:, None] >= low[1]) & (X[1][:, None] <= high[1])
@@ -271,7 +272,11 @@ class Located:
         beyond = np.maximum(-at.min(axis=0), at.max(axis=0) - 1 if quad else at.sum(axis=0) - 1)
         least = np.full(X.shape[1], np.inf)
         np.minimum.at(least, place, beyond)
-        self.inside, self.outside = least <= _INSIDE, least > _OUTSIDE
+        rounded = ROUNDED * np.ptp(corners, axis=(1, 2)).max() / extent.min(axis=0)
+        self.inside = np.zeros(X.shape[1], dtype=bool)
+        self.inside[place[beyond <= np.maximum(_INSIDE, rounded[element])]] = True
+        self.outside = np.ones(X.shape[1], dtype=bool)
+        self.outside[place[beyond <= np.maximum(_OUTSIDE, 2 * rounded[element])]] = False
         best = np.flatnonzero((beyond == least[place]) & self.inside[place])
         _, first = np.unique(place[best], return_index=True)
         best = best[first]

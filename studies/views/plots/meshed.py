@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from solver.mesh.rounding import ROUNDED
 from solver.results.body_fields import BODY_FIELDS
 from solver.results.mesh_fields import NO_NODE, MeshFields
 from solver.results.quantities import QUANTITIES
@@ -98,12 +99,12 @@ def on_mesh(
     numbers, name = values.to_numpy(), component_name(values)
     faces = _there(fields.faces[0], moved)
     triangles, edges = _triangles(faces), _edges(faces)
-    if is_half(run) and (fields.X[0] >= -1e-9 * np.ptp(fields.X[0])).all():
+    if is_half(run) and (fields.X[0] > -ROUNDED * np.ptp(fields.X[0])).all():
         count, odd = X.shape[1], is_odd(name, AXES[0])
         X, whole = (np.hstack([each, each * [[-1.0], [1.0]]]) for each in (X, whole))
         numbers = np.concatenate([numbers, -numbers if odd else numbers])
         triangles = np.vstack([triangles, count + triangles])
-        kept = edges[(np.abs(fields.X[0][edges]) > 1e-9 * np.ptp(fields.X[0])).any(axis=1)]
+        kept = edges[(np.abs(fields.X[0][edges]) > ROUNDED * np.ptp(fields.X[0])).any(axis=1)]
         edges = np.vstack([kept, count + kept])
         if tensor is not None:
             tensor = np.hstack([tensor, tensor * [[1.0], [1.0], [1.0], [-1.0]]])

@@ -7,12 +7,14 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+from skfem import Basis
 
 from solver.errors import ModelError
 from solver.mesh.check import check_mesh
 from solver.mesh.elements import element_type
 from studies.scenes import scene
 from studies.scenes.description import Description
+from studies.scenes.formats import FORMATS
 from studies.scenes.meshdata import MeshData
 from studies.scenes.meshfile import OUTLINE, MeshFile
 from tests.studies.scenes.conftest import blocks
@@ -93,18 +95,6 @@ def test_points_that_are_not_there_or_none_are_refused(tmp_path: Path) -> None:
         written(tmp_path, mesh, "mesh.mesh").mesh(None)
 
 
-def test_sets_of_nodes_are_boundaries(tmp_path: Path) -> None:
-    mesh = two_squares(
-        point_sets={"above": np.array([3, 4, 5]), "corner": np.array([0])},
-        cell_sets={"left": [np.array([], dtype=int), np.array([0])]},
-    )
-    file = written(tmp_path, mesh, "mesh.inp")
-    assert set(file.mesh(None).boundaries) == {OUTLINE, "above"}
-    left = file.mesh("left")
-    (facet,) = left.boundaries["above"]
-    assert left.p[1, left.facets[:, facet]] == pytest.approx(1.0)
-
-
 @pytest.mark.parametrize("kind", ["quad", "quad8", "quad9", "triangle", "triangle6"])
 def test_all_kinds_of_cells_are_read(tmp_path: Path, kind: str) -> None:
     quads = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
@@ -144,8 +134,16 @@ def test_curved_sides_of_quad8_stay_curved(tmp_path: Path) -> None:
     ("points", "cells", "words"),
     [
         (SQUARE, [("line", [[0, 1]])], "must have cells"),
-        (SQUARE, [("triangle", [[0, 1, 4]]), ("quad", [[1, 2, 5, 4]])], "of one kind"),
-        (None, [("quad", [[0, 1, 4, 3]])], "lie in a plane"),
+        (
+            SQUARE,
+            [
+                ("line3", [[0, 2, 1]]),
+                ("quad8", [[0, 2, 5, 3, 1, 2, 4, 3]]),
+                ("triangle", [[0, 1, 4]]),
+            ],
+            "all straight or all quadratic, not quad8, triangle",
+        ),
+        (None, [("quad", [[0, 1, 4, 3]])], "lie in the xy plane: its z differ by 4 mm"),
     ],
 )
 def test_what_is_no_plane_mesh_is_refused(
@@ -159,7 +157,7 @@ def test_what_is_no_plane_mesh_is_refused(
 
 
 @pytest.mark.parametrize(
-    "name", ["mesh.msh", "mesh.vtu", "mesh.vtk", "mesh.inp", "mesh.what", "mesh"]
+    "name", [*(f"mesh{ending}" for ending in FORMATS), "mesh.what", "mesh.xdmf", "mesh"]
 )
 @pytest.mark.parametrize("data", [b"", b"nothing", bytes(range(256)) * 20])
 def test_a_file_that_is_no_mesh_is_refused(name: str, data: bytes) -> None:
@@ -172,6 +170,113 @@ def test_a_damaged_gmsh_file_is_refused() -> None:
     for cut in (100, 5000, len(data) // 2):
         with pytest.raises(ModelError, match=r"pin\.msh"):
             MeshFile("pin.msh", data[:cut]).mesh("pin")
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "told"),
+    [
+        ("a.msh", b"$MeshFormat\n5 0 8\n$EndMeshFormat\n", "Need mesh format in"),
+        ("a.mesh", b"MeshVersionFormatted 2\nVerticesOfAll\n", "Unknown keyword 'VerticesOfAll'"),
+        ("a.bdf", b"BEGIN BULK\nGRID,1,,0,0,0\nCQUADX,1,,1,2,3,4\n", "line 3: CQUADX is not read"),
+        (
+            "a.bdf",
+            b"GRID*                  1               7\n",
+            "line 1: coordinates must be in",
+        ),
+        ("a.vtu", b"<VTKFile", "ReadError; save it in another format, such as .msh"),
+        ("a.med", b"", "Truncated|not accessible|file signature"),
+        ("a.e", b"CDF", "NetCDF: Invalid argument"),
+        ("a.xdmf", b"", r"must end in one of \.msh, \.inp, \.med"),
+    ],
+)
+def test_the_reason_of_a_reader_is_in_the_error(name: str, data: bytes, told: str) -> None:
+    with pytest.raises(ModelError, match=told):
+        MeshFile(name, data).mesh(None)
+
+
+GROUPS = """$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$PhysicalNames
+3
+1 1 "side"
+2 1 "whole"
+2 2 "side"
+$EndPhysicalNames
+$Entities
+0 1 1 0
+1 0 0 0 1 0 0 1 -1 0
+1 0 0 0 1 1 0 2 1 2 0
+$EndEntities
+$Nodes
+1 4 1 4
+2 1 0 4
+1
+2
+3
+4
+0 0 0
+1 0 0
+1 1 0
+0 1 0
+$EndNodes
+$Elements
+2 2 1 2
+1 1 1 1
+1 1 2
+2 1 3 1
+2 1 2 3 4
+$EndElements
+"""
+
+
+def test_groups_of_gmsh_that_share_a_name_or_a_cell_or_run_backwards() -> None:
+    """The surface has two groups; the line, which runs backwards, has the name of one of them."""
+    mesh = MeshFile("a.msh", GROUPS.encode()).mesh("side")
+    assert {name: len(own) for name, own in mesh.subdomains.items()} == {"side": 1, "whole": 1}
+    assert mesh.p[1, mesh.facets[:, mesh.boundaries["side"]]] == pytest.approx(0.0)
+    some = GROUPS.replace("1 0 0 0 1 0 0 1 -1 0", "1 0 0 0 1 0 0 0 0")
+    with pytest.raises(ModelError, match=r"no physical group: save it with Mesh\.SaveAll = 0"):
+        MeshFile("a.msh", some.encode()).mesh("side")
+
+
+def test_cells_that_are_there_twice_are_one(tmp_path: Path) -> None:
+    """Format 2.2 of gmsh repeats a cell in each of its groups."""
+    quads = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
+    numbers = {"gmsh:physical": [np.array([1, 2]), np.array([3, 3])]}
+    mesh = meshio.Mesh(np.pad(SQUARE, ((0, 0), (0, 1))), [("quad", quads)] * 2, cell_data=numbers)
+    found = written(tmp_path, mesh, "mesh.vtu").mesh(None)
+    assert found.nelements == 2
+    assert {name: own.tolist() for name, own in found.subdomains.items()} == {
+        "1": [0], "2": [1], "3": [0, 1],
+    }  # fmt: skip
+    assert len(found.boundaries[OUTLINE]) == 6
+
+
+@pytest.mark.parametrize("quads", ["quad", "quad8", "quad9"])
+def test_a_body_of_quadrilaterals_with_some_triangles_is_one_of_triangles(
+    tmp_path: Path, quads: str
+) -> None:
+    """A curved quadrilateral keeps its sides; two triangles have its area."""
+    angle = np.radians([0, 0, 90, 90, 0, 45, 90, 45, 45])
+    radius = np.array([1, 2, 2, 1, 1.5, 2, 1.5, 1, 1.5])
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * angle], axis=1)
+    points = np.concatenate([points, [[1.5, -0.5, 0], [1.25, -0.25, 0], [1.75, -0.25, 0]]])
+    count = int(quads[4:] or 4)
+    triangle = [0, 9, 1, 10, 11, 4][: 3 if quads == "quad" else 6]
+    cells = [(quads, np.array([range(count)]))]
+    cells.append(("triangle" if quads == "quad" else "triangle6", np.array([triangle])))
+    numbers = {"gmsh:physical": [np.array([1]), np.array([2])]}
+    used = np.unique(np.concatenate([each.ravel() for _, each in cells]))
+    cells = [(kind, np.searchsorted(used, each)) for kind, each in cells]
+    mesh = written(tmp_path, meshio.Mesh(points[used], cells, cell_data=numbers)).mesh(None)
+    assert mesh.t.shape == (3, 3)
+    assert {name: len(own) for name, own in mesh.subdomains.items()} == {"1": 2, "2": 1}
+    check_mesh(mesh, "ring", element_type("tri6"))
+    straight = 1.5 + 0.25  # of the chords
+    bulge = 2 / 3 * (np.sqrt(2) * (1 - np.sqrt(0.5))) * (4 - 1)  # of parabolas over them
+    area = float(np.abs(Basis(mesh, mesh.elem(), intorder=6).dx).sum())
+    assert area == pytest.approx(straight + (bulge if count > 4 else 0), rel=1e-12)
 
 
 def test_an_unknown_part_is_refused_with_those_there_are() -> None:

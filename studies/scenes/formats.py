@@ -1,0 +1,279 @@
+"""The formats of mesh files: what each has of points, cells, and names of sets.
+
+Decks of Abaqus, MED and Exodus are read here, since meshio loses their sets; meshio reads the
+others.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import re
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.errors import ModelError
+from studies.scenes.abaqus import read_deck
+from studies.scenes.meshdata import MeshData
+from studies.scratch import scratch
+
+if TYPE_CHECKING:
+    import meshio
+
+_NUMBERS = ("gmsh:physical", "medit:ref", "nastran:ref")
+"""Cell data of meshio that hold the number of the set of each cell."""
+_MED = {
+    "PO1": "vertex", "SE2": "line", "SE3": "line3", "TR3": "triangle", "TR6": "triangle6",
+    "QU4": "quad", "QU8": "quad8", "QU9": "quad9",
+}  # fmt: skip
+_EXODUS = {
+    ("BAR", 2): "line", ("BEAM", 2): "line", ("TRUSS", 2): "line", ("EDGE", 2): "line",
+    ("BAR", 3): "line3", ("BEAM", 3): "line3", ("TRUSS", 3): "line3", ("EDGE", 3): "line3",
+    ("TRI", 3): "triangle", ("TRI", 6): "triangle6", ("QUAD", 4): "quad", ("QUAD", 8): "quad8",
+    ("QUAD", 9): "quad9", ("SHELL", 4): "quad", ("SHELL", 8): "quad8", ("SHELL", 9): "quad9",
+}  # fmt: skip
+_NASTRAN = ("CTRIA3", "CTRIA6", "CTRIAR", "CTRIAX6", "CQUAD4", "CQUAD8", "CQUADR", "CSHEAR")
+"""Plane elements of Nastran that are read."""
+
+
+def read_mesh(name: str, data: bytes) -> MeshData:
+    """Return the content of a mesh file.
+
+    Raises
+    ------
+    ModelError
+        if its format is not read, or with the reason why it cannot be read
+    """
+    reader = next((FORMATS[end] for end in FORMATS if name.lower().endswith(end)), None)
+    if reader is None:
+        raise ModelError("mesh", name, f"must end in one of {', '.join(FORMATS)}")
+    try:
+        with contextlib.redirect_stdout(None), contextlib.redirect_stderr(None):
+            return reader(data)  # meshio prints remarks
+    except MemoryError:
+        raise
+    except Exception as error:  # a damaged file may raise any
+        reason = str(error) or f"{type(error).__name__}; save it in another format, such as .msh"
+        if isinstance(error, LookupError | AssertionError):
+            reason = f"{type(error).__name__} {error}"
+        raise ModelError("mesh", name, f"cannot be read: {reason}") from None
+
+
+def load_readers() -> None:
+    """Import what reads files, so that copies of this process find it loaded."""
+    for library in ("h5py", "meshio", "netCDF4"):
+        importlib.import_module(library)
+
+
+def _abaqus(data: bytes) -> MeshData:
+    return read_deck(data.decode("utf-8-sig", errors="replace"))
+
+
+def _by_meshio(kind: str, data: bytes) -> meshio.Mesh:
+    """Return what a reader of meshio makes of a file; it can only read from a path."""
+    with scratch() as folder:
+        path = folder / "mesh"
+        path.write_bytes(data)
+        try:
+            return importlib.import_module(f"meshio.{kind}").read(str(path))
+        except Exception as error:
+            if not error.args or not isinstance(error.args[0], str):
+                raise
+            error.args = (error.args[0].replace(str(path), "the file"), *error.args[1:])
+            raise
+
+
+def _plain(kind: str, data: bytes) -> MeshData:
+    return _arrays(_by_meshio(kind, data), {})
+
+
+def _gmsh(data: bytes) -> MeshData:
+    """Return the mesh of a file of gmsh.
+
+    meshio knows groups by their names alone, but a line and a surface may share one, and a group
+    has the number of a line that runs backwards with a minus: each gets a name of its own here.
+    """
+    names: dict[tuple[int, int], str] = {}
+    head, found, rest = data.partition(b"$PhysicalNames")
+    section, _, rest = rest.partition(b"$EndPhysicalNames")
+    for dim, number, name in re.findall(r'(\d+)\s+(\d+)\s+"(.*)"', section.decode()):
+        names |= {(sign * int(number), int(dim)): name for sign in (1, -1)}
+    if found:
+        lines = [f'{dim} {number} "{number},{dim}"' for number, dim in names]
+        section = "\n".join(["", str(len(lines)), *lines, ""]).encode()
+        data = b"".join([head, found, section, b"$EndPhysicalNames", rest])
+    try:
+        return _arrays(_by_meshio("gmsh", data), names)
+    except ValueError as error:
+        if "gmsh:physical" not in str(error):
+            raise
+        reason = "some of its cells are in no physical group: save it with Mesh.SaveAll = 0"
+        raise ValueError(reason) from None
+
+
+def _nastran(data: bytes) -> MeshData:
+    """Return the mesh of bulk data, which may stand without the lines before and behind it."""
+    text = data.decode("utf-8", errors="replace").upper()
+    for line, row in enumerate(text.splitlines(), start=1):
+        word = row.partition(",")[0][:8].strip()
+        coordinates = (
+            row.split(",")[2:3] if "," in row else [row[24:40] if "*" in word else row[16:24]]
+        )
+        if word in ("INCLUDE", "GRDSET") or (
+            re.match("C(QUAD|TRI|TRAX|PLST|SHEAR)", word) and word not in _NASTRAN
+        ):
+            raise ValueError(f"line {line}: {word} is not read, but {', '.join(_NASTRAN)}")
+        if word in ("GRID", "GRID*") and "".join(coordinates).strip() not in ("", "0"):
+            raise ValueError(f"line {line}: coordinates must be in the global system")
+    begin, end = ("" if each in text else each for each in ("BEGIN BULK", "ENDDATA"))
+    return _plain("nastran", f"{begin}\n{text}\n{end}\n".encode())
+
+
+def _arrays(found: meshio.Mesh, names: Mapping[tuple[int, int], str]) -> MeshData:
+    """Return the arrays of a mesh; a set of cells without a name has its number for one."""
+    sets: dict[str, dict[int, NDArray[np.int64]]] = {}
+    for key, each in found.cell_sets.items():
+        if key.startswith("gmsh:"):
+            continue
+        number, _, dim = key.partition(",")
+        name = names[int(number), int(dim)] if names else key
+        for k, rows in enumerate(each):
+            if rows is not None and len(rows):
+                _add(sets, name, k, rows)
+    for key in set(_NUMBERS) & found.cell_data.keys():
+        for k, (block, numbers) in enumerate(zip(found.cells, found.cell_data[key], strict=True)):
+            for number in np.unique(numbers):
+                name = names.get((int(number), block.dim), str(number))
+                _add(sets, name, k, np.flatnonzero(numbers == number))
+    return MeshData(
+        points=np.asarray(found.points, dtype=float),
+        cells=[(block.type, np.asarray(block.data)) for block in found.cells],
+        sets=sets,
+        nodes={name: np.asarray(own, dtype=np.int64) for name, own in found.point_sets.items()},
+    )
+
+
+def _add(
+    sets: dict[str, dict[int, NDArray[np.int64]]], name: str, block: int, rows: NDArray[Any]
+) -> None:
+    own = sets.setdefault(name, {})
+    own[block] = np.union1d(own.get(block, rows), rows).astype(np.int64)
+
+
+def _med(data: bytes) -> MeshData:
+    """Return the mesh of a MED file; a family is what belongs to the same groups."""
+    import h5py
+
+    with h5py.File(io.BytesIO(data)) as file:
+        meshes = file["ENS_MAA"]
+        if len(meshes) != 1:
+            raise ValueError(f"must have one mesh, not {', '.join(meshes) or 'none'}")
+        ((name, mesh),) = meshes.items()
+        if "NOE" not in mesh:
+            if len(mesh) != 1:
+                raise ValueError(f"must have one step of {name}, not {len(mesh)}")
+            (mesh,) = mesh.values()
+        families = file.get(f"FAS/{name}", {})
+        place = mesh["NOE/COO"]
+        points = place[()].reshape((place.attrs["NBR"], -1), order="F")
+        made = MeshData(points, [], {}, {})
+        if "FAM" in mesh["NOE"]:
+            for group, rows in _groups(families.get("NOEUD", {}), mesh["NOE/FAM"][()]):
+                made.nodes[group] = np.union1d(made.nodes.get(group, rows), rows)
+        for k, (kind, own) in enumerate(mesh["MAI"].items()):
+            if kind in ("POG", "POG2"):
+                raise ValueError("polygons are not read: save them as triangles or quadrilaterals")
+            numbers = own["NOD"]
+            cells = numbers[()].reshape((numbers.attrs["NBR"], -1), order="F") - 1
+            made.cells.append((_MED.get(kind, kind), cells.astype(np.int64)))
+            if "FAM" in own:
+                for group, rows in _groups(families.get("ELEME", {}), own["FAM"][()]):
+                    _add(made.sets, group, k, rows)
+    return made
+
+
+def _groups(
+    families: Mapping[str, Any], own: NDArray[np.int64]
+) -> list[tuple[str, NDArray[np.int64]]]:
+    """Return the groups of families of MED, and what belongs to them."""
+    found = []
+    for family in families.values():
+        names = family["GRO/NOM"][()] if "GRO" in family else ()
+        rows = np.flatnonzero(own == family.attrs["NUM"])
+        for name in names if len(rows) else ():
+            found.append(
+                (bytes(np.array(name, dtype=np.uint8)).decode(errors="replace").strip("\0 "), rows)
+            )
+    return found
+
+
+def _exodus(data: bytes) -> MeshData:
+    """Return the mesh of an Exodus file, with its blocks, sets of nodes, and sets of sides."""
+    import netCDF4
+
+    with netCDF4.Dataset("mesh", memory=data) as file:
+        file.set_auto_mask(False)
+        own = {name: each for name, each in file.variables.items() if not name.startswith("vals")}
+        axes = [own[f"coor{axis}"][:] for axis in "xyz" if f"coor{axis}" in own]
+        made = MeshData(np.array(own["coord"][:] if "coord" in own else axes, float).T, [], {}, {})
+        shell = []
+        for k, name in _exodus_names(own, "eb", "connect"):
+            block = own[f"connect{k}"]
+            kind = re.sub(r"\d", "", block.elem_type.upper()).replace("TRIANGLE", "TRI")
+            shell.append("SHELL" in kind)
+            cells = block[:].astype(np.int64) - 1
+            kind = kind.replace("TRISHELL", "TRI")
+            _add(made.sets, name, len(made.cells), np.arange(len(cells)))
+            made.cells.append((_EXODUS.get((kind, cells.shape[1]), kind), cells))
+        for k, name in _exodus_names(own, "ns", "node_ns"):
+            made.nodes[name] = own[f"node_ns{k}"][:].astype(np.int64) - 1
+        first = np.cumsum([0, *(len(cells) for _, cells in made.cells)])
+        for k, name in _exodus_names(own, "ss", "elem_ss"):
+            element, side = (
+                own[f"{what}_ss{k}"][:].astype(np.int64) - 1 for what in ("elem", "side")
+            )
+            within = np.searchsorted(first, element, side="right") - 1
+            edges = []
+            for at in np.unique(within).tolist():
+                kind, cells = made.cells[at]
+                corners = {"t": 3, "q": 4}.get(kind[0], 0)
+                start = side[within == at] - 2 * shell[at]  # sides 1 and 2 of a shell are its faces
+                if not (corners and 0 <= start.min() <= start.max() < corners):
+                    raise ValueError(f"the set of sides {name} must have edges of plane elements")
+                rows = cells[element[within == at] - first[at]]
+                pairs = [rows[np.arange(len(rows)), each % corners] for each in (start, start + 1)]
+                edges.append(np.stack(pairs, axis=1))
+            _add(made.sets, name, len(made.cells), np.arange(len(element)))
+            made.cells.append(("line", np.concatenate([np.zeros((0, 2), np.int64), *edges])))
+    return made
+
+
+def _exodus_names(own: Mapping[str, Any], kind: str, data: str) -> list[tuple[int, str]]:
+    """Return the numbers of blocks or sets that are there, and their names, else their ids."""
+    ids = own[f"{kind}_prop1"][:].tolist() if f"{kind}_prop1" in own else []
+    names = own[f"{kind}_names"][:] if f"{kind}_names" in own else [[]] * len(ids)
+    found = []
+    for k, (number, name) in enumerate(zip(ids, names, strict=True), start=1):
+        if f"{data}{k}" in own:
+            found.append((k, b"".join(name).decode().strip("\0 ") or str(number)))
+    return found
+
+
+FORMATS: dict[str, Callable[[bytes], MeshData]] = {
+    ".msh": _gmsh,
+    ".inp": _abaqus,
+    ".med": _med,
+    ".e": _exodus,
+    ".exo": _exodus,
+    ".vtk": partial(_plain, "vtk"),
+    ".vtu": partial(_plain, "vtu"),
+    ".mesh": partial(_plain, "medit"),
+    ".bdf": _nastran,
+    ".nas": _nastran,
+}
+"""Ending of a mesh file -> its reader. None refers to other files."""
