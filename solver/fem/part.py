@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy  # loads spatial when it is used: few models look for places
 
+from solver.linear.schur import Eliminated
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy import sparse
@@ -120,6 +122,13 @@ class Part(ABC):
     def on_whole(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the nodal forces of the whole body for those of this part [N]."""
         return force
+
+    def begin(self, force: NDArray[np.float64]) -> Eliminated:
+        """Return nodal forces of the whole body on the unknowns of this part.
+
+        ``finish`` returns the displacements of the whole body for those of this part.
+        """
+        return Eliminated(force, lambda u: u)
 
     @property
     def volumes(self) -> NDArray[np.float64]:

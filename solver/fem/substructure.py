@@ -20,7 +20,7 @@ from solver.fem.loads import Superposed
 from solver.fem.operators import Dense, Fixed
 from solver.fem.part import Part
 from solver.fem.surface import Surface
-from solver.linear.schur import SchurComplement
+from solver.linear.schur import Eliminated, SchurComplement
 from solver.memory import remembered
 
 if TYPE_CHECKING:
@@ -44,9 +44,13 @@ class _CondensedBody:
         stiffness[np.ix_(at, at)] -= self._schur.taken
         self.stiffness = _without_motions(stiffness, part.rigid[kept])
 
+    def begin(self, force: NDArray[np.float64]) -> Eliminated:
+        """Eliminate the inner unknowns of forces (n,)."""
+        return self._schur.begin(force)
+
     def expand(self, u: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return all displacements (n,) from those kept, at the factors of the loads."""
-        return self._schur.begin(self._loads @ factors).finish(u)
+        return self.begin(self._loads @ factors).finish(u)
 
 
 def _without_motions(S: NDArray[np.float64], rigid: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -151,6 +155,12 @@ class Substructure(Part):
         whole = np.zeros(self.whole.n)
         whole[self._kept] = force[self.elastic]
         return whole
+
+    def begin(self, force: NDArray[np.float64]) -> Eliminated:
+        """See `Part.begin`."""
+        own, begun = np.zeros(self.n), self._condensed.begin(force)
+        own[self.elastic] = begun.condensed
+        return Eliminated(own, lambda u: begun.finish(u[self.elastic])[self.whole.copied])
 
     def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Return the whole body's displacements [mm]; those of a wheel in its hub's frame."""

@@ -231,7 +231,8 @@ class Solution:
         """
         after = self.stages.get("unloaded") if stage == "loaded" else None
         tally = self.tally
-        found = audit(self.system, self._at(stage), after, tally.dissipation, tally.lost)
+        every = self.stages.values()
+        found = audit(self.system, self._at(stage), after, tally.dissipation, tally.lost, every)
         own = self.system.model.doubts + untouched(self.system, self.stages.values())
         return replace(found, warnings=own + found.warnings)
 

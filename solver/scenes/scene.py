@@ -290,7 +290,8 @@ def by_increments(
         def check(outcome: Outcome = outcome) -> Audit:
             loaded, unloaded = outcome.points[view.loaded], outcome.points.get(view.unloaded)
             tally = outcome.tally
-            return audit(system, loaded, unloaded, tally.dissipation, tally.lost)
+            stages = outcome.points.values()
+            return audit(system, loaded, unloaded, tally.dissipation, tally.lost, stages)
 
         # in the rest of a run that failed, any pair could have come into contact
         notes = () if outcome.error else untouched(system, outcome.points.values())

@@ -80,6 +80,16 @@ def test_a_given_pressure_passes_where_it_begins_with_the_state_of_the_pass_befo
     assert "audit_slip" not in each.figures
     (told,) = audit_prism(track, PERFECT, found, found).violations
     assert told.startswith("audit_history")
+    assert not each.outside
+    state = found.after.state
+
+    def left(**changed: Any) -> tuple[str, ...]:
+        after = replace(found.after, state=replace(state, **changed))
+        return audit_prism(track, PERFECT, replace(found, after=after), None).outside
+
+    assert not left(accumulated=state.accumulated + 0.2), "of many passes, to and fro"
+    (outside,) = left(plastic_strain=100 * state.plastic_strain)
+    assert outside.startswith("equivalent plastic strain reaches ")
 
 
 # -- faults ---------------------------------------------------------------------------------------

@@ -97,6 +97,11 @@ _DECLARED = [
         "audit_plastic_strain", "largest equivalent plastic strain away from singular points"
     ),
     declare(
+        "audit_large_strain",
+        "share of stress or of plastic strain that small-strain theory leaves out, largest at the "
+        "stages",
+    ),
+    declare(
         "audit_small_sliding",
         "ratio of the motion along the partner that small sliding leaves out to the side of an "
         "element",

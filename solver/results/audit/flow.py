@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.materials.state import Response
+from solver.results.audit.large_strain import of_material
+from solver.results.audit.theory import equivalent
 from solver.steady.flow import LEAST
 
 if TYPE_CHECKING:
@@ -15,6 +17,7 @@ if TYPE_CHECKING:
 
     from solver.materials.law import Law
     from solver.materials.state import PlasticState
+    from solver.results.audit.theory import Neglected
     from solver.steady import Pass
 
     Array = NDArray[np.float64]
@@ -72,6 +75,23 @@ class AuditedFlow:
         nothing = np.zeros((n, n, 0)), np.zeros(0, dtype=bool)
         response = Response(self._stress, nothing[0], self._after, nothing[1])
         return float(self._material.dissipation(self._before, response).min())
+
+    def large_strain(self, body: str, volume: Array) -> Neglected:
+        """Return what small-strain theory leaves out of the stress of a body in the window.
+
+        Parameters
+        ----------
+        volume : (n_rows, n_columns) volume of the points [mm3]
+        """
+        elasticity = self._material.elasticity
+        return of_material(body, elasticity, self._stress, self._strain, volume.ravel())
+
+    def strained(self) -> Array:
+        """Return the largest equivalent plastic strain of each row (n_rows,), in and behind it."""
+        within, behind = (
+            equivalent(state) for state in (self._found.states, self._found.after.state)
+        )
+        return np.maximum(within.max(axis=1), behind)
 
     def inflow(self) -> float:
         """Return the plastic strain added in the first column, over that of the pass."""

@@ -102,7 +102,7 @@ class PlainBody:
         kind = element_type(self.body.element)
         return kind.mean_dilatation and self.body.kinematics != "plane_stress"
 
-    def _level(self, field: Array) -> Array:
+    def level(self, field: Array) -> Array:
         """Return a tensor field, for B-bar elements with its trace averaged over each element."""
         if not self._averaged:
             return field
@@ -112,17 +112,22 @@ class PlainBody:
         out[:3] += (mean[:, None] - trace) / 3
         return out
 
+    def gradient(self, u: Array) -> tuple[Array, Array]:
+        """Return the gradient of displacements (n,) [mm] at the points, and their hoop strain.
+
+        They are (2, 2, n_elements, n_points), direction of displacement first, and (n_elements,
+        n_points).
+        """
+        at = u.reshape(-1, 2)[self._nodes]  # (n_element_nodes, n_elements, 2)
+        gradient = np.einsum("ijep,iek->kjep", self._gradients, at)
+        if self.body.kinematics == "axisymmetric":
+            return gradient, np.einsum("iep,ie->ep", self._round, at[..., 0])
+        return gradient, np.zeros(gradient.shape[2:])
+
     def strain(self, u: Array) -> Array:
         """Return Mandel strain (4, n_elements, n_points) for displacements (n,) [mm]."""
-        at = u.reshape(-1, 2)[self._nodes]  # (n_element_nodes, n_elements, 2)
-        xx = np.einsum("iep,ie->ep", self._gradients[:, 0], at[..., 0])
-        yy = np.einsum("iep,ie->ep", self._gradients[:, 1], at[..., 1])
-        xy = np.einsum("iep,ie->ep", self._gradients[:, 1], at[..., 0])
-        xy += np.einsum("iep,ie->ep", self._gradients[:, 0], at[..., 1])
-        zz = np.zeros_like(xx)
-        if self.body.kinematics == "axisymmetric":
-            zz = np.einsum("iep,ie->ep", self._round, at[..., 0])
-        return self._level(np.array([xx, yy, zz, xy / SQRT2]))
+        ((xx, xy), (yx, yy)), hoop = self.gradient(u)
+        return self.level(np.array([xx, yy, hoop, (xy + yx) / SQRT2]))
 
     @cached_property
     def points(self) -> Array:
@@ -233,18 +238,24 @@ class PlainBody:
 
     def forces(self, stress: Array) -> Array:
         """Return the nodal forces (n_nodes, 2) that balance a Mandel stress (4, n_points) [N]."""
-        tensor = to_tensor(stress).reshape(4, *self.volume.shape)
-        weighted = self._level(tensor) * self.volume
-        G = self._gradients
-        x = np.einsum("iep,ep->ie", G[:, 0], weighted[0])
-        x += np.einsum("iep,ep->ie", G[:, 1], weighted[3])
-        y = np.einsum("iep,ep->ie", G[:, 1], weighted[1])
-        y += np.einsum("iep,ep->ie", G[:, 0], weighted[3])
+        xx, yy, zz, xy = self.level(to_tensor(stress).reshape(4, *self.volume.shape))
+        return self.nominal_forces(np.array([[xx, xy], [xy, yy]]), zz)
+
+    def nominal_forces(self, stress: Array, hoop: Array) -> Array:
+        """Return the nodal forces (n_nodes, 2) that balance a nominal stress [N].
+
+        Parameters
+        ----------
+        stress : (2, 2, n_elements, n_points) force on planes before loading, direction of the force
+            first [MPa]
+        hoop : (n_elements, n_points) [MPa]
+        """
+        each = np.einsum("ijep,kjep->kie", self._gradients, stress * self.volume)
         if self.body.kinematics == "axisymmetric":
-            x += np.einsum("iep,ep->ie", self._round, weighted[2])
+            each[0] += np.einsum("iep,ep->ie", self._round, hoop * self.volume)
         count = self.part.X.shape[1]
         nodes = self._nodes.ravel()
-        return np.stack([np.bincount(nodes, f.ravel(), count) for f in (x, y)], axis=1)
+        return np.stack([np.bincount(nodes, f.ravel(), count) for f in each], axis=1)
 
     def applied(self, time: float) -> Array:
         """Return the resultant [N] of the loads at a time and its first moments [N mm] (3, 2).

@@ -73,7 +73,8 @@ def audit_prism(
     residual = law.stiffness(6) @ (after.strain - after.plastic_strain).T
     flow = AuditedFlow(law, found, before.strain)
     rim = (found.accumulated - before.accumulated[:, None])[track.rim]
-    strain = largest_strain([("section", track.points, after.accumulated)])
+    strain = largest_strain([("section", track.points, flow.strained())])
+    neglected = strain.neglected, flow.large_strain("section", track.weights)
     figures = {
         "audit_residual": plain.unbalanced(waves) / patch.force,
         "audit_reactions": max(
@@ -98,7 +99,8 @@ def audit_prism(
         "audit_steadiness": stiff * max(unsteady, unsteady_behind) / law.yield_stress,
         "audit_length": _far(track, law, plain.resultants(waves.pulled)) / law.yield_stress,
         "audit_initial_stress": track.initial.change / law.yield_stress if track.initial else 0.0,
-        "audit_plastic_strain": strain.value,
+        "audit_plastic_strain": largest(after.accumulated),
+        "audit_large_strain": max(each.share for each in neglected),
         **patch.figures,
     }  # fmt: skip
     limits = limits_at(patch.force) | _LIMITS
@@ -109,7 +111,7 @@ def audit_prism(
         figures,
         violations=broken(figures, limits, law.yield_stress),
         warnings=warnings(figures),
-        outside=strain.outside,
+        outside=sum((each.outside for each in neglected), ()),
     )
 
 

@@ -15,10 +15,11 @@ from solver.results.audit.bodies import AuditedBody
 from solver.results.audit.contact_error import contact_error
 from solver.results.audit.figures import LIMITS
 from solver.results.audit.forces import action_reaction, imbalance, left_on, reactions
+from solver.results.audit.large_strain import large_strain
 from solver.results.audit.links import least_energy, links_error, turned
 from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.plain import PlainBody
-from solver.results.audit.theory import strain_of
+from solver.results.audit.theory import accumulated_strain, plastic_strain
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -80,10 +81,12 @@ def audit(
     unloaded: Converged | None,
     least_dissipation: float,
     lost: float = 0.0,
+    stages: Iterable[Converged] = (),
 ) -> Audit:
     """Check one run: its state under load and, if there is one, that after unloading.
 
     ``least_dissipation`` [MPa] and ``lost`` are the extremes over all its increments, see `Tally`.
+    Strain is judged at the end of all ``stages``.
     """
     states = (loaded, unloaded or loaded)
     plain = [PlainBody(system.full(body.name)) for body in system.model.bodies]
@@ -115,8 +118,10 @@ def audit(
     figures |= _strength(system, loaded)
     figures |= _discretisation(system, states, loaded.energy.scale)
     figures["audit_error_contact"] = contact_error(system, loaded)
-    strain = strain_of(system, states[1])
-    figures["audit_plastic_strain"] = strain.value
+    every = list({id(each): each for each in (*states, *stages)}.values())
+    neglected = plastic_strain(system, every).neglected, large_strain(system, plain, every)
+    figures["audit_plastic_strain"] = accumulated_strain(system, states[1])
+    figures["audit_large_strain"] = _largest(*(each.share for each in neglected))
     figures["audit_small_sliding"] = max(
         (p.left_out.sides for p in pairs if p.left_out), default=0.0
     )
@@ -124,7 +129,8 @@ def audit(
         figures,
         violations=_violations(system, figures, loaded, pairs) + _severed([*bodies, *released]),
         warnings=sum((pair.warnings for pair in pairs), warnings(figures)),
-        outside=sum((pair.outside for pair in pairs), strain.outside) + turned(system, loaded),
+        outside=sum((each.outside for each in neglected), ())
+        + sum((pair.outside for pair in pairs), turned(system, loaded)),
     )
 
 

@@ -12,7 +12,7 @@ from solver.results.audit.plain import PlainBody, load_factor
 from solver.results.audit.recomputed import Acting
 from solver.results.audit.report import Audit, broken, estimated_error, limits_at, warnings
 from solver.results.audit.sources import between, hertz
-from solver.results.audit.theory import Strained, largest_strain
+from solver.results.audit.theory import Neglected, equivalent, largest_strain
 from solver.results.audit.values import PassFields
 from solver.steady import RollingContact
 from solver.steady.fields import of_layers, under_load
@@ -53,7 +53,7 @@ def audit_pass(
     lacking = plain.forces(stress) - load
     level = float(np.abs(load).sum(axis=0).max()) or 1.0
     flow = AuditedFlow(material, found, found.before.strain(track.elasticity))
-    strain = _strain(track, found)
+    neglected = _neglected(track, found, flow)
     figures = {
         "audit_residual": float(np.linalg.norm(lacking[~held])) / level,
         "audit_reactions": largest(abs((load + np.where(held, lacking, 0)).sum(axis=0))) / level,
@@ -70,7 +70,8 @@ def audit_pass(
         "audit_contact_after_unloading": float(np.linalg.norm(plain.forces(residual)[~held])),
         "audit_error_loaded": estimated_error([(track.part, stress)]),
         "audit_error_residual": estimated_error([(track.part, residual)]),
-        "audit_plastic_strain": strain.value,
+        "audit_plastic_strain": largest(found.after.whole.accumulated),
+        "audit_large_strain": max(each.share for each in neglected),
         **_of_contact(material, found),
     }
     limits = limits_at(level, travelling=True) | _LIMITS
@@ -79,15 +80,17 @@ def audit_pass(
         figures,
         violations=broken(figures, limits, material.yield_stress),
         warnings=warnings(figures),
-        outside=strain.outside,
+        outside=sum((each.outside for each in neglected), ()),
     )
 
 
-def _strain(track: Track, found: Pass[Layers]) -> Strained:
-    """Return the largest plastic strain behind the pass, which does not depend on x."""
-    layers = found.after.whole
-    places = np.stack([np.zeros_like(layers.depth), -layers.depth])
-    return largest_strain([(track.part.body.name, places, layers.accumulated)])
+def _neglected(track: Track, found: Pass[Layers], flow: AuditedFlow) -> tuple[Neglected, Neglected]:
+    """Return what small-strain theory leaves out of strain and stress, in the window and behind."""
+    depth, surface = found.after.whole.depth, (found.surface, found.after.top.state)
+    top, name = max(float(equivalent(state).max()) for state in surface), track.part.body.name
+    places = np.stack([np.zeros_like(depth), -depth])
+    strain = largest_strain([(name, places, np.append(top, flow.strained()))])
+    return strain.neglected, flow.large_strain(name, track.weights)
 
 
 def _released(track: Track, material: Law, found: Pass[Layers]) -> float:

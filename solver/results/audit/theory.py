@@ -1,4 +1,4 @@
-"""Where small-strain theory ends: the largest plastic strain away from singular points."""
+"""Where small-strain theory ends: what it leaves out, and the plastic strain of bodies."""
 
 from __future__ import annotations
 
@@ -11,15 +11,27 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from solver.contact.state import Converged
+    from solver.contact.state import Converged, State
     from solver.contact.system import System
+    from solver.materials.state import PlasticState
     from solver.model.singular import SingularPoint
 
     Array = NDArray[np.float64]
 
-LARGE_STRAIN = 0.10
-"""Largest equivalent plastic strain for small-strain theory. At it engineering and logarithmic
-strain, which agree for small strain, differ by 5 %."""
+LARGE = 0.05
+"""Largest share that small-strain theory may leave out."""
+
+
+class Neglected(NamedTuple):
+    """The share of stress or strain that small-strain theory leaves out, and where."""
+
+    share: float = 0.0
+    text: str = ""
+
+    @property
+    def outside(self) -> tuple[str, ...]:
+        """A message if it is too much."""
+        return () if self.share <= LARGE else (self.text,)
 
 
 class Strained(NamedTuple):
@@ -31,15 +43,22 @@ class Strained(NamedTuple):
     y: float = np.nan
 
     @property
-    def outside(self) -> tuple[str, ...]:
-        """A message if the strain is outside small-strain theory."""
-        if self.value <= LARGE_STRAIN:
-            return ()
-        return (
+    def neglected(self) -> Neglected:
+        """Half of the strain: the share by which engineering and logarithmic strain differ."""
+        return Neglected(
+            self.value / 2,
             f"equivalent plastic strain reaches {self.value:.0%} in {self.body} at "
             f"({self.x:z.4g}, {self.y:z.4g}): small-strain theory does not hold there, reduce the "
             "load",
         )
+
+
+def equivalent(state: PlasticState) -> Array:
+    """Return the equivalent (...) of the plastic strain tensor, sqrt(2/3) times its norm.
+
+    The accumulated plastic strain grows in every cycle, also where strain stays small.
+    """
+    return np.asarray(np.sqrt(2 / 3) * np.linalg.norm(state.plastic_strain, axis=0))
 
 
 def largest_strain(
@@ -62,12 +81,24 @@ def largest_strain(
     return most
 
 
-def strain_of(system: System, converged: Converged) -> Strained:
-    """Return the largest strain in the bodies of a system that may yield."""
-    plastic = converged.state.plastic
-    bodies = [
-        (part.body.name, system.positions(part.body.name), plastic[number].accumulated)
+def accumulated_strain(system: System, converged: Converged) -> float:
+    """Return the largest accumulated plastic strain."""
+    each = _yielding(system, converged.state)
+    bodies = [(name, X, plastic.accumulated) for name, X, plastic in each]
+    return largest_strain(bodies, system.model.singular).value
+
+
+def plastic_strain(system: System, states: Iterable[Converged]) -> Strained:
+    """Return the largest equivalent of the plastic strain tensor in some states."""
+    each = (body for converged in states for body in _yielding(system, converged.state))
+    bodies = ((name, X, equivalent(plastic)) for name, X, plastic in each)
+    return largest_strain(bodies, system.model.singular)
+
+
+def _yielding(system: System, state: State) -> list[tuple[str, Array, PlasticState]]:
+    """Return name, positions (2, n) [mm] and internal variables of the bodies that may yield."""
+    return [
+        (part.body.name, system.positions(part.body.name), state.plastic[number])
         for number, part in enumerate(system.parts)
         if not part.body.material.elastic
     ]
-    return largest_strain(bodies, system.model.singular)
