@@ -12,7 +12,10 @@ from typing import Any
 
 from service.guarded import Guarded
 from service.settings import Settings
+from solver.scenes import Scene
 from studies import Bounds, Estimate, Store, Study, estimate
+from studies.definition.extending import EXTENDS
+from studies.scenes.registry import scene_named
 
 WAITING = 100
 """Number of studies that may wait to be checked."""
@@ -67,9 +70,13 @@ class Examiner:
 def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:
     """Return a checked study with its run ids and its cost; called in a separate process."""
     store = Store(directory)
-    study = Study.known(content, lambda name: store.scene(store.scene_id(name)), store.definition)
+
+    def find(name: str) -> Scene | None:
+        return store.scene(store.scene_id(name))
+
+    if EXTENDS not in content:
+        bounds.check_count(content, scene_named(content.get("scene"), find), store)
+    study = Study.known(content, find, store.definition)
     bounds.check_size(study)
-    runs = list(study.checked().run_ids())
-    cost = estimate(study, store)
-    bounds.check(cost)
-    return Examined(study, runs, cost)
+    cost = estimate(study.checked(), store, bounds)
+    return Examined(study, list(study.run_ids()), cost)

@@ -35,6 +35,7 @@ from service.maps import Pictures
 from service.settings import Settings
 from studies import Store, StoreFull, Study, StudyError
 from studies.errors import Unusable
+from tests.counted import counted
 from tests.service.servers import COARSE_PUNCH, Server, fake_study
 from tests.service.test_errors import problem
 
@@ -372,3 +373,29 @@ def test_a_study_larger_than_the_free_disk_or_the_default_limits_is_refused(
         bounds.check(replace(found, cpu_seconds=(1.0, 61_000.0, 1e9)))
     with pytest.raises(StudyError, match=r"bytes = 198000000000: at most 5e\+10: use fewer runs"):
         bounds.check(replace(found, bytes=198_000_000_000))
+
+
+MANY = {"start": 0.1, "stop": 0.5, "num": 2000}
+SAMPLE = {"method": "sobol", "num": 99_999, "ranges": {"friction": [0.0, 0.5]}}
+
+
+@pytest.mark.parametrize(
+    ("content", "allowed", "most"),
+    [
+        ({"sample": SAMPLE}, r"estimate\.bytes = 197998020000: at most 5e\+10", 10_000),
+        ({"sweep": {"a": SAMPLE, "load_ratio": [0.2, 0.3]}}, "at most 100000 runs", 10_000),
+        ({"sweep": {"friction": MANY}}, r"estimate\.cpu_seconds = 100: at most 100", 1_300_000),
+    ],
+    ids=["bytes", "axes", "time"],
+)
+def test_a_study_too_large_is_refused_before_its_runs_are_made(
+    tmp_path: Path, content: dict[str, Any], allowed: str, most: int
+) -> None:
+    """All 2000 paths would take 1.6 million calls, those up to the bound take a million."""
+    bounds = Settings(data=tmp_path, max_cpu_seconds=100.0).bounds
+    study = {"name": "a", "scene": "punch", "parameters": COARSE_PUNCH}
+    with contextlib.suppress(StudyError):
+        examined(study | {"sweep": {"friction": [0.0, 0.1]}}, tmp_path, bounds)  # loads once
+    with counted() as calls, pytest.raises(StudyError, match=allowed):
+        examined(study | content, tmp_path, bounds)
+    assert calls < most
