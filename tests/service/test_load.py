@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -33,11 +32,11 @@ from service.examiner import examined
 from service.jobs import Jobs
 from service.maps import Pictures
 from service.settings import Settings
+from service.turns import Share, Turn, Turns
 from studies import Store, StoreFull, Study, StudyError
 from studies.errors import Unusable
 from tests.counted import counted
 from tests.service.servers import COARSE_PUNCH, Server, fake_study
-from tests.service.test_errors import problem
 
 CONNECTIONS = 120
 SECONDS = 1.0
@@ -59,7 +58,6 @@ def strict(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         "RESIDUA_CONNECTIONS": str(CONNECTIONS),
         "RESIDUA_ARRIVAL_SECONDS": str(SECONDS),
         "RESIDUA_ANSWER_SECONDS": str(SECONDS),
-        "RESIDUA_MAP_QUEUE": "3",
         "RESIDUA_POLL_SECONDS": "1",
     }
     server = Server(tmp_path_factory.mktemp("load"), settings=limits)
@@ -192,18 +190,16 @@ def test_a_long_answer_and_a_quiet_client_are_no_offence(strict: Server) -> None
     assert strict.client.get("/health").status_code == 200
 
 
-def test_health_does_not_wait_for_pictures_and_too_many_are_refused(
-    strict: Server, study: dict[str, Any]
-) -> None:
+def test_health_does_not_wait_for_pictures(strict: Server, study: dict[str, Any]) -> None:
     url = f"/runs/{study['runs'][0]['id']}/map.png"
     # one thread of httpx may close an idle connection that another has just taken: none is kept
     once = {"connection": "close"}
 
     def draw(zoom: int) -> httpx.Response:
-        return strict.client.get(url, params={"zoom": zoom}, headers=once, timeout=60.0)
+        return strict.client.get(url, params={"zoom": zoom}, headers=once, timeout=120.0)
 
-    with ThreadPoolExecutor(80) as pool:
-        asked = [pool.submit(draw, zoom) for zoom in range(1, 81)]
+    with ThreadPoolExecutor(8) as pool:
+        asked = [pool.submit(draw, zoom) for zoom in range(1, 9)]
         waited = []
         while not all(each.done() for each in asked):
             start = time.monotonic()
@@ -212,51 +208,33 @@ def test_health_does_not_wait_for_pictures_and_too_many_are_refused(
             time.sleep(0.05)
         answers = [each.result() for each in asked]
     assert max(waited) < 5.0
-    counts = Counter(answer.status_code for answer in answers)
-    assert set(counts) == {200, 503} and counts[200] >= 4
-    for answer in answers:
-        if answer.status_code == 503:
-            problem(answer, 503)
-            assert int(answer.headers["retry-after"]) > 0
+    assert {answer.status_code for answer in answers} == {200}
 
 
-class Drawer:
-    """Stands in for what draws: counts, and waits until it may go on."""
+def test_a_picture_is_drawn_once_for_who_asks_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[int] = []
 
-    def __init__(self, size: int) -> None:
-        self.size = size
-        self.drawn: list[int] = []
-        self.go = threading.Event()
-
-    def __call__(self, zoom: int) -> bytes:
-        self.go.wait(10.0)
-        self.drawn.append(zoom)
-        return bytes(self.size)
-
-
-def test_a_picture_is_drawn_once_for_all_who_ask() -> None:
-    drawer = Drawer(size=10)
+    async def apart(self: Turn, draw: object, zoom: int, **limits: object) -> bytes:
+        await asyncio.sleep(0.0)
+        drawn.append(zoom)
+        return bytes(10)
 
     async def ask() -> None:
-        pictures = Pictures(queue=2, memory=25)
+        pictures, share = Pictures(memory=25), Share(Turns(2), "anna")
 
-        def get(zoom: int) -> asyncio.Task[bytes]:
-            draw = partial(pictures.alone, drawer, zoom)
-            return asyncio.create_task(pictures.get(str(zoom), draw))
+        async def get(zoom: int) -> bytes:
+            return await pictures.get(str(zoom), share, bytes, zoom, name="a")
 
-        tasks = [get(zoom) for zoom in (1, 2, 3, 1, 2, 3)]
-        await asyncio.sleep(0.01)
-        with pytest.raises(Busy):
-            await get(4)
-        drawer.go.set()
-        await asyncio.gather(*tasks)
-        assert sorted(drawer.drawn) == [1, 2, 3]
+        await asyncio.gather(*map(get, (1, 2, 1, 2, 3)))
+        assert drawn == [1, 2, 3]
         assert list(pictures.kept) == ["2", "3"], "the bytes are bounded"
         await asyncio.gather(get(2), get(3))
-        assert len(drawer.drawn) == 3
+        assert len(drawn) == 3
         await asyncio.gather(get(1), get(3))
-        assert len(drawer.drawn) == 4 and not pictures.underway
+        assert len(drawn) == 4
+        assert await Pictures(memory=0).get("1", share, bytes, 1, name="a") == bytes(10)
 
+    monkeypatch.setattr(Turn, "apart", apart)
     asyncio.run(ask())
 
 
