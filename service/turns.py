@@ -11,6 +11,7 @@ answers other requests.
 
 from __future__ import annotations
 
+import asyncio
 import copyreg
 import os
 import pickle
@@ -24,18 +25,21 @@ from dataclasses import dataclass
 from io import BytesIO
 from math import ceil, inf
 from pathlib import Path
+from threading import Lock
 from typing import Any, TypeVar, cast
 from weakref import WeakValueDictionary
 
-from anyio import BrokenWorkerProcess, CapacityLimiter, Lock, fail_after, to_process, to_thread
+from anyio import BrokenWorkerProcess, CapacityLimiter, fail_after, to_process, to_thread
 from threadpoolctl import threadpool_limits
 
 from service.errors import Busy, TooMany
 from studies import StudyError
 
-READING, COMPUTING = 1, 2
-"""Number of calls at a time. Files are read one at a time: the netCDF library ends the process if
-two threads do it."""
+READING, COMPUTING = 2, 2
+"""Number of calls at a time."""
+
+FILES = Lock()
+"""Held while a file is read: the netCDF library ends the process if two threads do it."""
 
 WAITING = 200
 """Number of calls of a caller that may wait."""
@@ -90,7 +94,7 @@ class Turns:
 
     def __init__(self, slots: int, seconds: float | None = None) -> None:
         self.slots, self.seconds = CapacityLimiter(slots), seconds
-        self.own: WeakValueDictionary[str, Lock] = WeakValueDictionary()
+        self.own: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
         self.waiting = Counter[str]()
         self.even: dict[str, float] = {}
 
@@ -109,7 +113,7 @@ class Turns:
         if self.waiting[caller] >= WAITING:
             raise TooMany(f"{WAITING} of your requests wait already: ask later")
         self.waiting[caller] += 1
-        own = self.own.setdefault(caller, Lock())
+        own = self.own.setdefault(caller, asyncio.Lock())
         try:
             async with own, self.slots:
                 turn = Turn(self.left(caller))
@@ -228,6 +232,15 @@ class Share:
         """Return what `Turn.here` does, in the caller's turn."""
         async with self.turns.turn(self.caller) as turn:
             return await turn.here(function, *given)
+
+    async def read(self, function: Callable[..., Found], *given: object) -> Found:
+        """Return what a function returns that opens files, called while no other one does."""
+
+        def alone() -> Found:
+            with FILES:
+                return function(*given)
+
+        return await self.here(alone)
 
     async def apart(self, function: Callable[..., Found], *given: object, **limits: Any) -> Found:
         """Return what `Turn.apart` does, in the caller's turn."""

@@ -23,7 +23,6 @@ from service import overview
 from service.datasets import Datasets
 from service.dependencies import (
     TheCaller,
-    TheComputing,
     TheDatasets,
     TheDetails,
     TheJobs,
@@ -139,15 +138,14 @@ async def study_page(
     tables: TheTables,
     datasets: TheDatasets,
     reading: TheReading,
-    computing: TheComputing,
 ) -> Response:
     """Show a study: what it found, numbers over its sweep, one of its runs, a part of its table."""
     study = json.loads(await details.get(study_id, Window(limit=1)))
     found = None
     if overview.chooses(study):
         with suppress(Busy, NotFound):  # it is there at the end
-            found = await reading.here(_found, tables.jobs.get(study_id), datasets)
-    table = await tables.get(study_id, computing)
+            found = await reading.read(_found, tables.jobs.get(study_id), datasets)
+    table = await tables.get(study_id, reading)
     return await run_in_threadpool(_study, request, study, tables.store, table, found)
 
 
@@ -237,7 +235,7 @@ def _cell(column: Any, at: int) -> str:
 @router.get("/runs/{run_id}")
 async def run_page(run: TheRun, request: Request, store: TheStore, reading: TheReading) -> Response:
     """Show a run: its maps and lines, its numbers, its audit."""
-    drawn = await reading.here(outlined, store.run_path(run["id"]))
+    drawn = await reading.read(outlined, store.run_path(run["id"]))
     return await run_in_threadpool(_run, request, run, store, drawn)
 
 

@@ -15,7 +15,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 import solver
-from service.dependencies import TheComputing, TheReading, TheRun, TheStore, TheTables
+from service.dependencies import TheReading, TheRun, TheStore, TheTables
 from service.errors import CONTENT, REFUSED
 from service.files import UNCHANGED, tagged, unchanged
 from service.octets import MEDIA_TYPE, octets
@@ -59,7 +59,7 @@ async def table(
     study_id: ContentId,
     which: Annotated[TableFilter, Query()],
     tables: TheTables,
-    computing: TheComputing,
+    reading: TheReading,
     request: Request,
 ) -> Response:
     """Return a line for each run: its place in the sweep, its status, its numbers.
@@ -71,7 +71,7 @@ async def table(
     ending = request.scope["path"].rpartition(".")[2]
     if ending == "parquet" and find_spec("pyarrow") is None:
         raise HTTPException(HTTPStatus.NOT_ACCEPTABLE, MISSING)
-    found = await tables.get(study_id, computing)
+    found = await tables.get(study_id, reading)
     at = await run_in_threadpool(found.chosen, which.sort, which.selection)
     names = dict.fromkeys(which.columns.split(",") if which.columns else found.columns)
     form, columns = FORMS[ending], [found.column(name) for name in names]
@@ -84,7 +84,7 @@ async def numbers(
     study_id: ContentId,
     which: Annotated[NumbersFilter, Query()],
     tables: TheTables,
-    computing: TheComputing,
+    reading: TheReading,
 ) -> Response:
     """Return columns of the table as octets, in the order of the sweep; NaN is no value.
 
@@ -92,7 +92,7 @@ async def numbers(
     numbers are little endian. A text is a number, whose word is in `words`. Beside `name`, every
     column is a query, as of the table; `at` has the positions of the runs that meet them.
     """
-    found = await tables.get(study_id, computing)
+    found = await tables.get(study_id, reading)
     content = await run_in_threadpool(_numbers, found, which)
     return Response(content, media_type=MEDIA_TYPE)
 
@@ -117,13 +117,13 @@ def _numbers(found: RunTable, which: NumbersFilter) -> bytes:
 
 @router.get("/studies/{study_id}/audit", tags=["studies"])
 async def tell_audit(
-    study_id: ContentId, tables: TheTables, computing: TheComputing
+    study_id: ContentId, tables: TheTables, reading: TheReading
 ) -> list[AuditFigure]:
     """Return the largest value of each figure of the audit, the nearest to its limit first.
 
     Figures whose limit depends on the run are left out.
     """
-    return await run_in_threadpool(_audit, await tables.get(study_id, computing))
+    return await run_in_threadpool(_audit, await tables.get(study_id, reading))
 
 
 def _audit(table: RunTable) -> list[AuditFigure]:
@@ -147,7 +147,7 @@ async def fields(
     run: TheRun, store: TheStore, reading: TheReading
 ) -> dict[str, list[dict[str, Any]]]:
     """Return the variables of a run that are drawn: `maps` and `lines`, with their labels."""
-    return await reading.here(outlined, store.run_path(run["id"]))
+    return await reading.read(outlined, store.run_path(run["id"]))
 
 
 @router.get("/runs/{run_id}/values", tags=["runs"], responses={**OCTETS, **UNCHANGED, **REFUSED})
@@ -172,7 +172,7 @@ async def values(
     headers = tagged((solver.__version__, digests, field, component, stage))
     if known := unchanged(request, headers):
         return known
-    found = await reading.here(read, files, field, component, stage)
+    found = await reading.read(read, files, field, component, stage)
     return Response(found, media_type=MEDIA_TYPE, headers=dict(headers))
 
 

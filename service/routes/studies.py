@@ -280,7 +280,7 @@ async def tell_fit(
     `message` warns, such as of parameters that cannot be told apart. The lines over which it was
     fitted are in the data set.
     """
-    return await reading.here(_fitted, job, jobs, datasets)
+    return await reading.read(_fitted, job, jobs, datasets)
 
 
 def _fitted(job: Job, jobs: Jobs, datasets: Datasets) -> dict[str, Any]:

@@ -441,7 +441,7 @@ def test_files_are_read_one_at_a_time(tmp_path: Path) -> None:
 
     async def all_at_once() -> None:
         turns = create_app(Settings(data=tmp_path)).state.reading
-        await asyncio.gather(*(Share(turns, f"caller {k}").here(read) for k in range(6)))
+        await asyncio.gather(*(Share(turns, f"caller {k}").read(read) for k in range(6)))
 
     asyncio.run(all_at_once())
     assert most == 1

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 
 from service import turns as turning
@@ -381,7 +382,8 @@ def test_whatever_is_computed_takes_the_budget_of_the_key(
 
     for way in ("here", "apart"):
         monkeypatch.setattr(Turn, way, called)
-    app.state.computing.charge("anna", 30.0)
+    for turns in (app.state.reading, app.state.computing):
+        turns.charge("anna", 30.0)
     answers = {
         name: asking(app)(
             method,
@@ -397,6 +399,33 @@ def test_whatever_is_computed_takes_the_budget_of_the_key(
         assert problem(answers["bert"], 422)["detail"] == "study: was read"
     assert [each.status_code for each in answers.values()] == [429, 422]
     assert 28 <= int(answers["anna"].headers["retry-after"]) <= 33, "until 1 s of 20 is left again"
+
+
+def test_reading_does_not_wait_for_computing(tmp_path: Path) -> None:
+    """Of the same caller, and of all others, every turn to compute is taken."""
+    app = create_app(Settings(data=tmp_path))
+    study = Study.from_dict({"name": "a", "scene": "punch", "sweep": {"friction": [0.1, 0.2]}})
+    app.state.jobs.accept(study.id, study.to_dict(), study.run_ids())
+    transport = httpx.ASGITransport(app, client=("anna", 1))
+
+    async def read() -> list[int]:
+        clerk, waiting = Clerk(), list[asyncio.Task[Any]]()
+        for caller in ("address anna", "bert", "cora"):
+            waiting.append(asyncio.create_task(clerk.serve(app.state.computing, caller)))
+        await settled()
+        assert len(clerk.begun) == turning.COMPUTING
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as one:
+            paths = ("/ui/studies/{}", "/studies/{}", "/studies/{}/table.csv", "/studies/{}/audit")
+            answers = [await one.get(each.format(study.id)) for each in paths]
+            waiting.append(asyncio.create_task(one.get("/scenes/punch/draw.png")))
+            await settled()
+            assert not waiting[-1].done()
+            for each in waiting:
+                each.cancel()
+            await asyncio.gather(*waiting, return_exceptions=True)
+        return [each.status_code for each in answers]
+
+    assert asyncio.run(asyncio.wait_for(read(), 60.0)) == [200] * 4
 
 
 def test_without_keys_nobody_has_a_budget(tmp_path: Path) -> None:
