@@ -89,7 +89,8 @@ class Turns:
     Parameters
     ----------
     slots : number of calls at a time
-    seconds : processor time that a caller may take in a minute [s]; None for no limit
+    seconds : processor time that a caller may take in a minute [s]; None where there is one caller,
+        who has all slots and no limit
     """
 
     def __init__(self, slots: int, seconds: float | None = None) -> None:
@@ -113,7 +114,9 @@ class Turns:
         if self.waiting[caller] >= WAITING:
             raise TooMany(f"{WAITING} of your requests wait already: ask later")
         self.waiting[caller] += 1
-        own = self.own.setdefault(caller, asyncio.Lock())
+        own = asyncio.Lock()
+        if self.seconds is not None:
+            own = self.own.setdefault(caller, own)
         try:
             async with own, self.slots:
                 turn = Turn(self.left(caller))

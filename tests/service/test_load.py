@@ -220,7 +220,7 @@ def test_a_picture_is_drawn_once_for_who_asks_again(monkeypatch: pytest.MonkeyPa
         return bytes(10)
 
     async def ask() -> None:
-        pictures, share = Pictures(memory=25), Share(Turns(2), "anna")
+        pictures, share = Pictures(memory=25), Share(Turns(2, 60.0), "anna")
 
         async def get(zoom: int) -> bytes:
             return await pictures.get(str(zoom), share, bytes, zoom, name="a")

@@ -89,7 +89,7 @@ async def settled() -> None:
 
 def test_callers_take_turns_and_each_has_one_call_at_a_time() -> None:
     async def calls() -> None:
-        turns, clerk = Turns(2), Clerk()
+        turns, clerk = Turns(2, 60.0), Clerk()
         wanted = ["anna"] * 25 + ["bert"] * 2 + ["cora"]
         tasks = [asyncio.create_task(clerk.serve(turns, each)) for each in wanted]
         await settled()
