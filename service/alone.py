@@ -47,13 +47,11 @@ class Answer:
     text : the value of the function; empty if it has none
     failed : error number of the system if it was stopped: time, memory or room did not suffice; or
         `CRASHED`, or `FAILED`, see the log
-    seconds : processor time that it took
     open : what this system does not let a process give up: ``network``, ``files``
     """
 
     text: str
     failed: int
-    seconds: float
     open: str
 
 
@@ -74,13 +72,13 @@ def alone(function: Callable[..., str], *given: object, folder: Path, seconds: f
     os.close(into)
     with os.fdopen(out, encoding="utf-8", errors="replace") as pipe:
         left, _, text = pipe.read().partition("\n")
-    _, status, used = os.wait4(process, 0)
+    _, status = os.waitpid(process, 0)
     failed = os.waitstatus_to_exitcode(status)
     if failed in (-signal.SIGXCPU, -signal.SIGKILL):
         failed = errno.ETIME
     elif failed < 0:
         failed = CRASHED
-    return Answer(text, failed, used.ru_utime + used.ru_stime, left)
+    return Answer(text, failed, left)
 
 
 def _answer(

@@ -42,6 +42,7 @@ from service.routes.manual import ASSETS
 from service.runner import Runner
 from service.settings import Settings, chosen
 from service.table import Tables
+from service.turns import COMPUTING, READING, Turns
 from studies import Store, StoreBusy, StudyError
 from studies.errors import CatalogueDamaged, StoreFull
 from studies.scratch import remove_left
@@ -102,6 +103,7 @@ def assembled(settings: Settings, store: Store, jobs: Jobs, held: int | None) ->
     keeper = Keeper(jobs, store, runner.computes, *kept, *scenes)
     metrics = Metrics(jobs, store, runner)
     datasets = Datasets(jobs, store, computes=held is not None)
+    budget = settings.reader_seconds if settings.keys_required else None
 
     @contextlib.asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -130,7 +132,8 @@ def assembled(settings: Settings, store: Store, jobs: Jobs, held: int | None) ->
         "keys": keys, "metrics": metrics, "datasets": datasets, "probe": Probe(),
         "examiner": Examiner(settings), "inspector": Inspector(settings.reader_seconds),
         "details": Details(jobs, store), "tables": Tables(jobs, store),
-        "pictures": Pictures(settings.map_queue, settings.map_bytes),
+        "pictures": Pictures(settings.map_bytes),
+        "reading": Turns(READING, budget), "computing": Turns(COMPUTING, budget),
     }  # fmt: skip
     app.state.only_shows, app.state.closing = held is None, False
     for name, part in parts.items():

@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from service.errors import Busy, Conflict, NotFound
-from service.guarded import Beyond, Guarded
 from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.overview import chooses
+from service.turns import Beyond, Share
 from studies import Store, Study
 from studies.errors import FileDamaged, StoreFull
 from studies.scratch import scratch
@@ -39,9 +39,6 @@ SECONDS = 600.0
 
 PATIENCE = 20.0
 """Time that a request waits for one [s]; then it is told to ask later."""
-
-WAITING = 8
-"""Number of studies whose data sets may wait to be made."""
 
 LARGE = (
     "the data set of the runs that are there takes too long, or too much memory, to be made in "
@@ -77,7 +74,6 @@ class Datasets:
 
     def __init__(self, jobs: Jobs, store: Store, computes: bool = True) -> None:
         self.jobs, self.store, self.computes = jobs, store, computes
-        self.process = Guarded("data set", WAITING, SECONDS)
         self.made: OrderedDict[str, _Offered] = OrderedDict()
         self.folders = ExitStack()
         self.folder: Path | None = None
@@ -101,7 +97,7 @@ class Datasets:
             f"no data set yet: it is written when the work ends, and the study is {job.state}"
         )
 
-    async def current(self, job: Job) -> Path:
+    async def current(self, job: Job, share: Share) -> Path:
         """Return the path of that of `ended`, or before the first end of one of the runs there are.
 
         Raise `NotFound` if the study chooses its runs and has not ended, `Busy` if it is made now.
@@ -111,18 +107,18 @@ class Datasets:
         except NotFound:
             if job.stood == StudyState.SUCCESSFUL and not job.state.final:
                 raise Busy(AGAIN) from None
-            return await self._partial(job)
+            return await self._partial(job, share)
 
-    async def tiles(self, job: Job) -> Tiles:
+    async def tiles(self, job: Job, share: Share) -> Tiles:
         """Return the current data set of a study as a Zarr store; errors as `current`."""
-        return await asyncio.to_thread(self._tiles, job.id, await self.current(job))
+        return await asyncio.to_thread(self._tiles, job.id, await self.current(job, share))
 
     def _tiles(self, study_id: str, path: Path) -> Tiles:
         found = Tiles(path)
         turn = self.jobs.layout_turn(study_id, found.layout)
         return Tiles(path, turn) if turn else found
 
-    async def _partial(self, job: Job) -> Path:
+    async def _partial(self, job: Job, share: Share) -> Path:
         """Return the path of the data set of a study as it is now, or was a little before."""
         study = await asyncio.to_thread(self.jobs.study, job.id)
         if chooses(study):
@@ -132,13 +128,15 @@ class Datasets:
         made = self.made.setdefault(job.id, _Offered())
         self.made.move_to_end(job.id)
         if made.task is None or made.task.done():
-            made.task = asyncio.create_task(self._current(job.id, study, made))
+            made.task = asyncio.create_task(self._current(job.id, study, made, share))
         try:
             return await asyncio.wait_for(asyncio.shield(made.task), PATIENCE)
         except TimeoutError:
             raise Busy("the data set is being made of the runs that are there: ask later") from None
 
-    async def _current(self, study_id: str, content: dict[str, Any], made: _Offered) -> Path:
+    async def _current(
+        self, study_id: str, content: dict[str, Any], made: _Offered, share: Share
+    ) -> Path:
         of = await asyncio.to_thread(state_of, self.store.catalogue.path)
         began = time.monotonic()
         if made.path and (made.of == of or began < made.until):
@@ -150,8 +148,7 @@ class Datasets:
         target = self.folder / f"{study_id}-{made.number + 1}.nc"
         given = content, self.store.directory.resolve(), self.store.aside, target
         try:
-            async with self.process.turn():
-                await self.process.call(combined, *given, name=study_id)
+            await share.apart(combined, *given, field="data set", name=study_id, seconds=SECONDS)
         except StoreFull:  # not the data directory
             raise OSError(errno.ENOSPC, "no room is left for temporary files") from None
         except Beyond:

@@ -22,6 +22,7 @@ from service.runner import Runner
 from service.schemas import ContentId
 from service.settings import Settings
 from service.table import Tables
+from service.turns import Share
 from studies import Store
 
 
@@ -73,13 +74,17 @@ async def get_caller(request: Request) -> Scope | None:
     return scope
 
 
-async def get_name(request: Request) -> str:
-    """Return the name of the caller's key; without one, ``address`` and its address."""
-    name: str = request.state.name
-    return name
+def share(name: str) -> Any:
+    """Return a dependency on what the caller has of the turns of this name."""
+
+    async def get(request: Request) -> Share:
+        return Share(getattr(request.app.state, name), request.state.name)
+
+    return Depends(get)
 
 
+TheReading = Annotated[Share, share("reading")]
+TheComputing = Annotated[Share, share("computing")]
 TheCaller = Annotated[Scope | None, Depends(get_caller)]
-TheName = Annotated[str, Depends(get_name)]
 TheJob = Annotated[Job, Depends(get_job)]
 TheRun = Annotated[dict[str, Any], Depends(get_run)]

@@ -61,6 +61,10 @@ class Busy(RuntimeError):
         self.later = {"retry-after": str(seconds)}
 
 
+class TooMany(Busy):
+    """Not now: requests of this caller wait, or have taken the time that a caller may have."""
+
+
 class NoRoom(RuntimeError):
     """What is asked for takes more room than the disk has."""
 
@@ -75,6 +79,7 @@ STATUS: dict[type[Exception], HTTPStatus] = {
     NotFound: HTTPStatus.NOT_FOUND,
     Conflict: HTTPStatus.CONFLICT,
     Busy: HTTPStatus.SERVICE_UNAVAILABLE,
+    TooMany: HTTPStatus.TOO_MANY_REQUESTS,
     QueueLost: HTTPStatus.SERVICE_UNAVAILABLE,
     KeysError: HTTPStatus.SERVICE_UNAVAILABLE,
     NoRoom: HTTPStatus.INSUFFICIENT_STORAGE,
@@ -211,7 +216,8 @@ def on_validation_error(request: Request, exc: RequestValidationError) -> Proble
 def on_plain_error(request: Request, exc: Exception) -> Problem:
     """Answer with an error of one sentence."""
     status = status_of(exc)
-    later = getattr(exc, "later", LATER) if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
+    usual = LATER if status >= HTTPStatus.INTERNAL_SERVER_ERROR else None
+    later = getattr(exc, "later", usual)
     texts = {StoreFull: NO_ROOM, StoreBusy: "the data directory is held by another process"}
     said = texts.get(type(exc), str(exc))
     return problem(request, status, said, headers=later)

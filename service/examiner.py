@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from service.guarded import Guarded
 from service.settings import Settings
+from service.turns import Share
+from solver.scenes import Scene
 from studies import Bounds, Estimate, Store, Study, estimate
+from studies.definition.extending import EXTENDS
+from studies.scenes.registry import scene_named
 
-WAITING = 100
-"""Number of studies that may wait to be checked."""
 SECONDS = 120
 """Longest time of the check of a study [s]."""
 
@@ -37,7 +38,7 @@ class Examined:
 
 
 class Examiner:
-    """Checks studies, one after the other.
+    """Checks studies.
 
     Parameters
     ----------
@@ -46,9 +47,8 @@ class Examiner:
 
     def __init__(self, settings: Settings) -> None:
         self.directory, self.bounds = settings.data.resolve(), settings.bounds
-        self.process = Guarded("study", WAITING, SECONDS)
 
-    async def examine(self, content: Mapping[str, Any]) -> Examined:
+    async def examine(self, content: Mapping[str, Any], share: Share) -> Examined:
         """Return the study that ``content`` describes.
 
         Raises
@@ -56,20 +56,25 @@ class Examiner:
         StudyError
             If it has a mistake, or its cost exceeds the settings.
         Busy
-            If too many others wait, or the process was killed.
+            If the process was killed.
         """
         what = dict(content), self.directory, self.bounds
-        name = content.get("name")
-        async with self.process.turn():
-            return await self.process.call(examined, *what, name=name, advice=": sweep less")
+        name, advice = content.get("name"), ": sweep less"
+        return await share.apart(
+            examined, *what, field="study", name=name, seconds=SECONDS, advice=advice
+        )
 
 
 def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:
     """Return a checked study with its run ids and its cost; called in a separate process."""
     store = Store(directory)
-    study = Study.known(content, lambda name: store.scene(store.scene_id(name)), store.definition)
+
+    def find(name: str) -> Scene | None:
+        return store.scene(store.scene_id(name))
+
+    if EXTENDS not in content:
+        bounds.check_count(content, scene_named(content.get("scene"), find), store)
+    study = Study.known(content, find, store.definition)
     bounds.check_size(study)
-    runs = list(study.checked().run_ids())
-    cost = estimate(study, store)
-    bounds.check(cost)
-    return Examined(study, runs, cost)
+    cost = estimate(study.checked(), store, bounds)
+    return Examined(study, list(study.run_ids()), cost)

@@ -1,7 +1,6 @@
 """Check scene files before they are stored, and draw them; nothing in them is executed.
 
-A scene is read in a process without a network, which writes in one folder; a caller has a budget of
-the time of these processes.
+A scene is read in a process without a network, which writes in one folder.
 """
 
 from __future__ import annotations
@@ -9,16 +8,15 @@ from __future__ import annotations
 import errno
 import json
 import logging
-import time
 from base64 import b64decode, b64encode
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from service.alone import CRASHED, FAILED, Answer, alone
-from service.guarded import Budget, Guarded, beyond
 from service.maps import draw_scene
 from service.schemas import KeptScene, SketchQuery
+from service.turns import Share, beyond
 from studies import Store, Study, StudyError
 from studies.definition.parameters import read_values
 from studies.errors import SceneError
@@ -35,44 +33,34 @@ log = logging.getLogger(__name__)
 
 SLOW = 10.0
 """Longest time of reading a scene, as a multiple of its processor time: others compute too."""
-WAITING = 20
-"""Number of scenes that may wait to be read."""
 LONGEST = 1_000_000
 """Largest size of a scene file, without its meshes [bytes]."""
 _FILE = "scene.toml"
 
-Drawn = TypeVar("Drawn")
-
 
 class Inspector:
-    """Checks scenes, two at a time.
+    """Checks scenes.
 
     Parameters
     ----------
-    seconds : processor time that the scenes and pictures of a caller may take in a minute, and the
-        longest of one
+    seconds : longest processor time of one [s]
     """
 
     def __init__(self, seconds: float) -> None:
-        self.seconds, self.budget = seconds, Budget(seconds)
-        self.process = Guarded("scene", WAITING, SLOW * seconds)
+        self.seconds = seconds
         self.told = ""
 
     async def inspect(
-        self, text: bytes, meshes: Mapping[str, bytes], caller: str
+        self, text: bytes, meshes: Mapping[str, bytes], share: Share
     ) -> tuple[KeptScene, Description]:
         """Return the scene of a file and its meshes, and their content.
-
-        Parameters
-        ----------
-        caller : whose budget it takes
 
         Raises
         ------
         StudyError
             with all its mistakes
         Busy
-            if too many others wait, the budget is used, or the process was killed
+            if the budget of the caller is used, or the process was killed
         """
         if len(text) > LONGEST:
             raise StudyError("scene", f"{len(text)} bytes", f"must have at most {LONGEST} bytes")
@@ -81,55 +69,20 @@ class Inspector:
             if not (FILE_NAME.fullmatch(name) and name.lower().endswith(known)):
                 allowed = f"must be the name of a file and end in one of {', '.join(known)}"
                 raise StudyError("meshes", name, allowed)
-        self.budget.left(caller)
-        async with self.process.turn(caller):
-            spent = left = self.budget.left(caller)  # all of it if there is no answer
-            try:
-                files = {**meshes, _FILE: text}
-                answer = await self.process.call(inspected, files, left, name=_FILE)
-                spent = answer.seconds
-            except OSError:  # no room for temporary files
-                spent = 0.0
-                raise
-            finally:
-                self.budget.charge(caller, spent)
+        slow = SLOW * self.seconds
+        async with share.turns.turn(share.caller) as turn:
+            left, files = min(turn.left, self.seconds), {**meshes, _FILE: text}
+            answer = await turn.apart(
+                inspected, files, left, field="scene", name=_FILE, seconds=slow
+            )
         if answer.failed == errno.ETIME and left < self.seconds:
-            self.budget.left(caller)
+            share.turns.left(share.caller)
         found = self._read(answer)
         if mistakes := found.get("mistakes"):
             raise SceneError(_FILE, [StudyError(*each) for each in mistakes], found["count"])
         arrays = {name: b64decode(text) for name, text in found["arrays"].items()}
         given = {name: MeshFile(name, data, arrays[name]) for name, data in meshes.items()}
         return KeptScene(**found["scene"]), Description(_FILE, found["content"], given)
-
-    async def draw(self, directory: Path, name: str, query: SketchQuery, caller: str) -> bytes:
-        """Return the picture of a scene of a store before loading, as PNG; errors as `inspect`."""
-        return await self._charged(caller, name, drawn, directory, name, query)
-
-    async def picture(self, directory: Path, content: Mapping[str, Any], caller: str) -> bytes:
-        """Return the scene of the first run of a study, as PNG; errors as `inspect`."""
-        return await self._charged(caller, content.get("name"), pictured, directory, dict(content))
-
-    async def _charged(
-        self, caller: str, name: object, draw: Callable[..., tuple[Drawn, float]], *given: object
-    ) -> Drawn:
-        """Return a picture of a scene.
-
-        Its meshes may be those of a stranger, and its parameters are the caller's: it is drawn in
-        a process with limits, and takes the caller's budget.
-        """
-        self.budget.left(caller)
-        async with self.process.turn(caller):
-            spent = left = self.budget.left(caller)  # all of it if there is no answer
-            begun = time.monotonic()
-            try:
-                found, spent = await self.process.call(draw, *given, name=name)
-            except StudyError:
-                spent = min(left, time.monotonic() - begun)
-                raise
-            finally:
-                self.budget.charge(caller, spent)
-        return found
 
     def _read(self, answer: Answer) -> dict[str, Any]:
         if answer.open != self.told:
@@ -161,20 +114,19 @@ def inspected(files: Mapping[str, bytes], seconds: float) -> Answer:
         return alone(_told, folder, folder=folder, seconds=seconds)
 
 
-def drawn(directory: Path, name: str, query: SketchQuery) -> tuple[bytes, float]:
-    """Return the picture of a scene of a store as PNG, and the processor time it took [s]."""
-    begun = time.process_time()
+def drawn(directory: Path, name: str, query: SketchQuery) -> bytes:
+    """Return the picture of a scene of a store as PNG; called in a process.
+
+    Its meshes may be those of a stranger, and its parameters are the caller's.
+    """
     scene = Store(directory).scene(name) or scene_named(name)
-    values = read_values(scene, query.selection)
-    return draw_scene(scene, values, query), time.process_time() - begun
+    return draw_scene(scene, read_values(scene, query.selection), query)
 
 
-def pictured(directory: Path, content: dict[str, Any]) -> tuple[bytes, float]:
-    """Return the scene of the first run of a study as PNG, and its processor time [s]."""
-    begun = time.process_time()
+def pictured(directory: Path, content: dict[str, Any]) -> bytes:
+    """Return the scene of the first run of a study as PNG; called in a process."""
     first = next(iter(Study.known(content, Store(directory).scene).cases()))
-    picture = draw_scene(first.scene, first.values, SketchQuery())
-    return picture, time.process_time() - begun
+    return draw_scene(first.scene, first.values, SketchQuery())
 
 
 def _told(folder: Path) -> str:

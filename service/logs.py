@@ -31,8 +31,15 @@ access = logging.getLogger("service.access")
 LINE = "%(client)s %(method)s %(path)s %(status)s %(milliseconds)s ms"
 
 
+CONNECTIONS = ("distributed", "tornado")
+"""Libraries by which processes speak; their errors tell that another one has ended."""
+
+
 class About(logging.Filter):
-    """Adds ids to every log record: its own, or those of the process."""
+    """Adds ids to every log record: its own, or those of the process.
+
+    Of errors of connections the traceback is left out: it shows code of libraries alone.
+    """
 
     def __init__(self, ids: dict[str, str]) -> None:
         super().__init__()
@@ -40,11 +47,19 @@ class About(logging.Filter):
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Add the ids."""
+        error = record.exc_info[1] if record.exc_info else None
+        if error and {record.name.split(".")[0], _package(error)} & {*CONNECTIONS}:
+            said = f"{record.getMessage()} {type(error).__name__}: {error}"
+            record.msg, record.args, record.exc_info = " ".join(said.split()), (), None
         known = {"request": REQUEST.get(), **self.ids, **vars(record)}
         entry = {name: known[name] for name in ("request", "study", "run") if known.get(name)}
         about = "".join(f" {name}={value}" for name, value in entry.items())
         vars(record).update(entry, about=about)
         return True
+
+
+def _package(error: BaseException) -> str:
+    return type(error).__module__.split(".")[0]
 
 
 def configure(form: str, **ids: str) -> None:
@@ -73,6 +88,10 @@ def configure(form: str, **ids: str) -> None:
         "root": {"handlers": ["stderr"], "level": "INFO"},
     }
     logging.config.dictConfig(described)
+    for name in logging.root.manager.loggerDict:
+        if name.split(".")[0] in CONNECTIONS:  # they have handlers of their own
+            logging.getLogger(name).handlers.clear()
+            logging.getLogger(name).propagate = True
     logging.captureWarnings(True)
     sys.excepthook = lambda *error: logging.critical("the process ended", exc_info=error)
 

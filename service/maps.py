@@ -1,97 +1,78 @@
-"""Pictures of runs and studies as PNG, drawn one at a time."""
+"""Pictures of runs and studies as PNG, each drawn in a process and kept."""
 
 from __future__ import annotations
 
-import asyncio
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable, Mapping
-from functools import partial
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from anyio import CapacityLimiter
-from anyio.to_thread import run_sync
 from fastapi.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
 
 import solver
-from service.errors import Busy
 from service.files import UNCHANGED, tagged, unchanged
 from service.schemas import LineQuery, MapQuery, PlotQuery, SketchQuery
+from service.turns import Share
 from solver.errors import ModelError
 from solver.scenes import Scene
 from studies import StudyError
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
 
-WAITING = 200
-"""Number of readings and pictures that may wait for their turn."""
-
 PNG = "image/png"
 PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {PNG: {}}}, **UNCHANGED}
 """What a route of a picture answers."""
 
-Read = TypeVar("Read")
 Drawn = TypeVar("Drawn")
-Draw = Callable[[], Awaitable[bytes]]
-"""Draws a picture."""
 
 
 class Pictures:
-    """Draws pictures, one at a time, and keeps the latest ones.
-
-    Matplotlib shares fonts and the text cache among figures, so two cannot be drawn at once; and
-    the netCDF library ends the process if two threads read files. So all reading is `alone`.
-    Methods raise `Busy` if too many others wait.
+    """Draws pictures, and keeps the latest ones.
 
     Parameters
     ----------
-    queue : number of pictures that may wait to be drawn
     memory : total size of the pictures that are kept [bytes]
     """
 
-    def __init__(self, queue: int, memory: int) -> None:
-        self.queue = queue
-        self.memory = memory
-        self.size = self.present = 0
-        self.pencil = CapacityLimiter(1)
+    def __init__(self, memory: int) -> None:
+        self.memory, self.size = memory, 0
         self.kept: OrderedDict[str, bytes] = OrderedDict()
-        self.underway: dict[str, asyncio.Task[bytes]] = {}
 
-    async def get(self, tag: str, draw: Draw) -> bytes:
-        """Return the picture with this tag; it is drawn unless it is kept or being drawn."""
-        if tag in self.kept:
-            self.kept.move_to_end(tag)
-            return self.kept[tag]
-        if tag not in self.underway:
-            if len(self.underway) > self.queue:
-                raise Busy(f"{self.queue} pictures wait to be drawn already")
-            self.underway[tag] = asyncio.ensure_future(self._kept(tag, draw))
-        return await asyncio.shield(self.underway[tag])
-
-    async def alone(self, read: Callable[..., Read], *arguments: Any) -> Read:
-        """Return what ``read`` returns, called in a thread while no other one reads or draws."""
-        if self.present > WAITING:
-            raise Busy(f"{WAITING} readings of runs wait already")
-        self.present += 1
-        try:
-            return await run_sync(read, *arguments, limiter=self.pencil)
-        finally:
-            self.present -= 1
-
-    async def _kept(self, tag: str, draw: Draw) -> bytes:
-        try:
-            picture = await draw()
-        finally:
-            del self.underway[tag]
-        self.kept[tag] = picture
-        self.size += len(picture)
-        while self.size > self.memory:
-            self.size -= len(self.kept.popitem(last=False)[1])
+    async def get(
+        self, tag: str, share: Share, draw: Callable[..., bytes], *given: object, name: object
+    ) -> bytes:
+        """Return the picture with this tag, drawn in the turn of a caller unless it is kept."""
+        picture = self._kept(tag)
+        if picture is None:
+            async with share.turns.turn(share.caller) as turn:
+                picture = self._kept(tag)  # it may have been drawn meanwhile
+                if picture is None:
+                    picture = await turn.apart(draw, *given, field="picture", name=name)
+                    self._keep(tag, picture)
         return picture
 
-    async def answer(self, request: Request, what: object, draw: Draw) -> Response:
+    def _kept(self, tag: str) -> bytes | None:
+        if tag in self.kept:
+            self.kept.move_to_end(tag)
+        return self.kept.get(tag)
+
+    def _keep(self, tag: str, picture: bytes) -> None:
+        self.size += len(picture) - len(self.kept.get(tag, b""))
+        self.kept[tag] = picture
+        while self.size > self.memory:
+            self.size -= len(self.kept.popitem(last=False)[1])
+
+    async def answer(
+        self,
+        request: Request,
+        what: object,
+        share: Share,
+        draw: Callable[..., bytes],
+        *given: object,
+        name: object,
+    ) -> Response:
         """Return the answer with the picture of ``what``, unless the caller has it.
 
         Parameters
@@ -101,15 +82,20 @@ class Pictures:
         headers = tagged((solver.__version__, what))
         if known := unchanged(request, headers):
             return known
-        picture = await self.get(headers["etag"], draw)
+        picture = await self.get(headers["etag"], share, draw, *given, name=name)
         return Response(picture, media_type=PNG, headers=dict(headers))
 
     async def of_file(
-        self, request: Request, path: Path, query: Drawn, draw: Callable[[Path, Drawn], bytes]
+        self,
+        request: Request,
+        path: Path,
+        query: Drawn,
+        share: Share,
+        draw: Callable[[Path, Drawn], bytes],
     ) -> Response:
-        """Return the answer with a picture of the file of a run or a study, drawn `alone`."""
+        """Return the answer with a picture of the file of a run or a study."""
         what = path.name, await run_in_threadpool(digest, path), query
-        return await self.answer(request, what, partial(self.alone, draw, path, query))
+        return await self.answer(request, what, share, draw, path, query, name=path.stem)
 
 
 def draw_map(path: Path, query: MapQuery) -> bytes:

@@ -72,10 +72,10 @@ class Settings(BaseSettings):
         default=2_000_000_000, ge=0, description="the same for the scenes of a key"
     )
     reader_seconds: float = Field(
-        default=10.0,
+        default=30.0,
         gt=0,
-        description="processor time in a minute for scenes that a key posts or draws; also the "
-        "longest of one [s]",
+        description="processor time in a minute for what is computed for a key, and as much for "
+        "what is read; also the longest of reading a scene [s]",
     )
     connections: int = Field(default=500, ge=1, description="most connections at a time")
     arrival_seconds: float = Field(
@@ -84,7 +84,6 @@ class Settings(BaseSettings):
     answer_seconds: float = Field(
         default=60.0, gt=0, description="time a client may take no part of its answer"
     )
-    map_queue: int = Field(default=8, ge=0, description="pictures that may wait to be drawn")
     map_bytes: int = Field(default=32_000_000, ge=0, description="size of the pictures kept")
     attempts: int = Field(
         default=5, ge=1, description="starts of a study that bring no new run before it fails"

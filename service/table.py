@@ -10,15 +10,16 @@ from __future__ import annotations
 import math
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
-from threading import Lock
 from typing import Any
 
 import numpy as np
+from fastapi.concurrency import run_in_threadpool
 
 from service.job import Job
 from service.jobs import Jobs
 from service.overview import PENDING, chooses, searched_at
 from service.scenes import scene_of
+from service.turns import Share
 from solver.scenes import Scene
 from studies import Store
 from studies.definition.parameters import parameters_of
@@ -42,22 +43,31 @@ class Tables:
     def __init__(self, jobs: Jobs, store: Store) -> None:
         self.jobs, self.store = jobs, store
         self.kept: OrderedDict[str, tuple[object, RunTable]] = OrderedDict()
-        self.one = Lock()
 
-    def get(self, study_id: str) -> RunTable:
-        """Return the table of a study."""
-        with self.one:
-            job = self.jobs.get(study_id)
-            asked = job.state, job.stage  # its runs may not all be known yet
-            state = job.turn, job.size, job.digest, asked, state_of(self.store.catalogue.path)
-            known, table = self.kept.get(study_id, (None, None))
-            if table is None or known != state:
-                table = self._made(job)
-                self.kept[study_id] = state, table
-            self.kept.move_to_end(study_id)
-            while len(self.kept) > KEPT:
-                self.kept.popitem(last=False)
-            return table
+    async def get(self, study_id: str, share: Share) -> RunTable:
+        """Return the table of a study, made in the turn of a caller unless it is kept."""
+        job, state = await run_in_threadpool(self._state, study_id)
+        table = self._known(study_id, state)
+        if table is None:
+            async with share.turns.turn(share.caller) as turn:
+                table = self._known(study_id, state)  # it may have been made meanwhile
+                if table is None:
+                    table = await turn.here(self._made, job)
+                    self.kept[study_id] = state, table
+        self.kept.move_to_end(study_id)
+        while len(self.kept) > KEPT:
+            self.kept.popitem(last=False)
+        return table
+
+    def _state(self, study_id: str) -> tuple[Job, object]:
+        """Return a study, and all on which its table depends."""
+        job = self.jobs.get(study_id)
+        asked = job.state, job.stage  # its runs may not all be known yet
+        return job, (job.turn, job.size, job.digest, asked, state_of(self.store.catalogue.path))
+
+    def _known(self, study_id: str, state: object) -> RunTable | None:
+        known, table = self.kept.get(study_id, (None, None))
+        return table if known == state else None
 
     def _made(self, job: Job) -> RunTable:
         study, runs = self.jobs.study(job.id), self.jobs.runs(job.id)

@@ -388,7 +388,8 @@ def _has_zarr() -> bool:
 def _later(answer: httpx.Response, until: float) -> bool:
     """Wait if an answer is put off; return whether to ask again."""
     after = answer.headers.get("retry-after", "")
-    if answer.status_code != httpx.codes.SERVICE_UNAVAILABLE or not after.isdecimal():
+    later = httpx.codes.SERVICE_UNAVAILABLE, httpx.codes.TOO_MANY_REQUESTS
+    if answer.status_code not in later or not after.isdecimal():
         return False
     if time.monotonic() + float(after) > until:
         return False

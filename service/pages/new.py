@@ -12,9 +12,10 @@ from fastapi import APIRouter, File, Request, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse, RedirectResponse
 
-from service.dependencies import TheExaminer, TheInspector, TheKeeper, TheName, TheStore
+from service.dependencies import TheComputing, TheExaminer, TheInspector, TheKeeper, TheStore
 from service.errors import NoRoom
 from service.examiner import Examined
+from service.inspector import pictured
 from service.maps import PNG
 from service.pages import form
 from service.pages.rendering import ROOT, PageRoute, page, to_study
@@ -48,9 +49,7 @@ def _given(fields: Iterable[tuple[str, object]]) -> dict[str, list[str]]:
 
 
 @router.get("/scene.png")
-async def draw_scene(
-    request: Request, store: TheStore, inspector: TheInspector, caller: TheName
-) -> Response:
+async def draw_scene(request: Request, store: TheStore, computing: TheComputing) -> Response:
     """Draw the scene of the first run that the fields describe; of a scene without a model nothing.
 
     A page asks for what may not be there, which no browser takes for an error.
@@ -62,7 +61,8 @@ async def draw_scene(
     for field, allowed in wrong.items():
         raise StudyError(field, given.get(f"p.{field}"), allowed)
     try:
-        picture = await inspector.picture(store.directory, content, caller)
+        what = store.directory, content
+        picture = await computing.apart(pictured, *what, field="study", name=content["name"])
     except StudyError as error:
         if error.field != "scene":
             raise
@@ -77,14 +77,14 @@ async def take_scene(
     inspector: TheInspector,
     keeper: TheKeeper,
     store: TheStore,
-    caller: TheName,
+    computing: TheComputing,
     meshes: Annotated[list[UploadFile], File(default_factory=list)],
 ) -> Response:
     """Keep a scene file with its meshes, and show the form of its studies."""
     there = [each for each in meshes if each.filename]  # a browser sends one of no name for none
     try:
         found = await post_scene(
-            scene, inspector, keeper, store, caller, request, Response(), there
+            scene, inspector, keeper, store, computing, request, Response(), there
         )
     except StudyError as error:
         refused = {"file": scene.filename or "", "mistakes": error.listed}
@@ -95,7 +95,11 @@ async def take_scene(
 
 @router.post("/new")
 async def make(
-    request: Request, store: TheStore, examiner: TheExaminer, keeper: TheKeeper
+    request: Request,
+    store: TheStore,
+    examiner: TheExaminer,
+    keeper: TheKeeper,
+    computing: TheComputing,
 ) -> Response:
     """Tell what a study costs and what is wrong in the form, or accept the study and show it."""
     given = _given((await request.form()).multi_items())
@@ -105,7 +109,7 @@ async def make(
     found: Examined | None = None
     if not wrong:
         try:
-            examined = await examiner.examine(content)
+            examined = await examiner.examine(content, computing)
             await run_in_threadpool(keeper.check_room, examined)
             found = examined
         except StudyError as error:

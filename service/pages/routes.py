@@ -27,8 +27,8 @@ from service.dependencies import (
     TheDetails,
     TheJobs,
     TheKeys,
-    ThePictures,
     TheProbe,
+    TheReading,
     TheRun,
     TheRunner,
     TheStore,
@@ -46,13 +46,12 @@ from service.routes.health import health
 from service.routes.numbers import outlined
 from service.scenes import scene_name, scene_of
 from service.schemas import ContentId, StudyFilter, Window
-from service.table import Tables
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
 from studies.scenes.registry import known_names
 from studies.storage.seal import State, state_of
-from studies.views.table import MESSAGE, RUN, STATUS, varied
+from studies.views.table import MESSAGE, RUN, STATUS, RunTable, varied
 
 if TYPE_CHECKING:
     from studies.views.found import Found
@@ -138,15 +137,16 @@ async def study_page(
     details: TheDetails,
     tables: TheTables,
     datasets: TheDatasets,
-    pictures: ThePictures,
+    reading: TheReading,
 ) -> Response:
     """Show a study: what it found, numbers over its sweep, one of its runs, a part of its table."""
     study = json.loads(await details.get(study_id, Window(limit=1)))
     found = None
     if overview.chooses(study):
         with suppress(Busy, NotFound):  # it is there at the end
-            found = await pictures.alone(_found, tables.jobs.get(study_id), datasets)
-    return await run_in_threadpool(_study, request, study, tables, found)
+            found = await reading.read(_found, tables.jobs.get(study_id), datasets)
+    table = await tables.get(study_id, reading)
+    return await run_in_threadpool(_study, request, study, tables.store, table, found)
 
 
 def _found(job: Job, datasets: Datasets) -> Found | None:
@@ -166,10 +166,13 @@ def _found_in(path: Path, state: State | None) -> Found | None:
 
 
 def _study(
-    request: Request, study: Mapping[str, Any], tables: Tables, found: Found | None
+    request: Request,
+    study: Mapping[str, Any],
+    store: Store,
+    table: RunTable,
+    found: Found | None,
 ) -> Response:
-    table = tables.get(study["id"])
-    scene = scene_of(tables.store, study["scene"])
+    scene = scene_of(store, study["scene"])
     query = dict(request.query_params)
     numbers = [each.name for each in chosen.usual(table)]
     number = query.get("number", "")
@@ -230,11 +233,9 @@ def _cell(column: Any, at: int) -> str:
 
 
 @router.get("/runs/{run_id}")
-async def run_page(
-    run: TheRun, request: Request, store: TheStore, pictures: ThePictures
-) -> Response:
+async def run_page(run: TheRun, request: Request, store: TheStore, reading: TheReading) -> Response:
     """Show a run: its maps and lines, its numbers, its audit."""
-    drawn = await pictures.alone(outlined, store.run_path(run["id"]))
+    drawn = await reading.read(outlined, store.run_path(run["id"]))
     return await run_in_threadpool(_run, request, run, store, drawn)
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body
 from pydantic import WithJsonSchema
 
-from service.dependencies import TheExaminer, TheKeeper
+from service.dependencies import TheComputing, TheExaminer, TheKeeper
 from service.errors import REFUSED
 from service.routes.studies import SUBMISSION, taken_priority
 from service.strict import StrictRoute
@@ -21,6 +21,7 @@ router = APIRouter(tags=["studies"], route_class=StrictRoute)
 async def estimate(
     content: Annotated[dict[str, Any], Body(), WithJsonSchema(SUBMISSION)],
     examiner: TheExaminer,
+    computing: TheComputing,
     keeper: TheKeeper,
 ) -> Estimate:
     """Tell what a study asks for beyond the runs that are there; nothing is stored.
@@ -29,6 +30,6 @@ async def estimate(
     refused as it is when it is submitted.
     """
     taken_priority(content)
-    found = await examiner.examine(content)
+    found = await examiner.examine(content, computing)
     await asyncio.to_thread(keeper.check_room, found)
     return found.estimate

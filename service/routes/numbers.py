@@ -15,7 +15,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 import solver
-from service.dependencies import ThePictures, TheRun, TheStore, TheTables
+from service.dependencies import TheReading, TheRun, TheStore, TheTables
 from service.errors import CONTENT, REFUSED
 from service.files import UNCHANGED, tagged, unchanged
 from service.octets import MEDIA_TYPE, octets
@@ -25,7 +25,7 @@ from studies import StudyError
 from studies.storage.runfile import verify
 from studies.storage.seal import digest
 from studies.views.audited import Worst, worst
-from studies.views.table import RUN, STATUS, varied
+from studies.views.table import RUN, STATUS, RunTable, varied
 from studies.views.written import FORMS
 
 router = APIRouter()
@@ -55,10 +55,11 @@ OCTETS: dict[int | str, dict[str, Any]] = {
         **REFUSED,
     },
 )
-def table(
+async def table(
     study_id: ContentId,
     which: Annotated[TableFilter, Query()],
     tables: TheTables,
+    reading: TheReading,
     request: Request,
 ) -> Response:
     """Return a line for each run: its place in the sweep, its status, its numbers.
@@ -70,8 +71,8 @@ def table(
     ending = request.scope["path"].rpartition(".")[2]
     if ending == "parquet" and find_spec("pyarrow") is None:
         raise HTTPException(HTTPStatus.NOT_ACCEPTABLE, MISSING)
-    found = tables.get(study_id)
-    at = found.chosen(which.sort, which.selection)
+    found = await tables.get(study_id, reading)
+    at = await run_in_threadpool(found.chosen, which.sort, which.selection)
     names = dict.fromkeys(which.columns.split(",") if which.columns else found.columns)
     form, columns = FORMS[ending], [found.column(name) for name in names]
     named = {"content-disposition": f'attachment; filename="table.{ending}"'}
@@ -79,8 +80,11 @@ def table(
 
 
 @router.get("/studies/{study_id}/numbers", tags=["studies"], responses={**OCTETS, **REFUSED})
-def numbers(
-    study_id: ContentId, which: Annotated[NumbersFilter, Query()], tables: TheTables
+async def numbers(
+    study_id: ContentId,
+    which: Annotated[NumbersFilter, Query()],
+    tables: TheTables,
+    reading: TheReading,
 ) -> Response:
     """Return columns of the table as octets, in the order of the sweep; NaN is no value.
 
@@ -88,7 +92,13 @@ def numbers(
     numbers are little endian. A text is a number, whose word is in `words`. Beside `name`, every
     column is a query, as of the table; `at` has the positions of the runs that meet them.
     """
-    found = tables.get(study_id)
+    found = await tables.get(study_id, reading)
+    content = await run_in_threadpool(_numbers, found, which)
+    return Response(content, media_type=MEDIA_TYPE)
+
+
+def _numbers(found: RunTable, which: NumbersFilter) -> bytes:
+    """Return what `numbers` tells."""
     at = found.chosen("", which.selection)
     arrays, words = {"at": at}, {}
     for each in dict.fromkeys(which.name):
@@ -102,16 +112,22 @@ def numbers(
             arrays[each] = np.array([number[word] for word in column.values[at]])
         else:
             raise StudyError("name", each, "must be a column of numbers, of the sweep, or status")
-    return Response(octets({"words": words}, arrays), media_type=MEDIA_TYPE)
+    return octets({"words": words}, arrays)
 
 
 @router.get("/studies/{study_id}/audit", tags=["studies"])
-def tell_audit(study_id: ContentId, tables: TheTables) -> list[AuditFigure]:
+async def tell_audit(
+    study_id: ContentId, tables: TheTables, reading: TheReading
+) -> list[AuditFigure]:
     """Return the largest value of each figure of the audit, the nearest to its limit first.
 
     Figures whose limit depends on the run are left out.
     """
-    table = tables.get(study_id)
+    return await run_in_threadpool(_audit, await tables.get(study_id, reading))
+
+
+def _audit(table: RunTable) -> list[AuditFigure]:
+    """Return what `tell_audit` tells."""
     found = worst({each.name: each.values for each in table.numbers})
     runs = table.columns[RUN].values
     places = {each.name: each.values for each in varied(table)}
@@ -128,17 +144,17 @@ def tell_audit(study_id: ContentId, tables: TheTables) -> list[AuditFigure]:
 
 @router.get("/runs/{run_id}/fields", tags=["runs"])
 async def fields(
-    run: TheRun, store: TheStore, pictures: ThePictures
+    run: TheRun, store: TheStore, reading: TheReading
 ) -> dict[str, list[dict[str, Any]]]:
     """Return the variables of a run that are drawn: `maps` and `lines`, with their labels."""
-    return await pictures.alone(outlined, store.run_path(run["id"]))
+    return await reading.read(outlined, store.run_path(run["id"]))
 
 
 @router.get("/runs/{run_id}/values", tags=["runs"], responses={**OCTETS, **UNCHANGED, **REFUSED})
 async def values(
     run: TheRun,
     store: TheStore,
-    pictures: ThePictures,
+    reading: TheReading,
     request: Request,
     field: str,
     component: str | None = None,
@@ -156,7 +172,7 @@ async def values(
     headers = tagged((solver.__version__, digests, field, component, stage))
     if known := unchanged(request, headers):
         return known
-    found = await pictures.alone(read, files, field, component, stage)
+    found = await reading.read(read, files, field, component, stage)
     return Response(found, media_type=MEDIA_TYPE, headers=dict(headers))
 
 

@@ -11,7 +11,7 @@ from fastapi.responses import FileResponse
 from starlette.convertors import StringConvertor, register_url_convertor
 
 from service import maps
-from service.dependencies import TheKeeper, ThePictures, TheRun, TheStore
+from service.dependencies import TheComputing, TheKeeper, ThePictures, TheRun, TheStore
 from service.errors import REFUSED
 from service.files import NETCDF, netcdf
 from service.maps import PICTURE
@@ -53,13 +53,14 @@ def fetch_run(run: TheRun, store: TheStore) -> FileResponse:
 
 @router.get("/{run_id}.vtu", responses={200: {"content": {VTU: {}}}, **REFUSED})
 async def fetch_mesh(
-    run: TheRun, store: TheStore, pictures: ThePictures, stage: str | None = None
+    run: TheRun, store: TheStore, computing: TheComputing, stage: str | None = None
 ) -> Response:
     """Return the fields at the nodes at a stage, the last one by default, as ParaView reads them.
 
     The study must say `"keep": "fields"`.
     """
-    content = await pictures.alone(nodal_fields, store.run_path(run["id"]), stage)
+    given = store.run_path(run["id"]), stage
+    content = await computing.apart(nodal_fields, *given, field="stage", name=stage)
     named = {"content-disposition": f'attachment; filename="{run["id"]}.vtu"'}
     return Response(content, media_type=VTU, headers=named)
 
@@ -93,10 +94,12 @@ async def draw_map(
     query: Annotated[MapQuery, Query()],
     store: TheStore,
     pictures: ThePictures,
+    computing: TheComputing,
     request: Request,
 ) -> Response:
     """Draw a field of a run around the contact."""
-    return await pictures.of_file(request, store.run_path(run["id"]), query, maps.draw_map)
+    path = store.run_path(run["id"])
+    return await pictures.of_file(request, path, query, computing, maps.draw_map)
 
 
 @router.get("/{run_id}/line.png", responses={**PICTURE, **REFUSED})
@@ -105,10 +108,12 @@ async def draw_lines(
     query: Annotated[LineQuery, Query()],
     store: TheStore,
     pictures: ThePictures,
+    computing: TheComputing,
     request: Request,
 ) -> Response:
     """Draw a field of a run along lines, contacts, depths or increments.
 
     Beside the queries named below, every dimension of the field is one: `?stage=loaded&pass=2`.
     """
-    return await pictures.of_file(request, store.run_path(run["id"]), query, maps.draw_lines)
+    path = store.run_path(run["id"])
+    return await pictures.of_file(request, path, query, computing, maps.draw_lines)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from functools import partial
 from http import HTTPStatus
 from typing import Annotated, Any
 
 from fastapi import APIRouter, File, Query, Request, Response, UploadFile
 
-from service.dependencies import TheInspector, TheKeeper, TheName, ThePictures, TheStore
+from service.dependencies import TheComputing, TheInspector, TheKeeper, ThePictures, TheStore
 from service.errors import REFUSED
+from service.inspector import drawn
 from service.maps import PICTURE
 from service.scenes import known_scene
 from service.schemas import ContentId, KeptScene, SceneSummary, SketchQuery, Window
@@ -47,7 +47,7 @@ async def post_scene(
     inspector: TheInspector,
     keeper: TheKeeper,
     store: TheStore,
-    caller: TheName,
+    computing: TheComputing,
     request: Request,
     response: Response,
     meshes: Annotated[
@@ -66,9 +66,9 @@ async def post_scene(
         if not each.filename or each.filename in files:
             raise StudyError("meshes", each.filename, "must have file names of their own")
         files[each.filename] = await each.read()
-    found, content = await inspector.inspect(await scene.read(), files, caller)
+    found, content = await inspector.inspect(await scene.read(), files, computing)
     known = await asyncio.to_thread(store.scene, found.id, whole=False)
-    if not await asyncio.to_thread(keeper.keep_scene, found.id, content, caller):
+    if not await asyncio.to_thread(keeper.keep_scene, found.id, content, computing.caller):
         response.status_code = HTTPStatus.OK
     response.headers["location"] = request.url_for("get_scene", name=found.id).path
     if not isinstance(known, FileScene) or known.description.content == content.content:
@@ -95,8 +95,7 @@ async def draw_scene(
     query: Annotated[SketchQuery, Query()],
     store: TheStore,
     pictures: ThePictures,
-    inspector: TheInspector,
-    caller: TheName,
+    computing: TheComputing,
     request: Request,
 ) -> Response:
     """Draw a scene before anything is computed: meshes, boundaries, supports, loads, contacts.
@@ -106,8 +105,8 @@ async def draw_scene(
     """
     known = await asyncio.to_thread(store.scene_id, name)
     await asyncio.to_thread(known_scene, store, known)
-    draw = partial(inspector.draw, store.directory, known, query, caller)
-    return await pictures.answer(request, (known, query), draw)
+    what, given = (known, query), (store.directory, known, query)
+    return await pictures.answer(request, what, computing, drawn, *given, name=known)
 
 
 @router.delete("/{name}", status_code=HTTPStatus.NO_CONTENT)

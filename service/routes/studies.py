@@ -6,6 +6,7 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator
 from http import HTTPStatus
+from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query, Request, Response
@@ -17,6 +18,7 @@ from pydantic import WithJsonSchema
 from service import maps, overview
 from service.datasets import Datasets
 from service.dependencies import (
+    TheComputing,
     TheDatasets,
     TheDetails,
     TheExaminer,
@@ -24,6 +26,7 @@ from service.dependencies import (
     TheJobs,
     TheKeeper,
     ThePictures,
+    TheReading,
     TheRunner,
     TheSettings,
     TheStore,
@@ -99,12 +102,13 @@ async def submit(
     content: Annotated[dict[str, Any], Body(), WithJsonSchema(SUBMISSION)],
     keeper: TheKeeper,
     examiner: TheExaminer,
+    computing: TheComputing,
     request: Request,
     response: Response,
 ) -> StudySummary:
     """Accept a study; 200 when it is known already, whatever became of it."""
     priority = taken_priority(content)
-    found = await examiner.examine(content)
+    found = await examiner.examine(content, computing)
     job, new = await asyncio.to_thread(keeper.accept, found, priority)
     if not new:
         response.status_code = HTTPStatus.OK
@@ -192,7 +196,7 @@ async def predict(
     jobs: TheJobs,
     store: TheStore,
     datasets: TheDatasets,
-    pictures: ThePictures,
+    computing: TheComputing,
 ) -> Prediction:
     """Tell a number between the runs of a study, with its error.
 
@@ -200,19 +204,22 @@ async def predict(
     `?of=peak_residual_tension&load_ratio=0.62&friction=0.21`. A place outside of the runs, or
     across failed ones, is refused.
     """
-    return await pictures.alone(_predicted, job, query, jobs, store, datasets)
+    path = await run_in_threadpool(datasets.ended, job)
+    content = await run_in_threadpool(jobs.study, job.id)
+    given = path, content, store.directory, store.aside, query
+    return await computing.apart(_predicted, *given, field="of", name=query.of)
 
 
 def _predicted(
-    job: Job, query: PredictQuery, jobs: Jobs, store: Store, datasets: Datasets
+    path: Path, content: dict[str, Any], directory: Path, aside: Path | None, query: PredictQuery
 ) -> Prediction:
-    """Return what `predict` tells."""
+    """Return what `predict` tells; called in a process."""
     from studies import open_netcdf  # xarray takes half a second to import
     from studies.views.answers import answer
 
-    path, asked = datasets.ended(job), query.model_dump()
+    asked, store = query.model_dump(), Store(directory, aside=aside)
     at = {name: asked.pop(name) for name in query.model_extra or {}}
-    study = Study.known(jobs.study(job.id), store.scene)
+    study = Study.known(content, store.scene)
     with open_netcdf(path) as runs:
         found = answer(runs, study, store, at=at, **asked)
     add = None if found.enough else found.run.to_dict()
@@ -222,7 +229,7 @@ def _predicted(
 
 @router.get("/{study_id}/sensitivity", responses=REFUSED)
 async def tell_sensitivity(
-    job: TheJob, datasets: TheDatasets, pictures: ThePictures, of: str
+    job: TheJob, datasets: TheDatasets, computing: TheComputing, of: str
 ) -> dict[str, Any]:
     """Tell which parameter matters for a number of the runs: indices of sensitivity.
 
@@ -230,15 +237,16 @@ async def tell_sensitivity(
     alone, and with others, and how well they are known. A sample that does not bear it is refused
     with the reason.
     """
-    return await pictures.alone(_indices, job, datasets, of)
+    path = await run_in_threadpool(datasets.ended, job)
+    return await computing.apart(_indices, path, of, field="of", name=of)
 
 
-def _indices(job: Job, datasets: Datasets, of: str) -> dict[str, Any]:
-    """Return what `tell_sensitivity` tells."""
+def _indices(path: Path, of: str) -> dict[str, Any]:
+    """Return what `tell_sensitivity` tells; called in a process."""
     from studies import open_netcdf, sensitivity  # xarray takes half a second to import
     from studies.views.sensitivity import told
 
-    with open_netcdf(datasets.ended(job)) as runs:
+    with open_netcdf(path) as runs:
         if (size := runs["status"].size) > MOST_FITTED:
             allowed = f"at most {MOST_FITTED} are fitted here: fetch the data set, and fit it there"
             raise StudyError("runs", size, allowed)
@@ -251,6 +259,7 @@ async def draw_study(
     query: Annotated[PlotQuery, Query()],
     datasets: TheDatasets,
     pictures: ThePictures,
+    computing: TheComputing,
     request: Request,
 ) -> Response:
     """Draw a number of the runs over what is swept, or a map or lines of one run.
@@ -259,19 +268,19 @@ async def draw_study(
     `?field=contact_pressure&over=friction&load_ratio=0.5&stage=loaded`.
     """
     found = await run_in_threadpool(datasets.ended, job)
-    return await pictures.of_file(request, found, query, maps.draw_study)
+    return await pictures.of_file(request, found, query, computing, maps.draw_study)
 
 
 @router.get("/{study_id}/fit", responses=REFUSED)
 async def tell_fit(
-    job: TheJob, jobs: TheJobs, datasets: TheDatasets, pictures: ThePictures
+    job: TheJob, jobs: TheJobs, datasets: TheDatasets, reading: TheReading
 ) -> dict[str, Any]:
     """Tell what a fit has found: of `parameters` each has its `value`, `sigma` and bounds.
 
     `message` warns, such as of parameters that cannot be told apart. The lines over which it was
     fitted are in the data set.
     """
-    return await pictures.alone(_fitted, job, jobs, datasets)
+    return await reading.read(_fitted, job, jobs, datasets)
 
 
 def _fitted(job: Job, jobs: Jobs, datasets: Datasets) -> dict[str, Any]:
@@ -286,24 +295,26 @@ def _fitted(job: Job, jobs: Jobs, datasets: Datasets) -> dict[str, Any]:
 
 
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)
-async def dataset(job: TheJob, datasets: TheDatasets) -> FileResponse:
+async def dataset(job: TheJob, datasets: TheDatasets, computing: TheComputing) -> FileResponse:
     """Return the combined data set of a study, as its last end left it.
 
     Before the first end it has the runs that are there; those to come are NaN, and `missing`.
     """
-    return netcdf(await datasets.current(job), f"{job.name}.nc")
+    return netcdf(await datasets.current(job, computing), f"{job.name}.nc")
 
 
 @router.get(
     "/{study_id}/zarr/{key:path}", responses={200: {"content": {MEDIA_TYPE: {}}}, **UNCHANGED}
 )
-async def tile(job: TheJob, datasets: TheDatasets, request: Request, key: str) -> Response:
+async def tile(
+    job: TheJob, datasets: TheDatasets, computing: TheComputing, request: Request, key: str
+) -> Response:
     """Return a part of the data set as a Zarr store has it (version 3, consolidated metadata).
 
     `xarray.open_zarr("http://…/studies/{study_id}/zarr")` opens it and reads the parts it needs. A
     run that is missing has no chunks: readers take its values as NaN.
     """
-    tiles = await datasets.tiles(job)
+    tiles = await datasets.tiles(job, computing)
     headers = tagged((await asyncio.to_thread(digest, tiles.path), key))
     if known := unchanged(request, headers):
         return known

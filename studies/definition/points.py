@@ -131,8 +131,6 @@ def checked_points(name: str, content: Any, known: Mapping[str, Parameter]) -> P
         raise StudyError(field, dict(content), allowed)
     if not isinstance(content, list | tuple) or not content:
         raise StudyError(field, content, "must be a list of points, each a table of parameters")
-    if len(content) > MOST_POINTS:
-        raise StudyError(field, f"{len(content)} points", f"must be at most {MOST_POINTS}")
     headings: dict[Any, tuple[str, str]] = {}
     given = [_point(f"{field}[{k}]", each, known, headings) for k, each in enumerate(content)]
     own = [key for key in known if key != CASE and any(key in point for point in given)]

@@ -37,6 +37,7 @@ from studies.definition.sweep import (
     labels,
     linked_values,
     owners,
+    run_count,
 )
 from studies.definition.vocabulary import taken
 from studies.errors import StudyError, one_of
@@ -155,6 +156,7 @@ class Study(BaseModel):
         """
         if not isinstance(content, Mapping):
             raise StudyError("study", content, "must be a table with name, scene and sweep")
+        run_count(content)
         if EXTENDS in content:
             content = cls._extended(content, scenes, studies)
         try:

@@ -17,6 +17,7 @@ from solver.results.quantities import QUANTITIES
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
 from studies.definition.points import (
+    ENTRIES,
     POINT,
     checked_points,
     describes_points,
@@ -106,7 +107,10 @@ def checked_axes(content: Any, known: Mapping[str, Parameter]) -> Axes:
     }
     lists = {name: axis for name, axis in given.items() if name not in tables}
     lists = checked_table("sweep", lists, known)
-    _check_size(given)
+    for name, axis in given.items():
+        if not isinstance(axis, list | tuple | Mapping) or not axis:
+            allowed = "must be a list of one value or more, or a table of one label or more"
+            raise StudyError(f"sweep.{name}", axis, allowed)
     linked = {
         name: _linked_axis(name, axis, known) if isinstance(axis, Mapping) else axis
         for name, axis in tables.items()
@@ -177,15 +181,33 @@ def labels(name: str, axis: list[Any] | LinkedAxis) -> list[Any]:
     return [each.at for each in positions(name, axis)]
 
 
-def _check_size(axes: Mapping[str, Any]) -> None:
-    for name, axis in axes.items():
-        if not isinstance(axis, list | tuple | Mapping) or not axis:
-            allowed = "must be a list of one value or more, or a table of one label or more"
-            raise StudyError(f"sweep.{name}", axis, allowed)
-    runs = math.prod(len(axis) for axis in axes.values())
+def run_count(content: Mapping[str, Any]) -> int:
+    """Return the number of runs that the axes of a study describe, before one is made.
+
+    It is the product of the lengths of lists and tables, and of the ``num`` of ranges and samples.
+
+    Raises
+    ------
+    StudyError
+        if it is larger than `MAXIMUM_RUNS`
+    """
+    sweep = content.get("sweep", {})
+    axes = {entry: content[entry] for entry in ENTRIES if entry in content}
+    axes |= sweep if isinstance(sweep, Mapping) else {}
+    sizes = {str(name): _length(axis) for name, axis in axes.items()}
+    runs = math.prod(sizes.values())
     if runs > MAXIMUM_RUNS:
-        sizes = " x ".join(f"{len(axis)} {name}" for name, axis in axes.items())
-        raise StudyError("sweep", f"{runs} runs", f"at most {MAXIMUM_RUNS} runs ({sizes})")
+        listed = " x ".join(f"{size} {name}" for name, size in sizes.items())
+        raise StudyError("sweep", f"{runs} runs", f"at most {MAXIMUM_RUNS} runs ({listed})")
+    return runs
+
+
+def _length(axis: Any) -> int:
+    """Return the number of positions of an axis as it is given; 1 of what is no axis."""
+    num = axis.get("num") if isinstance(axis, Mapping) else None
+    if isinstance(num, int):  # of a range or a sample: a label of this name has a table
+        return num if 0 < num <= MAXIMUM_RUNS else 1  # what makes it refuses others
+    return max(len(axis), 1) if isinstance(axis, list | tuple | Mapping) else 1
 
 
 def _axis(parameter: Parameter, values: list[Any]) -> list[Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -13,13 +13,14 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.memory import most_kept
-from solver.scenes import Effort
+from solver.scenes import Effort, Scene
 from studies.definition.cases import LoadingPath
 from studies.definition.fit import Fit
 from studies.definition.goal import Goal
 from studies.definition.parameters import build
 from studies.definition.refine import Refine
 from studies.definition.study import Study
+from studies.definition.sweep import run_count
 from studies.definition.vocabulary import OK, SOLVED
 from studies.errors import StudyError
 from studies.execution.bundles import most_together, setup_of
@@ -97,6 +98,30 @@ class Bounds:
     cpu_seconds: float | None = None
     bytes: int | None = None
 
+    def check_count(self, content: Mapping[str, Any], scene: Scene, store: Store) -> None:
+        """Refuse a study by the number of its runs, before one of them is made.
+
+        What the runs that `store` can lack will store is at least that of the scene's usual files.
+
+        Parameters
+        ----------
+        content : the study, as `Study.from_dict` reads it
+
+        Raises
+        ------
+        StudyError
+            naming the bound, and the setting that holds it
+        """
+        if content.get("refine") or content.get("fit"):  # its axes are no runs
+            return
+        runs = run_count(content)
+        self._refuse("runs", runs)
+        there = store.catalogue.counts()
+        lacking = runs - sum(there.get(status, 0) for status in SOLVED)
+        if lacking > 0:
+            usual = _file_size(scene.name, content.get("keep", ""), store)
+            self._refuse("bytes", lacking * usual * _COMBINED)
+
     def check_size(self, study: Study) -> None:
         """Refuse a study of too many runs, before each run is checked.
 
@@ -126,6 +151,12 @@ class Bounds:
         for bound in fields(self):
             self._refuse(bound.name, requested[bound.name])
 
+    def check_so_far(self, unknowns: int, increments: int, cpu_seconds: float) -> None:
+        """Refuse a study by a part of its runs; as `check`."""
+        self._refuse("unknowns", unknowns)
+        self._refuse("increments", increments)
+        self._refuse("cpu_seconds", cpu_seconds)
+
     def _refuse(self, name: str, requested: float | None) -> None:
         most = getattr(self, name)
         if most is not None and requested is not None and requested > most:
@@ -142,7 +173,7 @@ _MEANING = {
 }
 
 
-def estimate(study: Study, store: Store) -> Estimate:
+def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estimate:
     """Return the cost of the runs of `study` that `store` lacks; nothing is written.
 
     Runs that the scene cannot set up end at once and cost nothing.
@@ -150,7 +181,8 @@ def estimate(study: Study, store: Store) -> Estimate:
     Raises
     ------
     StudyError
-        for the first run, if the store has none and the scene can set up none
+        for the first run, if the store has none and the scene can set up none; as soon as the runs
+        so far exceed one of the `bounds`
     ModelError
         if the setting of the memory that is kept is not a size
     """
@@ -182,6 +214,8 @@ def estimate(study: Study, store: Store) -> Estimate:
                 more = effort.seconds / _TOLD, effort.seconds, effort.seconds * _TOLD
                 basis = f"what passes of {scene.name} took elsewhere"
             seconds = [sum(both) for both in zip(seconds, more, strict=True)]
+            if bounds:
+                bounds.check_so_far(unknowns, longest, seconds[1])
         if scene.setup is None:
             alone += set_up
         else:
@@ -191,7 +225,7 @@ def estimate(study: Study, store: Store) -> Estimate:
     fixed = _PER_RUN * to_compute + alone + _shared(list(set_ups.values()))
     low, likely, high = (fixed + each for each in seconds)
     known = scene.effort is not None
-    return Estimate(
+    found = Estimate(
         runs=study.size,
         to_compute=to_compute,
         paths=paths,
@@ -199,10 +233,13 @@ def estimate(study: Study, store: Store) -> Estimate:
         increments=increments if known else None,
         longest=longest if known else None,
         cpu_seconds=(low, likely, high) if known else None,
-        bytes=round(to_compute * _file_size(study, store, unknowns) * _COMBINED),
+        bytes=round(to_compute * _file_size(scene.name, study.keep, store, unknowns) * _COMBINED),
         memory=memory if known else None,
         basis=basis if known else f"{scene.name} does not estimate the work of its paths",
     )
+    if bounds:
+        bounds.check(found)
+    return found
 
 
 def memory_needed(study: Study) -> int:
@@ -289,10 +326,10 @@ def _longest(study: Study, asks: Goal | Refine | Fit) -> Iterator[tuple[LoadingP
             yield from itertools.repeat((path, [high]), runs)
 
 
-def _file_size(study: Study, store: Store, unknowns: int) -> float:
-    """Return the usual size [bytes] of the file of a run with the same ``keep``."""
-    rows, _ = store.catalogue.runs(scene=study.problem.name, status=OK, limit=20)
-    files = (store.run_path(row["id"]) for row in rows if row["keep"] == study.keep)
+def _file_size(scene: str, keep: str, store: Store, unknowns: int = 0) -> float:
+    """Return the usual size [bytes] of the file of a run with this ``keep``."""
+    rows, _ = store.catalogue.runs(scene=scene, status=OK, limit=20)
+    files = (store.run_path(row["id"]) for row in rows if row["keep"] == keep)
     sizes: Sequence[int] = [file.stat().st_size for file in files if file.exists()]
-    fields = _FIELDS * unknowns if study.keep else 0
+    fields = _FIELDS * unknowns if keep else 0
     return float(np.mean(sizes)) if sizes else _BYTES + fields

@@ -16,6 +16,7 @@ from studies.definition.vocabulary import OK
 from studies.errors import StudyError, one_of
 from studies.storage.frame import SETS
 from studies.toml import CASE
+from studies.views.by_content import by_content
 from studies.views.gaussian import Array, Gaussian, in_hull
 from studies.views.picking import (
     only_numbers,
@@ -29,6 +30,8 @@ WAYS = CELLS, GAUSSIAN = "cells", "gaussian"
 MOST = 1000
 """Largest number of runs of a Gaussian process: its cost grows with their cube."""
 _RUN = "run_between"
+
+_process = by_content(Gaussian)
 
 
 def predict(
@@ -233,7 +236,7 @@ def _by_process(dataset: xr.Dataset, between: _Between, names: Sequence[str]) ->
         each = runs[name].isel({_RUN: known}).transpose(_RUN, ...)
         flat = each.to_numpy().reshape(len(good), -1)
         there = np.isfinite(flat).all(axis=0)
-        process = Gaussian(good, flat[:, there])
+        process = _process(good, flat[:, there])
         parts, variance = process.weights(place)
         error = np.full(flat.shape[1], np.nan)
         error[there] = process.error(variance)

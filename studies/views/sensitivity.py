@@ -23,6 +23,7 @@ import xarray as xr
 
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError, one_of
+from studies.views.by_content import by_content
 from studies.views.chaos import DEGREES, Chaos, Numbers, bears, fitted
 from studies.views.columns import aligned, or_none, value_text
 from studies.views.grids import parameters_over, point_axes
@@ -183,6 +184,7 @@ def _sampled(dataset: xr.Dataset, of: str) -> tuple[list[_Scale], Numbers, Numbe
     return scales, np.column_stack(shares), values
 
 
+@by_content
 def _indices(places: Numbers, values: Numbers, unsure: Numbers, of: str) -> xr.Dataset:
     """Return the indices of a fit, or refuse one that predicts too little.
 

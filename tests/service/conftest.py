@@ -6,11 +6,14 @@ a core.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from service.turns import Turn
 from tests.service.servers import Server, worker_elsewhere
 
 
@@ -44,3 +47,13 @@ def mortal(tmp_path: Path) -> Iterator[Server]:
     server = Server(tmp_path / "mortal")
     yield server
     server.close()
+
+
+@pytest.fixture
+def computing_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compute in threads of this process, which knows the fake scene."""
+
+    async def apart(self: Turn, function: Any, *given: Any, **named: Any) -> Any:
+        return await asyncio.to_thread(function, *given)
+
+    monkeypatch.setattr(Turn, "apart", apart)

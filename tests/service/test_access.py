@@ -17,7 +17,7 @@ from fastapi.testclient import TestClient
 
 from residua.cli import main
 from service.app import create_app
-from service.dependencies import TheName
+from service.dependencies import TheComputing
 from service.keys import Keys, KeysError, Scope
 from service.settings import Settings, chosen
 from studies import StudyError
@@ -406,8 +406,8 @@ def test_an_address_has_no_name_that_a_key_may_have(tmp_path: Path) -> None:
     names = []
     app = create_app(Settings(data=tmp_path))
 
-    async def told(name: TheName) -> None:
-        names.append(name)
+    async def told(share: TheComputing) -> None:
+        names.append(share.caller)
 
     app.add_api_route("/me", told)
     assert asking(app)("GET", "/me").status_code == 200

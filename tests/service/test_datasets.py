@@ -21,8 +21,8 @@ from fastapi.testclient import TestClient
 
 from service import datasets
 from service.app import create_app
-from service.guarded import Guarded, beyond
 from service.settings import Settings
+from service.turns import Share, Turns, beyond
 from studies import Store, open_study
 from studies.storage.tiles import KEYS, Tiles
 from tests.service.servers import free_port
@@ -54,14 +54,7 @@ class Running:
         return open_study(self.store.dataset_path(self.half.id))
 
 
-@pytest.fixture(autouse=True)
-def here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make data sets in a thread of this process, which knows the fake scene."""
-
-    async def call(self: Guarded, function: Any, *given: Any, **named: Any) -> Any:
-        return await asyncio.to_thread(function, *given)
-
-    monkeypatch.setattr(Guarded, "call", call)
+pytestmark = pytest.mark.usefixtures("computing_here")
 
 
 @pytest.fixture(scope="module")
@@ -130,15 +123,18 @@ def test_one_that_took_long_stays_though_others_were_asked_for_meanwhile(
     held, made, first = datasets.Datasets(running.jobs, running.store), datasets.combined, []
     later = fake_study("later", sweep=AXES | {"load_ratio": [0.3]})
     running.jobs.accept(later.id, later.to_dict(), later.run_ids())
-    ended = threading.Event()
+    ended, turns = threading.Event(), Turns(2)
 
     def combined(content: dict[str, Any], *given: Any) -> None:
         assert content["name"] != later.name or ended.wait(10.0)
         made(content, *given)
 
+    async def current(study_id: str) -> Path:
+        return await held.current(running.jobs.get(study_id), Share(turns, study_id))
+
     async def both() -> Path:
         ids = (running.study.id, later.id)
-        tasks = [asyncio.create_task(held.current(running.jobs.get(each))) for each in ids]
+        tasks = [asyncio.create_task(current(each)) for each in ids]
         path = await tasks[0]
         first.append(path.is_file())
         ended.set()

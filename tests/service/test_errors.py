@@ -12,9 +12,9 @@ import pytest
 from fastapi import FastAPI, Request
 from starlette.exceptions import HTTPException
 
+from service import turns
 from service.app import create_app
 from service.errors import STATUS, on_field_error, on_http_error
-from service.guarded import READERS
 from service.settings import Settings
 from service.strict import StrictRequest
 from studies import Study, StudyError
@@ -402,11 +402,11 @@ def test_health_fails_without_executor_and_without_a_place_to_write(app: FastAPI
     assert ask(app, "/health").json()["data_writable"] is False
 
 
-def test_too_many_studies_to_examine_are_put_off(
+def test_too_many_requests_of_a_caller_are_put_off(
     app: FastAPI, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(app.state.examiner.process, "waiting", -READERS)
+    monkeypatch.setattr(turns, "WAITING", 0)
     for path in ("/studies", "/estimate"):
         answer = ask(app, path, "POST", json={"name": "a", "scene": "punch"})
-        problem(answer, 503)
+        problem(answer, 429)
         assert int(answer.headers["retry-after"]) > 0

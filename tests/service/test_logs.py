@@ -136,3 +136,34 @@ def test_a_port_in_use_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -
     assert f"port = {port}" in told
     assert "--port" in told
     check_port("127.0.0.1", 0)
+
+
+LOST = """
+import logging
+import distributed
+from service import logs
+logs.configure("json", study="a")
+for name in ("distributed.client", "asyncio", "service"):
+    try:
+        try:
+            raise ConnectionRefusedError("refused")
+        except OSError as error:
+            raise distributed.comm.CommClosedError("in a connection") from error
+    except OSError:
+        logging.getLogger(name).exception("lost")
+try:
+    1 / 0
+except ZeroDivisionError:
+    logging.getLogger("service").exception("a defect")
+"""
+
+
+def test_a_lost_connection_to_workers_is_one_line_without_a_traceback() -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", LOST], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    *lost, defect = lines(run.stderr)
+    assert len(run.stderr.splitlines()) == 4, run.stderr
+    assert {each["message"] for each in lost} == {"lost CommClosedError: in a connection"}
+    assert [each["study"] for each in lost] == ["a"] * 3 and "exc_info" not in lost[0]
+    assert "Traceback" in defect["exc_info"]

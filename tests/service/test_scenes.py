@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from service.guarded import BYTES
+from service.turns import BYTES
 from studies import Store, Study, run_study
 from studies.scenes.scene import read_scene
 from studies.views.summary import summary_of

@@ -34,6 +34,7 @@ from service.probe import look
 from service.recovery import Mender, open_queue
 from service.retention import Keeper
 from service.settings import Settings
+from service.turns import Share, Turns
 from studies import FileDamaged, Store, Study, StudyError, estimate, open_netcdf
 from studies.errors import CatalogueDamaged, SceneError
 from studies.scenes.scene import FileScene, read_scene
@@ -683,8 +684,9 @@ def test_the_meshes_of_a_posted_scene_are_read_once_for_all(
 ) -> None:
     """Whoever uses them later reads arrays: the library of meshes stays in a process shut in."""
     text, mesh = ((ROOT / "data/scenes" / name).read_bytes() for name in ("pin.toml", "pin.msh"))
+    share = Share(Turns(1), "anna")
     text = text.replace(b"0.01", b"0.011")  # no other test has made this scene
-    found, content = asyncio.run(Inspector(60.0).inspect(text, {"pin.msh": mesh}, "anna"))
+    found, content = asyncio.run(Inspector(60.0).inspect(text, {"pin.msh": mesh}, share))
     store = Store(tmp_path)
     assert store.keep_scene(found.id, content, "anna")
     monkeypatch.setitem(sys.modules, "meshio", None)

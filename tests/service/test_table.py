@@ -10,6 +10,7 @@ import json
 import math
 import time
 import tomllib
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,12 +18,12 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
-from service.errors import Busy, Conflict
+from service.errors import Conflict
 from service.jobs import Jobs
-from service.maps import Pictures
 from service.pages.form import as_toml, study_of
 from service.pages.run import audited
 from service.settings import Settings
+from service.turns import Share
 from studies import Store, open_netcdf, open_study
 from studies.definition.identity import content_id
 from studies.views.table import RunTable, column_of
@@ -428,7 +429,7 @@ def test_a_page_shows_only_limits_that_every_run_has() -> None:
     assert [each.name for each in found["others"]] == ["audit_energy", "audit_reactions"]
 
 
-def test_files_are_read_one_at_a_time() -> None:
+def test_files_are_read_one_at_a_time(tmp_path: Path) -> None:
     now, most = 0, 0
 
     def read() -> None:
@@ -439,20 +440,8 @@ def test_files_are_read_one_at_a_time() -> None:
         now -= 1
 
     async def all_at_once() -> None:
-        pictures = Pictures(8, 1000)
-        await asyncio.gather(*(pictures.alone(read) for _ in range(6)))
+        turns = create_app(Settings(data=tmp_path)).state.reading
+        await asyncio.gather(*(Share(turns, f"caller {k}").read(read) for k in range(6)))
 
     asyncio.run(all_at_once())
     assert most == 1
-
-
-def test_readings_that_would_wait_long_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("service.maps.WAITING", 2)
-
-    async def all_at_once() -> list[object]:
-        pictures = Pictures(8, 1000)
-        each = (pictures.alone(time.sleep, 0.02) for _ in range(6))
-        return await asyncio.gather(*each, return_exceptions=True)
-
-    found = asyncio.run(all_at_once())
-    assert [type(each) for each in found] == [type(None)] * 3 + [Busy] * 3

@@ -65,6 +65,7 @@ def rows(client: TestClient, study_id: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text)))
 
 
+@pytest.mark.usefixtures("computing_here")
 def test_a_folder_is_shown_and_nothing_is_written_there(folder: tuple[Study, Store]) -> None:
     study, store = folder
     damaged = store.run_path("0" * 32)
@@ -164,6 +165,7 @@ def test_a_damaged_data_set_is_told_and_stays(folder: tuple[Study, Store], tmp_p
         assert content(copy) == before
 
 
+@pytest.mark.usefixtures("computing_here")
 def test_a_data_set_alone_has_the_pages_of_its_runs(
     folder: tuple[Study, Store], tmp_path: Path
 ) -> None:

@@ -19,6 +19,7 @@ from tests.service.servers import Server
 from tests.stress.attacks import attacks
 from tests.stress.crowds import description, half_open, pictures
 from tests.stress.disks import full_disk
+from tests.stress.fairness import fairness
 from tests.stress.measure import Figure, table
 from tests.stress.mixtures import mixed, scenes
 from tests.stress.polling import pollers
@@ -31,6 +32,7 @@ SCENARIOS: Mapping[str, Callable[[Server], list[Figure]]] = {
     "last-page": last_page,
     "half-open": half_open,
     "pictures": pictures,
+    "fairness": fairness,
     "attacks": attacks,
     "full-disk": full_disk,
     "scenes": scenes,

@@ -72,7 +72,7 @@ def pictures(server: Server) -> list[Figure]:
         statuses = [each.result() for each in drawn]
     return [
         Figure("pictures drawn", statuses.count(200)),
-        Figure("pictures put off (503)", statuses.count(503)),
-        Figure("other answers", PICTURES - statuses.count(200) - statuses.count(503), most=0),
+        Figure("pictures put off (429)", statuses.count(429)),
+        Figure("other answers", PICTURES - statuses.count(200) - statuses.count(429), most=0),
         Figure("health answers within", quantile(times, 1.0), "s", most=1.0),
     ]

@@ -218,7 +218,7 @@ def test_points_without_a_value_are_marked_at_the_foot_of_every_panel(store: Sto
         ("tests", "points", "must be a list of points"),
         ({"A": {"friction": 0.1}}, "points", "labels are [sweep.NAME]"),
         ({"method": "lhs", "num": 2}, "points", "a sample is [sample]"),
-        ([{"friction": 0.1}] * 100_001, "points", "must be at most 100000"),
+        ([{"friction": 0.1}] * 100_001, "sweep", "at most 100000 runs (100001 points)"),
         ([{"friction": 0.1}, 3], "points[1]", "must be a table of parameters"),
         ([{}], "points", "must set a parameter"),
         ([{"case": "A"}], "points", "must set a parameter"),

@@ -1,0 +1,288 @@
+"""Turns: what is read and computed for answers, fairly among callers, with limits.
+
+A caller has one call at a time, whatever it asks for, and the callers take turns: one who asks a
+hundred times waits for its own calls, and others wait for one of them. Each has a budget of
+processor time.
+
+What takes long is computed in processes, with limits of time and memory: a large study takes
+seconds and memory to check, and a malicious mesh could take both without end. Meanwhile the service
+answers other requests.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import copyreg
+import os
+import pickle
+import resource
+import signal
+import time
+from collections import Counter
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
+from io import BytesIO
+from math import ceil, inf
+from pathlib import Path
+from threading import Lock
+from typing import Any, TypeVar, cast
+from weakref import WeakValueDictionary
+
+from anyio import BrokenWorkerProcess, CapacityLimiter, fail_after, to_process, to_thread
+from threadpoolctl import threadpool_limits
+
+from service.errors import Busy, TooMany
+from studies import StudyError
+
+READING, COMPUTING = 2, 2
+"""Number of calls at a time."""
+
+FILES = Lock()
+"""Held while a file is read: the netCDF library ends the process if two threads do it."""
+
+WAITING = 200
+"""Number of calls of a caller that may wait."""
+
+MINUTE = 60.0
+"""Time after which a caller has its whole budget again [s]."""
+
+SECONDS = 60.0
+"""Longest time of a call in a process, unless it says another one [s]."""
+
+Found = TypeVar("Found")
+
+
+class Beyond(StudyError):
+    """An input that takes more time or memory than is allowed."""
+
+
+def memory(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path("/sys/fs/cgroup")) -> int:
+    """Return the memory that this process and those it starts may have [bytes].
+
+    The smallest limit of its control groups, of version 2 or 1, or all of the machine. In a
+    container the path of a group may be that outside, and its files are at the top.
+    """
+    found = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")]
+    with suppress(OSError):
+        for line in groups.read_text().splitlines():
+            _, kinds, path = line.split(":", 2)
+            if kinds and "memory" not in kinds.split(","):
+                continue
+            top, name = (
+                (mounted / "memory", "memory.limit_in_bytes") if kinds else (mounted, "memory.max")
+            )
+            own = top / path.lstrip("/")
+            for folder in (own, *own.parents):
+                with suppress(OSError, ValueError):  # no such file, or "max"
+                    found.append(int((folder / name).read_text()))
+    return min(found)
+
+
+BYTES = min(max(memory() // 5, 2**30), 8 * 2**30)
+"""Address space of a process [bytes]: the service, two of them and studies share the memory."""
+
+
+class Turns:
+    """Slots that callers share.
+
+    Parameters
+    ----------
+    slots : number of calls at a time
+    seconds : processor time that a caller may take in a minute [s]; None where there is one caller,
+        who has all slots and no limit
+    """
+
+    def __init__(self, slots: int, seconds: float | None = None) -> None:
+        self.slots, self.seconds = CapacityLimiter(slots), seconds
+        self.own: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
+        self.waiting = Counter[str]()
+        self.even: dict[str, float] = {}
+
+    @asynccontextmanager
+    async def turn(self, caller: str) -> AsyncIterator[Turn]:
+        """Give a caller its turn: those who wait are served in order, one call of each.
+
+        What it takes is charged to the caller.
+
+        Raises
+        ------
+        TooMany
+            if too many calls of the caller wait, or its budget is used
+        """
+        self.left(caller)
+        if self.waiting[caller] >= WAITING:
+            raise TooMany(f"{WAITING} of your requests wait already: ask later")
+        self.waiting[caller] += 1
+        own = asyncio.Lock()
+        if self.seconds is not None:
+            own = self.own.setdefault(caller, own)
+        try:
+            async with own, self.slots:
+                turn = Turn(self.left(caller))
+                try:
+                    yield turn
+                finally:
+                    self.charge(caller, turn.spent)
+        finally:
+            self.waiting[caller] -= 1
+            self.waiting += Counter()  # forgets those that have none
+
+    def left(self, caller: str) -> float:
+        """Return the processor time that a caller has left [s]; raise `TooMany` without any."""
+        if self.seconds is None:
+            return inf
+        whole = max(self.even.get(caller, 0.0) - time.monotonic(), 0.0)
+        left, least = self.seconds * (1.0 - whole / MINUTE), min(1.0, self.seconds / 2)
+        if left < least:
+            used = f"{self.seconds:g} s of processor time in a minute are used"
+            raise TooMany(f"{used}: ask later", ceil((least - left) / self.seconds * MINUTE))
+        return left
+
+    def charge(self, caller: str, seconds: float) -> None:
+        """Take time from the budget of a caller."""
+        if self.seconds is not None:
+            now = time.monotonic()
+            self.even = {name: at for name, at in self.even.items() if at > now}
+            self.even[caller] = self.even.get(caller, now) + seconds / self.seconds * MINUTE
+
+
+@dataclass(slots=True)
+class Turn:
+    """The turn of a caller.
+
+    Attributes
+    ----------
+    left : processor time that the caller has left [s]
+    spent : processor time that the turn has taken [s]
+    """
+
+    left: float
+    spent: float = 0.0
+
+    async def here(self, function: Callable[..., Found], *given: object) -> Found:
+        """Return ``function(*given)``, called in a thread."""
+
+        def timed() -> Found:
+            begun = time.thread_time()
+            try:
+                return function(*given)
+            finally:
+                self.spent += time.thread_time() - begun
+
+        return await to_thread.run_sync(timed, limiter=CapacityLimiter(1))
+
+    async def apart(
+        self,
+        function: Callable[..., Found],
+        *given: object,
+        field: str,
+        name: object,
+        seconds: float = SECONDS,
+        advice: str = "",
+    ) -> Found:
+        """Return ``function(*given)``, called in a process; all of it must be picklable.
+
+        Parameters
+        ----------
+        field : the input that errors name: ``study``, ``scene``
+        name, advice : value and advice in the error if a limit is exceeded
+        seconds : longest time [s]
+
+        Raises
+        ------
+        Beyond
+            if time or memory did not suffice; errors of the function are raised too
+        Busy
+            if the process was killed
+        """
+        begun = time.monotonic()
+        try:
+            with fail_after(seconds):
+                one = CapacityLimiter(1)
+                answer = await to_process.run_sync(
+                    _limited, function, *given, cancellable=True, limiter=one
+                )
+        except BaseException as error:  # without an answer nobody knows
+            self.spent += time.monotonic() - begun
+            if isinstance(error, BrokenWorkerProcess):
+                raise Busy(f"the process that reads a {field} has ended: ask again") from None
+            if isinstance(error, TimeoutError):
+                raise beyond(field, name, seconds, advice) from None
+            raise
+        found, failed, spent = pickle.loads(answer)
+        self.spent += spent
+        if isinstance(failed, MemoryError):
+            raise beyond(field, name, seconds, advice)
+        if failed is not None:
+            raise failed
+        return cast("Found", found)
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """What a caller has of the slots.
+
+    Attributes
+    ----------
+    turns, caller : the slots, and whose share it is
+    """
+
+    turns: Turns
+    caller: str
+
+    async def here(self, function: Callable[..., Found], *given: object) -> Found:
+        """Return what `Turn.here` does, in the caller's turn."""
+        async with self.turns.turn(self.caller) as turn:
+            return await turn.here(function, *given)
+
+    async def read(self, function: Callable[..., Found], *given: object) -> Found:
+        """Return what a function returns that opens files, called while no other one does."""
+
+        def alone() -> Found:
+            with FILES:
+                return function(*given)
+
+        return await self.here(alone)
+
+    async def apart(self, function: Callable[..., Found], *given: object, **limits: Any) -> Found:
+        """Return what `Turn.apart` does, in the caller's turn."""
+        async with self.turns.turn(self.caller) as turn:
+            return await turn.apart(function, *given, **limits)
+
+
+def beyond(field: str, name: object, seconds: float, advice: str = "") -> Beyond:
+    """Return the error for what takes more than this time, or more memory than is allowed."""
+    allowed = f"must be read within {seconds:g} s and {BYTES / 2**30:.3g} GiB of memory"
+    return Beyond(field, name, allowed + advice)
+
+
+def _limited(function: Callable[..., object], *given: object) -> bytes:
+    """Return a pickle of what a function returns, the error that it raises, and its time [s].
+
+    An error is pickled by its own rule. That of `tblib`, which Dask sets for all errors, adds what
+    the error came from; in the errors of pydantic that has no end.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the service's to handle
+    resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
+    threadpool_limits(1)
+    begun, found, failed = _used(), None, None
+    try:
+        found = function(*given)
+    except Exception as error:
+        failed = error
+    out = BytesIO()
+    pickler = pickle.Pickler(out)
+    pickler.dispatch_table = {
+        kind: rule
+        for kind, rule in copyreg.dispatch_table.items()
+        if not issubclass(kind, BaseException)
+    }
+    pickler.dump((found, failed, _used() - begun))
+    return out.getvalue()
+
+
+def _used() -> float:
+    """Return the processor time of this process and of those that it has waited for [s]."""
+    each = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
+    return sum(used.ru_utime + used.ru_stime for used in each)
