@@ -24,6 +24,7 @@ from anyio import BrokenWorkerProcess, CapacityLimiter, Lock, fail_after
 from anyio.to_process import run_sync
 
 from service.errors import Busy
+from solver.files import read_file
 from studies import StudyError
 
 READERS = 2
@@ -47,7 +48,7 @@ def memory(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path("/sys/
     """
     found = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")]
     with suppress(OSError):
-        for line in groups.read_text().splitlines():
+        for line in read_file(groups).decode().splitlines():
             _, kinds, path = line.split(":", 2)
             if kinds and "memory" not in kinds.split(","):
                 continue
@@ -57,7 +58,7 @@ def memory(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path("/sys/
             own = top / path.lstrip("/")
             for folder in (own, *own.parents):
                 with suppress(OSError, ValueError):  # no such file, or "max"
-                    found.append(int((folder / name).read_text()))
+                    found.append(int(read_file(folder / name)))
     return min(found)
 
 

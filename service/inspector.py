@@ -19,6 +19,7 @@ from service.alone import CRASHED, FAILED, Answer, alone
 from service.guarded import Budget, Guarded, beyond
 from service.maps import draw_scene
 from service.schemas import KeptScene, SketchQuery
+from solver.files import LARGEST
 from studies import Store, Study, StudyError
 from studies.definition.parameters import read_values
 from studies.errors import SceneError
@@ -28,7 +29,6 @@ from studies.scenes.registry import scene_named
 from studies.scenes.scene import FileScene, read_scene
 from studies.scenes.table import FILE_NAME
 from studies.scratch import scratch
-from studies.toml import LARGEST
 
 log = logging.getLogger(__name__)
 

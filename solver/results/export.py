@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from solver.errors import ModelError
+from solver.files import check_replaceable, read_file
 
 if TYPE_CHECKING:
     import meshio
@@ -49,6 +50,8 @@ def write_vtu(fields: MeshFields, folder: Path) -> Path:
         whole = ElementTree.ElementTree(root)
         whole.write(Path(part) / _PVD, xml_declaration=True, encoding="utf-8")
         now = [each.attrib["file"] for each in stages]
+        for name in (*now, _PVD):
+            check_replaceable(folder / name)
         for name in (*now, _PVD):  # only when all files are written: the set is complete
             (Path(part) / name).replace(folder / name)
     for name in before - {*now}:
@@ -59,7 +62,7 @@ def write_vtu(fields: MeshFields, folder: Path) -> Path:
 def _listed(path: Path) -> set[str]:
     """Return the names of the files that a .pvd lists; empty if there is no such file."""
     try:
-        found = ElementTree.parse(path).iter("DataSet")
+        found = ElementTree.fromstring(read_file(path)).iter("DataSet")
         return {Path(each.attrib["file"]).name for each in found}
     except (OSError, ElementTree.ParseError, KeyError):
         return set()
@@ -70,7 +73,7 @@ def vtu_of(fields: MeshFields, stage: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:  # meshio can only write to a path
         path = Path(folder) / "stage.vtu"
         to_meshio(fields, stage).write(path)
-        return path.read_bytes()
+        return read_file(path)
 
 
 def to_meshio(fields: MeshFields, stage: str) -> meshio.Mesh:

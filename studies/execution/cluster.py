@@ -16,6 +16,7 @@ from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+from solver.files import read_file
 from studies.errors import GridLost, StudyError, Unusable
 from studies.execution.forking import prepare
 from studies.execution.script import GUARD, check_script
@@ -120,7 +121,7 @@ class Access:
                 raise GridLost(f"no scheduler has written the file {path} in {_APPEARS:g} s")
             time.sleep(0.2)
         try:
-            address = json.loads(path.read_text(encoding="utf-8"))["address"]
+            address = json.loads(read_file(path))["address"]
         except (OSError, ValueError, LookupError, TypeError):
             allowed = "must be a file that `dask scheduler --scheduler-file` has written"
             raise StudyError("scheduler-file", str(path), allowed) from None
@@ -276,10 +277,12 @@ def connect(access: Access) -> Client:
             tls_client_cert=access.cert,
             tls_client_key=access.key,
         )
+        names = [each for each in (access.ca, access.cert, access.key) if each]
         try:
+            for name in (each for each in names if "\n" not in each):
+                read_file(name)  # OpenSSL would wait for a pipe
             security.get_connection_args("client")
         except (OSError, ValueError) as error:
-            names = [each for each in (access.ca, access.cert, access.key) if each]
             files = ", ".join("(in memory)" if "\n" in each else each for each in names)
             raise Unusable("certificates", files, f"cannot be used: {error}") from None
     try:

@@ -24,6 +24,7 @@ from residua.status import complain
 from solver.results.shakedown import ShakedownState
 from studies import Store, Study, StudyEvent, open_netcdf
 from studies.storage.dataset import attributes_of
+from studies.storage.seal import seal
 from tests.studies.conftest import compute_here, fake_study
 
 pytestmark = pytest.mark.usefixtures("one_worker")
@@ -159,6 +160,7 @@ def test_show_of_a_run_tells_flags_in_words_and_no_negative_zero(
         changed[name] = xr.full_like(changed["peak_residual_tension"], float(value))
         changed[name].attrs = attributes_of(name)
     changed.to_netcdf(tmp_path / "run.nc")
+    seal(tmp_path / "run.nc", "run changed")
     assert main(["show", str(tmp_path / "run.nc")]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["shakedown_state", "undecided"] in lines
