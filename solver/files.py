@@ -100,7 +100,8 @@ def appearing(path: Path) -> Iterator[Path]:
 
     It replaces a regular file. Raises `NoFile` if `path` is something else, such as a link.
     """
-    check_replaceable(path)
+    if kind := special(path, links=False):
+        raise NoFile(path, f"it is {kind}, and only files are replaced")
     part = path.with_name(f"{path.name}.{uuid.uuid4().hex}.part")
     try:
         yield part
@@ -109,12 +110,6 @@ def appearing(path: Path) -> Iterator[Path]:
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
-
-
-def check_replaceable(path: Path) -> None:
-    """Raise `NoFile` if a path is neither new nor a regular file."""
-    if kind := special(path, links=False):
-        raise NoFile(path, f"it is {kind}, and only files are replaced")
 
 
 def _kind(mode: int) -> str:

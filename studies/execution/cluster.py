@@ -196,7 +196,12 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
         distributed.utils._forkserver_preload_set = True  # or dask would load pandas everywhere
         started = {"distributed.worker.multiprocessing-method": method}
         security = Security.temporary()
-        with scratch() as folder, dask.config.set({**CONFIGURATION, **_CLOSED, **started}):
+        with (
+            scratch() as folder,
+            dask.config.set(
+                {**CONFIGURATION, **_CLOSED, **started, "temporary-directory": str(folder)}
+            ),
+        ):
             try:
                 cluster = starter.submit(
                     LocalCluster,
@@ -208,7 +213,6 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
                     security=security,
                     dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
                     scheduler_kwargs={"dashboard": False},
-                    local_directory=str(folder),
                     env={**os.environ, **FROM_THE_START},  # through a pipe
                     silence_logs=logging.CRITICAL,
                     memory_limit=memory or MEMORY_LIMIT // max(workers, 1),
