@@ -7,6 +7,7 @@ import resource
 import shutil
 import signal
 import socket
+import stat
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -180,3 +181,58 @@ def test_files_beside_a_study_file_are_refused(special: Special, tmp_path: Path)
     path = write_study(tmp_path, 'name = "a"\nscene = "fake"\n[sweep]\npoints = "points.csv"\n')
     with pytest.raises(StudyError, match=r"readable text file: .*points\.csv: it is a "):
         Study.from_toml(path)
+
+
+def endless_link(path: Path) -> None:
+    path.symlink_to("/dev/full")
+
+
+WRITERS = {
+    "table": ["table", "{data}", "--out", "{out}"],
+    "report": ["report", "{data}", "--out", "{out}"],
+    "plot": ["plot", "{data}", "--out", "{out}.png"],
+    "draw": ["draw", "punch", "--out", "{out}.png"],
+    "diff": ["diff", "{data}", "{other}", "--out", "{out}.png"],
+    "slurm": ["slurm", "{study}", "--tasks", "2", "--script", "{out}"],
+    "certificates": ["certificates", "--out", "{folder}"],
+}
+"""Commands that write a file; `{out}` is its name, and `{folder}` that of a folder for several."""
+
+
+@pytest.mark.parametrize("special", [pipe, endless_link, a_socket, folder])
+@pytest.mark.parametrize("command", WRITERS)
+def test_only_files_are_replaced(
+    special: Special,
+    command: str,
+    computed: ComputedStudy,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    study, store = computed
+    own = tmp_path / "scheduler" / "ca.pem" if command == "certificates" else tmp_path / "out"
+    options = WRITERS[command]
+    path = own.with_name(own.name + ".png") if any(".png" in each for each in options) else own
+    path.parent.mkdir(exist_ok=True)
+    special(path)
+    kind = stat.S_IFMT(path.lstat().st_mode)
+    data = store.dataset_path(study.id)
+    given = [
+        each.format(
+            data=data, other=data, out=own, folder=tmp_path, study=write_study(tmp_path)
+        )
+        for each in options
+    ]  # fmt: skip
+    assert main(given) in (1, 2)
+    told = capsys.readouterr().err
+    assert path.name in told and "only files are replaced" in told
+    assert stat.S_IFMT(path.lstat().st_mode) == kind
+    assert not [each for each in path.parent.iterdir() if each.suffix == ".part"]
+
+
+def test_a_new_name_and_a_file_are_written(computed: ComputedStudy, tmp_path: Path) -> None:
+    study, store = computed
+    out = tmp_path / "out.csv"
+    for _ in range(2):
+        assert main(["table", str(store.dataset_path(study.id)), "--out", str(out)]) == 0
+        assert out.read_text().startswith("load_ratio")
+        out.write_text("other")
