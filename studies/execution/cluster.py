@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 _APPEARS = 60.0
 """Seconds within which a scheduler must write its file."""
 
+_LATE = 3.0
+"""Seconds after which it is reported that a scheduler has not answered."""
+
 _ABSENT = 30.0
 """Seconds without a sign of life of a worker started here until it is replaced."""
 
@@ -58,6 +61,8 @@ CONFIGURATION: Mapping[str, Any] = {
     "distributed.worker.profile.enabled": False,
 }
 """Settings of the scheduler and the workers started here."""
+
+_LOG = logging.getLogger("studies")
 
 _CLOSED: Mapping[str, Any] = {
     # dask's pages show what is computed, without a password.
@@ -116,10 +121,11 @@ class Access:
             if it tells no address
         """
         deadline = time.monotonic() + _APPEARS
-        while not (path.exists() and path.stat().st_size):  # it is written after it appears
-            if time.monotonic() > deadline:
-                raise GridLost(f"no scheduler has written the file {path} in {_APPEARS:g} s")
-            time.sleep(0.2)
+        with _reported_if_late(f"no scheduler has written the file {path} yet: waiting"):
+            while not (path.exists() and path.stat().st_size):  # it is written after it appears
+                if time.monotonic() > deadline:
+                    raise GridLost(f"no scheduler has written the file {path} in {_APPEARS:g} s")
+                time.sleep(0.2)
         try:
             address = json.loads(read_file(path))["address"]
         except (OSError, ValueError, LookupError, TypeError):
@@ -261,7 +267,8 @@ def _kept(cluster: LocalCluster, workers: int) -> Iterator[None]:
 def connect(access: Access) -> Client:
     """Return a client of a scheduler.
 
-    It must answer within Dask's ``distributed.comm.timeouts.connect`` (30 s, if nothing is set).
+    It must answer within Dask's ``distributed.comm.timeouts.connect`` (30 s, if nothing is set); a
+    message says soon that it has not.
 
     Raises
     ------
@@ -291,9 +298,22 @@ def connect(access: Access) -> Client:
             raise Unusable("certificates", files, f"cannot be used: {error}") from None
     try:
         get_address_host_port(access.address)  # a refused client closes badly
-        return Client(access.address, security=security, set_as_default=False)
+        with _reported_if_late(f"no scheduler answers at {access.address} yet: waiting"):
+            return Client(access.address, security=security, set_as_default=False)
     except (OSError, ValueError) as error:
         raise GridLost(f"no scheduler answers at {access.address}: {error}") from error
+
+
+@contextmanager
+def _reported_if_late(message: str) -> Iterator[None]:
+    """Log a message once if the context lasts for some seconds."""
+    late = threading.Timer(_LATE, _LOG.warning, [message])
+    late.daemon = True
+    late.start()
+    try:
+        yield
+    finally:
+        late.cancel()
 
 
 def called(calls: Sequence[Callable[[], Any]], workers: int) -> list[Any]:
