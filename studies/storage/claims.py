@@ -3,10 +3,10 @@
 A claim is a file ``claims/<name>.<number>``. It appears at once, with its content, by a hard link,
 which fails if there is one; so one process has it. Its owner holds a lock on it, and changes its
 time now and then. A claim is dead if its lock is free, for processes of the same machine; for those
-of another one, whose locks may not be seen, if its time is too old. The next number is then
-claimed: that of a dead claim is never used again, so that two processes that find it dead cannot
-both take it over. A claim that stays because all was done ends with a line that says so: its owner
-did not die of it.
+of another one, whose locks may not be seen, if its time is too far from now. The next number is
+then claimed: that of a dead claim is never used again, so that two processes that find it dead
+cannot both take it over. A claim that stays because all was done ends with a line that says so: its
+owner did not die of it.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class Claims:
                 if json.loads(file.readline(_LONGEST))["machine"] == _machine():
                     return _free(file.fileno())
                 age = self._now(own) - os.fstat(file.fileno()).st_mtime
-                return abs(age) > self._stale  # one from the future is beaten by nobody
+                return abs(age) > self._stale  # an owner sets no time in the future
         except FileNotFoundError:
             return False
         except (NoFile, ValueError, LookupError, TypeError):  # no claim of ours
