@@ -503,3 +503,14 @@ def test_a_scene_and_a_study_in_each_others_place_are_told_by_what_they_are(
     )
     assert main(["scenes", str(study)]) == 2
     assert "is a study file, not a scene: its scene is pin.toml" in capsys.readouterr().err
+
+
+def test_an_interrupt_while_libraries_are_loaded_ends_without_a_traceback(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("residua.arguments.parser", interrupted)
+    assert main(["scenes"]) == 130
+    assert capsys.readouterr().err == ""
