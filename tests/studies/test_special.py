@@ -127,7 +127,7 @@ def test_a_file_of_a_study_is_set_aside_and_made_again(
     path = store.study_directory(study.id) / name
     path.unlink(missing_ok=True)
     special(path)
-    assert main(["show", str(store.directory)]) in (0, 2)
+    assert main(["table", str(store.directory)]) in (0, 2)
     outcome = run_study(study, store, workers=0)
     assert outcome.ok
     if name != "report.txt":
