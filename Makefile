@@ -1,5 +1,6 @@
 PYTHON ?= $(firstword $(shell command -v python3.11 python3))
 BIN := .venv/bin
+INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 STAMP := .venv/installed
 COMPILED := .venv/compiled
 KERNELS := solver/prism/influence.py solver/steady/sweep.py
@@ -57,9 +58,10 @@ clean: ## remove the environment and caches; results in out/ stay
 	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
 	find solver studies service residua tests -name __pycache__ -prune -exec rm -rf {} +
 
+# A new environment has the pip and the setuptools of the day when its Python was built.
 $(STAMP): pyproject.toml constraints.txt $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-		--constraint constraints.txt --editable '.[dev,mkl,parquet,zarr]'
+	$(INSTALL) pip setuptools
+	$(INSTALL) --editable '.[dev,mkl,parquet,zarr]'
 	@touch $@
 
 # Else the first run that needs a kernel would wait for the compiler, for 13 s.

@@ -75,7 +75,7 @@ def main() -> None:
     """Write both files."""
     check_system()
     given = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    own = given["build-system"]["requires"] + given["project"]["dependencies"]
+    own = ["pip", *given["build-system"]["requires"], *given["project"]["dependencies"]]
     lock: Lock = defaultdict(set)
     for machine in MACHINES:
         for pin, digest in resolved(own, machine).items():

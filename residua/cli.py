@@ -26,6 +26,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     another process computes in the directory. 2: bad input, or Python finds other packages of the
     same names. 130: interrupted.
     """
+    try:
+        return _run(arguments)
+    except KeyboardInterrupt:  # also while libraries are loaded
+        return INTERRUPTED
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     if reason := wrong_package():
         return complain(reason, BAD_INPUT)
     gc.set_threshold(_YOUNG)
@@ -55,8 +62,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return complain(error, BAD_INPUT)
     except (CatalogueDamaged, FileDiffers, GridLost, StoreBusy, StoreFull) as error:
         return complain(error, FAILED)
-    except KeyboardInterrupt:
-        return INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()  # the reader of the output has closed it: print nothing more
         return OK

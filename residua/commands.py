@@ -428,7 +428,7 @@ def _save(drawn: Any, path: Path) -> None:
 @contextmanager
 def _written(option: str, path: Path) -> Iterator[Path]:
     """Give a path to write to, for the file that an option names."""
-    from studies.appearing import appearing
+    from solver.files import appearing
     from studies.storage.room import needs_room
 
     try:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from residua.status import OK
+from solver.files import read_file
 from studies.errors import StudyError
 
 
@@ -58,7 +59,7 @@ def api_key(path: Path | None) -> str | None:
     if path is None:
         return _plain("RESIDUA_API_KEY", os.environ.get("RESIDUA_API_KEY", "")) or None
     try:
-        text = path.read_text(encoding="ascii", errors="replace")
+        text = read_file(path).decode("ascii", "replace")
     except OSError as error:  # the text may be the key itself, typed by mistake: do not show it
         allowed = f"must be a file that contains the key: {error.strerror}"
         raise StudyError("--api-key-file", "…", allowed) from None

@@ -17,6 +17,7 @@ from service.alone import CRASHED, FAILED, Answer, alone
 from service.maps import draw_scene
 from service.schemas import KeptScene, SketchQuery
 from service.turns import Share, beyond
+from solver.files import LARGEST
 from studies import Store, Study, StudyError
 from studies.definition.parameters import read_values
 from studies.errors import SceneError
@@ -27,7 +28,6 @@ from studies.scenes.registry import scene_named
 from studies.scenes.scene import FileScene, read_scene
 from studies.scenes.table import FILE_NAME
 from studies.scratch import scratch
-from studies.toml import LARGEST
 
 log = logging.getLogger(__name__)
 

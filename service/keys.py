@@ -22,8 +22,8 @@ from anyio import CapacityLimiter, fail_after
 from anyio.to_thread import run_sync
 from pydantic import BaseModel, TypeAdapter
 
+from solver.files import appearing
 from studies import FileDamaged, Store, StudyError
-from studies.appearing import appearing
 from studies.storage.seal import State, content_of, sealed_json, state_of
 
 

@@ -9,12 +9,12 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, FilePath, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+from solver.files import LARGEST
 from solver.memory import most_kept
 from studies.errors import StudyError
 from studies.execution.cluster import Access
 from studies.execution.estimate import Bounds
 from studies.execution.limits import Limits
-from studies.toml import LARGEST
 
 
 def _words(given: Any) -> Any:

@@ -30,6 +30,7 @@ from service.jobs import Jobs, forget, put
 from service.processes import share_arenas
 from service.recovery import add
 from service.settings import Settings
+from solver.files import NoFile, opened
 from studies import Store, Study, StudyError
 from studies.scratch import scratch
 from studies.storage.seal import state_of
@@ -58,8 +59,12 @@ class ViewedFolder:
 
     def __init__(self, directory: Path, aside: Path) -> None:
         self.store = Store(directory, held=True, aside=aside)
-        with suppress(FileNotFoundError):  # a torn copy is found damaged, and made again
-            shutil.copyfile(directory / "catalogue.sqlite", self.store.catalogue.path)
+        with (
+            suppress(FileNotFoundError, NoFile),  # a torn copy is found damaged, and made again
+            opened(directory / "catalogue.sqlite") as found,
+            self.store.catalogue.path.open("wb") as copy,
+        ):
+            shutil.copyfileobj(found, copy)
         self.jobs = Jobs(aside / "jobs.sqlite")
         self._seen: dict[str, object] = {}
 

@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import sys
 import time
 from collections.abc import Iterator, Mapping
@@ -18,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Self, TextIO
 
 import httpx
 
-from studies.appearing import appearing
+from solver.files import appearing, read_file
 from studies.definition.files import read_study
 from studies.definition.identity import is_id
 from studies.definition.study import Study
@@ -139,7 +138,7 @@ class Client:
 
     def post_scene(self, path: Path | str) -> dict[str, Any]:
         """Send a scene file and its meshes; return its ``id``, ``name`` and ``summary``."""
-        return self._post(Description.read(Path(path)), Path(path).read_bytes())
+        return self._post(Description.read(Path(path)), read_file(path))
 
     def _post(self, known: Description, text: bytes | None = None) -> dict[str, Any]:
         files = [
@@ -267,7 +266,7 @@ class RemoteStudy:
         """
         import xarray as xr
 
-        from studies.views.reading import indexed
+        from studies.views.reading import indexed, loaded
 
         if lazy and _has_zarr():
             self.client.ask(
@@ -276,7 +275,7 @@ class RemoteStudy:
             options = {"headers": self.client.headers}
             return indexed(xr.open_zarr(f"{self.url}/zarr", chunks=None, storage_options=options))
         content = self.client.ask("GET", f"{self._path}/dataset.nc").content
-        return indexed(xr.load_dataset(io.BytesIO(content), engine="h5netcdf"))
+        return loaded(content, self.url)
 
     def fetch(self, target: Path | str) -> Path:
         """Save the data set as a netCDF file."""

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import json
 import re
-import stat
 import tomllib
 from collections.abc import Mapping
 from itertools import accumulate, chain
 from pathlib import Path
 from typing import Any
 
+from solver.files import read_file
 from studies.errors import StudyError
-
-LARGEST = 50_000_000
-"""Largest size of a file that a user names, or that is stored and read whole [bytes]."""
 
 DEEPEST = 50
 """Largest number of tables and lists inside one another."""
@@ -32,8 +29,8 @@ _BARE = re.compile(r"[\w-]+", re.ASCII)
 _STEP = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
-def read_bytes(path: Path | str, field: str) -> bytes:
-    """Return the content of a file.
+def read_given(path: Path | str, field: str) -> bytes:
+    """Return the content of a file that a user names.
 
     Raises
     ------
@@ -41,14 +38,9 @@ def read_bytes(path: Path | str, field: str) -> bytes:
         for ``field``, when it is a device or a pipe, too large, or cannot be read
     """
     try:
-        found = Path(path).stat()
-        if not stat.S_ISREG(found.st_mode):
-            raise StudyError(field, str(path), "must be a file")
-        if found.st_size > LARGEST:
-            raise StudyError(field, str(path), f"must be at most {LARGEST} bytes")
-        return Path(path).read_bytes()
+        return read_file(path)
     except OSError as error:
-        raise StudyError(field, str(path), f"cannot be read: {error.strerror}") from None
+        raise StudyError(field, str(path), f"must be a file to read: {error.strerror}") from None
 
 
 def check_depth(text: str) -> None:
@@ -83,7 +75,7 @@ def read_toml(path: Path | str, field: str) -> dict[str, Any]:
     StudyError
         for ``field``, when the file cannot be read or is no TOML
     """
-    return toml_of(read_bytes(path, field), field, str(path))
+    return toml_of(read_given(path, field), field, str(path))
 
 
 def toml_of(data: bytes, field: str, name: str) -> dict[str, Any]:

@@ -11,6 +11,9 @@ import importlib.metadata
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
+
+from solver.files import read_file
 
 MEDIA_TYPES = {"js": "text/javascript", "css": "text/css", "svg": "image/svg+xml"}
 
@@ -35,8 +38,8 @@ class Asset:
 @cache
 def own() -> dict[str, bytes]:
     """Return the files of this package by name."""
-    folder = files("service.pages") / "static"
-    return {each.name: each.read_bytes() for each in folder.iterdir() if each.is_file()}
+    folder = _folder("service.pages") / "static"
+    return {each.name: read_file(each) for each in folder.iterdir() if each.is_file()}
 
 
 @cache
@@ -53,10 +56,14 @@ def asset(of: str, name: str) -> Asset | None:
     return _packed(name) if of == version() and name in {CHARTS, *own()} else None
 
 
+def _folder(package: str) -> Path:
+    return Path(str(files(package)))
+
+
 @cache
 def _packed(name: str) -> Asset:
     if name == CHARTS:
-        content = files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()
+        content = read_file(_folder("plotly") / "package_data" / "plotly.min.js")
     else:
         content = own()[name]
     kind = MEDIA_TYPES[name.rpartition(".")[2]]

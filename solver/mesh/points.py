@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.errors import ModelError
+from solver.files import read_file
 from solver.parameters import Pairs, pairs
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def read_points(path: str | Path) -> Array:
         for ``file``, if it cannot be read or a line does not have two numbers; for ``points``
     """
     try:
-        lines = [line.replace(",", " ").split() for line in Path(path).read_text().splitlines()]
+        lines = [line.replace(",", " ").split() for line in read_file(path).decode().splitlines()]
     except (OSError, UnicodeDecodeError) as error:
         raise ModelError("file", str(path), f"must be a readable text file: {error}") from None
     points = []

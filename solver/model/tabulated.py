@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.errors import ModelError
+from solver.files import read_file
 from solver.mesh.rounding import ROUNDED
 
 if TYPE_CHECKING:
@@ -112,7 +113,7 @@ class Tabulated:
     @classmethod
     def read(cls, path: Path | str, column: str = "value") -> Tabulated:
         """Return the table of a CSV file; see `of`."""
-        return cls.of(Path(path).read_text(encoding="utf-8-sig"), column)
+        return cls.of(read_file(path).decode("utf-8-sig"), column)
 
     def times(self, factor: float) -> Tabulated:
         """Return the table with its values multiplied by ``factor``."""

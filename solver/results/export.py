@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
@@ -10,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from solver.errors import ModelError
+from solver.files import appearing, read_file
 
 if TYPE_CHECKING:
     import meshio
@@ -24,7 +26,7 @@ _CELLS = {
 }  # fmt: skip
 """Cell type of meshio by the number of nodes of an element. The nodes have the same order: corners,
 mid-sides, middle."""
-_PVD = "stages.pvd"
+_PVD, _FORMAT = "stages.pvd", "vtu"
 
 
 def write_vtu(fields: MeshFields, folder: Path) -> Path:
@@ -39,19 +41,17 @@ def write_vtu(fields: MeshFields, folder: Path) -> Path:
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     stages = ElementTree.SubElement(root, "Collection")
     path, before = folder / _PVD, _listed(folder / _PVD)
-    with tempfile.TemporaryDirectory(dir=folder) as part:
+    with ExitStack() as written:  # all appear when all are complete, the list last
+        listed = written.enter_context(appearing(path))
         for number, name in enumerate(fields.stages):
             file = f"{number}-{''.join(c if c.isalnum() else '-' for c in name)}.vtu"
-            to_meshio(fields, name).write(Path(part) / file)
+            part = written.enter_context(appearing(folder / file))
+            to_meshio(fields, name).write(part, file_format=_FORMAT)
             ElementTree.SubElement(
                 stages, "DataSet", timestep=repr(float(number)), name=name, file=file
             )
-        whole = ElementTree.ElementTree(root)
-        whole.write(Path(part) / _PVD, xml_declaration=True, encoding="utf-8")
-        now = [each.attrib["file"] for each in stages]
-        for name in (*now, _PVD):  # only when all files are written: the set is complete
-            (Path(part) / name).replace(folder / name)
-    for name in before - {*now}:
+        ElementTree.ElementTree(root).write(listed, xml_declaration=True, encoding="utf-8")
+    for name in before - {each.attrib["file"] for each in stages}:
         (folder / name).unlink(missing_ok=True)
     return path
 
@@ -59,7 +59,7 @@ def write_vtu(fields: MeshFields, folder: Path) -> Path:
 def _listed(path: Path) -> set[str]:
     """Return the names of the files that a .pvd lists; empty if there is no such file."""
     try:
-        found = ElementTree.parse(path).iter("DataSet")
+        found = ElementTree.fromstring(read_file(path)).iter("DataSet")
         return {Path(each.attrib["file"]).name for each in found}
     except (OSError, ElementTree.ParseError, KeyError):
         return set()
@@ -67,10 +67,9 @@ def _listed(path: Path) -> set[str]:
 
 def vtu_of(fields: MeshFields, stage: str) -> bytes:
     """Return the content of the .vtu file of a stage."""
-    with tempfile.TemporaryDirectory() as folder:  # meshio can only write to a path
-        path = Path(folder) / "stage.vtu"
-        to_meshio(fields, stage).write(path)
-        return path.read_bytes()
+    with tempfile.TemporaryFile() as file:  # meshio can only write to a path
+        to_meshio(fields, stage).write(f"/dev/fd/{file.fileno()}", file_format=_FORMAT)
+        return file.read()
 
 
 def to_meshio(fields: MeshFields, stage: str) -> meshio.Mesh:

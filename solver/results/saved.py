@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from solver.errors import ModelError
+from solver.files import appearing, opened
 from solver.version import __version__
 
 if TYPE_CHECKING:
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
 
 _HEAD = b"residua solution "
 """Start of the file; the version of the solver and the end of the line follow."""
+_LONGEST = 100
+"""Largest length of this line [bytes]."""
 
 
 def write(path: Path, content: Mapping[str, Any]) -> None:
@@ -30,15 +33,12 @@ def write(path: Path, content: Mapping[str, Any]) -> None:
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         allowed = f"must hold no lambda and no function within a function: {error}"
         raise ModelError("model", "", allowed) from None
-    part = path.with_name(f"{path.name}.part")  # an existing file stays until this is complete
     try:
-        part.write_bytes(_HEAD + __version__.encode() + b"\n" + stored)
-        part.replace(path)
+        with appearing(path) as part:
+            part.write_bytes(_HEAD + __version__.encode() + b"\n" + stored)
     except OSError as error:
         allowed = f"cannot be written: {error.strerror}"
         raise ModelError("path", str(path), allowed) from None
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -50,7 +50,8 @@ def read(path: Path) -> dict[str, Any]:
         if the file cannot be read, is not of this kind, or was written by another version
     """
     try:
-        head, _, stored = path.read_bytes().partition(b"\n")
+        with opened(path) as file:
+            head, stored = file.readline(_LONGEST).removesuffix(b"\n"), file.read()
     except OSError as error:
         raise ModelError("path", str(path), f"cannot be read: {error.strerror}") from None
     if not head.startswith(_HEAD):

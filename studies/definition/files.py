@@ -13,7 +13,7 @@ from solver.errors import ModelError
 from studies.errors import StudyError
 from studies.scenes.formats import FORMATS
 from studies.scenes.meshfile import MeshFile
-from studies.toml import CASE, read_bytes, read_toml
+from studies.toml import CASE, read_given, read_toml
 
 _MAY_NAME_FILES, _OF_POINTS = ("parameters", "points", "sweep"), (".csv", ".txt")
 _LONGEST_CHAIN = 20
@@ -137,7 +137,7 @@ def read_table(path: Path | str, field: str) -> list[dict[str, str]]:
     """
     name = Path(path).name
     try:
-        lines = read_bytes(path, field).decode("utf-8-sig").splitlines()
+        lines = read_given(path, field).decode("utf-8-sig").splitlines()
     except UnicodeDecodeError:
         raise StudyError(field, name, "must be text in UTF-8") from None
     text = [(k, each) for k, each in enumerate(lines, 1) if each.strip() and each.strip()[0] != "#"]
@@ -193,6 +193,6 @@ def _with_files(value: Any, field: str, folder: Path) -> Any:
             from solver.mesh.points import read_points  # loads numpy
 
             return read_points(folder / value).T.tolist()
-        return MeshFile(value, read_bytes(folder / value, field)).section()
+        return MeshFile(value, read_given(folder / value, field)).section()
     except ModelError as error:
         raise StudyError(field, value, f"{error.field} {error.allowed}") from None

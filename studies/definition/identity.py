@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import solver
+from solver.files import read_file
 from solver.parts import own_files
 from studies.definition.meaning import digest, digests_of
 
@@ -116,7 +117,7 @@ def solver_hash() -> str:
     files = {f"solver/{path.relative_to(root).as_posix()}": path for path in root.rglob("*.py")}
     files |= {f"studies/{name}": here / name for name in FORM}
     files |= {f"parts/{k}": path for k, path in enumerate(own_files())}
-    digests = digests_of([path.read_bytes() for path in files.values()])
+    digests = digests_of([read_file(path) for path in files.values()])
     return digest(json.dumps(dict(zip(files, digests, strict=True)), sort_keys=True).encode())
 
 
@@ -150,7 +151,7 @@ def _read(scene: Scene) -> list[list[str]]:
 @cache
 def _file_digests(files: tuple[Path, ...]) -> list[tuple[str, str]]:
     """Return the name of each file, and the digest of its source."""
-    digests = digests_of([each.read_bytes() for each in files])
+    digests = digests_of([read_file(each) for each in files])
     return [(each.name, found) for each, found in zip(files, digests, strict=True)]
 
 
@@ -196,9 +197,9 @@ def _module_digest(name: str) -> str:
         return ""
     spec = getattr(sys.modules[name], "__spec__", None)
     if spec is None:  # of a script nothing tells whether it is loaded again
-        return _code_digest(file.read_bytes())
+        return _code_digest(read_file(file))
     if name not in _LOADED or _LOADED[name][0] is not spec:
-        _LOADED[name] = spec, _code_digest(file.read_bytes())
+        _LOADED[name] = spec, _code_digest(read_file(file))
     return _LOADED[name][1]
 
 

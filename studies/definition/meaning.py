@@ -20,7 +20,7 @@ from importlib.util import cache_from_source
 from pathlib import Path
 from typing import Any
 
-from studies.appearing import appearing
+from solver.files import appearing, read_file
 
 _NO_MEANING = frozenset({"ctx", "kind", "type_comment", "type_ignores"})
 """Fields of Python's grammar that follow from the position of a node, or come from comments."""
@@ -31,7 +31,7 @@ _MOST = 5000
 
 def digests_of(sources: Sequence[bytes]) -> list[str]:
     """Return a digest of the `meaning` of each source, from the kept ones where they are known."""
-    maker, whole = digest(Path(__file__).read_bytes()), [digest(each) for each in sources]
+    maker, whole = digest(read_file(__file__)), [digest(each) for each in sources]
     kept = Path(cache_from_source(__file__)).with_suffix(".json")
     known = _kept(kept, maker)
     fresh = {
@@ -52,7 +52,7 @@ def digest(data: bytes) -> str:
 def _kept(path: Path, maker: str) -> Mapping[str, str]:
     """Return the kept digests, if this module has not changed since; else none."""
     try:
-        content = json.loads(path.read_bytes())
+        content = json.loads(read_file(path))
         return dict(content["digests"]) if content["maker"] == maker else {}
     except (OSError, ValueError, TypeError, KeyError):
         return {}

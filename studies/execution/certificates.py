@@ -15,7 +15,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
-from studies.appearing import appearing
+from solver.files import appearing
 
 _LIFE = timedelta(days=3650)
 

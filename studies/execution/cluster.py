@@ -16,6 +16,7 @@ from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+from solver.files import read_file
 from studies.errors import GridLost, StudyError, Unusable
 from studies.execution.forking import prepare
 from studies.execution.script import GUARD, check_script
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 
 _APPEARS = 60.0
 """Seconds within which a scheduler must write its file."""
+
+_LATE = 3.0
+"""Seconds after which it is reported that a scheduler has not answered."""
 
 _ABSENT = 30.0
 """Seconds without a sign of life of a worker started here until it is replaced."""
@@ -57,6 +61,8 @@ CONFIGURATION: Mapping[str, Any] = {
     "distributed.worker.profile.enabled": False,
 }
 """Settings of the scheduler and the workers started here."""
+
+_LOG = logging.getLogger("studies")
 
 _CLOSED: Mapping[str, Any] = {
     # dask's pages show what is computed, without a password.
@@ -115,12 +121,13 @@ class Access:
             if it tells no address
         """
         deadline = time.monotonic() + _APPEARS
-        while not (path.exists() and path.stat().st_size):  # it is written after it appears
-            if time.monotonic() > deadline:
-                raise GridLost(f"no scheduler has written the file {path} in {_APPEARS:g} s")
-            time.sleep(0.2)
+        with _reported_if_late(f"no scheduler has written the file {path} yet: waiting"):
+            while not (path.exists() and path.stat().st_size):  # it is written after it appears
+                if time.monotonic() > deadline:
+                    raise GridLost(f"no scheduler has written the file {path} in {_APPEARS:g} s")
+                time.sleep(0.2)
         try:
-            address = json.loads(path.read_text(encoding="utf-8"))["address"]
+            address = json.loads(read_file(path))["address"]
         except (OSError, ValueError, LookupError, TypeError):
             allowed = "must be a file that `dask scheduler --scheduler-file` has written"
             raise StudyError("scheduler-file", str(path), allowed) from None
@@ -195,7 +202,12 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
         distributed.utils._forkserver_preload_set = True  # or dask would load pandas everywhere
         started = {"distributed.worker.multiprocessing-method": method}
         security = Security.temporary()
-        with scratch() as folder, dask.config.set({**CONFIGURATION, **_CLOSED, **started}):
+        with (
+            scratch() as folder,
+            dask.config.set(
+                {**CONFIGURATION, **_CLOSED, **started, "temporary-directory": str(folder)}
+            ),
+        ):
             try:
                 cluster = starter.submit(
                     LocalCluster,
@@ -207,7 +219,6 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
                     security=security,
                     dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
                     scheduler_kwargs={"dashboard": False},
-                    local_directory=str(folder),
                     env={**os.environ, **FROM_THE_START},  # through a pipe
                     silence_logs=logging.CRITICAL,
                     memory_limit=memory or MEMORY_LIMIT // max(workers, 1),
@@ -256,7 +267,8 @@ def _kept(cluster: LocalCluster, workers: int) -> Iterator[None]:
 def connect(access: Access) -> Client:
     """Return a client of a scheduler.
 
-    It must answer within Dask's ``distributed.comm.timeouts.connect`` (30 s, if nothing is set).
+    It must answer within Dask's ``distributed.comm.timeouts.connect`` (30 s, if nothing is set); a
+    message says soon that it has not.
 
     Raises
     ------
@@ -276,17 +288,32 @@ def connect(access: Access) -> Client:
             tls_client_cert=access.cert,
             tls_client_key=access.key,
         )
+        names = [each for each in (access.ca, access.cert, access.key) if each]
         try:
+            for name in (each for each in names if "\n" not in each):
+                read_file(name)  # OpenSSL would wait for a pipe
             security.get_connection_args("client")
         except (OSError, ValueError) as error:
-            names = [each for each in (access.ca, access.cert, access.key) if each]
             files = ", ".join("(in memory)" if "\n" in each else each for each in names)
             raise Unusable("certificates", files, f"cannot be used: {error}") from None
     try:
         get_address_host_port(access.address)  # a refused client closes badly
-        return Client(access.address, security=security, set_as_default=False)
+        with _reported_if_late(f"no scheduler answers at {access.address} yet: waiting"):
+            return Client(access.address, security=security, set_as_default=False)
     except (OSError, ValueError) as error:
         raise GridLost(f"no scheduler answers at {access.address}: {error}") from error
+
+
+@contextmanager
+def _reported_if_late(message: str) -> Iterator[None]:
+    """Log a message once if the context lasts for some seconds."""
+    late = threading.Timer(_LATE, _LOG.warning, [message])
+    late.daemon = True
+    late.start()
+    try:
+        yield
+    finally:
+        late.cancel()
 
 
 def called(calls: Sequence[Callable[[], Any]], workers: int) -> list[Any]:

@@ -7,6 +7,7 @@ It is a fork of this process where that is one of ours which has a single thread
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import gc
 import multiprocessing
@@ -14,7 +15,7 @@ import os
 import sys
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from itertools import pairwise
 from multiprocessing import forkserver, util
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from solver.parts import own_files
+from studies.scratch import scratch
 
 NEEDED = (
     "distributed.nanny",
@@ -49,6 +51,11 @@ _ALLOCATION = {"MALLOC_TRIM_THRESHOLD_": -1, "MALLOC_MMAP_THRESHOLD_": -3}
 """Settings that C's library reads when a process starts, with their numbers in ``mallopt``."""
 
 
+_FOLDER = ExitStack()
+"""The folder of sockets, until this process ends."""
+atexit.register(_FOLDER.close)
+
+
 def prepare(settings: Mapping[str, object], more: Sequence[str] = ()) -> str:
     """Start to load the modules, and return the method of `multiprocessing` for the workers.
 
@@ -63,6 +70,9 @@ def prepare(settings: Mapping[str, object], more: Sequence[str] = ()) -> str:
     """
     if sys.platform != "linux" or own_files():
         return "spawn"
+    process: Any = multiprocessing.current_process()
+    if not process._config.get("tempdir"):  # else its folder would stay after a kill
+        process._config["tempdir"] = str(_FOLDER.enter_context(scratch()))
     preloaded = [*more, *NEEDED]
     multiprocessing.get_context("forkserver").set_forkserver_preload(preloaded)
     # The modules are found where this process finds them, before anything in its directory.

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from solver.files import appearing
 from solver.results.shakedown import ShakedownState
-from studies.appearing import appearing
 from studies.definition.cases import Case
 from studies.definition.goal import ALREADY, FAILED, NEVER, PASSED, REFUSED, Search
 from studies.definition.identity import canonical

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from studies.appearing import appearing
+from solver.files import appearing, read_file
 from studies.storage.store import Store
 
 _PATIENCE = 2.0
@@ -56,7 +56,7 @@ class Proof:
 
     def _seen(self) -> bool:
         try:
-            return self.path.read_text(encoding="ascii") == self.token
+            return read_file(self.path).decode() == self.token
         except (OSError, ValueError):
             return False
 

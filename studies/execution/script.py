@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from solver.files import read_file
 from studies.definition.identity import only_as_script
 from studies.errors import StudyError
 
@@ -34,7 +35,7 @@ def check_script() -> None:
     if file is None or line is None:
         return
     try:
-        statements = ast.parse(Path(file).read_bytes()).body
+        statements = ast.parse(read_file(file)).body
     except (OSError, SyntaxError, ValueError):  # not a Python source
         return
     if not any(only_as_script(each) and _guards(each, line) for each in statements):

@@ -21,7 +21,7 @@ from studies.scenes.quantities import in_own_units, wrong_units
 from studies.scenes.refusals import dotted, mistakes_of
 from studies.scenes.table import FILE_NAME
 from studies.scenes.tables import ACCURACY, OPEN, ParameterTable, SceneFile
-from studies.toml import read_bytes, toml_of
+from studies.toml import read_given, toml_of
 
 PLAIN = ("name", "summary", "parameters", "derived", "accuracy", "advice")
 """Entries of a scene file without expressions of parameters, and the derived numbers."""
@@ -100,14 +100,14 @@ class Description:
             if a file cannot be read or is no TOML
         """
         path = Path(path)
-        content = toml_of(read_bytes(path, "scene"), "scene", path.name)
+        content = toml_of(read_given(path, "scene"), "scene", path.name)
         if "scene" in content and "bodies" not in content:
             allowed = f"is a study file, not a scene: its scene is {content['scene']}"
             raise StudyError("scene", path.name, allowed)
         meshes = {}
         for name in file_names(content):
             if (path.parent / name).is_file():  # a missing one is a mistake of the scene file
-                meshes[name] = MeshFile(name, read_bytes(path.parent / name, "scene"))
+                meshes[name] = MeshFile(name, read_given(path.parent / name, "scene"))
         return cls(path.name, content, meshes, shipped)
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -3,10 +3,10 @@
 A claim is a file ``claims/<name>.<number>``. It appears at once, with its content, by a hard link,
 which fails if there is one; so one process has it. Its owner holds a lock on it, and changes its
 time now and then. A claim is dead if its lock is free, for processes of the same machine; for those
-of another one, whose locks may not be seen, if its time is too old. The next number is then
-claimed: that of a dead claim is never used again, so that two processes that find it dead cannot
-both take it over. A claim that stays because all was done ends with a line that says so: its owner
-did not die of it.
+of another one, whose locks may not be seen, if its time is too far from now. The next number is
+then claimed: that of a dead claim is never used again, so that two processes that find it dead
+cannot both take it over. A claim that stays because all was done ends with a line that says so: its
+owner did not die of it.
 """
 
 from __future__ import annotations
@@ -22,11 +22,15 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from solver.files import NoFile, opened, read_file
+
 BEAT = 20.0
 """Seconds after which an owner changes the time of its claim."""
 STALE = 300.0
 """Age of a claim of another machine at which it is dead [s]."""
 _DONE = b"\ndone\n"
+_LONGEST = 1000
+"""Largest size of a claim [bytes]."""
 
 
 @dataclass(slots=True)
@@ -80,7 +84,8 @@ class Claims:
                         os.write(descriptor, _DONE)
                 else:
                     for path in [*before, self._path(name, number)]:
-                        path.unlink(missing_ok=True)
+                        with suppress(FileNotFoundError, IsADirectoryError):
+                            path.unlink()
         finally:
             own.unlink(missing_ok=True)
             os.close(descriptor)
@@ -108,14 +113,14 @@ class Claims:
     def _dead(self, claim: Path, own: int) -> bool:
         """Whether the owner of a claim has died; a claim that is gone is none that died."""
         try:
-            with claim.open("rb") as file:
-                if json.loads(file.readline())["machine"] == _machine():
+            with opened(claim) as file:
+                if json.loads(file.readline(_LONGEST))["machine"] == _machine():
                     return _free(file.fileno())
                 age = self._now(own) - os.fstat(file.fileno()).st_mtime
-                return age > self._stale
+                return abs(age) > self._stale  # an owner sets no time in the future
         except FileNotFoundError:
             return False
-        except (ValueError, LookupError, TypeError):  # no claim of ours
+        except (NoFile, ValueError, LookupError, TypeError):  # no claim of ours
             return True
 
     @staticmethod
@@ -127,9 +132,12 @@ class Claims:
 
 def _done(claim: Path) -> bool:
     """Whether the owner of a claim has ended with nothing left to do."""
-    with suppress(FileNotFoundError):
-        return claim.read_bytes().endswith(_DONE)
-    return True
+    try:
+        return read_file(claim, _LONGEST).endswith(_DONE)
+    except NoFile:
+        return False
+    except FileNotFoundError:
+        return True
 
 
 def _free(descriptor: int) -> bool:
@@ -164,5 +172,5 @@ def _beating(path: Path) -> Iterator[None]:
 def _machine() -> str:
     """Return what tells this machine from others: its name alone may be that of all."""
     with suppress(OSError):
-        return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+        return read_file("/proc/sys/kernel/random/boot_id").decode("ascii").strip()
     return f"{os.uname().nodename}-{os.getpid()}"  # its locks are not trusted

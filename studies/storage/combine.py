@@ -11,8 +11,8 @@ from typing import Any
 import h5netcdf
 import h5py
 
+from solver.files import appearing
 from solver.scenes import Scene
-from studies.appearing import appearing
 from studies.definition.cases import Case
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK, SYMMETRIC

@@ -9,6 +9,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
+from solver.files import special
 from studies.errors import StoreFull
 
 _WAIT = 30.0
@@ -48,6 +49,9 @@ class Database:
         """Give a connection for one transaction; the mode is ``memory`` or that of the file."""
         address = f"{self.path.resolve().as_uri()}?mode={mode}"
         try:
+            for file in (self.path, self.path.with_name(f"{self.path.name}-journal")):
+                if kind := special(file):  # SQLite would wait for a pipe
+                    raise WrongContent(f"{file.name} is {kind}")
             with closing(
                 sqlite3.connect(
                     ":memory:" if mode == "memory" else address,

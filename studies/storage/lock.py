@@ -8,6 +8,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from solver.files import descriptor_of
 from studies.errors import StoreBusy
 
 
@@ -25,8 +26,10 @@ def lock(path: Path, busy: str, patience: float = 0.0, shared: bool = False) -> 
     ------
     StoreBusy
         if the lock is not released; with the id of the process
+    NoFile
+        if it is no regular file
     """
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    descriptor = descriptor_of(path, os.O_RDWR | os.O_CREAT)
     deadline = time.monotonic() + patience
     while True:
         try:

@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from studies.appearing import appearing
+from solver.files import appearing, read_file, special
 from studies.definition.identity import sources
 from studies.definition.study import Study
 from studies.errors import FileDamaged
@@ -76,8 +76,8 @@ class Made:
             return {}
 
     def _write(self, path: Path, content: bytes) -> None:
-        if path.is_dir():
-            self._store.put_aside(path, "it is a directory", "a file takes its place")
+        if kind := special(path, links=False):
+            self._store.put_aside(path, f"it is {kind}", "a file takes its place")
         with needs_room(self._store.directory), appearing(path) as part:
             part.write_bytes(content)
 
@@ -87,5 +87,5 @@ class Made:
     @cached_property
     def _makers(self) -> list[str]:
         """Digests of the sources, and versions of libraries."""
-        found = [digest_of(path.read_bytes()) for path in sources(self._study.problem)]
+        found = [digest_of(read_file(path)) for path in sources(self._study.problem)]
         return found + [importlib.metadata.version(name) for name in _LIBRARIES]

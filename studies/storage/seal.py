@@ -13,19 +13,19 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import io
 import json
 import os
 import re
-import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
-from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from solver.files import LARGEST, NoFile, opened, read_file
 from studies.errors import FileDamaged
-from studies.toml import LARGEST, check_depth
+from studies.toml import check_depth
 
 SEALED = {"checksum": "SHA-256 in the last line, after the end of HDF5"}
 """Attribute of netCDF files that have the line."""
@@ -69,22 +69,23 @@ def state_of(path: Path) -> State | None:
     return None if found is None else _state(found)
 
 
-def check(path: Path, name: str) -> None:
-    """Raise `FileDamaged` unless a file is sealed under this name and has not changed since."""
+def check(path: Path, name: str = "") -> None:
+    """Raise `FileDamaged` unless a file is sealed and has not changed since.
+
+    Parameters
+    ----------
+    path : of the file
+    name : what it must be, such as ``run <id>``; empty for a file outside of its place
+    """
     found, reason, _ = _looked(path, name)
-    if reason or found != name:
+    if reason or found != (name or found):
         raise FileDamaged(path, name, reason or f"it is the {found}", state_of(path))
 
 
-def lost(path: Path) -> bool:
-    """Whether a file without a seal had one: it has the attribute `SEALED`.
-
-    The bytes are searched, because HDF5 may end the process when it reads a damaged file.
-    """
-    if not path.stat().st_size:
-        return False
-    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
-        return content.find(SEALED["checksum"].encode()) >= 0
+def check_content(content: bytes) -> None:
+    """Raise `ValueError` unless the content of a file is sealed and has not changed since."""
+    if reason := _examined(io.BytesIO(content))[1]:
+        raise ValueError(reason)
 
 
 def digest(path: Path) -> str:
@@ -95,8 +96,8 @@ def digest(path: Path) -> str:
         return ""
 
 
-def content_of(path: Path, name: str, largest: int = LARGEST) -> dict[str, Any]:
-    """Return the object in a JSON file, without its seal.
+def content_of(path: Path, name: str = "", largest: int = LARGEST) -> dict[str, Any]:
+    """Return the object in a JSON file, without its seal; its name as in `check`.
 
     One without a seal is of an earlier version; the caller compares its content with the name.
 
@@ -118,47 +119,35 @@ def content_of(path: Path, name: str, largest: int = LARGEST) -> dict[str, Any]:
     return content
 
 
-def bytes_of(path: Path, name: str, largest: int = LARGEST) -> tuple[bytes, State]:
+def bytes_of(path: Path, name: str, largest: int = LARGEST) -> tuple[bytes, State | None]:
     """Return the bytes of a file and its state.
 
     Raises
     ------
     FileDamaged
-        if it is missing, no file, or larger than `largest` bytes
+        if it is missing, no regular file, or larger than `largest` bytes
     """
-    state = _state_of_file(path, name)
-    if state[1] > largest:
-        raise FileDamaged(path, name, f"it has more than {largest} bytes", state)
-    with _missing_is_damage(path, name, state):
-        return path.read_bytes(), state
+    state = state_of(path)
+    with _no_file_is_damage(path, name, state):
+        return read_file(path, largest), state
 
 
 def _looked(path: Path, name: str) -> tuple[str, str, str]:
     """Return the name in the seal of a file, what is wrong, and the digest of the whole file."""
-    state = _state_of_file(path, name)
-    with _missing_is_damage(path, name, state, errno.EIO):  # a sector of the disk is damaged
+    state = state_of(path)
+    with _no_file_is_damage(path, name, state, errno.EIO):  # a sector of the disk is damaged
         return _read(path, state)
 
 
 @contextmanager
-def _missing_is_damage(path: Path, name: str, state: State, *also: int) -> Iterator[None]:
-    """Raise `FileDamaged` if a file is gone; other errors of the system, but `also`, may pass."""
+def _no_file_is_damage(path: Path, name: str, state: State | None, *also: int) -> Iterator[None]:
+    """Raise `FileDamaged` if there is no file; other errors of the system, but `also`, may pass."""
     try:
         yield
     except OSError as error:
-        if error.errno not in {*_NO_FILE, *also}:
+        if not isinstance(error, NoFile) and error.errno not in {*_NO_FILE, *also}:
             raise
         raise FileDamaged(path, name, str(error.strerror), state) from None
-
-
-def _state_of_file(path: Path, name: str) -> State:
-    """Return the state of a regular file; anything else, such as a pipe, is not opened."""
-    found = _stat(path)
-    if found is None:
-        raise FileDamaged(path, name, "there is no such file", None)
-    if not stat.S_ISREG(found.st_mode):
-        raise FileDamaged(path, name, "it is not a file", _state(found))
-    return _state(found)
 
 
 def _stat(path: Path) -> os.stat_result | None:
@@ -175,15 +164,20 @@ def _state(found: os.stat_result) -> State:
 
 
 @lru_cache(maxsize=4096)
-def _read(path: Path, state: State) -> tuple[str, str, str]:
-    size = state[1]
-    with path.open("rb") as file:
-        file.seek(max(size - _LONGEST, 0))
-        end = file.read()
-        line = _LINE.search(end)
-        file.seek(0)
-        covered = _fed(hashlib.sha256(), file, size - len(end) + line.start(2) if line else 0)
-        whole = _fed(covered.copy(), file, size)
+def _read(path: Path, state: State | None) -> tuple[str, str, str]:
+    with opened(path) as file:
+        return _examined(file)
+
+
+def _examined(file: BinaryIO) -> tuple[str, str, str]:
+    """Return what `_looked` does."""
+    size = file.seek(0, os.SEEK_END)
+    file.seek(max(size - _LONGEST, 0))
+    end = file.read()
+    line = _LINE.search(end)
+    file.seek(0)
+    covered = _fed(hashlib.sha256(), file, size - len(end) + line.start(2) if line else 0)
+    whole = _fed(covered.copy(), file, size)
     if line is None:
         return "", NO_SEAL, whole.hexdigest()
     wrong = "" if covered.hexdigest() == line[2].decode() else "its checksum is wrong"

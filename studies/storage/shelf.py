@@ -16,8 +16,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
+from solver.files import appearing
 from solver.scenes import Scene
-from studies.appearing import appearing
 from studies.definition.parameters import parameters_of
 from studies.errors import CatalogueDamaged, FileDamaged, StoreBusy
 from studies.scenes.description import Description, file_names

@@ -31,9 +31,9 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any, TypeVar
 
+from solver.files import appearing
 from solver.results.record import Record
 from solver.scenes import Scene
-from studies.appearing import appearing
 from studies.definition.cases import Case
 from studies.definition.identity import is_id
 from studies.definition.refine import OPEN
@@ -196,8 +196,6 @@ class Store:
         try:
             seal.check(path, f"dataset {study_id}")
         except FileDamaged as error:
-            if error.reason == seal.NO_SEAL and _noted(path, study_id):
-                return path
             self.set_aside(error, "it is made again from the runs")
             raise
         return path
@@ -417,18 +415,18 @@ class Store:
     def reconcile(self) -> None:
         """Update the catalogue to the files that exist and can be read.
 
-        One that is missing or damaged is made again beside it, and appears when it is complete.
+        One that is missing or damaged is made again, and appears when it is complete.
         """
         path = self.catalogue.path
         try:
             known = self.catalogue.stamps()
         except CatalogueDamaged as error:
             anew = Store(self.directory, held=True, aside=self.aside)
+            for old in (path, path.with_name(f"{path.name}-journal")):
+                self.put_aside(old, str(error.__cause__), "it is made again from the runs")
             with self._writable(), appearing(path) as part:
                 anew.catalogue = Catalogue(part)
                 anew._follow({})
-                for old in (path, path.with_name(f"{path.name}-journal")):
-                    self.put_aside(old, str(error.__cause__), "it is made again from the runs")
             _LOG.warning("%s has been made again from the files of the runs", path.name)
             known = self.catalogue.stamps()
         self.catalogue.damaged = False
@@ -506,20 +504,6 @@ def _left(part: Path) -> bool:
     try:
         return part.parent.name == "runs" or time.time() - part.stat().st_mtime > _UNFINISHED
     except FileNotFoundError:
-        return False
-
-
-def _noted(dataset: Path, study_id: str) -> bool:
-    """Whether an earlier version, which sealed no data sets, noted this one in ``made.json``."""
-    import h5py
-
-    try:
-        made = seal.content_of(dataset.with_name("made.json"), f"made {study_id}")
-        if made["data set"]["files"][dataset.name] != seal.digest(dataset):
-            return False
-        with h5py.File(dataset, "r") as file:
-            return runfile.global_attributes(file)["id"] == study_id
-    except (FileDamaged, LookupError, TypeError):
         return False
 
 

@@ -7,6 +7,7 @@ import json
 import logging
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -34,8 +35,10 @@ _WAIT = 60.0
 """Timeout of a request to a service [s]."""
 
 
-def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
+def open_study(path: Path | str, name: str | None = None, *, unchecked: bool = False) -> xr.Dataset:
     """Open the combined data set of a study; arrays are read when they are used.
+
+    It must be as it was written, which its seal proves, wherever the file is.
 
     Parameters
     ----------
@@ -44,17 +47,20 @@ def open_study(path: Path | str, name: str | None = None) -> xr.Dataset:
         key, such as ``http://localhost:8000/studies/<id>``
     name : name of the study, if the directory has several; of those with this name the one
         computed last is opened, and the logger ``studies`` says which there are
+    unchecked : whether to open a file that has no seal or was changed, such as one that another
+        program has written; its numbers are not those of the study
 
     Raises
     ------
     StudyError
-        if there is no data set (of this name), or there are studies with different names
+        if there is no data set (of this name), there are studies with different names, or it is not
+        as it was written
     """
     if isinstance(path, str) and path.startswith(("http://", "https://")):
         if name is not None:
             raise StudyError("name", name, "must be left out: the URL is that of one study")
-        return _fetched(path)
-    return open_netcdf(find_study(path, name))
+        return _fetched(path, unchecked)
+    return open_netcdf(find_study(path, name), unchecked=unchecked)
 
 
 def find_study(path: Path | str, name: str | None = None) -> Path:
@@ -102,7 +108,7 @@ def _written(path: Path) -> float:
     return path.stat().st_mtime
 
 
-def _fetched(url: str) -> xr.Dataset:
+def _fetched(url: str, unchecked: bool) -> xr.Dataset:
     """Return the data set of a study from a service, completely read."""
     import httpx
 
@@ -111,10 +117,17 @@ def _fetched(url: str) -> xr.Dataset:
         answer = httpx.get(whole, timeout=_WAIT, follow_redirects=True)
         if answer.is_error:
             raise ValueError(_refusal(answer))
-        dataset = xr.load_dataset(io.BytesIO(answer.content), engine="h5netcdf")
     except (httpx.HTTPError, httpx.InvalidURL, OSError, ValueError) as error:
         raise StudyError("path", url, f"must be a study of a service: {error}") from None
-    return indexed(dataset)
+    return loaded(answer.content, url, unchecked=unchecked)
+
+
+def loaded(content: bytes, path: str, *, unchecked: bool = False) -> xr.Dataset:
+    """Return a data set, completely read, from the content of its file; see `open_netcdf`."""
+    with one_error(path):
+        if not unchecked:
+            seal.check_content(content)
+        return indexed(xr.load_dataset(io.BytesIO(content), engine="h5netcdf"))
 
 
 def _refusal(answer: Any) -> str:
@@ -133,16 +146,15 @@ def _name(dataset: Path) -> str:
 def _content(dataset: Path) -> dict[str, Any]:
     """Return the definition of a data set's study; empty if it cannot be read."""
     try:
-        content = json.loads(dataset.with_name("study.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return seal.content_of(dataset.with_name("study.json"))
+    except (FileDamaged, OSError):
         return {}
-    return {k: v for k, v in content.items() if k != "seal"} if isinstance(content, dict) else {}
 
 
-def open_netcdf(path: Path | str) -> xr.Dataset:
+def open_netcdf(path: Path | str, *, unchecked: bool = False) -> xr.Dataset:
     """Open the file of a run or of a study; arrays are read when they are used.
 
-    One in a store is checked: it must be what was written there.
+    It is checked as `check` does, unless ``unchecked``.
 
     If runs have grids of different length, ``depth`` is a coordinate over the sweep and
     ``depth_fraction`` is the index: ``dataset.sel(depth_fraction=0.1, method="nearest")``.
@@ -150,31 +162,39 @@ def open_netcdf(path: Path | str) -> xr.Dataset:
     Raises
     ------
     StudyError
-        if it is not a netCDF file, or was damaged or replaced in its store
+        if it is not a netCDF file, or not as it was written
     """
-    check(Path(path))
-    try:
-        dataset = xr.open_dataset(path, engine=ENGINE)
-    except OSError as error:
-        raise StudyError("path", str(path), f"must be a netCDF file: {error}") from None
-    return indexed(dataset)
+    if not unchecked:
+        check(Path(path))
+    with one_error(path):
+        return indexed(xr.open_dataset(path, engine=ENGINE))
 
 
 def check(path: Path) -> None:
-    """Raise `StudyError` if a file in a store is not what its place says."""
-    whole = path.absolute()
+    """Raise `StudyError` unless a file has its seal, and in a store is what its place says.
+
+    The seal is at the end of the file, and goes with every copy of it.
+    """
+    whole, name = path.absolute(), ""
     if whole.name == "dataset.nc" and is_id(whole.parent.name):
         name = f"dataset {whole.parent.name}"
     elif whole.parent.name == "runs" and is_id(whole.stem):
         name = f"run {whole.stem}"
-    else:
-        return
-    try:
+    with one_error(path):
         seal.check(path, name)
-    except FileDamaged as error:
-        if error.state is None or (error.reason == seal.NO_SEAL and not seal.lost(path)):
-            return  # it is missing, or of an earlier version
-        allowed = f"was damaged or replaced, compute its study again: {error.reason}"
+
+
+@contextmanager
+def one_error(path: Path | str) -> Iterator[None]:
+    """Raise `StudyError` in place of what a library or the check of a file raises."""
+    try:
+        yield
+    except (FileDamaged, OSError, RuntimeError, ValueError, LookupError) as error:
+        reason = error.reason if isinstance(error, FileDamaged) else str(error)
+        allowed = (
+            f"is not a file as Residua has written it: {reason}. Compute its study again; "
+            "open_study(path, unchecked=True) opens a file that another program has written"
+        )
         raise StudyError("path", str(path), allowed) from None
 
 

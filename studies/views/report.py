@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from solver.files import read_file
 from studies.definition.fit import Fit
 from studies.definition.goal import Goal
 from studies.definition.refine import Refine
@@ -61,7 +62,7 @@ def report(study: Study, store: Store, outcome: StudyOutcome) -> Report:
     made = Made(study, store)
     of = made.digest(outcome.dataset.name)
     if files := made.kept(_NAME, of):
-        return Report(files[0].read_text(encoding="utf-8"), files, anew=False)
+        return Report(read_file(files[0]).decode(), files, anew=False)
     from studies.views.reading import open_study  # with tables and pictures it takes a second
 
     with open_study(outcome.dataset) as dataset:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from studies.appearing import appearing
+from solver.files import appearing
 from studies.definition.identity import is_id
 from studies.definition.vocabulary import MISSING
 from studies.errors import StudyError
@@ -23,7 +23,7 @@ from studies.storage.frame import SETS
 from studies.storage.store import Store
 from studies.views.columns import or_none
 from studies.views.picking import own_grid
-from studies.views.reading import check, indexed
+from studies.views.reading import check, indexed, one_error
 
 _TEXTS = ("status", "message")
 
@@ -85,10 +85,8 @@ class Unpacked(Store):
 
     def _opened(self) -> xr.Dataset:
         """Return the data set, read by h5py: its calls wait for those of other threads."""
-        try:
+        with one_error(self.path):
             return indexed(xr.open_dataset(self.path, engine="h5netcdf"))
-        except OSError as error:
-            raise StudyError("path", str(self.path), f"must be a netCDF file: {error}") from None
 
     def _run(self, dataset: xr.Dataset, run_id: str) -> xr.Dataset:
         """Return a run as its file has it: with the axes of the sweep, on its own grid."""

@@ -100,7 +100,8 @@ def test_the_locks_have_all_that_the_image_needs_at_the_versions_of_the_tests() 
     (pin,) = build.specifier
     assert pin.operator == "==", "the build tool is pinned"
     lock, mkl = locked("requirements.lock"), locked("mkl.lock")
-    assert lock.pop(canonicalize_name(build.name))[0] == Version(pin.version)
+    assert lock.pop(canonicalize_name(build.name))[0] == Version(pin.version) == pins()[build.name]
+    assert lock.pop("pip")[0] == pins()["pip"]
     free = closure(PROJECT["project"]["dependencies"])
     extra = closure(PROJECT["project"]["optional-dependencies"]["mkl"])
     assert (set(lock), set(mkl)) == (free, extra)
@@ -108,6 +109,11 @@ def test_the_locks_have_all_that_the_image_needs_at_the_versions_of_the_tests() 
         assert version == pins()[name], name
         assert digests, name
     assert "mkl" not in lock, "its licence is not free"
+
+
+@pytest.mark.parametrize("tool", ["pip", "setuptools"])
+def test_the_environment_has_the_tools_that_are_pinned(tool: str) -> None:
+    assert Version(distribution(tool).version) == pins()[tool]
 
 
 def test_the_list_of_what_the_image_installs_is_made_of_the_lock() -> None:

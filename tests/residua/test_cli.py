@@ -24,6 +24,7 @@ from residua.status import complain
 from solver.results.shakedown import ShakedownState
 from studies import Store, Study, StudyEvent, open_netcdf
 from studies.storage.dataset import attributes_of
+from studies.storage.seal import seal
 from tests.studies.conftest import compute_here, fake_study
 
 pytestmark = pytest.mark.usefixtures("one_worker")
@@ -159,6 +160,7 @@ def test_show_of_a_run_tells_flags_in_words_and_no_negative_zero(
         changed[name] = xr.full_like(changed["peak_residual_tension"], float(value))
         changed[name].attrs = attributes_of(name)
     changed.to_netcdf(tmp_path / "run.nc")
+    seal(tmp_path / "run.nc", "run changed")
     assert main(["show", str(tmp_path / "run.nc")]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["shakedown_state", "undecided"] in lines
@@ -501,3 +503,14 @@ def test_a_scene_and_a_study_in_each_others_place_are_told_by_what_they_are(
     )
     assert main(["scenes", str(study)]) == 2
     assert "is a study file, not a scene: its scene is pin.toml" in capsys.readouterr().err
+
+
+def test_an_interrupt_while_libraries_are_loaded_ends_without_a_traceback(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("residua.arguments.parser", interrupted)
+    assert main(["scenes"]) == 130
+    assert capsys.readouterr().err == ""

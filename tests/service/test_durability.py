@@ -202,15 +202,16 @@ def test_a_temporary_folder_that_a_kill_leaves_is_removed_at_the_next_start(
     study = mortal.start().post(fake_study("left", seconds=0.5))
     wait_until(mortal.computed)
     assert mortal.process is not None
-    (left,) = temporary.glob("residua-*")
+    left = set(temporary.iterdir())
+    assert {each.name.rpartition("-")[0] for each in left} == {"residua-scratch"}
     family = psutil.Process(mortal.process.pid).children(recursive=True)
     for each in (mortal.process, *family):
         each.kill()
     mortal.process.wait()
     psutil.wait_procs(family, timeout=10)
-    assert left.exists()
+    assert left == set(temporary.iterdir())
     mortal.start()
-    assert not left.exists()
+    assert not left & set(temporary.iterdir())
     assert mortal.finished(study)["status"] == "successful"
 
 

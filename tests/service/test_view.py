@@ -230,6 +230,7 @@ def test_a_run_of_a_data_set_is_that_of_its_file(
 def test_what_is_no_study_is_refused(tmp_path: Path) -> None:
     other = tmp_path / "other.nc"
     xr.Dataset({"a": 1.0}).to_netcdf(other, engine="h5netcdf")
+    seal.seal(other, "dataset other")
     for path in (other, tmp_path / "nothing", tmp_path):
         with pytest.raises(StudyError), application(path):
             pass

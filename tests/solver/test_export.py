@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from solver import Body, ContactPair, Material, Model, ModelError, Solution, solve
+from solver.files import NoFile
 from solver.mesh import grid
 
 pytestmark = pytest.mark.solves
@@ -81,3 +83,11 @@ def test_a_folder_holds_the_stages_of_the_last_export_alone(tmp_path: Path) -> N
     after = {each.name for each in tmp_path.iterdir()}
     assert before == {"mine.txt", "stages.pvd", "0-loaded.vtu", "1-unloaded.vtu"}
     assert after == {"mine.txt", "stages.pvd", "0-alone.vtu"}
+
+
+def test_stages_replace_only_files_and_appear_together(tmp_path: Path) -> None:
+    found = pressed("quad4")
+    os.mkfifo(tmp_path / "1-unloaded.vtu")
+    with pytest.raises(NoFile, match=r"1-unloaded\.vtu: it is a pipe, and only files are replaced"):
+        found.to_vtu(tmp_path)
+    assert [each.name for each in tmp_path.iterdir()] == ["1-unloaded.vtu"]

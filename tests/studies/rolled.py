@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from studies.definition.vocabulary import OK
+from studies.storage.seal import seal
 
 DEPTH = np.concatenate([np.linspace(0.0, 25.0, 126), np.linspace(25.5, 50.0, 30)])
 PEAK = 3.0
@@ -83,4 +84,5 @@ def data_set(
 def written(dataset: xr.Dataset, path: Path) -> Path:
     fixed = json.loads(dataset.attrs["parameters"])
     dataset.drop_vars([name for name in fixed if name in dataset.coords]).to_netcdf(path)
+    seal(path, f"dataset {path.stem}")
     return path

@@ -12,6 +12,7 @@ import xarray as xr
 
 from residua.cli import main
 from studies import Store, Study, open_study, summary
+from studies.storage.seal import seal
 from studies.views.archive import archive
 from studies.views.columns import value_text
 
@@ -55,6 +56,7 @@ def test_a_file_that_is_no_study_is_refused_in_one_line(
 ) -> None:
     other = tmp_path / "other.nc"
     xr.Dataset({"a": 1.0}).to_netcdf(other, engine="h5netcdf")
+    seal(other, "dataset other")
     for command in (["report"], ["table"], ["plot", "--out", str(tmp_path / "a.png")]):
         assert main([command[0], str(other), *command[1:]]) == 2, command
         told = capsys.readouterr().err

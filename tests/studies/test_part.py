@@ -197,6 +197,19 @@ def test_a_path_that_kills_two_is_blamed(tmp_path: Path) -> None:
     assert "the processes that computed this loading path died" in row["message"]
 
 
+@pytest.mark.parametrize("ahead", [100.0, 400.0, 1e7])
+def test_a_claim_of_another_machine_is_dead_if_its_time_is_far_in_the_future(
+    tmp_path: Path, ahead: float
+) -> None:
+    """An owner that lives sets it to the time of the file system again and again."""
+    claims = Claims(tmp_path)
+    left = tmp_path / "a.0"
+    left.write_text(json.dumps({"machine": "elsewhere"}))
+    os.utime(left, (time.time() + ahead,) * 2)
+    with claims.held("a") as claim:
+        assert claim == (Claim(1) if ahead > 300.0 else None)
+
+
 def test_a_claim_has_one_owner_until_it_ends_or_dies(tmp_path: Path) -> None:
     mine, other = Claims(tmp_path / "claims"), Claims(tmp_path / "claims")
     with mine.held("a") as claim:

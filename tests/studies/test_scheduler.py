@@ -169,6 +169,24 @@ def test_no_scheduler_at_the_address_is_one_clear_error_and_leaves_nothing(
     assert not store.directory.exists()
 
 
+def test_that_a_scheduler_is_waited_for_is_reported_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    for seconds in ("_LATE", "_APPEARS"):
+        monkeypatch.setattr(
+            f"studies.execution.cluster.{seconds}", 0.1 if seconds == "_LATE" else 0.6
+        )
+    address, file = "tcp://127.0.0.1:1", tmp_path / "none.json"
+    with pytest.raises(GridLost), dask.config.set({ANSWERS: "2s"}):
+        connect(Access(address))
+    with pytest.raises(GridLost):
+        Access.of_file(file, None, None, None)
+    assert [each for each in caplog.messages if each.endswith("yet: waiting")] == [
+        f"no scheduler answers at {address} yet: waiting",
+        f"no scheduler has written the file {file} yet: waiting",
+    ]
+
+
 def test_a_worker_that_does_not_see_the_directory_computes_nothing(
     stage: Stage, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:

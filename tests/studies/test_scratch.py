@@ -22,6 +22,15 @@ with scratch() as folder:
 """
 
 
+STARTER = """
+import time
+from studies.execution.cluster import own_workers
+with own_workers(0):
+    print("started", flush=True)
+    time.sleep(60)
+"""
+
+
 @pytest.fixture(autouse=True)
 def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The directory of temporary files."""
@@ -79,6 +88,21 @@ def test_a_folder_of_a_killed_process_is_removed_by_the_next(folders: Path) -> N
         "residua-results",
     }
     assert (ROOT / "pyproject.toml").exists()
+
+
+@pytest.mark.processes
+def test_what_workers_need_is_in_folders_that_the_next_process_removes(folders: Path) -> None:
+    holder = subprocess.Popen(
+        [sys.executable, "-c", STARTER], stdout=subprocess.PIPE, text=True, cwd=ROOT
+    )
+    with holder:
+        assert holder.stdout is not None and holder.stdout.readline() == "started\n"
+        holder.kill()
+        holder.wait()
+    left = {each.name.rpartition("-")[0] for each in folders.iterdir()}
+    assert left == {"residua-scratch"}
+    remove_left()
+    assert list(folders.iterdir()) == []
 
 
 def test_no_folder_for_temporary_files_leaves_nothing_to_remove(

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from solver.files import appearing
 from studies import CatalogueDamaged, Store, StoreBusy, Study, run_study
-from studies.appearing import appearing
 from tests.studies.conftest import compute_here, fake_study
 
 pytestmark = pytest.mark.usefixtures("one_worker")

@@ -340,7 +340,7 @@ def test_a_file_that_is_not_utf8_or_not_there_is_one_clear_error(tmp_path: Path)
     (tmp_path / "latin.toml").write_bytes(b'name = "\xe9"')
     with pytest.raises(StudyError, match="must be saved as UTF-8, which line 1 is not"):
         Study.from_toml(tmp_path / "latin.toml")
-    with pytest.raises(StudyError, match="cannot be read"):
+    with pytest.raises(StudyError, match="must be a file to read: No such file"):
         Study.from_toml(tmp_path / "absent.toml")
     with pytest.raises(StudyError, match="must be a file"):
         Study.from_toml(tmp_path)

@@ -124,7 +124,7 @@ class Contact:
 
     @property
     def yielding(self):
-        """Share of the contact that is close to yield: at the surface error by increments is 5 %."""
+        """Share of the contact close to yield: increments make an error of 5 % at the surface."""
         return (self.mises > 0.9 * YIELD).mean()
 
     @property

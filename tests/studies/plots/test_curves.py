@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 from residua.cli import main
 from studies import StudyError
 from studies.storage.dataset import attributes_of
+from studies.storage.seal import seal
 from studies.views.plots.picture import picture
 from studies.views.plots.sweep import sweep_figure
 from tests.studies.plots.test_lines import legend_of, lines_of
@@ -148,6 +149,7 @@ def test_runs_with_different_grids_are_not_laid_over_each_other() -> None:
 
 def test_the_resolution_is_that_of_the_file(tmp_path: Path) -> None:
     swept(frictions=[0.0]).to_netcdf(tmp_path / "swept.nc")
+    seal(tmp_path / "swept.nc", "dataset swept")
     widths = []
     for resolution in ("50", "300"):
         command = ["plot", str(tmp_path / "swept.nc"), "--field", "increments"]
