@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 _MOST = 1_000_000
 """Largest number of elements along a line."""
+_SLIVER = 0.5
+"""Least length of elements that grow from a point, over their first side; below it there are none:
+those from the other point go on to this one."""
 
 
 def graded(length: float, smallest: float, ratio: float, largest: float) -> Array:
@@ -139,10 +142,14 @@ def refined(
             continue
         length = end - start
         ahead = _meeting(length, first, last, ratio)
-        if ahead > 0:
+        back = length - ahead
+        if ahead < _SLIVER * min(first, most, length):
+            ahead, back, most = 0.0, length, min(most, first)
+        elif back < _SLIVER * min(last, most, length):
+            ahead, back, most = length, 0.0, min(most, last)
+        if ahead:
             pieces.append(start + graded(ahead, min(first, most, ahead), ratio, most)[1:])
-        if ahead < length:
-            back = length - ahead
+        if back:
             pieces.append(end - graded(back, min(last, most, back), ratio, most)[-2::-1])
     return np.concatenate(pieces)
 
