@@ -27,7 +27,7 @@ _CLOSE = 1e-3
 """Relative distance of a load below one that is excluded; up to it the load is at the limit."""
 _ISOCHORIC = 0.01
 """Largest work of a mean stress of the tensile strength on a mechanism, over its dissipation."""
-_SINGULAR = 1e-5
+_SINGULAR = 1e-6
 """Ratio of the tangent to the elastic stiffness along a step; below it the tangent is singular."""
 _MECHANISM = 1e-2
 """The same for bodies without load."""

@@ -21,6 +21,7 @@ plastic tangent of the previous step would make Newton's method diverge.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +29,7 @@ import numpy as np
 from solver.contact.candidates import Candidates, find_candidates, no_candidates
 from solver.contact.ends import beyond_end
 from solver.contact.state import Converged, State, Timing
+from solver.fem.window import Windowed
 from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
 from solver.loading.acceleration import Series
@@ -72,8 +74,6 @@ _UNBALANCED = 100.0
 _ROUNDED = 10.0
 """Factor between the force level of bodies without load and the level at which rounding errors
 alone would exceed the tolerance."""
-_LATE = 1
-"""Number of the first iteration whose step is looked at as a mechanism."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,6 +141,7 @@ class Increment:
         self._began: tuple[Vectors, Candidates] | None = None  # residuals, candidates
         self._pivoted, self._blended = 0, 0
         self._softened = any(part.body.law.has_corners for part in system.parts)  # no tangent there
+        self._path: list[Vectors] = []  # displacements of all iterates so far
         self.compliance = {} if compliance is None else compliance
 
     def solve(self) -> Converged:
@@ -167,7 +168,7 @@ class Increment:
         u, contacts, links = origin.u, origin.contacts, origin.links
         responses = self._respond(u)
         residuals = self._residuals(u, responses)
-        best, since_best, why = np.inf, 0, Mechanism()
+        best, since_best = np.inf, 0
         series, begun, crawled = Series(), 0.0, 0
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts, links)
@@ -201,13 +202,12 @@ class Increment:
             try:
                 step = self._step(residuals, responses, candidates, _BLENDS[first:])
             except IncrementFailed as failure:
-                failure.why = self._slide((residuals, candidates)) or why
+                slides = self._slide((residuals, candidates))
+                failure.why = slides or self._flow(responses, residuals, candidates, scale)
                 raise
-            if iteration >= _LATE:
-                known = responses, residuals, candidates, scale
-                why = max(why, mechanism(self.system, self.time, step.u, *known))
             out = max(error, tolerances.residual / _LESS) * scale
             before = u
+            self._path.append(u)
             share, u, responses, residuals = self._search(u, residuals, candidates, step, out)
             crawled = crawled + 1 if share < _SHORT else 0
             forces = (1 - share) * candidates.forces + share * step.forces
@@ -220,13 +220,11 @@ class Increment:
             links = forces[candidates.linked]
             if self.elastic_only and any(r.yielding.any() for r in responses):
                 raise Yielded
-        moved = tuple(now - before for now, before in zip(u, origin.u, strict=True))
-        known = responses, residuals, candidates, scale
-        why = max(why, mechanism(self.system, self.time, moved, *known))
+        self._path.append(u)
         raise IncrementFailed(
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
             f"and a contact violation of {violation:.1e}",
-            self._slide() or why,
+            self._slide() or self._flow(responses, residuals, candidates, scale),
         )
 
     def _guessed(self) -> State:
@@ -248,6 +246,30 @@ class Increment:
         places = (*places, self._began) if self._began else places
         found = (slide(self.system, residuals, candidates) for residuals, candidates in places)
         return next((each for each in found if each is not None), None)
+
+    def _flow(
+        self,
+        responses: Sequence[Response],
+        residuals: Vectors,
+        candidates: Candidates,
+        level: float,
+    ) -> Mechanism:
+        """Return the motion that proves a limit load, or the one that comes closest to a proof.
+
+        Motions are the ways from each iterate to the next and to the last one: the iterates of a
+        body that flows wander about its mechanism, and the longer the way the less they do. In
+        windows of bodies nothing is proven: the rest of a body could flow too.
+        """
+        system, best, path = self.system, Mechanism(), self._path
+        if any(isinstance(part, Windowed) for part in system.parts):
+            return best
+        for start, end in (*((at, path[-1]) for at in path[:-1]), *pairwise(path)):
+            moved = tuple(after - before for before, after in zip(start, end, strict=True))
+            found = mechanism(system, self.time, moved, responses, residuals, candidates, level)
+            best = max(best, found)
+            if best.limit:
+                break
+        return best
 
     # -- 1, 2: stress, residual, contact geometry ----------------------------------------------
 

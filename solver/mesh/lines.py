@@ -136,11 +136,11 @@ def refined(
     pieces = [np.array([points[0]], dtype=float)]
     counts = parts or [None] * len(largest)
     spans = zip(pairwise(points), pairwise(sizes), largest, counts, strict=True)
-    for (start, end), (first, last), most, count in spans:
+    for (start, end), (first, last), limit, count in spans:
         if count is not None:
             pieces.append(np.linspace(start, end, count + 1)[1:])
             continue
-        length = end - start
+        length, most = end - start, limit
         ahead = _meeting(length, first, last, ratio)
         back = length - ahead
         if ahead < _SLIVER * min(first, most, length):

@@ -45,7 +45,7 @@ def bars(stiff: Material, joined: str, force: float = FORCE) -> Model:
     stiff one) or without ("apart"), or contact with an end that presses ("pressed").
     """
     fine = 1.3 if joined == "slave" else 1.0
-    u, l = bar("u", SOFT, (0.0, 3.0), 2.3 - fine), bar("l", stiff, (-2.0, 0.0), fine)
+    u, low = bar("u", SOFT, (0.0, 3.0), 2.3 - fine), bar("l", stiff, (-2.0, 0.0), fine)
     tied = {"slave": (Link(slave=("u", "bottom"), master=("l", "top")),),
             "master": (Link(slave=("l", "top"), master=("u", "bottom")),)}  # fmt: skip
     if joined not in tied:
@@ -55,10 +55,10 @@ def bars(stiff: Material, joined: str, force: float = FORCE) -> Model:
         end = RigidBody(name="end", surfaces={"face": plate}, x=Pushed(value=-force))
         pairs = tuple(ContactPair(slave=(b, "right"), master=("end", "face"), friction=0.0)
                       for b in ("u", "l"))  # fmt: skip
-        return Model(bodies=(u, l), rigid=(end,), contacts=pairs)
+        return Model(bodies=(u, low), rigid=(end,), contacts=pairs)
     end = RigidBody(name="end", centre=(40.0, 0.0), x=Pushed(value=force))
     ends = tuple(Link(slave=(b, "right"), rigid="end", components="x") for b in ("u", "l"))
-    return Model(bodies=(u, l), rigid=(end,), links=ends + tied.get(joined, ()))
+    return Model(bodies=(u, low), rigid=(end,), links=ends + tied.get(joined, ()))
 
 
 def solved(model: Model, steps: int) -> Solution:
