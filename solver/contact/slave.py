@@ -3,6 +3,8 @@
 Contact forces need displacements of the same resolution. A rigid body has no displacement unknowns
 at its vertices: it is the slave only if its edges are about as long as those of its partner. Two
 curved surfaces touch in a narrow zone; the surface with much longer edges would not resolve it.
+A curved body that contact alone holds stands on one vertex at first. It can stand on a vertex of
+its own, which moves with it; on one of its partner any small moment turns it to the next vertex.
 """
 
 from __future__ import annotations
@@ -26,6 +28,8 @@ _RIGID = (0.4, 1.1)
 _COARSE = 2.0
 """Ratio of the edge length of a slave to that of its partner; above it the partner becomes the
 slave if one of them is curved."""
+_STANDS = 0.75
+"""The same ratio if contact alone holds the partner, and the partner is curved."""
 _AT_ONCE = 1_000_000
 """Number of distances between vertices that are in memory at a time, about."""
 _NEAR = 0.01
@@ -52,8 +56,19 @@ def _ordered(
     if isinstance(model.body(contact.slave[0]), RigidBody):
         bears = _RIGID[0] <= ratio <= _RIGID[1]
     else:
-        bears = ratio <= _COARSE or not (is_curved(slave) or is_curved(master))
+        stands = is_curved(master) and _floats(model, contact.master[0])
+        most = _STANDS if stands and not _floats(model, contact.slave[0]) else _COARSE
+        bears = ratio <= most or not (is_curved(slave) or is_curved(master))
     return contact if bears else replace(contact, slave=contact.master, master=contact.slave)
+
+
+def _floats(model: Model, name: str) -> bool:
+    """Whether contact alone keeps a body from turning."""
+    body = model.body(name)
+    if isinstance(body, RigidBody) or body.kinematics == "axisymmetric":
+        return False
+    linked = {side[0] for link in model.links for side in (link.slave, link.master) if side}
+    return not (body.supports or body.axle or name in linked)
 
 
 def _edges(slave: Surface, master: Surface) -> float:
