@@ -18,7 +18,7 @@ from solver.contact.normals import is_curved
 from solver.model.rigid import RigidBody
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from solver.fem.surface import Surface
     from solver.model.model import ContactPair, Model
@@ -37,16 +37,23 @@ _NEAR = 0.01
 contact."""
 
 
-def with_slaves(model: Model, surfaces: Mapping[tuple[str, str], Surface]) -> Model:
+def with_slaves(
+    model: Model, surfaces: Mapping[tuple[str, str], Surface], free: Collection[str]
+) -> Model:
     """Return the model with slave and master exchanged in the pairs where that is better.
 
-    ``surfaces`` has the surfaces of all pairs, by body and boundary.
+    ``surfaces`` has the surfaces of all pairs, by body and boundary; ``free`` are the names of the
+    bodies that contact alone holds.
     """
-    return replace(model, contacts=tuple(_ordered(model, c, surfaces) for c in model.contacts))
+    contacts = tuple(_ordered(model, contact, surfaces, free) for contact in model.contacts)
+    return replace(model, contacts=contacts)
 
 
 def _ordered(
-    model: Model, contact: ContactPair, surfaces: Mapping[tuple[str, str], Surface]
+    model: Model,
+    contact: ContactPair,
+    surfaces: Mapping[tuple[str, str], Surface],
+    free: Collection[str],
 ) -> ContactPair:
     """Return the pair, its sides exchanged where that is better."""
     slave, master = surfaces[contact.slave], surfaces[contact.master]
@@ -56,19 +63,10 @@ def _ordered(
     if isinstance(model.body(contact.slave[0]), RigidBody):
         bears = _RIGID[0] <= ratio <= _RIGID[1]
     else:
-        stands = is_curved(master) and _floats(model, contact.master[0])
-        most = _STANDS if stands and not _floats(model, contact.slave[0]) else _COARSE
+        stands = is_curved(master) and contact.master[0] in free and contact.slave[0] not in free
+        most = _STANDS if stands else _COARSE
         bears = ratio <= most or not (is_curved(slave) or is_curved(master))
     return contact if bears else replace(contact, slave=contact.master, master=contact.slave)
-
-
-def _floats(model: Model, name: str) -> bool:
-    """Whether contact alone keeps a body from turning."""
-    body = model.body(name)
-    if isinstance(body, RigidBody) or body.kinematics == "axisymmetric":
-        return False
-    linked = {side[0] for link in model.links for side in (link.slave, link.master) if side}
-    return not (body.supports or body.axle or name in linked)
 
 
 def _edges(slave: Surface, master: Surface) -> float:
