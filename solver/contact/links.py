@@ -66,11 +66,6 @@ class Links(OnParts):
         """Return the number of conditions."""
         return len(self.compliance)
 
-    @property
-    def springy(self) -> bool:
-        """Whether springs resist any motion."""
-        return bool(self.compliance.any())
-
     def loose(self, paired: Sequence[bool]) -> tuple[bool, ...]:
         """Return for each part whether nothing holds it, no link and none of the pairs given."""
         each = zip(self.rows, paired, strict=True)

@@ -3,6 +3,8 @@
 Contact forces need displacements of the same resolution. A rigid body has no displacement unknowns
 at its vertices: it is the slave only if its edges are about as long as those of its partner. Two
 curved surfaces touch in a narrow zone; the surface with much longer edges would not resolve it.
+A curved body that contact alone holds stands on one vertex at first. It can stand on a vertex of
+its own, which moves with it; on one of its partner any small moment turns it to the next vertex.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from solver.contact.normals import is_curved
 from solver.model.rigid import RigidBody
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from solver.fem.surface import Surface
     from solver.model.model import ContactPair, Model
@@ -26,6 +28,8 @@ _RIGID = (0.4, 1.1)
 _COARSE = 2.0
 """Ratio of the edge length of a slave to that of its partner; above it the partner becomes the
 slave if one of them is curved."""
+_STANDS = 0.75
+"""The same ratio if contact alone holds the partner, and the partner is curved."""
 _AT_ONCE = 1_000_000
 """Number of distances between vertices that are in memory at a time, about."""
 _NEAR = 0.01
@@ -33,16 +37,23 @@ _NEAR = 0.01
 contact."""
 
 
-def with_slaves(model: Model, surfaces: Mapping[tuple[str, str], Surface]) -> Model:
+def with_slaves(
+    model: Model, surfaces: Mapping[tuple[str, str], Surface], free: Collection[str]
+) -> Model:
     """Return the model with slave and master exchanged in the pairs where that is better.
 
-    ``surfaces`` has the surfaces of all pairs, by body and boundary.
+    ``surfaces`` has the surfaces of all pairs, by body and boundary; ``free`` are the names of the
+    bodies that contact alone holds.
     """
-    return replace(model, contacts=tuple(_ordered(model, c, surfaces) for c in model.contacts))
+    contacts = tuple(_ordered(model, contact, surfaces, free) for contact in model.contacts)
+    return replace(model, contacts=contacts)
 
 
 def _ordered(
-    model: Model, contact: ContactPair, surfaces: Mapping[tuple[str, str], Surface]
+    model: Model,
+    contact: ContactPair,
+    surfaces: Mapping[tuple[str, str], Surface],
+    free: Collection[str],
 ) -> ContactPair:
     """Return the pair, its sides exchanged where that is better."""
     slave, master = surfaces[contact.slave], surfaces[contact.master]
@@ -52,7 +63,9 @@ def _ordered(
     if isinstance(model.body(contact.slave[0]), RigidBody):
         bears = _RIGID[0] <= ratio <= _RIGID[1]
     else:
-        bears = ratio <= _COARSE or not (is_curved(slave) or is_curved(master))
+        stands = is_curved(master) and contact.master[0] in free and contact.slave[0] not in free
+        most = _STANDS if stands else _COARSE
+        bears = ratio <= most or not (is_curved(slave) or is_curved(master))
     return contact if bears else replace(contact, slave=contact.master, master=contact.slave)
 
 

@@ -103,7 +103,9 @@ class System:
         wholes: dict[str, Discretisation | RigidPart] = {**self._wholes, **rigid}
         self._chains = wholes
         surfaces = surfaces_of(model, wholes)
-        self.model = model = with_slaves(model, surfaces)
+        free = {name for name, whole in self._wholes.items() if whole.rigid.shape[1] == 3}
+        free -= {side[0] for side in linked} | {b.name for b in model.bodies if b.axle}
+        self.model = model = with_slaves(model, surfaces, free)
         every = [*surfaces.items(), *linked.items()]
         own = [[chain for (name, _), chain in every if name == body] for body in wholes]
         self.surfaces, self._linear_solver = own, linear_solver
@@ -305,9 +307,11 @@ class System:
 
         True without friction, or if all facing vertices touch before loading: every status then
         stays the same while the load grows. It is False if the friction bound is not proportional
-        to the pressure, as with cohesion or a shear limit, and if bodies overlap before loading.
+        to the pressure, as with cohesion or a shear limit, if bodies overlap before loading, and if
+        sliding is declared finite: normals rotate, and the work of contact needs increments.
         """
-        if self.overlapping or not all(i.law.proportional for i in self.interfaces):
+        finite = any(i.declared.sliding == "finite" for i in self.interfaces)
+        if finite or self.overlapping or not all(i.law.proportional for i in self.interfaces):
             return False
         gaps = np.concatenate([np.zeros(0), *(c.gap for c in self.initial().contacts)])
         conforming = (np.isinf(gaps) | (np.abs(gaps) < self.touching)).all()

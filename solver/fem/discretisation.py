@@ -275,10 +275,6 @@ class Discretisation(Nodes, Part):
         tangent = np.einsum("ap,abp,bp->p", some, D, some) @ self.volumes[yields]
         return float(elastic[~yields].sum() + tangent), float(elastic.sum())
 
-    def most_strained(self, step: NDArray[np.float64]) -> int:
-        """Return the number of the point that a step (n,) strains most."""
-        return int((self.strain(step) ** 2).sum(axis=0).argmax())
-
     def place(self, point: int) -> tuple[float, float]:
         """Return the position (x, y) of a point [mm]."""
         x, y = self.points.reshape(2, -1)[:, point]

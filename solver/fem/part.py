@@ -224,11 +224,6 @@ class Part(ABC):
         """Return for each unknown (n,) the one a distance ``way`` [mm] behind along x, or -1."""
         return same_unknowns(self.nodes, self.nodes - np.array([[way], [0.0]]))
 
-    def most_strained(self, step: NDArray[np.float64]) -> int:
-        """Return the number of the point that a step (n,) strains most; 0 without points."""
-        del step
-        return 0
-
     def place(self, point: int) -> tuple[float, float]:
         """Return the position (x, y) of a point [mm]; NaN without points."""
         del point

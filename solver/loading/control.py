@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from solver.errors import ModelError
 from solver.kinds import check_kinds
@@ -23,12 +23,17 @@ class Tolerances:
     residual : largest out-of-balance force over the largest force level so far
     contact : largest violation of the contact conditions, as a force, over the same level
     iterations : largest number of Newton iterations of an increment; half as many more in windows
-        of the bodies, where an iteration costs a fraction
+        of the bodies, where an iteration costs a fraction, and in the last attempt
     """
 
     residual: float = 1e-8
     contact: float = 1e-7
     iterations: int = 40
+
+    @property
+    def patient(self) -> Tolerances:
+        """The same with half as many more iterations."""
+        return replace(self, iterations=3 * self.iterations // 2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""The stiffness along a step: low in a plastic mechanism, not in other failures."""
+"""The proof of a limit load: a mechanism on which the load does more work than can be resisted."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from solver.loading.step import moving
 from solver.tensors import deviator
 
 if TYPE_CHECKING:
@@ -14,136 +15,137 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from solver.contact.candidates import Candidates
+    from solver.contact.system import System
     from solver.fem.discretisation import Discretisation
     from solver.fem.part import Part
-    from solver.materials import Law, PlasticState, Response
+    from solver.materials import Response
 
-_FLOWING = 0.02
-"""Ratio of the tangent to the elastic stiffness along a late step; below it the structure flows."""
-_EXHAUSTED = 0.99
-"""Ratio of the flow stress to its limit in a law; above it little hardening is left."""
+    Vectors = Sequence[NDArray[np.float64]]
+
+_CLOSE = 1e-3
+"""Relative distance of a load below one that is excluded; up to it the load is at the limit."""
+_ISOCHORIC = 0.01
+"""Largest work of a mean stress of the tensile strength on a mechanism, over its dissipation."""
+_SINGULAR = 1e-6
+"""Ratio of the tangent to the elastic stiffness along a step; below it the tangent is singular."""
 _MECHANISM = 1e-2
-"""Like `_FLOWING`, for bodies without load."""
+"""The same for bodies without load."""
 _MOVES = 1e-3
 """Ratio of the elastic energy of a part in a step to that of all; above it the part moves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SoftestStep:
-    """The step with the least stiffness along it.
+class Mechanism:
+    """A motion in which bodies flow, strained most in ``body`` at ``place`` (x, y) [mm].
 
-    ``stiffness`` is the ratio of the tangent to the elastic stiffness along the step. ``body`` and
-    ``place`` (x, y) [mm] are where it strains most. ``proves`` says whether vanishing stiffness
-    proves a limit load: no hardening is left, and the stress is at no corner of the yield surface.
-    ``excludes`` says that the kinematic theorem excludes any equilibrium at this load
-    (`collapses`), whatever the state before.
+    ``ratio`` is the power of the load over the largest power that can resist it.
     """
 
-    stiffness: float = 1.0
+    ratio: float = 0.0
     body: str = ""
     place: tuple[float, float] = (0.0, 0.0)
-    proves: bool = False
-    excludes: bool = False
+
+    def __lt__(self, other: Mechanism) -> bool:
+        """Whether the other proves more."""
+        return self.ratio < other.ratio
 
     @property
     def limit(self) -> bool:
-        """Whether the step was a plastic mechanism that no hardening resists."""
-        return self.stiffness < _FLOWING and (self.proves or self.excludes)
+        """Whether the load is above the limit load, or within `_CLOSE` of it."""
+        return self.ratio > 1 - _CLOSE
+
+    @property
+    def excludes(self) -> bool:
+        """The same: no state before allows for a larger load."""
+        return self.limit
 
     def __str__(self) -> str:
         x, y = self.place
         return (
-            f"body {self.body!r} flows around x = {x:.4g}, y = {y:.4g} mm with "
-            f"{self.stiffness:.1%} of its elastic stiffness"
+            f"body {self.body!r} flows around x = {x:.4g}, y = {y:.4g} mm, where the load does "
+            f"{self.ratio:.4g} times the largest work of plastic flow and friction"
         )
 
 
-def _forms(
-    parts: Sequence[Part], step: Sequence[NDArray[np.float64]], responses: Sequence[Response]
-) -> NDArray[np.float64]:
-    """Return ``step' K step`` of each part, with tangent and elastic stiffness (n_parts, 2)."""
-    each = zip(parts, step, responses, strict=True)
-    return np.array([part.stiffness_along(du, response) for part, du, response in each])
-
-
-def softer(
-    than: SoftestStep,
-    parts: Sequence[Part],
-    step: Sequence[NDArray[np.float64]],
-    responses: Sequence[Response],
-) -> SoftestStep:
-    """Return the softest step: this one (displacements of each part) or ``than``."""
-    forms = _forms(parts, step, responses)
-    tangent, elastic = forms.sum(axis=0)
-    if not elastic > 0 or tangent / elastic >= than.stiffness:
-        return than
-    most = int((forms[:, 1] - forms[:, 0]).argmax())
-    law, at = parts[most].body.law, parts[most].most_strained(step[most])
-    return SoftestStep(
-        stiffness=max(float(tangent / elastic), 0.0),  # less is rounding
-        body=parts[most].body.name,
-        place=parts[most].place(at),
-        proves=not (law.hardens or law.has_corners) and _exhausted(law, responses[most].state, at),
-    )
-
-
-def _exhausted(law: Law, state: PlasticState, point: int) -> bool:
-    """Whether the flow stress at a point is close to its limit, of a law that has one."""
-    bound = law.ultimate_shear_stress
-    strength = law.shear_strength(state.at(np.array([point])))[0] if np.isfinite(bound) else bound
-    return bool(strength >= _EXHAUSTED * bound)
-
-
-def collapses(
-    parts: Sequence[Part],
+def mechanism(
+    system: System,
     time: float,
-    moved: Sequence[NDArray[np.float64]],
-    forces: Sequence[NDArray[np.float64]],
+    step: Vectors,
     responses: Sequence[Response],
-) -> bool:
-    """Whether the work of out-of-balance forces exceeds the largest plastic dissipation.
+    residuals: Vectors,
+    candidates: Candidates,
+    level: float,
+) -> Mechanism:
+    """Return a motion of all parts as a mechanism.
 
-    This is the kinematic theorem of limit analysis, which also holds at corners of a yield surface.
-    If the forces do more work on a motion than any stress inside the yield surface can do beyond
-    the present stress, no equilibrium exists. If the motion changes volume, a mean stress that
-    differs by the tensile strength is also admitted.
+    This is the kinematic theorem of limit analysis: if the load does more work on a motion than any
+    stress inside the yield surfaces, no equilibrium exists. It also holds at corners of the
+    surface. With s the present deviator of stress and r the out-of-balance forces without contact:
+
+    1. A part whose stress has no bound only moves as a rigid body: the rest of its motion is left
+       out, so that it is found as a gap or overlap in step 4.
+    2. Power of the load on each part: r v + the integral of s e, with e the strain of the motion v.
+       It is that of the external forces, without the mean stress if the motion keeps the volume.
+    3. Power of plastic flow: the integral of the largest work of a stress on e. A mean stress that
+       differs from the present one by the tensile strength is admitted too.
+    4. Power of contact and links: no pressure acts where surfaces part. Against an overlap, and
+       against the violation of a link, a vertex resists with all of the force level. Friction
+       resists by its bound under the present normal forces.
 
     Parameters
     ----------
-    moved : displacements of each part, with little strain outside the flowing region [mm]
-    forces : out-of-balance nodal forces of each part, with contact forces [N]
+    step : displacements of each part, zero where motions are prescribed [mm]
+    residuals : external minus internal forces of each part, without contact forces [N]
+    candidates : contact, with the normal forces that bound friction
+    level : force level [N]
     """
-    elastic = _forms(parts, moved, responses)[:, 1]
-    excess = sum(float(force @ u) for force, u in zip(forces, moved, strict=True))
-    for part, u, response, share in zip(parts, moved, responses, elastic, strict=True):
-        law = part.law(time)
-        if share <= _MOVES * elastic.sum():
+    load, swelling, v, flow, most = 0.0, 0.0, [], [], []
+    each = zip(system.parts, step, responses, residuals, candidates.pushes, strict=True)
+    for part, u, response, residual, push in each:
+        strength = part.law(time).ultimate_shear_stress
+        flows = part.meshed and np.isfinite(strength)
+        v.append(u if flows else moving(part, u))
+        load += float((residual + push) @ v[-1])
+        flow.append(0.0)
+        most.append(0)
+        if not flows:
             continue
-        if not part.meshed or np.isinf(law.ultimate_shear_stress):
-            return False
-        body = cast("Discretisation", part)
+        body, surface = cast("Discretisation", part), part.law(time).surface
         strain = body.strain(u)
         if body.body.kinematics == "plane_stress":
             strain[2] = -strain[0] - strain[1]
-        strength = law.ultimate_shear_stress / law.surface.shear(1.0)
-        most = strength * (law.surface.power(strain) + np.abs(strain[:3].sum(axis=0)))
-        excess -= float((most - (response.stress * deviator(strain)).sum(axis=0)) @ part.volumes)
-    return excess > 0
+        tension = strength / surface.shear(1.0)
+        flow[-1] = float(tension * surface.power(strain) @ part.volumes)
+        most[-1] = int((strain**2).sum(axis=0).argmax())
+        swelling += float(tension * np.abs(strain[:3].sum(axis=0)) @ part.volumes)
+        load += float((response.stress * deviator(strain)).sum(axis=0) @ part.volumes)
+    if not load > 0 or swelling >= _ISOCHORIC * sum(flow):
+        return Mechanism()
+    rates = np.sum([candidates.of_part(k, u) for k, u in enumerate(v)], axis=0)
+    apart, normal = rates[: candidates.n], candidates.forces[: candidates.n]
+    held = np.abs(np.minimum(apart, 0.0)).sum() + np.abs(rates[candidates.linked]).sum()
+    bound = candidates.lines.least(normal)[: rates[candidates.along].size]
+    friction = float(bound @ np.abs(rates[candidates.along]))
+    weakest = int(np.argmax(flow))
+    return Mechanism(
+        ratio=load / (sum(flow) + swelling + friction + level * float(held)),
+        body=system.parts[weakest].body.name,
+        place=system.parts[weakest].place(most[weakest]),
+    )
 
 
-def is_mechanism(
-    parts: Sequence[Part],
-    time: float,
-    step: Sequence[NDArray[np.float64]],
-    responses: Sequence[Response],
+def is_singular(
+    parts: Sequence[Part], time: float, step: Vectors, responses: Sequence[Response]
 ) -> bool:
-    """Whether a step is a plastic mechanism in a part, although no body has a load.
+    """Whether a part has so little stiffness along a step that rounding determines the step.
 
-    Overlapping bodies push each other apart by a given distance. Without stiffness the plastic
-    strain that achieves this is not unique, and rounding would determine it.
+    Under no load overlapping bodies push each other apart by a given distance. Without stiffness
+    the plastic strain that achieves this is not unique.
     """
-    if any(part.external(time).any() for part in parts):
-        return False
-    tangent, elastic = _forms(parts, step, responses).T
+    loaded = any(part.external(time).any() for part in parts)
+    each = zip(parts, step, responses, strict=True)
+    tangent, elastic = np.array([part.stiffness_along(du, found) for part, du, found in each]).T
     moves = elastic > _MOVES * elastic.sum()
-    return bool((tangent < _MECHANISM * elastic)[moves].any())
+    least = _SINGULAR if loaded else _MECHANISM
+    return bool((tangent < least * elastic)[moves].any())

@@ -21,6 +21,7 @@ plastic tangent of the previous step would make Newton's method diverge.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,17 +29,17 @@ import numpy as np
 from solver.contact.candidates import Candidates, find_candidates, no_candidates
 from solver.contact.ends import beyond_end
 from solver.contact.state import Converged, State, Timing
+from solver.fem.window import Windowed
 from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
 from solver.loading.acceleration import Series
 from solver.loading.control import Tolerances
-from solver.loading.flow import SoftestStep, collapses, is_mechanism, softer
+from solver.loading.flow import Mechanism, is_singular, mechanism
 from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Yielded
 from solver.loading.slide import Slide, slide
 from solver.loading.step import (
     NewtonStep,
-    largest,
     newton_step,
     norm,
     on_parts,
@@ -73,10 +74,6 @@ _UNBALANCED = 100.0
 _ROUNDED = 10.0
 """Factor between the force level of bodies without load and the level at which rounding errors
 alone would exceed the tolerance."""
-_MOVING = 0.01
-"""Ratio of the last step to the displacements of the increment; above it bodies still move."""
-_LATE = 1
-"""Number of the first iteration in which a step without stiffness means plastic flow."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,6 +141,7 @@ class Increment:
         self._began: tuple[Vectors, Candidates] | None = None  # residuals, candidates
         self._pivoted, self._blended = 0, 0
         self._softened = any(part.body.law.has_corners for part in system.parts)  # no tangent there
+        self._path: list[Vectors] = []  # displacements of all iterates so far
         self.compliance = {} if compliance is None else compliance
 
     def solve(self) -> Converged:
@@ -170,7 +168,7 @@ class Increment:
         u, contacts, links = origin.u, origin.contacts, origin.links
         responses = self._respond(u)
         residuals = self._residuals(u, responses)
-        best, since_best, softest, moving = np.inf, 0, SoftestStep(), False
+        best, since_best = np.inf, 0
         series, begun, crawled = Series(), 0.0, 0
         for iteration in range(tolerances.iterations + 1):
             candidates = self._candidates(u, contacts, links)
@@ -204,17 +202,14 @@ class Increment:
             try:
                 step = self._step(residuals, responses, candidates, _BLENDS[first:])
             except IncrementFailed as failure:
-                if error > _UNBALANCED * tolerances.residual:
-                    failure.why = softest
-                failure.why = self._slide((residuals, candidates)) or failure.why
+                slides = self._slide((residuals, candidates))
+                failure.why = slides or self._flow(responses, residuals, candidates, scale)
                 raise
-            if iteration >= _LATE and not self.system.links.springy:
-                softest = softer(softest, self.system.parts, step.u, responses)
             out = max(error, tolerances.residual / _LESS) * scale
-            before, found = u, self._search(u, residuals, candidates, step, out)
-            share, u, responses, residuals = found
+            before = u
+            self._path.append(u)
+            share, u, responses, residuals = self._search(u, residuals, candidates, step, out)
             crawled = crawled + 1 if share < _SHORT else 0
-            moving = share * largest(step.u) > _MOVING * largest(u, self.start.u)
             forces = (1 - share) * candidates.forces + share * step.forces
             ahead = series.sum(before, candidates, step, share)
             if ahead is not None:
@@ -225,14 +220,11 @@ class Increment:
             links = forces[candidates.linked]
             if self.elastic_only and any(r.yielding.any() for r in responses):
                 raise Yielded
-        # a residual that stops at rounding is no plastic flow; bodies that flow without resistance
-        # are in balance, but move
-        flows = moving or best > _UNBALANCED * tolerances.residual
+        self._path.append(u)
         raise IncrementFailed(
             f"{iteration} iterations left a relative out-of-balance force of {error:.1e} "
             f"and a contact violation of {violation:.1e}",
-            self._slide()
-            or (self._judged(softest, u, responses, contacts, links) if flows else None),
+            self._slide() or self._flow(responses, residuals, candidates, scale),
         )
 
     def _guessed(self) -> State:
@@ -255,30 +247,29 @@ class Increment:
         found = (slide(self.system, residuals, candidates) for residuals, candidates in places)
         return next((each for each in found if each is not None), None)
 
-    def _judged(
+    def _flow(
         self,
-        flow: SoftestStep,
-        u: Vectors,
         responses: Sequence[Response],
-        contacts: tuple[ContactState, ...],
-        links: NDArray[np.float64],
-    ) -> SoftestStep:
-        """Return the softest step, with whether the kinematic theorem excludes equilibrium.
+        residuals: Vectors,
+        candidates: Candidates,
+        level: float,
+    ) -> Mechanism:
+        """Return the motion that proves a limit load, or the one that comes closest to a proof.
 
-        The theorem is not applied if a motion is prescribed: the work of its force is not known.
-        Nor is it with springs, whose force grows without limit.
+        Motions are the ways from each iterate to the next and to the last one: the iterates of a
+        body that flows wander about its mechanism, and the longer the way the less they do. In
+        windows of bodies nothing is proven: the rest of a body could flow too.
         """
-        if self.system.links.springy:
-            return flow
-        parts = self.system.parts
-        moved = [now - before for now, before in zip(u, self.start.u, strict=True)]
-        if any(np.delete(move, part.free).any() for part, move in zip(parts, moved, strict=True)):
-            return flow
-        candidates = self._candidates(u, contacts, links)
-        inner = on_parts(self.system, candidates, candidates.forces)
-        forces = [r + c for r, c in zip(self._residuals(u, responses), inner, strict=True)]
-        proven = collapses(parts, self.time, moved, forces, responses)
-        return replace(flow, excludes=proven)
+        system, best, path = self.system, Mechanism(), self._path
+        if any(isinstance(part, Windowed) for part in system.parts):
+            return best
+        for start, end in (*((at, path[-1]) for at in path[:-1]), *pairwise(path)):
+            moved = tuple(after - before for before, after in zip(start, end, strict=True))
+            found = mechanism(system, self.time, moved, responses, residuals, candidates, level)
+            best = max(best, found)
+            if best.limit:
+                break
+        return best
 
     # -- 1, 2: stress, residual, contact geometry ----------------------------------------------
 
@@ -375,7 +366,7 @@ class Increment:
                 step = newton_step(self.system, residuals, operators, candidates)
             except Singular:
                 continue
-            if step and not blend and is_mechanism(self.system.parts, self.time, step.u, responses):
+            if step and not blend and is_singular(self.system.parts, self.time, step.u, responses):
                 self._softened = True
             elif step is not None:
                 self._pivoted += step.pivoted

@@ -39,8 +39,6 @@ _LAYERS = 5
 """Number of layers of elements around those that yield, in a new window."""
 _LARGE = 0.5
 """Ratio of the elements of a window to those of the body; above it a window saves too little."""
-_PATIENCE = 1.5
-"""Ratio of the largest number of iterations in a window to that with whole bodies."""
 _ROUNDS = 4
 """Number of times windows may grow in an increment."""
 
@@ -73,7 +71,6 @@ def narrowed(
     if len(system.links):
         return None
     windows = before.windows or (None,) * len(system.parts)
-    longer = replace(tolerances, iterations=int(_PATIENCE * tolerances.iterations))
     begin, count = system.moved(start, time), np.zeros(3, dtype=int)
     at, elastic_first = system.moved(guess or start, time), guess is None
     each = zip(system.parts, at.u, start.plastic, strict=True)
@@ -106,7 +103,7 @@ def narrowed(
                 guess=_inside(at, parts),
                 elastic_first=elastic_first,
                 patient=patient,
-                tolerances=longer,
+                tolerances=tolerances.patient,
                 compliance=compliance,
             ).approach()
         except Singular:

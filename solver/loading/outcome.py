@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.errors import NotConverged, SolverError
-from solver.loading.flow import SoftestStep
+from solver.loading.flow import Mechanism
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -23,11 +23,11 @@ class Yielded(SolverError):
 
 
 class IncrementFailed(SolverError):
-    """The increment did not converge; ``why`` is the softest of its late steps, or a slide."""
+    """The increment did not converge; ``why`` is the mechanism that proves most, or a slide."""
 
-    def __init__(self, message: str, why: SoftestStep | Slide | None = None) -> None:
+    def __init__(self, message: str, why: Mechanism | Slide | None = None) -> None:
         super().__init__(message)
-        self.why = why or SoftestStep()
+        self.why = why or Mechanism()
 
 
 @dataclass(frozen=True, slots=True)

@@ -125,12 +125,6 @@ def newton_step(
     return NewtonStep(u, solution.forces, solution.status, solution.pivoted)
 
 
-def largest(vectors: Vectors, origin: Vectors | None = None) -> float:
-    """Return the largest change of an unknown from an origin, or from zero."""
-    start = origin or tuple(np.zeros_like(v) for v in vectors)
-    return max(float(np.abs(v - o).max()) for v, o in zip(vectors, start, strict=True))
-
-
 def norm(vectors: Sequence[NDArray[np.float64]]) -> float:
     """Return the Euclidean norm of all vectors together."""
     return float(np.sqrt(sum(float(v @ v) for v in vectors)))

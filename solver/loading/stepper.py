@@ -16,7 +16,7 @@ from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.fem.fields import elastic_energy
 from solver.linear.threads import one_thread
 from solver.loading.energy import worked
-from solver.loading.flow import SoftestStep
+from solver.loading.flow import Mechanism
 from solver.loading.history import lost
 from solver.loading.increment import Increment
 from solver.loading.integration import integrated
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from solver.loading.control import Control
     from solver.loading.slide import Slide
 
-    Attempt = tuple[float, SoftestStep | Slide | None]
+    Attempt = tuple[float, Mechanism | Slide | None]
     """Time of an increment that failed, and why; None if it failed in windows alone."""
     Report = Callable[[], None]
     Watch = Callable[[Converged], Any]
@@ -223,7 +223,7 @@ class Stepper:
 
     def _longer(
         self, point: Point, failed: Sequence[Attempt]
-    ) -> Converged | tuple[float, SoftestStep | Slide]:
+    ) -> Converged | tuple[float, Mechanism | Slide]:
         """Return what longer increments say of the shortest one, which has failed too.
 
         It may have failed so close to a limit load that nothing proves it. A longer one, to an
@@ -232,11 +232,11 @@ class Stepper:
         """
         now = point.now.state.time
         *longer, (time, last) = failed
-        why = last or SoftestStep()
+        why = last or Mechanism()
         if why.limit:
             return time, why
         for attempted, known in reversed(longer):
-            if abs(attempted - now) > _NEAR * abs(time - now):
+            if abs(attempted - now) > _NEAR * abs(time - now) * (1 + ROUNDING):
                 continue
             found = known or self._with_whole_bodies(point, attempted)
             if isinstance(found, Converged):
@@ -245,7 +245,7 @@ class Stepper:
                 return attempted, found
         return time, why
 
-    def _with_whole_bodies(self, point: Point, time: float) -> Converged | SoftestStep | Slide:
+    def _with_whole_bodies(self, point: Point, time: float) -> Converged | Mechanism | Slide:
         """Return the increment to a time, or why it fails also with whole bodies."""
         try:
             return self._increment(point, time, contact=True, patient=False, whole=True)
@@ -295,7 +295,7 @@ class Stepper:
                 contact=contact,
                 elastic_first=guess is None,
                 patient=patient,
-                tolerances=tolerances,
+                tolerances=tolerances.patient if whole else tolerances,
             ).solve()
 
         converged = solved(state, guess)
@@ -360,7 +360,7 @@ class Stepper:
         return (*history, self._watch(now)) if self._watch else history
 
     def _ended(
-        self, failure: IncrementFailed, point: Point, attempted: float, why: SoftestStep | Slide
+        self, failure: IncrementFailed, point: Point, attempted: float, why: Mechanism | Slide
     ) -> NotConverged:
         reached = point.now.state.time
         way = f"between {self.place(reached)} and {self.place(attempted)}"

@@ -138,8 +138,8 @@ class Law(ABC):
     def has_corners(self) -> bool:
         """Whether stress may stay at a corner or on an edge of the yield surface.
 
-        The tangent is small or zero there, though the body may carry more load: a soft body is then
-        no proof of a limit load.
+        The tangent is small or zero there, though the body may carry more load: increments then
+        blend it with elastic stiffness.
         """
         return False
 

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 _MOST = 1_000_000
 """Largest number of elements along a line."""
+_SLIVER = 0.5
+"""Least length of elements that grow from a point, over their first side; below it there are none:
+those from the other point go on to this one."""
 
 
 def graded(length: float, smallest: float, ratio: float, largest: float) -> Array:
@@ -133,16 +136,20 @@ def refined(
     pieces = [np.array([points[0]], dtype=float)]
     counts = parts or [None] * len(largest)
     spans = zip(pairwise(points), pairwise(sizes), largest, counts, strict=True)
-    for (start, end), (first, last), most, count in spans:
+    for (start, end), (first, last), limit, count in spans:
         if count is not None:
             pieces.append(np.linspace(start, end, count + 1)[1:])
             continue
-        length = end - start
+        length, most = end - start, limit
         ahead = _meeting(length, first, last, ratio)
-        if ahead > 0:
+        back = length - ahead
+        if ahead < _SLIVER * min(first, most, length):
+            ahead, back, most = 0.0, length, min(most, first)
+        elif back < _SLIVER * min(last, most, length):
+            ahead, back, most = length, 0.0, min(most, last)
+        if ahead:
             pieces.append(start + graded(ahead, min(first, most, ahead), ratio, most)[1:])
-        if ahead < length:
-            back = length - ahead
+        if back:
             pieces.append(end - graded(back, min(last, most, back), ratio, most)[-2::-1])
     return np.concatenate(pieces)
 

@@ -23,6 +23,7 @@ from solver.scenes.passes import Trace, shakedown_of
 from solver.scenes.rolling_steady import steady_passes, track_for
 from solver.scenes.scene import by_increments
 from solver.steady import RollingContact, standing_pressure
+from solver.steady.passing import SolveBudget
 from solver.tensors import to_tensor
 
 if TYPE_CHECKING:
@@ -108,6 +109,7 @@ class _SteadyPath:
     def __init__(self, scene: Scene, last: RollingParameters) -> None:
         self._scene, self._last = scene, last
         self._started, self._elsewhere = time.process_time(), 0.0
+        self._budget = SolveBudget()
         self.error: NotConverged | None = None
 
     def _begin(self, reach: float) -> None:
@@ -135,7 +137,8 @@ class _SteadyPath:
             return  # this window has too many elements: keep the error of the smaller one
         self.error = None
         try:
-            for number, found in enumerate(steady_passes(last, reach), start=1):
+            passes = steady_passes(last, reach, budget=self._budget)
+            for number, found in enumerate(passes, start=1):
                 self._previous, self._found = self._found, found
                 self._steps.append(max(found.steps, 1))
                 self._traces.append(self._by_way[found.direction].trace(found))

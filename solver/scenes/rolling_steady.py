@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from solver.steady import Pass, Track
     from solver.steady.layers import Layers
     from solver.steady.load import PassingLoad
+    from solver.steady.passing import SolveBudget
 
     Array = NDArray[np.float64]
 
@@ -37,7 +38,10 @@ _PARTS, _TOLERANCE = 4, 0.01
 
 
 def steady_passes(
-    parameters: RollingParameters, reach: float = 1.0, parts: int | None = None
+    parameters: RollingParameters,
+    reach: float = 1.0,
+    parts: int | None = None,
+    budget: SolveBudget | None = None,
 ) -> Iterator[Pass[Layers]]:
     """Yield the passes in their order.
 
@@ -45,6 +49,7 @@ def steady_passes(
     ----------
     reach : ratio of the size of the window to the usual size
     parts : increments between two points of a row, or None for the usual number
+    budget : counts the solves of each pass, as in `rolling`
     """
     p = parameters
     track = track_for(p, reach)
@@ -52,7 +57,9 @@ def steady_passes(
     load_of = {id(own): load_on(track, p, own) for own in block}
     loads = itertools.cycle(load_of[id(own)] for own in block)
     guess = _first_guess(p, reach)
-    yield from rolling(track, p.material(), loads, p.directions, guess=guess, parts=parts)
+    yield from rolling(
+        track, p.material(), loads, p.directions, guess=guess, parts=parts, budget=budget
+    )
 
 
 def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:

@@ -57,14 +57,14 @@ _AWAY = 3.0
 _FLOWS, _RUNS = 0.1, 1.0
 """A stalled solve counts as a limit load above the first plastic strain, any solve above the
 second. A material that hardens has no limit load: Newton's method has then diverged."""
-_SOLVES = 20_000
-"""Largest number of solves with the stiffness in a search for a pass; one pass takes 50 to 2100."""
+_SOLVES = 10_000
+"""Largest number of solves with the stiffness until a pass is found; one pass takes 50 to 2100."""
 _PATIENCE, _PROGRESS = 14, 0.7
 """Over this number of steps the residual must drop to this ratio, or the pass is given up."""
 
 
 class SolveBudget:
-    """Counts the solves with the stiffness of all attempts to find a pass."""
+    """Counts the solves with the stiffness of all attempts to find a pass, in all windows."""
 
     def __init__(self, most: int = _SOLVES) -> None:
         self.solves, self._most = 0, most
@@ -77,6 +77,10 @@ class SolveBudget:
                 "elements, a lighter load or more hardening it is easier to find"
             )
         self.solves += 1
+
+    def renew(self) -> None:
+        """Count from zero: a pass is found."""
+        self.solves = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from solver.errors import ModelError
 from solver.linear.threads import one_thread
-from solver.steady.passing import TOLERANCE
+from solver.steady.passing import TOLERANCE, SolveBudget
 from solver.steady.search import search
 
 if TYPE_CHECKING:
@@ -68,6 +68,7 @@ def rolling(
     *,
     guess: Array | None = None,
     parts: int | None = None,
+    budget: SolveBudget | None = None,
 ) -> Iterator[Pass[Layers]]:
     """Yield the passes of a load over a track that begins without plastic strain.
 
@@ -79,6 +80,7 @@ def rolling(
     directions : for each pass, 1 along +x, -1 along -x
     guess : strains (n_rows, n_columns, 4) that the first pass adds, for instance of a coarser mesh
     parts : number of increments between two points of a row, `usual_parts` if None
+    budget : counts the solves of each pass, those of earlier attempts at the first one included
 
     Raises
     ------
@@ -94,16 +96,18 @@ def rolling(
             "material", material.elasticity, f"must have those of the track, {track.elasticity}"
         )
     state: Layers = track.rows.virgin(material)
+    budget = budget or SolveBudget()
     expected: dict[tuple[int, int], Expected] = {}
     loads = load if isinstance(load, Iterable) else itertools.repeat(load)
     for number, (own, direction) in enumerate(zip(loads, directions, strict=False)):
         which = id(own), direction
         solve = partial(
             search, track, material, own, state if direction == 1 else state.mirrored,
-            parts=parts, tolerance=TOLERANCE if number < EXACT_AFTER else REPEATED,
+            parts=parts, tolerance=TOLERANCE if number < EXACT_AFTER else REPEATED, budget=budget,
         )  # fmt: skip
         with one_thread():
             found = solve(expected[which].next if which in expected else guess)
+        budget.renew()
         found = replace(found, direction=direction)
         guess = found.strain
         expected[which] = expected[which].after(guess) if which in expected else Expected(guess)

@@ -61,6 +61,7 @@ def search(
     *,
     parts: int | None = None,
     tolerance: float = TOLERANCE,
+    budget: SolveBudget | None = None,
 ) -> Pass[Layers]:
     """Return the steady pass that `passing` finds, from this guess or by continuation.
 
@@ -72,7 +73,7 @@ def search(
         as `passing` does, `TooLong` for all attempts together; `LimitLoad` also if a pass adds more
         than 30 % of plastic strain in a material without hardening
     """
-    budget = SolveBudget()
+    budget = budget or SolveBudget()
 
     def exactly(load: PassingLoad, guess: Array | None = None) -> Pass[Layers]:
         return passing(

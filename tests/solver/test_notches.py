@@ -32,6 +32,24 @@ def test_one_point_alone_gives_graded_lines(sizes, turned):
     assert np.array_equal(lines, 10.0 - alone[::-1] if turned else alone)
 
 
+def test_neighbouring_sides_differ_by_the_ratio_or_a_factor_of_two():
+    """Also where the two gradings meet within rounding of a point, or close to it."""
+    rng = np.random.default_rng(1917)
+    offsets = [0.0, 1e-16, -1e-16, 1e-12, 1e-6, 1e-3, 0.1, 1.0]
+    cases = [(5.0, (2.0, 0.5), 1.3, math.inf)]  # (5 + (0.5 - 2) / 0.3) / 2 = 4e-16
+    for _ in range(500):
+        sizes, ratio = 10 ** rng.uniform(-1, 1, 2), rng.uniform(1.05, 2)
+        length = np.ptp(sizes) / (ratio - 1) * (1 + rng.choice(offsets))
+        cases.append(
+            (length, tuple(sizes), ratio, rng.choice([math.inf, 10 ** rng.uniform(-1, 1)]))
+        )
+    for length, sizes, ratio, most in cases:
+        sides = np.diff(refined([0.0, length], sizes, ratio, [most]))
+        assert sides.sum() == pytest.approx(length)
+        assert (sides[[0, -1]] <= np.minimum(sizes, most) * (1 + 1e-9)).all()
+        assert np.abs(np.log(sides[1:] / sides[:-1])).max(initial=0.0) < np.log(2) + 1e-9
+
+
 def test_lines_that_do_not_grow_are_refused():
     with pytest.raises(ModelError, match="ratio"):
         refined([0.0, 1.0], [0.1, 0.1], 1.0, [1.0])

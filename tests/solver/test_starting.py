@@ -127,7 +127,7 @@ def test_a_body_that_hardens_has_no_limit_load(ratio, elastic_punch):
 
 
 def test_a_limit_load_says_what_flows():
-    with pytest.raises(LimitLoad, match=r"body 'bar' flows around x = .* mm with 0\.0% of its"):
+    with pytest.raises(LimitLoad, match=r"body 'bar' flows around x = .* mm, .* does 1\.\d+ times"):
         x = np.linspace(0.0, 4.0, 5)
         bar = block("bar", x, x, material=steel(300.0), kinematics="plane_stress",
                     supports={"left": "x", "bottom": "y"}, pressure={"right": -330.0})  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import Body, ContactPair, Model, Solution, solve
+from solver import Body, ContactPair, Model, Solution, Traction, solve
 from solver.loading.control import PathControl
 from solver.mesh import grid
 from solver.mesh.elements import ELEMENTS
@@ -90,3 +90,19 @@ def test_on_meshes_that_do_not_match_the_slave_changes_little() -> None:
         assert 1e-6 * P < miss < least * P
     u, v = (solution.displacement("upper", "loaded") for solution in (one, other))
     assert np.abs(u - v).max() < 2e-3 * np.abs(u).max()
+
+
+@pytest.mark.parametrize("cells_of_pad", [16, 17, 32])
+def test_a_free_pad_stands_on_a_plane_that_is_meshed_as_coarsely(cells_of_pad: int) -> None:
+    """It touches at one vertex first, where any small moment would turn it to the next."""
+    pad = block("pad", np.linspace(-4.0, 4.0, cells_of_pad + 1), np.linspace(0.0, 6.0, 13),
+                loads=(Traction(boundary="top", y=-P),))  # fmt: skip
+    pad.mesh.p[1] += pad.mesh.p[0] ** 2 / 80.0 * (1 - pad.mesh.p[1] / 6.0)
+    plane = block("plane", np.linspace(-10.0, 10.0, 41), np.linspace(-8.0, 0.0, 17),
+                  supports={"bottom": "xy"})  # fmt: skip
+    pair = ContactPair(slave=("plane", "top"), master=("pad", "bottom"), friction=0.3)
+    found = solve(Model(bodies=(pad, plane), contacts=(pair,)))
+    x, pressure, _ = from_left(found)
+    normal = found.loaded.state.contacts[0].normal.sum()
+    assert normal == pytest.approx(8.0 * P, rel=1e-4)  # some of the normals lean
+    assert pressure == pytest.approx(np.interp(-x, x, pressure), abs=0.05 * pressure.max())

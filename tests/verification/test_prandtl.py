@@ -125,6 +125,29 @@ def test_tresca_ends_at_its_limit_load(kinematics):
     assert outcome.value.attempted - outcome.value.reached < 0.1 / 8
 
 
+def test_uniform_pressure_on_a_circle_is_limited_by_its_edge():
+    """At (2 + pi) k, less than under a punch: close to its edge a circle is a strip.
+
+    Measured 5.25 k to 5.31 k with elements of 0.02 there, 5.19 k to 5.25 k with 0.006.
+    """
+    h = 0.02
+    x = np.concatenate(
+        [1.0 - graded(1.0, h, 1.25, 0.25)[::-1], 1.0 + graded(5.0, h, 1.25, 0.5)[1:]]
+    )
+    strip = {"strip": lambda m: (m[0] < 1.0) & (np.abs(m[1]) < 1e-9)}
+    body = Body(
+        name="half_space",
+        mesh=grid(x, -graded(4.0, h, 1.25, 0.5)[::-1]).with_boundaries(strip),
+        material=tresca(),
+        kinematics="axisymmetric",
+        supports={"left": "x", "right": "x", "bottom": "xy"},
+        pressure={"strip": YIELD / 2},
+    )
+    with pytest.raises(LimitLoad) as outcome:
+        solve(Model(bodies=(body,)), load=7.0, control=PathControl(load_step=0.5, unload_steps=1))
+    assert 2 + np.pi < outcome.value.reached < outcome.value.attempted < 1.04 * (2 + np.pi)
+
+
 def test_tresca_that_hardens_a_little_has_no_limit_load():
     found = pressed(tresca(modulus=200.0), "plane_strain", LIMITS["plane_strain"])
     assert found.loaded.state.time == 1.5

@@ -314,7 +314,7 @@ def test_bad_sequences_are_named(sequence, name):
 
 
 def test_a_run_without_a_steady_pass_is_rolled_by_increments_and_says_so(monkeypatch):
-    def fails(parameters, reach):
+    def fails(parameters, reach, budget):
         raise NotConverged("no steady pass was found")
         yield
 
@@ -385,12 +385,31 @@ def test_a_pass_that_is_not_found_ends_after_so_many_solves(monkeypatch):
         made.append(SolveBudget(30))
         return made[-1]
 
-    monkeypatch.setattr(search, "SolveBudget", little)
+    for place in (search, rolling_endless):
+        monkeypatch.setattr(place, "SolveBudget", little)
     (record,) = records.__wrapped__((5,), **HEAVY, traction=-0.9)
     assert record.status is Status.NOT_CONVERGED
     assert record.message.startswith("no steady pass was found in 30 solves")
     assert record.message.endswith("more hardening it is easier to find")  # not by a finer mesh
     assert {each.solves for each in made} == {30}
+
+
+def test_windows_of_all_sizes_share_their_solves(monkeypatch):
+    tried = []
+
+    def beyond(parameters, reach, budget):
+        tried.append(reach)
+        for _ in range(20):
+            budget.solve()
+        raise WindowTooSmall("the window is too small below for a steady pass")
+        yield
+
+    monkeypatch.setattr(rolling_endless, "SolveBudget", lambda: SolveBudget(30))
+    monkeypatch.setattr(rolling_endless, "steady_passes", beyond)
+    (record,) = records.__wrapped__((5,), **HEAVY)
+    assert tried == [1.0, 1.5]
+    assert record.status is Status.NOT_CONVERGED
+    assert record.message.startswith("no steady pass was found in 30 solves")
 
 
 def test_a_coarser_mesh_that_takes_too_long_does_not_end_the_run(monkeypatch):
@@ -415,7 +434,7 @@ def test_a_pass_beyond_its_window_is_found_in_a_larger_one(monkeypatch):
     tried = []
     found = rolling_steady.steady_passes
 
-    def needs_more(parameters, reach):
+    def needs_more(parameters, reach, budget):
         tried.append(reach)
         if reach < 2:
             raise WindowTooSmall("the window is too small ahead for a steady pass")
