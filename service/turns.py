@@ -33,6 +33,7 @@ from anyio import BrokenWorkerProcess, CapacityLimiter, fail_after, to_process, 
 from threadpoolctl import threadpool_limits
 
 from service.errors import Busy, TooMany
+from solver.files import read_file
 from studies import StudyError
 
 READING, COMPUTING = 2, 2
@@ -65,7 +66,7 @@ def memory(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path("/sys/
     """
     found = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")]
     with suppress(OSError):
-        for line in groups.read_text().splitlines():
+        for line in read_file(groups).decode().splitlines():
             _, kinds, path = line.split(":", 2)
             if kinds and "memory" not in kinds.split(","):
                 continue
@@ -75,7 +76,7 @@ def memory(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path("/sys/
             own = top / path.lstrip("/")
             for folder in (own, *own.parents):
                 with suppress(OSError, ValueError):  # no such file, or "max"
-                    found.append(int((folder / name).read_text()))
+                    found.append(int(read_file(folder / name)))
     return min(found)
 
 
