@@ -25,6 +25,7 @@ from studies.definition.points import (
     is_points,
 )
 from studies.definition.spaced import spaced
+from studies.definition.vocabulary import in_use
 from studies.errors import StudyError, nearest
 from studies.toml import CASE
 
@@ -96,7 +97,7 @@ def checked_axes(content: Any, known: Mapping[str, Parameter]) -> Axes:
             }
             given[name] = spaced(name, ends)
         elif name not in known and describes_points(name, axis):
-            _check_name(name, axis)
+            _check_name(name, axis, known)
             given[name] = checked_points(name, axis, known)
         else:
             given[name] = axis
@@ -228,7 +229,7 @@ def _axis(parameter: Parameter, values: list[Any]) -> list[Any]:
 def _linked_axis(
     name: str, content: Mapping[str, Any], known: Mapping[str, Parameter]
 ) -> LinkedAxis:
-    _check_name(name, content)
+    _check_name(name, content, known)
     given: LinkedAxis = {}
     for label, settings in content.items():
         field = f"sweep.{name}.{checked_text(f'sweep.{name}', label)}"
@@ -248,13 +249,11 @@ def _linked_axis(
     return axis
 
 
-def _check_name(name: Any, content: Any) -> None:
+def _check_name(name: Any, content: Any, known: Mapping[str, Parameter]) -> None:
     """Refuse the name of a linked axis that cannot be a dimension of the data set."""
-    from studies.definition.vocabulary import LABEL_ATTRIBUTES
-
     if name == POINT and describes_points(name, content):
         return
-    if name in QUANTITIES or name in LABEL_ATTRIBUTES:
+    if name in QUANTITIES or (name != CASE and in_use(str(name), known)):
         allowed = "the data set has a variable of this name: give the axis another one"
     elif not isinstance(name, str) or not _AXIS.fullmatch(name):
         allowed = "the name must be 1 to 80 of A-Z a-z 0-9 _, beginning with a letter"
