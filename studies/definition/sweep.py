@@ -71,6 +71,8 @@ def positions(name: str, axis: list[Any] | LinkedAxis) -> Iterator[Position]:
 
 
 _TEXT = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,79}")
+_OF_LABELS = (CASE, "mesh")
+"""Names that axes of labels may have: only points and files of runs have something else."""
 _AXIS = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,79}")
 
 
@@ -253,7 +255,7 @@ def _check_name(name: Any, content: Any, known: Mapping[str, Parameter]) -> None
     """Refuse the name of a linked axis that cannot be a dimension of the data set."""
     if name == POINT and describes_points(name, content):
         return
-    if name in QUANTITIES or (name != CASE and in_use(str(name), known)):
+    if name in QUANTITIES or (name not in _OF_LABELS and in_use(str(name), known)):
         allowed = "the data set has a variable of this name: give the axis another one"
     elif not isinstance(name, str) or not _AXIS.fullmatch(name):
         allowed = "the name must be 1 to 80 of A-Z a-z 0-9 _, beginning with a letter"
