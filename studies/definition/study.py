@@ -39,8 +39,9 @@ from studies.definition.sweep import (
     owners,
     run_count,
 )
-from studies.definition.vocabulary import in_use, taken
+from studies.definition.vocabulary import taken
 from studies.errors import StudyError, one_of
+from studies.scenes.names import in_use
 from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
 
 Kept = Callable[[str], Mapping[str, Any] | None]

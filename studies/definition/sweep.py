@@ -25,8 +25,8 @@ from studies.definition.points import (
     is_points,
 )
 from studies.definition.spaced import spaced
-from studies.definition.vocabulary import in_use
 from studies.errors import StudyError, nearest
+from studies.scenes.names import in_use
 from studies.toml import CASE
 
 MAXIMUM_RUNS = 100_000

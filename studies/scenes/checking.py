@@ -16,11 +16,11 @@ from solver.results.outputs import Need, outputs
 from solver.results.quantities import IN_SPACE, QUANTITIES
 from solver.results.requested import FORCES_OF_CONTACT, OF_PART, of_body
 from solver.tensors import AXES
-from studies.definition.vocabulary import RESERVED, in_use
 from studies.errors import StudyError, one_of
 from studies.scenes import tables
 from studies.scenes.arithmetic import is_expression
 from studies.scenes.description import LARGEST
+from studies.scenes.names import RESERVED, in_use
 
 
 def contradictions(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Iterator[StudyError]:

@@ -12,9 +12,9 @@ import pytest
 from residua.cli import main
 from solver.results.quantities import IN_SPACE, QUANTITIES
 from studies import Study, StudyError, open_study
-from studies.definition.vocabulary import RESERVED
 from studies.errors import SceneError
 from studies.scenes.description import Description
+from studies.scenes.names import RESERVED
 from studies.scenes.scene import FileScene, file_scene
 from tests.studies.fakes import Canned
 from tests.studies.test_sensitivity import ishigami

@@ -15,10 +15,10 @@ import pytest
 
 from solver.results.quantities import IN_SPACE, QUANTITIES
 from studies import Study
-from studies.definition.vocabulary import RESERVED
 from studies.errors import SceneError, StudyError, one_of
 from studies.scenes import building
 from studies.scenes.description import Description
+from studies.scenes.names import RESERVED
 from studies.scenes.refusals import dotted
 from studies.scenes.scene import file_scene
 from tests.studies.scenes.conftest import blocks, built
