@@ -260,6 +260,7 @@ def predict(options: argparse.Namespace) -> int:
     from studies.execution.task import compute_here
     from studies.views.answers import answer
     from studies.views.picking import study_of
+    from studies.views.predict import ERROR_IS
     from studies.views.reading import find_study, open_netcdf
 
     at, path = _selection(options.at, "NAME=VALUE"), find_study(options.path)
@@ -271,7 +272,8 @@ def predict(options: argparse.Namespace) -> int:
             compute_here(found.run, store)
             found = answer(dataset, study, store, **asked)
     unit = f" {found.unit}" if found.unit not in {"", "1"} else ""
-    print(f"{found.of} = {found.value:.6g}{unit}, error {found.error:.2g}{unit} (by {found.by})")
+    what = ERROR_IS.get(found.by, "error")
+    print(f"{found.of} = {found.value:.6g}{unit}, {what} {found.error:.2g}{unit} (by {found.by})")
     if found.enough:
         return OK
     place = ", ".join(f"{name} = {value}" for name, value in found.at.items())

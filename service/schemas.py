@@ -65,7 +65,10 @@ class Prediction(BaseModel):
 
     of: str
     value: float
-    error: float = Field(description="how far it may be off; 0 if the run was computed")
+    error: float = Field(
+        description="by ``gaussian`` the standard deviation of the value, by ``cells`` the error "
+        "of the cell; 0 by ``run``"
+    )
     unit: str
     by: str = Field(description="``cells``, ``gaussian``, or ``run``: that of this place is there")
     at: dict[str, Any] = Field(description="parameters of the place")

@@ -143,16 +143,6 @@ class Goal:
         return 1 + more, first + 1 + more * (self.parts - 1)
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names that the data set of the answers has besides those of a run."""
-        own, ends = self.parameter, ("low", "high")
-        tried = (own, self.of or "number", "status", "run")
-        return (
-            own, *(f"{own}_{end}" for end in ends), "runs", *(f"run_{end}" for end in ends),
-            "tried", *(f"tried_{each}" for each in tried),
-        )  # fmt: skip
-
-    @property
     def content(self) -> dict[str, Any]:
         """What `checked_goal` reads."""
         asked = {"of": self.of, self.kind: self.threshold} if self.of else {}

@@ -41,6 +41,7 @@ from studies.definition.sweep import (
 )
 from studies.definition.vocabulary import taken
 from studies.errors import StudyError, one_of
+from studies.scenes.names import in_use
 from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
 
 Kept = Callable[[str], Mapping[str, Any] | None]
@@ -226,6 +227,7 @@ class Study(BaseModel):
         known = parameters_of(scene)
         fixed = checked_table("parameters", content.get("parameters", {}), known)
         axes = checked_axes(with_points(content, known), known)
+        _check_names(scene, axes)
         over_points = "refine" in content or POINT in axes
         own_points = over_points and scene.places and scene.places(build(scene, {})).points
         if own_points and "refine" in content:
@@ -255,10 +257,6 @@ class Study(BaseModel):
                 where = "parameters" if goal.parameter in fixed else f"sweep.{other}"
                 allowed = f"is what the goal searches: take it out of {where}"
                 raise StudyError("goal.parameter", goal.parameter, allowed)
-            for name, axis in (owners(axes) | {axis: axis for axis in axes}).items():
-                if name in goal.names:
-                    allowed = f"{name} is a variable of the answers of a goal: use another name"
-                    raise StudyError(f"sweep.{axis}", f"{len(axes[axis])} values", allowed)
             own["goal"] = goal.content
         if "refine" in content:
             if "goal" in content:
@@ -407,3 +405,15 @@ class Study(BaseModel):
         return self.model_dump(exclude_defaults=True) | self.model_dump(
             include={"parameters", "sweep"}
         )
+
+
+def _check_names(scene: Scene, axes: Axes) -> None:
+    """Refuse a parameter or an axis of labels if data sets have its name for something else."""
+    known, numbers = parameters_of(scene), {each.name for each in scene.quantities}
+    for name in known:
+        if in_use(name, {*known, *numbers}):
+            allowed = f"has a parameter {name}: data sets have something else of this name"
+            raise StudyError("scene", name_of(scene), allowed)
+    for axis in numbers & axes.keys():
+        allowed = "the data set has a variable of this name: give the axis another one"
+        raise StudyError(f"sweep.{axis}", f"{len(axes[axis])} values", allowed)

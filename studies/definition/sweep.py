@@ -26,6 +26,7 @@ from studies.definition.points import (
 )
 from studies.definition.spaced import spaced
 from studies.errors import StudyError, nearest
+from studies.scenes.names import in_use
 from studies.toml import CASE
 
 MAXIMUM_RUNS = 100_000
@@ -70,6 +71,8 @@ def positions(name: str, axis: list[Any] | LinkedAxis) -> Iterator[Position]:
 
 
 _TEXT = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,79}")
+_OF_LABELS = (CASE, "mesh")
+"""Names that axes of labels may have: only points and files of runs have something else."""
 _AXIS = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,79}")
 
 
@@ -96,7 +99,7 @@ def checked_axes(content: Any, known: Mapping[str, Parameter]) -> Axes:
             }
             given[name] = spaced(name, ends)
         elif name not in known and describes_points(name, axis):
-            _check_name(name, axis)
+            _check_name(name, axis, known)
             given[name] = checked_points(name, axis, known)
         else:
             given[name] = axis
@@ -228,7 +231,7 @@ def _axis(parameter: Parameter, values: list[Any]) -> list[Any]:
 def _linked_axis(
     name: str, content: Mapping[str, Any], known: Mapping[str, Parameter]
 ) -> LinkedAxis:
-    _check_name(name, content)
+    _check_name(name, content, known)
     given: LinkedAxis = {}
     for label, settings in content.items():
         field = f"sweep.{name}.{checked_text(f'sweep.{name}', label)}"
@@ -248,13 +251,11 @@ def _linked_axis(
     return axis
 
 
-def _check_name(name: Any, content: Any) -> None:
+def _check_name(name: Any, content: Any, known: Mapping[str, Parameter]) -> None:
     """Refuse the name of a linked axis that cannot be a dimension of the data set."""
-    from studies.definition.vocabulary import LABEL_ATTRIBUTES
-
     if name == POINT and describes_points(name, content):
         return
-    if name in QUANTITIES or name in LABEL_ATTRIBUTES:
+    if name in QUANTITIES or (name not in _OF_LABELS and in_use(str(name), known)):
         allowed = "the data set has a variable of this name: give the axis another one"
     elif not isinstance(name, str) or not _AXIS.fullmatch(name):
         allowed = "the name must be 1 to 80 of A-Z a-z 0-9 _, beginning with a letter"

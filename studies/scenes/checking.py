@@ -13,16 +13,14 @@ import numpy as np
 from solver.errors import ModelError
 from solver.parameters import Accuracy, is_number
 from solver.results.outputs import Need, outputs
-from solver.results.quantities import QUANTITIES
+from solver.results.quantities import IN_SPACE, QUANTITIES
 from solver.results.requested import FORCES_OF_CONTACT, OF_PART, of_body
 from solver.tensors import AXES
 from studies.errors import StudyError, one_of
 from studies.scenes import tables
 from studies.scenes.arithmetic import is_expression
 from studies.scenes.description import LARGEST
-
-RESERVED = frozenset({"status", "message", "id", "scene", "name", "title", "created"})
-"""Names that data sets and queries use for something else."""
+from studies.scenes.names import RESERVED, in_use
 
 
 def contradictions(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Iterator[StudyError]:
@@ -62,7 +60,11 @@ def wrong_parameters(scene: tables.SceneFile, used: set[str]) -> Iterator[StudyE
         field, default = f"parameters.{name}", each.default
         if default is None:  # see `wrong_accuracies`
             continue
-        if name in QUANTITIES or name in RESERVED:
+        if (
+            name in QUANTITIES
+            or name in IN_SPACE
+            or in_use(name, {*scene.declared, *scene.outputs})
+        ):
             yield StudyError(field, name, "a data set has a variable of this name: choose another")
         if iskeyword(name):
             yield StudyError(field, name, "is a word of the language Python: choose another")
@@ -367,10 +369,10 @@ def _names(scene: tables.SceneFile) -> Iterator[StudyError]:
         for name in names:
             listed, named = "is listed twice", "two have this name: give each its own"
             yield StudyError(field, name, listed if field.startswith("results.") else named)
-    taken = {*QUANTITIES, *RESERVED, *scene.names}
+    taken = {*QUANTITIES, *IN_SPACE, *RESERVED, *scene.names}
     for name in scene.outputs:
         own = {name, *(f"{name}_{axis}" for axis in AXES)}
-        for each in sorted(own & taken):
+        for each in sorted(each for each in own if each in taken or in_use(each, scene.names)):
             allowed = f"the data set has {each} already: choose another name"
             yield StudyError(f"outputs.{name}", name, allowed)
         taken |= own

@@ -71,7 +71,11 @@ def verified(path: Path, case: Case, outcome: Record | str, keep: str = "") -> d
         raise FileDiffers(case.id, [reason]) from None
     if found:
         raise FileDiffers(case.id, sorted(found))
-    single = {name: values[name].item() for name in expected if expected[name].dims == sweep}
+    single = {
+        name: values[name].item()
+        for name, each in expected.items()
+        if each.dims == sweep and name not in sweep
+    }
     return layout.summary(attributes, single)
 
 

@@ -30,7 +30,8 @@ class NumberBetween:
 
     Attributes
     ----------
-    of, value, error, unit : the number and its error
+    of, value, error, unit : the number and its error: by ``gaussian`` a standard deviation, by
+        ``cells`` the error of the cell, by ``run`` 0
     by : how it was found: ``cells`` or ``gaussian`` (`predict`), or ``run``
     at : the parameters of the place that the study varies
     run : the run at this place, as a study
@@ -64,7 +65,7 @@ def answer(
     dataset, study, store : data set of a study of runs, the study, and its store
     of : a number of the runs
     at, by : as in `predict`
-    within : largest error that is enough
+    within : largest ``error`` that is enough
 
     Raises
     ------

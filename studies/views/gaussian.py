@@ -1,29 +1,36 @@
-"""A Gaussian process through the numbers of runs, with its leave-one-out error in closed form.
+"""A Gaussian process through the numbers of runs, with an error that runs left out have shown.
 
 The covariance is Matern 5/2 with a length for each parameter, the mean a constant that is found
-with the numbers (ordinary kriging). With ``Q = K^-1 - K^-1 1 1^T K^-1 / (1^T K^-1 1)`` the number
-of run ``i`` misses what all other runs predict by ``(Q y)_i / Q_ii``, with the variance
-``s^2 / Q_ii``. The lengths are the most likely ones; ``s^2`` is such that these misses have the
-variance that they are said to have. Runs at corners of the hull of all do not count: there the
-others extrapolate, which is no prediction that anybody is given.
+with the numbers (ordinary kriging). Its lengths are the most likely ones. With few runs these are
+not known well, and the variance that the process states for itself is too small. Therefore a tenth
+of the runs is left out in turn, the lengths are found again, and the others predict these runs:
+
+1. Kriging gives the variance ``v`` of a prediction over ``s^2``. Here ``s^2`` is the mean of
+   ``miss^2 / v`` of the runs left out, so that they have the variance that is stated for them.
+2. It is widened by Student's t, as it follows from few runs.
+3. The variance is added that a jackknife gives: by predictions from all runs, with the lengths that
+   were found without each tenth.
 
 References
 ----------
 Rasmussen, C. E. and Williams, C. K. I. (2006), Gaussian Processes for Machine Learning, eqs. 4.17
-(Matern), 5.8 (likelihood). Dubrule, O. (1983), Cross validation of kriging in a unique
-neighborhood, Math. Geol. 15, 687: the misses in closed form, the mean found again each time.
+(Matern), 5.8 and 5.9 (likelihood and its slopes). Bachoc, F. (2013), Cross validation and maximum
+likelihood estimations of hyper-parameters of Gaussian processes with model misspecification,
+Comput. Stat. Data Anal. 66, eq. 8: the variance by runs left out. Efron, B. and Tibshirani, R. J.
+(1993), An Introduction to the Bootstrap, section 11.5: the jackknife with groups.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import linprog, minimize
-from scipy.spatial import ConvexHull, QhullError
+from scipy.stats import t as student
+
+from studies.views.tenths import tenths
 
 Array = NDArray[np.float64]
 
@@ -32,9 +39,8 @@ _SHORTEST, _LONGEST = 0.05, 20.0
 _ROUGHNESS = (1e-7, 1e-2)
 """Variance of what no smooth function explains, as a multiple of the whole: smallest, largest."""
 _STARTS = (0.3, 1.5)
-_HULL = 6
-"""Largest number of parameters of which corners are told: of more almost all runs are corners, and
-the sides of their hull are more than the memory holds."""
+_NORMAL, _SURE = 1.96, 0.975
+"""Deviations of a normal distribution with this probability below them."""
 _FITTED = 200
 """Largest number of runs by which lengths are chosen; of more, evenly spaced ones are taken."""
 
@@ -49,40 +55,58 @@ class Gaussian:
 
     Attributes
     ----------
-    lengths, roughness : of the covariance: (d,), and the variance of what no smooth function
-        explains, as a multiple of ``s^2``
-    misses : (k, m) by how much all others miss each run that is not at a corner of their hull
+    misses : (n, m) number of each run less what fits that leave out its tenth predict
     """
 
     def __init__(self, places: Array, values: Array) -> None:
-        some = np.unique(np.linspace(0, len(places) - 1, min(len(places), _FITTED)).astype(int))
-        self.fit(places, values, *_most_likely(places[some], values[some]))
+        count, dimensions = places.shape
+        starts = [np.log([start] * dimensions + [1e-6]) for start in _STARTS]
+        likely = _most_likely(places, values, starts)
+        self._values, self._whole = values, Kriging(places, likely)
+        self._others = list[Kriging]()
+        self.misses, squares = np.empty_like(values), np.empty_like(values)
+        for out in tenths(count):
+            own = _most_likely(places[~out], values[~out], [likely])
+            part = Kriging(places[~out], own)
+            weights, variance = part.at(places[out])
+            self.misses[out] = values[out] - weights @ values[~out]
+            squares[out] = self.misses[out] ** 2 / variance[:, None]
+            self._others.append(Kriging(places, own))
+        free = max(count - dimensions - 2, 1)  # the mean and the lengths are found with s
+        self._deviation = np.sqrt(squares.mean(axis=0)) * student.ppf(_SURE, free) / _NORMAL
 
-    def fit(self, places: Array, values: Array, lengths: Array, roughness: float) -> None:
-        """Take values, with lengths (d,) and a roughness that are known."""
-        self.lengths, self.roughness, self._places = lengths, roughness, places
-        K = _covariance(places, places, lengths)
-        K[np.diag_indices_from(K)] += roughness
-        inverse = np.linalg.inv(K)
-        ones = inverse.sum(axis=1)
-        Q = inverse - np.outer(ones, ones) / ones.sum()
-        self._inverse, self._ones = inverse, ones
-        inside = ~_corners(places)
-        diagonal = np.diag(Q)[inside, None]
-        self.misses = (Q @ values)[inside] / diagonal
-        self._deviation = np.sqrt(np.mean(self.misses**2 * diagonal, axis=0))
+    def at(self, place: Array) -> tuple[Array, Array]:
+        """Return the weights (n,) of the runs at a place (d,), and standard deviations (m,)."""
+        weights, variance = self._whole.at(place[None, :])
+        each = [other.at(place[None, :])[0][0] - weights[0] for other in self._others]
+        unsure = (len(each) - 1) * np.mean((np.array(each) @ self._values) ** 2, axis=0)
+        return weights[0], np.sqrt(self._deviation**2 * variance[0] + unsure)
 
-    def weights(self, place: Array) -> tuple[Array, float]:
-        """Return the weights (n,) of the runs at a place (d,), and the variance over ``s^2``."""
-        k = _covariance(place[None, :], self._places, self.lengths)[0]
-        rest = 1.0 - self._ones @ k
-        weights = self._inverse @ k + self._ones * rest / self._ones.sum()
-        variance = 1.0 - k @ self._inverse @ k + rest**2 / self._ones.sum()
-        return weights, max(float(variance), 0.0)
 
-    def error(self, variance: float) -> Array:
-        """Return the standard deviations (m,) of the prediction with this variance over ``s^2``."""
-        return np.asarray(np.sqrt(variance) * self._deviation)
+class Kriging:
+    """Ordinary kriging with a known covariance.
+
+    Parameters
+    ----------
+    places : (n, d) of the runs
+    logs : (d + 1,) logarithms of the lengths, and of the roughness
+    """
+
+    def __init__(self, places: Array, logs: Array) -> None:
+        self._places, self._logs = places, logs
+        K = _covariance(places, places, logs).values
+        K[np.diag_indices_from(K)] += np.exp(logs[-1])
+        self._inverse = np.linalg.inv(K)
+        self._ones = self._inverse.sum(axis=1)
+
+    def at(self, places: Array) -> tuple[Array, Array]:
+        """Return weights (k, n) of the runs at places (k, d), and the variance (k,) over s^2."""
+        k = _covariance(places, self._places, self._logs).values
+        solved = k @ self._inverse
+        rest = 1.0 - k @ self._ones
+        weights = solved + np.outer(rest, self._ones) / self._ones.sum()
+        variance = 1.0 - np.sum(solved * k, axis=1) + rest**2 / self._ones.sum()
+        return weights, np.maximum(variance, 0.0) + np.exp(self._logs[-1])
 
 
 def in_hull(places: Array, place: Array) -> bool:
@@ -93,52 +117,53 @@ def in_hull(places: Array, place: Array) -> bool:
     return bool(found.status == 0)
 
 
-def _corners(places: Array) -> NDArray[np.bool_]:
-    """Return which places are corners of the hull of all.
+class _Covariance(NamedTuple):
+    """Covariance (n, m) of unit variance between places, and its slopes.
 
-    None of more than `_HULL` parameters, or if all others would be too few.
+    Over the logarithm of a length the slope is ``slope`` times the square (d, n, m) of its part of
+    the distance.
     """
-    count, dimensions = places.shape
-    corner = np.zeros(count, dtype=bool)
-    if dimensions == 1:
-        corner[[places[:, 0].argmin(), places[:, 0].argmax()]] = True
-    elif dimensions <= _HULL:
-        with suppress(QhullError):  # the places do not fill their space
-            corner[ConvexHull(places).vertices] = True
-    return corner if count - corner.sum() > dimensions else np.zeros(count, dtype=bool)
+
+    values: Array
+    slope: Array
+    squares: Array
 
 
-def _covariance(a: Array, b: Array, lengths: Array) -> Array:
-    """Return the Matern 5/2 covariance (n, m) of unit variance between places."""
-    apart = (a[:, None, :] - b[None, :, :]) / lengths
-    r = np.sqrt(5.0 * np.sum(apart**2, axis=2))
-    return np.asarray((1.0 + r + r**2 / 3.0) * np.exp(-r))
+def _covariance(a: Array, b: Array, logs: Array) -> _Covariance:
+    """Return the Matern 5/2 covariance between places (n, d) and (m, d)."""
+    squares = ((a.T[:, :, None] - b.T[:, None, :]) / np.exp(logs[:-1, None, None])) ** 2
+    r = np.sqrt(5.0 * squares.sum(axis=0))
+    decay = np.exp(-r)
+    return _Covariance((1.0 + r + r**2 / 3.0) * decay, 5.0 / 3.0 * (1.0 + r) * decay, squares)
 
 
-def _most_likely(places: Array, y: Array) -> tuple[Array, float]:
-    """Return the most likely lengths (d,) and roughness, the best of a few searches."""
-    count, dimensions = places.shape
+def _most_likely(places: Array, y: Array, starts: list[Array]) -> Array:
+    """Return logarithms (d + 1,) of the most likely lengths and roughness, the best of searches."""
+    some = np.unique(np.linspace(0, len(places) - 1, min(len(places), _FITTED)).astype(int))
+    places, y = places[some], y[some]
     spread = y.std(axis=0)
     y = y / np.where(spread > 0.0, spread, 1.0)
+    count, dimensions = places.shape
     bounds = [(np.log(_SHORTEST), np.log(_LONGEST))] * dimensions + [tuple(np.log(_ROUGHNESS))]
 
-    def unlikely(logs: Array) -> float:
-        K = _covariance(places, places, np.exp(logs[:-1]))
+    def unlikely(logs: Array) -> tuple[float, Array]:
+        K, slope, squares = _covariance(places, places, logs)
         K[np.diag_indices_from(K)] += np.exp(logs[-1])
         try:
             factor = cho_factor(K, lower=True)
         except np.linalg.LinAlgError:
-            return 1e25
-        solved = cho_solve(factor, np.column_stack([y, np.ones(count)]))
-        ones = solved[:, -1]
-        off = y - (ones @ y) / ones.sum()
-        squares = np.sum(off * (solved[:, :-1] - np.outer(ones, ones @ y / ones.sum())), axis=0)
-        alike = np.log(np.maximum(squares / count, 1e-300)).mean()
-        return float(0.5 * count * alike + np.sum(np.log(np.diag(factor[0]))))
+            return 1e25, np.zeros_like(logs)
+        inverse = cho_solve(factor, np.eye(count))
+        ones = inverse.sum(axis=1)
+        solved = inverse @ y - np.outer(ones, ones @ y / ones.sum())
+        missed = np.maximum(np.sum(y * solved, axis=0), 1e-300)
+        W = inverse - (solved * (count / missed / len(missed))) @ solved.T
+        slopes = [0.5 * np.sum(W * slope * each) for each in squares]
+        alike = 0.5 * count * np.log(missed / count).mean()
+        return (
+            float(alike + np.sum(np.log(np.diag(factor[0])))),
+            np.array([*slopes, 0.5 * np.trace(W) * np.exp(logs[-1])]),
+        )
 
-    found: list[Any] = [
-        minimize(unlikely, [*[np.log(start)] * dimensions, np.log(1e-6)], bounds=bounds)
-        for start in _STARTS
-    ]
-    best = min(found, key=lambda each: each.fun).x
-    return np.exp(best[:-1]), float(np.exp(best[-1]))
+    found: list[Any] = [minimize(unlikely, start, jac=True, bounds=bounds) for start in starts]
+    return np.asarray(min(found, key=lambda each: each.fun).x)

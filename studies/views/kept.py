@@ -34,7 +34,8 @@ def drawn_from(
     with open_netcdf(found) as own:
         left = {name: value for name, value in selection.items() if name not in swept}
         of = one_run(dataset, chosen)  # what distinguishes the run stands in the caption
-        run = own.assign_coords({name: of[name] for name in swept if name not in own.coords})
+        run = one_run(own)
+        run = run.assign_coords({name: of[name] for name in swept if name not in run.variables})
         yield (run, left) if keeps(run) else (dataset, selection)
 
 

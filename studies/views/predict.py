@@ -25,8 +25,11 @@ from studies.views.picking import (
     sweep_axes,
     sweep_coordinates,
 )
+from studies.views.tenths import check_predicted, share_predicted
 
 WAYS = CELLS, GAUSSIAN = "cells", "gaussian"
+ERROR_IS = {CELLS: "error", GAUSSIAN: "standard deviation"}
+"""What the error of a prediction is: a cell has one for all its places."""
 MOST = 1000
 """Largest number of runs of a Gaussian process: its cost grows with their cube."""
 _RUN = "run_between"
@@ -57,14 +60,16 @@ def predict(
     Returns
     -------
     xarray.Dataset : the place is in its coordinates. Of a Gaussian process the error is a standard
-        deviation; its attribute ``leave_one_out`` is the root of the mean square by which all
-        other runs miss a run
+        deviation; its attributes are ``q2``, and ``left_out``, the root of the mean square by
+        which fits miss the runs of a tenth that they leave out. Of all numbers of the runs those
+        are left out of which a process predicts too little
 
     Raises
     ------
     StudyError
         if the place is outside the hull of the runs, or between failed ones; if a parameter that
-        varies is left out, or there is no such variable
+        varies is left out, or there is no such variable; if a process predicts too little of the
+        runs that are left out (`check_predicted`, as for `sensitivity`)
     """
     ways = [way for way in WAYS if way == GAUSSIAN or "cell_state" in dataset]
     if by is not None and by not in ways:
@@ -72,7 +77,10 @@ def predict(
     way = by or ways[0]
     names = _names(dataset, of)
     between = _placed(only_numbers(dataset, *names), at, whole=way == GAUSSIAN)
-    found = (_in_cells if way == CELLS else _by_process)(dataset, between, names)
+    if way == CELLS:
+        found = _in_cells(dataset, between, names)
+    else:
+        found = _by_process(between, names, strict=of is not None)
     return found.assign_coords(between.fixed | between.place).assign_attrs(by=way)
 
 
@@ -209,12 +217,15 @@ def _in_cells(dataset: xr.Dataset, between: _Between, names: Sequence[str]) -> x
                 worst[axis] = np.maximum(worst.get(axis, 0.0), left)
             error = xr.zeros_like(inner) + sum(worst.values())
         found[name] = inner.assign_attrs(each.attrs)
-        found[f"{name}_error"] = error.assign_attrs(_error_of(each))
+        found[f"{name}_error"] = error.assign_attrs(_error_of(each, ERROR_IS[CELLS]))
     return xr.Dataset(found)
 
 
-def _by_process(dataset: xr.Dataset, between: _Between, names: Sequence[str]) -> xr.Dataset:
-    """Predict by a Gaussian process through all runs that succeeded."""
+def _by_process(between: _Between, names: Sequence[str], strict: bool) -> xr.Dataset:
+    """Predict by a Gaussian process through all runs that succeeded.
+
+    A variable of which it predicts too little is refused if ``strict``, or if there is no other.
+    """
     runs, known = between.runs, between.known(names)
     every = np.column_stack([runs[name].to_numpy().astype(float) for name in between.place])
     least, span = every.min(axis=0), np.ptp(every, axis=0)
@@ -231,24 +242,31 @@ def _by_process(dataset: xr.Dataset, between: _Between, names: Sequence[str]) ->
     if failed := [k for k in nearest if not known[k]]:
         allowed = f"is across a failed run: {runs['status'].to_numpy()[failed[0]]}"
         raise StudyError(*between.where, allowed)
-    found = {}
+    found, refused = dict[str, Any](), list[StudyError]()
     for name in names:
         each = runs[name].isel({_RUN: known}).transpose(_RUN, ...)
         flat = each.to_numpy().reshape(len(good), -1)
         there = np.isfinite(flat).all(axis=0)
         process = _process(good, flat[:, there])
-        parts, variance = process.weights(place)
+        q2 = share_predicted(flat[:, there], process.misses)
+        try:
+            check_predicted(name, q2, len(good))
+        except StudyError as refusal:
+            refused.append(refusal)
+            continue
         error = np.full(flat.shape[1], np.nan)
-        error[there] = process.error(variance)
+        parts, error[there] = process.at(place)
         value = xr.dot(each, xr.DataArray(parts, dims=_RUN), dim=_RUN)
         rms = float(np.sqrt(np.mean(process.misses**2)))
         found[name] = value.assign_attrs(each.attrs)
-        told = _error_of(each) | {"leave_one_out": rms}
+        told = _error_of(each, ERROR_IS[GAUSSIAN]) | {"q2": q2, "left_out": rms}
         found[f"{name}_error"] = value.copy(data=error.reshape(value.shape)).assign_attrs(told)
+    if refused and (strict or not found):
+        raise refused[0]
     return xr.Dataset(found)
 
 
-def _error_of(values: xr.DataArray) -> dict[str, Any]:
+def _error_of(values: xr.DataArray, what: str) -> dict[str, Any]:
     """Return the attributes of the error of a variable."""
     unit = {key: each for key, each in values.attrs.items() if key == "units"}
-    return {"long_name": f"error of {values.name} as it is predicted"} | unit
+    return {"long_name": f"{what} of the predicted {values.name}"} | unit

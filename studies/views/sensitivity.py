@@ -30,15 +30,12 @@ from studies.views.grids import parameters_over, point_axes
 from studies.views.picking import flags, select, sweep_axes
 from studies.views.plots.fields import sweep_fields, wide_fields
 from studies.views.table import one_number
+from studies.views.tenths import TENTHS, check_predicted, share_predicted, tenths
 
 METHODS = ("chaos", "delta", "pawn", "rbd_fast")
 """The fit of this module, and methods of the library SALib."""
-_GROUPS = 10
-"""Groups of runs that are left out in turn."""
 _RUNS = 4
 """Least number of runs for each parameter, and for the mean."""
-_PREDICTED = 0.8
-"""Least share of the variance that the fit must predict."""
 _FAILED = 0.05
 """Largest share of runs without a number."""
 _VALUES = 3
@@ -193,18 +190,13 @@ def _indices(places: Numbers, values: Numbers, unsure: Numbers, of: str) -> xr.D
     borne = [each for each in DEGREES if bears(len(values), places.shape[1], each)]
     tried = (_predicted(places, values, degree) for degree in borne)
     q2, degree, parts = max(tried, key=lambda each: each[0])
-    if q2 < _PREDICTED:
-        allowed = (
-            f"is the share of the variance of {of} that a fit to {len(values)} runs predicts, and "
-            f"at least {_PREDICTED} is needed: double the sample, or make ranges smaller"
-        )
-        raise StudyError("Q2", f"{q2:.2f}", allowed)
+    check_predicted(of, q2, len(values))
     whole = fitted(places, values, degree)
     spread = np.sum((parts - np.mean(parts, axis=0)) ** 2, axis=0)
     first, total = whole.indices()
     wider = places / (1.0 + 2.0 * np.diag(unsure))[:, None]  # one parameter at a time
     moved = [np.concatenate(fitted(each, values, degree).indices()) for each in wider[unsure > 0.0]]
-    spread = 4.0 * (_GROUPS - 1) / _GROUPS * spread
+    spread = 4.0 * (TENTHS - 1) / TENTHS * spread
     for each in moved:
         spread += (each - np.concatenate([first, total])) ** 2
     error = np.sqrt(spread) + (1.0 - q2) / 2.0
@@ -222,14 +214,13 @@ def _indices(places: Numbers, values: Numbers, unsure: Numbers, of: str) -> xr.D
 
 
 def _predicted(places: Numbers, values: Numbers, degree: int) -> tuple[float, int, Numbers]:
-    """Return Q² of fits that leave out a group of runs, the degree, and the indices of each fit."""
-    group = np.random.default_rng(0).permutation(len(values)) % _GROUPS
-    missed, found = 0.0, []
-    for k in range(_GROUPS):
-        part = fitted(places[group != k], values[group != k], degree)
-        missed += float(np.sum((values[group == k] - part(places[group == k])) ** 2))
+    """Return Q² of fits that leave out a tenth, the degree, and the indices of each fit."""
+    misses, found = np.empty_like(values), []
+    for out in tenths(len(values)):
+        part = fitted(places[~out], values[~out], degree)
+        misses[out] = values[out] - part(places[out])
         found.append(np.concatenate(part.indices()))
-    return 1.0 - missed / float(np.sum((values - values.mean()) ** 2)), degree, np.array(found)
+    return share_predicted(values, misses), degree, np.array(found)
 
 
 def _effects(whole: Chaos) -> Numbers:

@@ -509,13 +509,12 @@ def test_an_empty_goal_is_refused() -> None:
 def test_an_axis_may_not_have_the_name_of_an_answer(store: Store) -> None:
     asked = study(PRESSURE, {"friction": [0.0]})
     search_here(asked, store)
-    assert asked.asks is not None
     with open_study(store.directory) as dataset:
-        beside = {"status", "message", "friction", "hardening", "half_width"}
-        assert set(dataset.variables) - beside == set(asked.asks.names)
+        names = set(map(str, dataset.variables))
+    assert {"load_ratio_low", "run_high", "tried", "tried_status", "runs"} < names
     axis = {"a": {"friction": 0.0}, "b": {"friction": 0.1}}
-    for name in set(asked.asks.names) - {"load_ratio"}:
-        with pytest.raises(StudyError, match=rf"sweep\.{name} = .* use another name"):
+    for name in names - {"load_ratio", "friction", "hardening", "half_width"}:
+        with pytest.raises(StudyError, match=rf"sweep\.{name} = .* give the axis another one"):
             study(PRESSURE, {name: axis})
     study(PRESSURE, {"tribe": axis})
 

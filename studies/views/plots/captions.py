@@ -102,7 +102,8 @@ def setting(run: xr.Dataset) -> str:
     known = parameters_of(scene_of(run.attrs))
     given: Mapping[str, Any] = json.loads(run.attrs["parameters"])
     usual = _usual(run, given)
-    state = [words(given["state"])] if "state" in given and "state" not in run.coords else []
+    plane = given.get("state")
+    state = [words(plane)] if isinstance(plane, str) and "state" not in run.coords else []
     place = [
         named(
             str(name),
@@ -115,7 +116,10 @@ def setting(run: xr.Dataset) -> str:
     others = [
         named(name, value, known[name].unit)
         for name, value in given.items()
-        if name in known and name not in {"state", *run.coords} and value not in (None, usual[name])
+        if name in known
+        and name not in run.coords
+        and value not in (None, usual[name])
+        and not (state and name == "state")
     ]
     parts = [scene, *state, *place, *others]
     return f"{_STAY}· ".join(part.replace(" ", _STAY) for part in parts)

@@ -13,12 +13,12 @@ from typing import Any
 
 import pytest
 
-from solver.results.quantities import QUANTITIES
+from solver.results.quantities import IN_SPACE, QUANTITIES
 from studies import Study
 from studies.errors import SceneError, StudyError, one_of
 from studies.scenes import building
-from studies.scenes.checking import RESERVED
 from studies.scenes.description import Description
+from studies.scenes.names import RESERVED
 from studies.scenes.refusals import dotted
 from studies.scenes.scene import file_scene
 from tests.studies.scenes.conftest import blocks, built
@@ -202,4 +202,4 @@ def test_names_that_the_documentation_lists_as_taken_are_refused() -> None:
     text = (Path(__file__).parents[3] / "docs" / "scene-files.md").read_text()
     _, _, listed = text.partition("name of a variable or dimension of a data set:")
     names = {*re.findall(r"`(\w+)`", listed.partition(", nor a longer one")[0])}
-    assert {"force", "depth", "s", "stage", "status"} < names < {*QUANTITIES, *RESERVED}
+    assert {"force", "depth", "s", "stage", "status"} < names < {*QUANTITIES, *IN_SPACE, *RESERVED}
