@@ -14,6 +14,7 @@ P. Marek, PhD thesis, Warsaw University of Technology (1995), section 5.2.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -253,7 +254,7 @@ ROLLING = Scene(
     costs=(cost, progress),
     trace=Trace.of,
     refinement=refinement,
-    increment_error=0.04,  # as the mesh of `accuracy` is worth
+    increment_error=math.inf,  # increments are those of `advance_step`, see `refinement`
     effort=effort,
     warnings=warnings,
     advice=advice,

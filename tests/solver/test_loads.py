@@ -78,7 +78,7 @@ def test_a_displacement_in_one_step_finds_the_same_stress_as_in_many() -> None:
     stresses = []
     for steps in (1, 20):
         stage = Stage(name="loaded", target=1.0, steps=steps)
-        (outcome,) = Walker(System(Model(bodies=(body,))), Control()).walk(
+        (outcome,) = Walker(System(Model(bodies=(body,))), Control(increment_error=np.inf)).walk(
             [Program(laps=(Lap((stage,)),))]
         )
         assert outcome.error is None

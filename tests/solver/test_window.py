@@ -158,10 +158,12 @@ def test_whole_bodies_follow_failed_windows_in_the_shortest_increment(load_ratio
 
     run = replace(PRESSED, load_ratio=load_ratio, smallest_element=0.1, growth=2.0)
     system = System(PUNCH.model(run))
-    (plain,) = Walker(system, Control()).walk([PUNCH.program(run)])
+    (plain,) = Walker(system, Control(increment_error=np.inf)).walk([PUNCH.program(run)])
     monkeypatch.setattr(narrowing, "Increment", Fails)
     monkeypatch.setattr(stepper, "Increment", Whole)
-    (found,) = Walker(system, Control(max_cuts=2)).walk([PUNCH.program(run)])
+    (found,) = Walker(system, Control(max_cuts=2, increment_error=np.inf)).walk(
+        [PUNCH.program(run)]
+    )
     assert type(found.error) is type(plain.error)
     each: dict[float, list[float]] = {}
     for start, time in failed:

@@ -124,8 +124,8 @@ class Contact:
 
     @property
     def yielding(self):
-        """Share of the contact close to yield: increments make an error of 5 % at the surface."""
-        return (self.mises > 0.9 * YIELD).mean()
+        """Share of the contact that is at yield."""
+        return (self.mises > 0.95 * YIELD).mean()
 
     @property
     def half_lengths(self):

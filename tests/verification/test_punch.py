@@ -28,7 +28,11 @@ def solved(parameters):
     return solve(
         model(parameters),
         load=parameters.load_ratio,
-        control=PathControl(load_step=parameters.load_step, unload_steps=parameters.unload_steps),
+        control=PathControl(
+            load_step=parameters.load_step,
+            unload_steps=parameters.unload_steps,
+            increment_error=SCENES["punch"].increment_error,
+        ),
     )
 
 

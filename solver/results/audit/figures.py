@@ -127,7 +127,7 @@ LIMITS = {
     "audit_links": 1e-3,
     "audit_law": 1e-6,
     "audit_yield": 1e-6,
-    "audit_increment_error": 0.1,
+    "audit_increment_error": 0.15,
     "audit_slip": 0.03,
     "audit_touch_time": 0.1,
     "audit_slip_resolution": 0.5,

@@ -58,6 +58,8 @@ if TYPE_CHECKING:
 _FEW = 0.01
 """Least share of a body in the elastic energy of all; the stress of a body with less counts as that
 of this energy."""
+_FAINT = 1e-5
+"""Tensile stress over Young's modulus; the stress of a body with less energy counts as this one."""
 _SURE = 0.01
 """Estimate up to which plastic strain need not relax it: that can only make it smaller."""
 _STEPS, _SETTLED = 20, 1e-5
@@ -117,10 +119,11 @@ def _worst(bodies: Sequence[_Deformed], added: Sequence[Array], least: float) ->
         max(body.energy(s), body.energy(s + body.nominal))
         for body, s in zip(bodies, added, strict=True)
     ]
+    levels = [max(T, least, body.faint) for body, T in zip(bodies, own, strict=True)]
     ratios = [
-        _neglected(math.sqrt(energy / max(T, least)), body.name)
-        for body, energy, T in zip(bodies, changed, own, strict=True)
-        if max(T, least)
+        _neglected(math.sqrt(energy / level), body.name)
+        for body, energy, level in zip(bodies, changed, levels, strict=True)
+        if level
     ]
     return max(ratios, default=Neglected())
 
@@ -162,6 +165,11 @@ class _Deformed:
         self.nominal = change.reshape(4, -1)
         change = _mandel(_logarithm(H), np.log(np.maximum(1 + hoop, _FLAT))) - e
         self.strain = np.where(~counts | self.yielded, 0.0, plain.level(change).reshape(4, -1))
+
+    @property
+    def faint(self) -> float:
+        """Elastic energy of the least stress that counts [N mm]."""
+        return float(_FAINT**2 * self.elasticity.youngs_modulus / 2 * self.volume.sum())
 
     def energy(self, stress: Array) -> float:
         """Return the elastic energy of a stress (4, n_points) at the points that count [N mm]."""
