@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from solver.loading.outcome import Mechanism
 from solver.loading.step import moving
 from solver.tensors import deviator
 
@@ -23,49 +23,14 @@ if TYPE_CHECKING:
 
     Vectors = Sequence[NDArray[np.float64]]
 
-_CLOSE = 1e-3
-"""Relative distance of a load below one that is excluded; up to it the load is at the limit."""
 _ISOCHORIC = 0.01
 """Largest work of a mean stress of the tensile strength on a mechanism, over its dissipation."""
-_SINGULAR = 1e-6
+_SINGULAR = 1e-7
 """Ratio of the tangent to the elastic stiffness along a step; below it the tangent is singular."""
 _MECHANISM = 1e-2
 """The same for bodies without load."""
 _MOVES = 1e-3
 """Ratio of the elastic energy of a part in a step to that of all; above it the part moves."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Mechanism:
-    """A motion in which bodies flow, strained most in ``body`` at ``place`` (x, y) [mm].
-
-    ``ratio`` is the power of the load over the largest power that can resist it.
-    """
-
-    ratio: float = 0.0
-    body: str = ""
-    place: tuple[float, float] = (0.0, 0.0)
-
-    def __lt__(self, other: Mechanism) -> bool:
-        """Whether the other proves more."""
-        return self.ratio < other.ratio
-
-    @property
-    def limit(self) -> bool:
-        """Whether the load is above the limit load, or within `_CLOSE` of it."""
-        return self.ratio > 1 - _CLOSE
-
-    @property
-    def excludes(self) -> bool:
-        """The same: no state before allows for a larger load."""
-        return self.limit
-
-    def __str__(self) -> str:
-        x, y = self.place
-        return (
-            f"body {self.body!r} flows around x = {x:.4g}, y = {y:.4g} mm, where the load does "
-            f"{self.ratio:.4g} times the largest work of plastic flow and friction"
-        )
 
 
 def mechanism(

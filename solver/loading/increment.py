@@ -34,9 +34,9 @@ from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
 from solver.loading.acceleration import Series
 from solver.loading.control import Tolerances
-from solver.loading.flow import Mechanism, is_singular, mechanism
+from solver.loading.flow import is_singular, mechanism
 from solver.loading.line_search import search
-from solver.loading.outcome import IncrementFailed, Yielded
+from solver.loading.outcome import IncrementFailed, Mechanism, Yielded
 from solver.loading.slide import Slide, slide
 from solver.loading.step import (
     NewtonStep,

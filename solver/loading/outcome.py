@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solver.errors import NotConverged, SolverError
-from solver.loading.flow import Mechanism
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,9 +16,45 @@ if TYPE_CHECKING:
     from solver.loading.cycle import Cycle
     from solver.loading.slide import Slide
 
+_CLOSE = 1e-3
+"""Relative distance of a load below one that is excluded; up to it the load is at the limit."""
+
 
 class Yielded(SolverError):
     """A point yielded in an increment that had to stay elastic."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mechanism:
+    """A motion in which bodies flow, strained most in ``body`` at ``place`` (x, y) [mm].
+
+    ``ratio`` is the power of the load over the largest power that can resist it.
+    """
+
+    ratio: float = 0.0
+    body: str = ""
+    place: tuple[float, float] = (0.0, 0.0)
+
+    def __lt__(self, other: Mechanism) -> bool:
+        """Whether the other proves more."""
+        return self.ratio < other.ratio
+
+    @property
+    def limit(self) -> bool:
+        """Whether the load is above the limit load, or within `_CLOSE` of it."""
+        return self.ratio > 1 - _CLOSE
+
+    @property
+    def excludes(self) -> bool:
+        """The same: no state before allows for a larger load."""
+        return self.limit
+
+    def __str__(self) -> str:
+        x, y = self.place
+        return (
+            f"body {self.body!r} flows around x = {x:.4g}, y = {y:.4g} mm, where the load does "
+            f"{self.ratio:.4g} times the largest work of plastic flow and friction"
+        )
 
 
 class IncrementFailed(SolverError):

@@ -16,12 +16,11 @@ from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.fem.fields import elastic_energy
 from solver.linear.threads import one_thread
 from solver.loading.energy import worked
-from solver.loading.flow import Mechanism
 from solver.loading.history import lost
 from solver.loading.increment import Increment
 from solver.loading.integration import integrated
 from solver.loading.narrowing import FailedInWindows, narrowed
-from solver.loading.outcome import IncrementFailed, PathEnded, Point, Tally, Yielded
+from solver.loading.outcome import IncrementFailed, Mechanism, PathEnded, Point, Tally, Yielded
 from solver.loading.prediction import MEMORY, Predictor
 from solver.loading.program import ROUNDING
 from solver.loading.slide import spent

@@ -307,7 +307,7 @@ def test_a_wrong_file_is_told_with_its_line(tmp_path: Path, table: str, allowed:
 
 
 def test_a_file_that_is_missing_is_told(tmp_path: Path) -> None:
-    with pytest.raises(StudyError, match=r"points\.file = .*other.csv': cannot be read"):
+    with pytest.raises(StudyError, match=r"points\.file = .*other.csv': must be a file to read"):
         from_file(tmp_path, "", '[points]\nfile = "other.csv"\n')
 
 
