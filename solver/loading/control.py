@@ -10,8 +10,8 @@ from solver.loading.program import Program, load_and_release
 
 INCREMENT_ERROR = 0.006
 """Largest error of stress, over the yield stress, that the length of an increment may add: the sum
-over the increments of a load is then one or two percent. Smaller ones take the time of more
-increments, in proportion to the root of the error."""
+over the increments of a load is then one or two percent. The number of increments grows
+as 1 / sqrt(error)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +52,11 @@ class Control:
     increment_error: float = INCREMENT_ERROR
     tolerances: Tolerances = field(default_factory=Tolerances)
 
+    def __post_init__(self) -> None:
+        check_kinds(type(self), self)
+        if not self.increment_error > 0:
+            raise ModelError("increment_error", self.increment_error, "must be positive")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathControl(Control):
@@ -70,7 +75,7 @@ class PathControl(Control):
     unload_steps: int = 5
 
     def __post_init__(self) -> None:
-        check_kinds(PathControl, self)
+        Control.__post_init__(self)
         if not self.load_step > 0:
             raise ModelError("load_step", self.load_step, "must be positive")
         if self.unload_steps < 1:

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 
     Vectors = Sequence[NDArray[np.float64]]
 
-_ISOCHORIC = 0.01
-"""Largest work of a mean stress of the tensile strength on a mechanism, over its dissipation."""
+_ELSE = 0.01
+"""Largest work of what a mechanism does not do, change volume, overlap, violate links, over its
+dissipation: the forces that resist it are not known, only that this motion hardly needs them."""
 _SINGULAR = 1e-7
 """Ratio of the tangent to the elastic stiffness along a step; below it the tangent is singular."""
 _MECHANISM = 1e-2
@@ -85,16 +86,19 @@ def mechanism(
         most[-1] = int((strain**2).sum(axis=0).argmax())
         swelling += float(tension * np.abs(strain[:3].sum(axis=0)) @ part.volumes)
         load += float((response.stress * deviator(strain)).sum(axis=0) @ part.volumes)
-    if not load > 0 or swelling >= _ISOCHORIC * sum(flow):
-        return Mechanism()
     rates = np.sum([candidates.of_part(k, u) for k, u in enumerate(v)], axis=0)
     apart, normal = rates[: candidates.n], candidates.forces[: candidates.n]
     held = np.abs(np.minimum(apart, 0.0)).sum() + np.abs(rates[candidates.linked]).sum()
     bound = candidates.lines.least(normal)[: rates[candidates.along].size]
-    friction = float(bound @ np.abs(rates[candidates.along]))
+    friction, besides = (
+        float(bound @ np.abs(rates[candidates.along])),
+        swelling + level * float(held),
+    )
+    if not load > 0 or besides >= _ELSE * (sum(flow) + friction):
+        return Mechanism()
     weakest = int(np.argmax(flow))
     return Mechanism(
-        ratio=load / (sum(flow) + swelling + friction + level * float(held)),
+        ratio=load / (sum(flow) + friction + besides),
         body=system.parts[weakest].body.name,
         place=system.parts[weakest].place(most[weakest]),
     )

@@ -199,6 +199,7 @@ class Increment:
             elastic_first = iteration == 0 and self.elastic_first
             first = max(crawled - 1, int(self._softened))
             first = len(_BLENDS) - 1 if elastic_first else min(first, len(_BLENDS) - 2)
+            self._path.append(u)
             try:
                 step = self._step(residuals, responses, candidates, _BLENDS[first:])
             except IncrementFailed as failure:
@@ -207,7 +208,6 @@ class Increment:
                 raise
             out = max(error, tolerances.residual / _LESS) * scale
             before = u
-            self._path.append(u)
             share, u, responses, residuals = self._search(u, residuals, candidates, step, out)
             crawled = crawled + 1 if share < _SHORT else 0
             forces = (1 - share) * candidates.forces + share * step.forces

@@ -35,7 +35,7 @@ def integrated(system: System, before: Converged, now: Converged) -> Converged:
         if not (isinstance(part, Discretisation) and grown.any()):
             continue
         own = _missed(part, now, k, grown > 0)
-        added = max(added, _mean(part, own, grown > 0))
+        added = float(np.maximum(added, _mean(part, own, grown > 0)))
         had = sums[k]
         sums[k] = own if had is None else _carried(part, now, k, had) + own
     return replace(now, missed=tuple(sums), added=added)
@@ -44,14 +44,12 @@ def integrated(system: System, before: Converged, now: Converged) -> Converged:
 def missed(system: System, now: Converged) -> float:
     """Return the error of stress of all increments so far, over the yield stress: see `_mean`."""
     each = zip(system.parts, now.missed, now.state.plastic, strict=False)
-    return max(
-        (
-            _mean(part, error, plastic.accumulated > 0)
-            for part, error, plastic in each
-            if error is not None and isinstance(part, Discretisation)
-        ),
-        default=0.0,
-    )
+    errors = [
+        _mean(part, error, plastic.accumulated > 0)
+        for part, error, plastic in each
+        if error is not None and isinstance(part, Discretisation)
+    ]
+    return float(np.max(errors, initial=0.0))
 
 
 def _missed(part: Discretisation, now: Converged, number: int, flows: NDArray[np.bool_]) -> Array:

@@ -50,6 +50,8 @@ _PASSAGE = 0.5
 """Ratio of a contact's motion in an increment to its width; above it an increment is divided."""
 _SHORTEST = 2.0**-6
 """Shortest fraction into which an increment is divided for these reasons, or for its error."""
+_FURTHER = 4
+"""Into so many parts an increment that was divided for these reasons may still be, if it fails."""
 
 
 class Stepper:
@@ -112,8 +114,8 @@ class Stepper:
                 f"{failure}; move the bodies until they just touch"
             )
             raise PathEnded(error, replace(point, tally=self._timed(point.tally))) from failure
-        pushed = self._worked(point.now, pushed)
-        return self._after(point, pushed, ())
+        pushed = replace(integrated(self.system, point.now, pushed), added=0.0)
+        return self._after(point, self._worked(point.now, pushed), ())
 
     def _pushed_apart(self, state: State, time: float) -> Converged:
         """Return the increment that removes an overlap, without friction: no slip has a history.
@@ -147,9 +149,11 @@ class Stepper:
             begun = self.begin(state, time, point.tally)
             history, met = (*point.history, *begun.history), point.met | begun.met
             timing = point.now.timing.then(begun.now.timing)
-            now = replace(begun.now, timing=timing, missed=point.now.missed)
+            missed = begun.now.missed or point.now.missed
+            now = replace(begun.now, timing=timing, missed=missed)
             return replace(begun, now=now, history=history, met=met)
-        return replace(point, now=replace(point.now, state=replace(state, time=time)), past=())
+        now = replace(point.now, state=replace(state, time=time), added=0.0)
+        return replace(point, now=now, past=())
 
     def reach(self, point: Point, target: float, *, contact: bool = True) -> Point:
         """Return the point at time ``target`` or raise `PathEnded`.
@@ -162,14 +166,7 @@ class Stepper:
         Where windows of the bodies fail, whole bodies follow only in the shortest increment, and in
         the halves of a coarse one: the half of another one mostly converges in windows.
         """
-        begin = point.now.state.time
-        turn = max((part.turn(begin, target) for part in self.system.parts), default=0.0)
-        step = (target - begin) / max(1, math.ceil(turn / _TURN - ROUNDING))
-        size = _StepSize(step, self.control.max_cuts)
-        before, most = point.now, self.control.increment_error
-        if before.added:
-            scale = abs(step / (before.state.time - before.start.time))
-            size.divided(step, _halvings(before.added * scale**2, most))
+        size, most = self._step_size(point, target), self.control.increment_error
         known, coarse = point.now.timing, None
         failed: list[Attempt] = []
         while (now := point.now.state.time) != target:
@@ -196,10 +193,11 @@ class Stepper:
                     if not isinstance(end, Converged):
                         point = replace(point, tally=self._timed(point.tally))
                         raise PathEnded(self._ended(failure, point, *end), point) from failure
-                    converged = end
+                    converged = integrated(self.system, point.now, end)
                     size.resumed(converged.state.time - now)
                 else:
                     converged = coarse
+                    size.resumed(converged.state.time - now)
             else:
                 converged = integrated(self.system, point.now, converged)
                 # the forces of the coarse increment show how large they become
@@ -219,6 +217,21 @@ class Stepper:
                 raise PathEnded(NotConverged(message, now, reached), point)
             self._report()
         return point
+
+    def _step_size(self, point: Point, target: float) -> _StepSize:
+        """Return the step of the increments to a time.
+
+        It is smaller where a rigid body rotates far, or where the last increment has an error that
+        one of this length would exceed.
+        """
+        before, expected = point.now, 0.0
+        begin = before.state.time
+        turn = max((part.turn(begin, target) for part in self.system.parts), default=0.0)
+        step = (target - begin) / max(1, math.ceil(turn / _TURN - ROUNDING))
+        if before.added:
+            expected = before.added * (step / (begin - before.start.time)) ** 2
+        halvings = _halvings(expected, self.control.increment_error)
+        return _StepSize(step, self.control.max_cuts, halvings)
 
     def _longer(
         self, point: Point, failed: Sequence[Attempt]
@@ -384,17 +397,23 @@ class _StepSize:
     step : step in time of the next increment, with its sign
     """
 
-    def __init__(self, whole: float, cuts: int) -> None:
-        self.step = whole
+    def __init__(self, whole: float, cuts: int, halvings: int) -> None:
+        self.step = max(whole / 2**halvings, whole * _SHORTEST, key=abs)
         self._whole, self._least = whole, abs(whole) / 2**cuts
-        self._grows = False
+        self._grows = self._expected = halvings > 0
 
     def shortest(self, step: float) -> bool:
         """Whether an increment of this size cannot be halved again."""
-        return abs(step) < 2 * self._least * (1 - ROUNDING)
+        return not self._expected and abs(step) < 2 * self._least * (1 - ROUNDING)
 
     def failed(self, step: float) -> bool:
-        """Halve a step after a failure; return whether the half is permitted."""
+        """Halve a step after a failure; return whether the half is permitted.
+
+        One that was divided only because the last increment had an error gives way to the whole.
+        """
+        if self._expected:
+            self.step, self._grows, self._expected = self._whole, False, False
+            return True
         self.step, self._grows = step / 2, False
         return abs(self.step) >= self._least * (1 - ROUNDING)
 
@@ -405,7 +424,7 @@ class _StepSize:
         if not halvings:
             return False
         self.step, self._grows = step / 2**halvings, True
-        self._least = min(self._least, abs(self.step))  # a larger step that fails returns to this
+        self._least = min(self._least, abs(self.step) / _FURTHER)
         return True
 
     def resumed(self, step: float) -> None:
@@ -414,6 +433,7 @@ class _StepSize:
 
     def converged(self, step: float, *, grows: bool) -> None:
         """Double the next step, if steps may grow."""
+        self._expected = False
         if self._grows and grows:
             self.step = min(2 * step, self._whole, key=abs)
 

@@ -81,7 +81,8 @@ class Body:
         if self.mesh.t.shape[0] != corners:
             raise ModelError(
                 "element", self.element, f"needs cells of {corners} corners; the mesh of body "
-                f"{self.name!r} has {self.mesh.t.shape[0]} ; a file with triangles has no others",
+                f"{self.name!r} has {self.mesh.t.shape[0]}; a mesh file with "
+                "triangles gives no others",
             )  # fmt: skip
         check_mesh(self.mesh, self.name, element)
         if self.kinematics == "axisymmetric" and self.mesh.p[0].min() < 0:

@@ -303,7 +303,7 @@ PUNCH = Scene(
     view=view,
     outputs=(maps, profiles, surfaces, contact, extremes, residual_extremes, figures),
     costs=(cost,),
-    increment_error=0.04,  # as the mesh of `accuracy` is worth
+    increment_error=0.04,  # the error of the mesh is larger
     effort=effort,
     advice={
         Status.LIMIT_LOAD: "lower load_ratio, or let the material harden",

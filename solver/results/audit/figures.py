@@ -94,7 +94,7 @@ _DECLARED = [
         "equilibrium, to the yield stress",
     ),
     declare(
-        "audit_plastic_strain", "largest equivalent plastic strain away from singular points"
+        "audit_plastic_strain", "largest accumulated plastic strain away from singular points"
     ),
     declare(
         "audit_large_strain",

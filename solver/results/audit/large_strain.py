@@ -73,7 +73,12 @@ def large_strain(
     system: System, plain: Sequence[PlainBody], states: Iterable[Converged]
 ) -> Neglected:
     """Return the largest estimate of a body in some states of a system."""
-    return max((_in_state(system, plain, state) for state in states), default=Neglected())
+    return _largest(_in_state(system, plain, state) for state in states)
+
+
+def _largest(each: Iterable[Neglected]) -> Neglected:
+    """Return the largest share; one that is no number is the largest of all."""
+    return max(each, key=lambda one: np.nan_to_num(one.share, nan=np.inf), default=Neglected())
 
 
 def _neglected(share: float, body: str) -> Neglected:
@@ -125,7 +130,7 @@ def _worst(bodies: Sequence[_Deformed], added: Sequence[Array], least: float) ->
         for body, energy, level in zip(bodies, changed, levels, strict=True)
         if level
     ]
-    return max(ratios, default=Neglected())
+    return _largest(ratios)
 
 
 class _Deformed:
