@@ -10,13 +10,15 @@ import json
 import logging
 from base64 import b64decode, b64encode
 from collections.abc import Mapping
+from math import ceil
 from pathlib import Path
 from typing import Any
 
 from service.alone import CRASHED, FAILED, Answer, alone
+from service.errors import TooMany
 from service.maps import draw_scene
 from service.schemas import KeptScene, SketchQuery
-from service.turns import Share, beyond
+from service.turns import MINUTE, Share, beyond
 from solver.files import LARGEST
 from studies import Store, Study, StudyError
 from studies.definition.parameters import read_values
@@ -77,6 +79,7 @@ class Inspector:
             )
         if answer.failed == errno.ETIME and left < self.seconds:
             share.turns.left(share.caller)
+            raise TooMany("too little processor time was left: ask later", ceil(MINUTE))
         found = self._read(answer)
         if mistakes := found.get("mistakes"):
             raise SceneError(_FILE, [StudyError(*each) for each in mistakes], found["count"])

@@ -145,7 +145,8 @@ class Turns:
         if self.seconds is not None:
             now = time.monotonic()
             self.even = {name: at for name, at in self.even.items() if at > now}
-            self.even[caller] = self.even.get(caller, now) + seconds / self.seconds * MINUTE
+            even = self.even.get(caller, now) + seconds / self.seconds * MINUTE
+            self.even[caller] = min(even, now + 2 * MINUTE)
 
 
 @dataclass(slots=True)

@@ -157,9 +157,9 @@ class Study(BaseModel):
         """
         if not isinstance(content, Mapping):
             raise StudyError("study", content, "must be a table with name, scene and sweep")
-        run_count(content)
         if EXTENDS in content:
             content = cls._extended(content, scenes, studies)
+        run_count(content)
         try:
             return cls.model_validate(dict(content), context={"scenes": scenes})
         except ValidationError as error:

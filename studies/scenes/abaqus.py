@@ -293,7 +293,7 @@ class _Deck:
                 for text in each:
                     members |= self._members(kind, line, instance, text)
                 continue
-            first, last, step = [*(_number(line, text) for text in each), 1, 1][:3]
+            first, last, step = [*(_number(line, text) for text in each), 1, 1, 1][:3]
             if not 2 <= len(each) <= 3 or step < 1:
                 _refuse(line, "must have a first and a last number, and a step >= 1")
             members[instance, range(first, last + 1, step), ""] = line
@@ -333,11 +333,14 @@ class _Deck:
                 if key in place:
                     shape, row = place[key]
                     sets.setdefault(name, {}).setdefault(number[shape], []).append(row)
+        own = set(sets)
         for instance, name in self.instances.items():
             for key, (shape, row) in place.items():
-                if key[0] == instance:
+                if key[0] == instance and name not in own:
                     sets.setdefault(name, {}).setdefault(number[shape], []).append(row)
         for name, members in self._named("SURFACE").items():
+            if any(blocks[block][0].startswith("line") for block in sets.get(name, ())):
+                _refuse(next(iter(members.values())), f"a surface and a set are both called {name}")
             edges = [[index[end] for end in edge] for edge in self._edges(members)]
             if edges:
                 sets.setdefault(name, {})[len(blocks)] = list(range(len(edges)))
@@ -434,6 +437,9 @@ def _keys(members: _Members, known: Mapping[Key, object], what: str) -> Iterator
 def _motion(block: _Block) -> Callable[[Array], Array]:
     """Return how an instance is moved: a translation, then a rotation about a line from a to b."""
     lines = [line for line, _ in block.data]
+    for (line, fields), count in zip(block.data, (3, 7), strict=False):
+        if any(fields[count:]):
+            _refuse(line, f"must have at most {count} numbers: a translation, then a rotation")
     shift, turn = [
         _numbers(*row, count)
         for row, count in zip([*block.data, *[(0, [])] * 2], (3, 7), strict=False)

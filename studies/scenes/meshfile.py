@@ -66,7 +66,7 @@ class MeshFile:
 
         A table is text, which needs none.
         """
-        if self.name.endswith(TABLE):
+        if self.name.lower().endswith(TABLE):
             return self
         return replace(self, arrays=_read(self.name, self.data).packed())
 

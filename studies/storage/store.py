@@ -381,7 +381,7 @@ class Store:
 
         In a directory that is only read it stays.
         """
-        if not path.exists():
+        if not os.path.lexists(path):
             return
         if self.aside:
             _LOG.warning("%s cannot be read: %s", path.name, reason)

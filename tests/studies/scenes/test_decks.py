@@ -227,6 +227,8 @@ def test_collapsed_quadrilaterals_and_triangles_make_a_body_of_triangles() -> No
     ("*NSET, NSET=A\n1, B\n", "line 18: there is no NSET B before"),
     ("*ELSET, ELSET=A\n1, Nall\n", "line 18: there is no ELSET Nall before"),
     ("*NSET, NSET=A, GENERATE\n1, 3, 0\n", "line 18: must have a first and a last number"),
+    ("*NSET, NSET=A, GENERATE\n,\n1, 2\n", "line 18: must have a first and a last number"),
+    ("*ELEMENT, TYPE=T2D2, ELSET=T\n3, 4, 5\n*SURFACE, NAME=T\n1, S1\n", "line 20: a surface and"),
     ("*NSET, NSET=A, INSTANCE=I\n1\n", "line 17: there is no instance I"),
     ("*SURFACE, NAME=A\n1, S5\n", "line 18: S5 must be an edge of a CPS4: S1, S2, S3, S4"),
     ("*ELEMENT, TYPE=MASS\n9, 1\n*SURFACE, NAME=A\n9, S1\n", "line 20: element 9 is MASS, which"),
