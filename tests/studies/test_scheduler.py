@@ -274,7 +274,7 @@ def test_a_scheduler_that_needs_certificates_is_refused_before_anything_is_writt
     assert main([*run, "--memory", "much"]) == 2
     assert "memory = 'much': must be a size" in capsys.readouterr().err
     assert main([*run, "--memory", "10MB", "--workers", "1"]) == 2
-    assert "memory = '10MB': must be at least 210MB" in capsys.readouterr().err
+    assert "memory = '10MB': must be at least 240MB" in capsys.readouterr().err
     assert main([*run, "--workers", "0", "--scheduler", "tcp://127.0.0.1:1"]) == 2
     assert "--workers = 0: must be left out with a scheduler" in capsys.readouterr().err
     assert main([*run, "--stall-seconds", "0"]) == 2
