@@ -32,10 +32,11 @@ def integrated(system: System, before: Converged, now: Converged) -> Converged:
     sums, added = list(before.missed or (None,) * len(system.parts)), 0.0
     for k, part in enumerate(system.parts):
         grown = now.responses[k].state.accumulated - now.start.plastic[k].accumulated
-        if not (isinstance(part, Discretisation) and grown.any()):
+        flows = grown > 0
+        if not (isinstance(part, Discretisation) and flows.any()):
             continue
-        own = _missed(part, now, k, grown > 0)
-        added = float(np.maximum(added, _mean(part, own, grown > 0)))
+        own = _missed(part, now, k, flows)
+        added = float(np.maximum(added, _mean(part, own, flows)))
         had = sums[k]
         sums[k] = own if had is None else _carried(part, now, k, had) + own
     return replace(now, missed=tuple(sums), added=added)

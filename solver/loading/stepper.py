@@ -194,10 +194,9 @@ class Stepper:
                         point = replace(point, tally=self._timed(point.tally))
                         raise PathEnded(self._ended(failure, point, *end), point) from failure
                     converged = integrated(self.system, point.now, end)
-                    size.resumed(converged.state.time - now)
                 else:
                     converged = coarse
-                    size.resumed(converged.state.time - now)
+                size.resumed(converged.state.time - now)
             else:
                 converged = integrated(self.system, point.now, converged)
                 # the forces of the coarse increment show how large they become
@@ -428,7 +427,7 @@ class _StepSize:
         return True
 
     def resumed(self, step: float) -> None:
-        """Go on with a step that converged after all shorter ones had failed."""
+        """Go on with a step that converged, after shorter ones had failed."""
         self.step = step
 
     def converged(self, step: float, *, grows: bool) -> None:

@@ -13,7 +13,7 @@ from solver.contact.system import LEAST
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from solver.contact.state import Converged, State
+    from solver.contact.state import Converged
     from solver.contact.system import System
     from solver.materials.law import Law
     from solver.results.audit.plain import PlainBody
@@ -43,18 +43,16 @@ class AuditedBody:
         """Whether the system solves for all of its nodes: the body is not condensed."""
         return self.part.meshed
 
-    def _strain(self, state: State) -> Array:
-        """Return Mandel strain (4, n_points) from the displacements, without the eigenstrain."""
-        strain = self.plain.strain(self._system.displacement(self.name, state))
-        return strain.reshape(len(strain), -1) - self.plain.eigenstrain(state.time)
-
     @cached_property
     def _law(self) -> Law:
         return self.plain.law(self._converged.state.time)
 
     @cached_property
     def _reached(self) -> Array:
-        return self._strain(self._converged.state)
+        """Mandel strain (4, n_points) from the displacements, without the eigenstrain."""
+        state = self._converged.state
+        strain = self.plain.strain(self._system.displacement(self.name, state))
+        return strain.reshape(len(strain), -1) - self.plain.eigenstrain(state.time)
 
     @cached_property
     def stress(self) -> Array:

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
-_LEVEL = 1e-6
-"""Ratio of the decrease of squared pressure over an edge to its maximum; less counts as zero."""
 _WHOLE = 1e-6
 """Share of a vertex's hat that may lie beyond the master although the vertex faces it."""
 COVERED = 1e-3
