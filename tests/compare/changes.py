@@ -58,14 +58,14 @@ def compared(before: Mapping[str, Run], after: Mapping[str, Run]) -> Row:
     alone = [f"{name} ({_side(name in before)})" for name in sorted(before.keys() ^ after.keys())]
     for name in before.keys() & after.keys():
         old, new = before[name], after[name]
-        was, is_ = (str(np.asarray(run.get("status", "")).tolist()) for run in (old, new))
+        was, is_ = (" ".join(np.ravel(run.get("status", ""))) for run in (old, new))
         if was == HUNG:
             left_out += 1
         elif was != is_:
             statuses.append((name, was, is_))
         else:
             alone += [f"{name}: {v} ({_side(v in old)})" for v in sorted(old.keys() ^ new.keys())]
-            shared = [v for v in sorted(old.keys() & new.keys()) if v not in EXCLUDED]
+            shared = [v for v in sorted(old.keys() & new.keys()) if _last(v) not in EXCLUDED]
             found += [(change(v, old[v], new[v]), f"{name}: {v}") for v in shared]
             values += sum(np.size(old[v]) for v in shared)
     found.sort(key=lambda each: (-each[0], each[1]))
@@ -97,7 +97,7 @@ def change(name: str, before: Any, after: Any) -> float:
     apart = float(np.abs(new - old)[~alike].max())  # NaN where only one is
     if not np.isfinite(apart):
         return np.inf
-    if apart <= _rounding(name.rpartition(".")[2]):
+    if apart <= _rounding(_last(name)):
         return 0.0
     level = float(np.abs(old[np.isfinite(old)]).max())
     return apart / level if level else np.inf
@@ -110,6 +110,11 @@ def _rounding(name: str) -> float:
 
     units = QUANTITIES[name].units if name in QUANTITIES else ""
     return 0.0 if units == "1" and not name.startswith("audit_") else ROUNDING.get(units, 0.0)
+
+
+def _last(name: str) -> str:
+    """Return the name of a variable of a record that is part of an answer."""
+    return name.rpartition(".")[2]
 
 
 def _side(old: bool) -> str:

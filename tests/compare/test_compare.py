@@ -11,15 +11,21 @@ import pytest
 from studies import Study
 from tests.compare.__main__ import computed, jobs
 from tests.compare.changes import HUNG, LIMIT, compared
-from tests.compare.worker import sampled
+from tests.compare.worker import named, sampled
 from tests.faults import ROOT
 
 STRESS = np.array([100.0, np.nan, 1e-3, 0.0])
-BEFORE = {"status": "OK", "stress": STRESS, "iterations": 4, "cpu_seconds": 1.0, "stage": ["a"]}
+BEFORE = {
+    "status": "OK",
+    "stress": STRESS,
+    "iterations": 4,
+    "record.cpu_seconds": 1.0,
+    "stage": ["a"],
+}
 
 
 def test_numbers_that_moved_less_than_the_limit_are_the_same() -> None:
-    close = BEFORE | {"stress": STRESS + 0.5 * LIMIT * 100.0, "cpu_seconds": 2.0}
+    close = BEFORE | {"stress": STRESS + 0.5 * LIMIT * 100.0, "record.cpu_seconds": 2.0}
     row = compared({"run": BEFORE}, {"run": close})
     assert row.same
     assert (row.runs, row.values) == (1, 7)
@@ -81,6 +87,12 @@ def test_the_choice_of_a_study_has_runs_of_the_study(file: Path) -> None:
     choice = sampled(study, 2)
     assert choice.asks or choice.size == 2
     assert {*choice.run_ids()} <= {*study.run_ids()}
+
+
+def test_runs_are_named_alike_in_any_order_and_with_other_parameters() -> None:
+    before = [('{"a": 2, "b": 1}', {"n": 2}), ('{"a": 1, "b": 1}', {"n": 1})]
+    after = [('{"b": 1, "aa": 0, "a": 1}', {"n": 1}), ('{"b": 1, "aa": 0, "a": 2}', {"n": 2})]
+    assert named(before) == named(after) == {"run 0": {"n": 1}, "run 1": {"n": 2}}
 
 
 @pytest.mark.processes

@@ -7,6 +7,7 @@ standard input, and writes a file with user time [s], memory [kB], and the numbe
 
 from __future__ import annotations
 
+import json
 import pickle
 import random
 import resource
@@ -37,9 +38,8 @@ def of_study(file: str, most: int) -> Computed:
     with tempfile.TemporaryDirectory() as folder:
         outcome = run_study(study, Store(Path(folder)), workers=0)
         cost = spent()
-        stored = {f"run {k}": f"{folder}/runs/{run}.nc" for k, run in enumerate(outcome.computed)}
-        stored["data set"] = str(outcome.dataset)
-        return *cost, {name: dict(variables(path)) for name, path in stored.items()}
+        runs = named([stored_in(f"{folder}/runs/{run}.nc") for run in outcome.computed])
+        return *cost, runs | {"data set": stored_in(str(outcome.dataset))[1]}
 
 
 def sampled(study: Any, most: int) -> Any:
@@ -55,14 +55,19 @@ def sampled(study: Any, most: int) -> Any:
     return type(study).from_dict(content, scenes=lambda name: study.problem)
 
 
-def variables(path: str) -> Iterator[tuple[str, Any]]:
-    """Yield the variables of a netCDF file."""
+def named(stored: Sequence[tuple[str, Run]]) -> dict[str, Run]:
+    """Name runs by their place in the order of their parameters: their ids depend on the code."""
+    ranked = sorted(stored, key=lambda run: json.dumps(json.loads(run[0]), sort_keys=True))
+    return {f"run {k}": values for k, (_, values) in enumerate(ranked)}
+
+
+def stored_in(path: str) -> tuple[str, Run]:
+    """Return the parameters of a netCDF file as text, and its variables."""
     import netCDF4
 
     with netCDF4.Dataset(path) as file:
         file.set_auto_mask(False)
-        for name, variable in file.variables.items():
-            yield name, variable[...]
+        return file.parameters, {name: each[...] for name, each in file.variables.items()}
 
 
 def of_family(names: Sequence[str], patience: float) -> Computed:
