@@ -107,7 +107,7 @@ def of_runs(given: Mapping[str, tuple[str, Mapping[str, Any]]]) -> Computed:
 
 
 def numbers(answer: Any, at: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the numbers of the records and solutions in an answer, by name."""
+    """Yield the numbers of the records, solutions and states in an answer, by name."""
     from solver import Record, Solution
     from studies import to_xarray
 
@@ -117,6 +117,8 @@ def numbers(answer: Any, at: str = "") -> Iterator[tuple[str, Any]]:
         yield from ((f"{at}{name}", values) for name, (_, values) in answer.fields.items())
     elif isinstance(answer, Solution):
         yield from ((f"{at}{n}", v.to_numpy()) for n, v in to_xarray(answer).variables.items())
+    elif hasattr(answer, "state") and hasattr(answer.state, "u"):  # a state without its model
+        yield from numbers(answer.state.u, f"{at}u.")
     elif isinstance(answer, list | tuple):
         for k, each in enumerate(answer):
             yield from numbers(each, f"{at}{k}.")
