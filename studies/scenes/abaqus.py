@@ -303,8 +303,10 @@ class _Deck:
         if kind not in ("ELEMENT", "NODE"):
             return  # an analytical surface
         on_nodes = kind == "NODE"
-        surface = "NODE SURFACE" if on_nodes else "SURFACE"
-        members = self._of(surface, block, self._given(block, "NAME"))
+        surface, other = ("SURFACE", "NODE SURFACE")[:: -1 if on_nodes else 1]
+        members = self._of(surface, block, name := self._given(block, "NAME"))
+        if (self.instance, name.upper()) in self.sets[other]:
+            _refuse(block.line, f"the surface {name} has both edges and nodes")
         for line, (one, *rest) in block.data:
             label = rest[0].upper() if rest and not on_nodes else ""
             of = self._members("NSET" if on_nodes else "ELSET", line, self.instance, one)
@@ -345,13 +347,14 @@ class _Deck:
             if edges:
                 sets.setdefault(name, {})[len(blocks)] = list(range(len(edges)))
                 blocks.append(("line", np.array(edges)))
-        nodes = {
-            name: np.array(
-                [index[key] for key in _keys(members, self.nodes, "node")], dtype=np.int64
-            )
-            for kind in ("NSET", "NODE SURFACE")
-            for name, members in self._named(kind).items()
-        }
+        nodes: dict[str, NDArray[np.int64]] = {}
+        for kind in ("NSET", "NODE SURFACE"):
+            for name, members in self._named(kind).items():
+                found = {index[key] for key in _keys(members, self.nodes, "node")}
+                new = np.array(sorted(found), dtype=np.int64)
+                if not np.array_equal(nodes.setdefault(name, new), new):
+                    line = next(iter(members.values()))
+                    _refuse(line, f"a surface has other nodes than the set {name}")
         return MeshData(
             np.array(list(self.nodes.values()), dtype=float).reshape(-1, 3),
             blocks,

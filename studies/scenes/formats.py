@@ -89,31 +89,75 @@ def _by_meshio(kind: str, data: bytes) -> meshio.Mesh:
 
 
 def _plain(kind: str, data: bytes) -> MeshData:
-    return _arrays(_by_meshio(kind, data), {})
+    return _arrays(_by_meshio(kind, data))
 
 
 def _gmsh(data: bytes) -> MeshData:
     """Return the mesh of a file of gmsh.
 
-    meshio knows groups by their names alone, but a line and a surface may share one, and a group
-    has the number of a line that runs backwards with a minus: each gets a name of its own here.
+    A group of lines and one of surfaces may share a name; an entity whose line runs backwards has
+    the number of its group with a minus.
     """
-    names: dict[tuple[int, int], str] = {}
-    head, found, rest = data.partition(b"$PhysicalNames")
-    section, _, rest = rest.partition(b"$EndPhysicalNames")
-    for dim, number, name in re.findall(r'(\d+)\s+(\d+)\s+"(.*)"', section.decode()):
-        names |= {(sign * int(number), int(dim)): name for sign in (1, -1)}
-    if found:
-        lines = [f'{dim} {number} "{number},{dim}"' for number, dim in names]
-        section = "\n".join(["", str(len(lines)), *lines, ""]).encode()
-        data = b"".join([head, found, section, b"$EndPhysicalNames", rest])
+    section = data.partition(b"$PhysicalNames")[2].partition(b"$EndPhysicalNames")[0].decode()
+    named = re.findall(r'(\d+)\s+(\d+)\s+"(.*)"', section)
+    names = {(int(dim), int(number)): name for dim, number, name in named}
     try:
-        return _arrays(_by_meshio("gmsh", data), names)
+        found = _by_meshio("gmsh", data)
     except ValueError as error:
         if "gmsh:physical" not in str(error):
             raise
         reason = "some of its cells are in no physical group: save it with Mesh.SaveAll = 0"
         raise ValueError(reason) from None
+    first, groups = found.cell_data.pop("gmsh:physical", None), _groups_of_entities(data)
+    made = _arrays(found)
+    for k, block in enumerate(found.cells if first else ()):
+        rows = np.arange(len(block.data))
+        if groups and len(rows):
+            entity = int(found.cell_data["gmsh:geometrical"][k][0])
+            numbers = dict.fromkeys(groups[block.dim, entity], rows)
+        else:
+            numbers = {each: rows[first[k] == each] for each in np.unique(first[k]).tolist()}
+        for number, own in numbers.items():
+            group = abs(number)
+            _add(made.sets, names.get((block.dim, group), str(group)), k, own)
+    return made
+
+
+def _groups_of_entities(data: bytes) -> dict[tuple[int, int], list[int]]:
+    """Return dimension and number of an entity of gmsh 4 -> its groups.
+
+    meshio keeps the first of them. Format 2 has no entities: it repeats a cell in each group.
+    """
+    head = re.search(rb"\$MeshFormat\s+(\S+)\s+([01])\s+(\d)", data)
+    begin = re.search(rb"^\$Entities\s*?\n", data, re.MULTILINE)
+    if head is None or begin is None:
+        return {}
+    version, binary, size = head.groups()
+    section = data[begin.end() : data.find(b"$EndEntities", begin.end())]
+    values = np.array(section.split(), dtype=float) if binary == b"0" else None
+    at, count_type = 0, f"u{size.decode()}"
+
+    def take(kind: str, count: int) -> list[int]:
+        nonlocal at
+        if values is None:
+            found = np.frombuffer(section, kind, count, at)
+            at += found.nbytes
+        else:
+            found = values[at : at + count]
+            at += count
+        if len(found) != count:
+            raise ValueError("its entities end too early")
+        return [int(each) for each in found] if kind != "f8" else []
+
+    groups = {}
+    for dim, entities in enumerate(take(count_type, 4)):
+        for _ in range(entities):
+            (entity,) = take("i4", 1)
+            take("f8", 3 if dim == 0 and version != b"4.0" else 6)  # its place or its box
+            groups[dim, entity] = take("i4", *take(count_type, 1))
+            if dim:
+                take("i4", *take(count_type, 1))  # what bounds it
+    return groups
 
 
 def _nastran(data: bytes) -> MeshData:
@@ -134,27 +178,18 @@ def _nastran(data: bytes) -> MeshData:
     return _plain("nastran", f"{begin}\n{text}\n{end}\n".encode())
 
 
-def _arrays(found: meshio.Mesh, names: Mapping[tuple[int, int], str]) -> MeshData:
-    """Return the arrays of a mesh; a set of cells without a name has its number for one."""
+def _arrays(found: meshio.Mesh) -> MeshData:
+    """Return the arrays of a mesh; a set of cells has its number for a name."""
     sets: dict[str, dict[int, NDArray[np.int64]]] = {}
-    for key, each in found.cell_sets.items():
-        if key.startswith("gmsh:"):
-            continue
-        number, _, dim = key.partition(",")
-        name = names[int(number), int(dim)] if names else key
-        for k, rows in enumerate(each):
-            if rows is not None and len(rows):
-                _add(sets, name, k, rows)
     for key in set(_NUMBERS) & found.cell_data.keys():
-        for k, (block, numbers) in enumerate(zip(found.cells, found.cell_data[key], strict=True)):
+        for k, numbers in enumerate(found.cell_data[key]):
             for number in np.unique(numbers):
-                name = names.get((int(number), block.dim), str(number))
-                _add(sets, name, k, np.flatnonzero(numbers == number))
+                _add(sets, str(number), k, np.flatnonzero(numbers == number))
     return MeshData(
         points=np.asarray(found.points, dtype=float),
         cells=[(block.type, np.asarray(block.data)) for block in found.cells],
         sets=sets,
-        nodes={name: np.asarray(own, dtype=np.int64) for name, own in found.point_sets.items()},
+        nodes={},
     )
 
 

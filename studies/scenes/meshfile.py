@@ -244,7 +244,10 @@ def _of_one_kind(
             found[new.kind] = found[new.kind].joined(new)
     if len(found) > 1:
         listed = ", ".join(sorted(found))
-        allowed = f"a body must have cells that are all straight or all quadratic, not {listed}"
+        allowed = (
+            "a body must have quadrilaterals of one kind with triangles of the same order "
+            f"(quad and triangle, quad8 or quad9 and triangle6), not {listed}"
+        )
         raise ModelError("mesh", name, allowed)
     (body,) = found.values()
     return points, body

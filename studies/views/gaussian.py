@@ -38,7 +38,10 @@ _SHORTEST, _LONGEST = 0.05, 20.0
 """Smallest and largest length, as a multiple of the range of a parameter."""
 _ROUGHNESS = (1e-7, 1e-2)
 """Variance of what no smooth function explains, as a multiple of the whole: smallest, largest."""
-_STARTS = (0.3, 1.5)
+_STARTS, _ROUGH = (0.3, 1.5), 1e-3
+"""Lengths and roughness from which the most likely ones are searched. From a much smaller roughness
+the likelihood has no slope along it, and a search ends at lengths that explain it instead.
+"""
 _NORMAL, _SURE = 1.96, 0.975
 """Deviations of a normal distribution with this probability below them."""
 _FITTED = 200
@@ -60,7 +63,7 @@ class Gaussian:
 
     def __init__(self, places: Array, values: Array) -> None:
         count, dimensions = places.shape
-        starts = [np.log([start] * dimensions + [1e-6]) for start in _STARTS]
+        starts = [np.log([start] * dimensions + [_ROUGH]) for start in _STARTS]
         likely = _most_likely(places, values, starts)
         self._values, self._whole = values, Kriging(places, likely)
         self._others = list[Kriging]()

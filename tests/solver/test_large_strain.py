@@ -18,7 +18,10 @@ from solver import (
     Link,
     Material,
     Model,
+    Moved,
     PathControl,
+    Pushed,
+    RigidBody,
     Solution,
     Traction,
     solve,
@@ -41,9 +44,9 @@ def block(x: tuple[float, float], height: float, cells: tuple[int, int], **field
                    "kinematics": "plane_stress", **fields})  # fmt: skip
 
 
-def solved(*bodies: Body, links: tuple[Link, ...] = (), step: float = 1.0) -> Solution:
+def solved(*bodies: Body, step: float = 1.0, **fields: Any) -> Solution:
     control = PathControl(load_step=step)
-    return solve(Model(bodies=bodies, links=links), load=1.0, control=control)
+    return solve(Model(bodies=bodies, **fields), load=1.0, control=control)
 
 
 def estimate(*bodies: Body, **options: Any) -> float:
@@ -157,3 +160,48 @@ def test_bodies_may_move_as_a_whole() -> None:
     bar = block((0.0, 4.0), 1.0, (4, 2), material=STRAIGHT, loads=loads)
     assert estimate(bar) == pytest.approx(0.01, rel=1e-3)
     assert LARGE > 0.01
+
+
+def grip(angle: float, at: float = 0.0, name: str = "grip", x: Moved | Pushed | None = None) -> Any:
+    return RigidBody(name=name, centre=(at, 0.5), x=x or Moved(), y=Moved(),
+                     rotation=Moved(value=angle))  # fmt: skip
+
+
+@pytest.mark.parametrize("angle", [0.007, 0.1])
+@pytest.mark.parametrize(
+    "others", [{}, {"stiffness": 1e5}, {"distributed": True}, {"master": ("base", "right")}]
+)
+def test_a_body_turned_by_links_lacks_nothing(others: dict[str, Any], angle: float) -> None:
+    """The stretch of its linear displacements, 0.5 %, is no strain."""
+    bar = block((0.0, 4.0), 1.0, (8, 2))
+    base = block((-1.0, 0.0), 1.0, (2, 2), name="base", supports={"left": "xy"})
+    held = Link(slave=("bar", "left"), rigid="grip", **others)
+    assert estimate(bar, base, links=(held,), rigid=(grip(angle),)) < 1e-8
+
+
+@pytest.mark.parametrize(("material", "force"), [(ELASTIC, 1e-3 * E), (YIELDS, 330.0)])
+def test_a_turned_bar_bends_under_a_force_that_does_not_turn(
+    material: Material, force: float
+) -> None:
+    """Axial force P, moment P w x at x from the free end: energies 1 to w^2 L^2 A / (3 I)."""
+    angle = 0.03
+    bar = block((0.0, 4.0), 1.0, (8, 2), material=material,
+                loads=(Traction(boundary="right", x=force),))  # fmt: skip
+    held = Link(slave=("bar", "left"), rigid="grip")
+    found = estimate(bar, links=(held,), rigid=(grip(angle),), step=0.25)
+    assert found == pytest.approx(math.sqrt(angle**2 * 4.0**2 * 12 / 3), rel=0.03)
+
+
+@pytest.mark.parametrize("free", [True, False])
+def test_a_beam_bent_by_its_grips_lacks_the_shortening_of_its_chord(free: bool) -> None:
+    """Turned by -a and a: arc over chord 1 + a^2 / 6, rms of bending strain a h / (sqrt(3) L)."""
+    turn = 0.03
+    beam = block((0.0, 10.0), 1.0, (40, 4), material=STRAIGHT)
+    ends = grip(-turn), grip(turn, 10.0, "end", Pushed() if free else None)
+    links = tuple(Link(slave=("bar", side), rigid=name)
+                  for side, name in (("left", "grip"), ("right", "end")))  # fmt: skip
+    found = estimate(beam, links=links, rigid=ends)
+    if free:
+        assert found < turn / 5, "of the size of its strain, 0.3 %"
+    else:
+        assert found == pytest.approx(turn * 10.0 * math.sqrt(3) / 6, rel=0.015)

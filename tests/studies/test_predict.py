@@ -76,10 +76,13 @@ STUDIES = {"punch": 16, "ball": 24, "rolling": 30, "pin": 48, "shaft_hub": 64}
 """Studies of `sampled`, and how many of their runs are fitted: the first ones of the sequence."""
 
 
-def test_nine_of_ten_runs_are_within_two_of_the_deviations_that_are_stated() -> None:
-    """At 40 other runs of each of five studies inside the hull, and of each of three numbers."""
+@pytest.mark.parametrize("counts", [STUDIES, {"shaft_hub": 30}])
+def test_nine_of_ten_runs_are_within_two_of_the_deviations_that_are_stated(
+    counts: dict[str, int],
+) -> None:
+    """At 40 other runs of each study inside the hull, and of each of three numbers."""
     within: dict[str, list[bool]] = {}
-    for name, count in STUDIES.items():
+    for name, count in counts.items():
         table = np.loadtxt(SAMPLED / f"{name}.csv", delimiter=",", skiprows=1)
         places = (table[:, :3] - table[:, :3].min(axis=0)) / np.ptp(table[:, :3], axis=0)
         inside = [k for k in range(count, 128) if in_hull(places[:count], places[k])][:40]
@@ -94,7 +97,7 @@ def test_nine_of_ten_runs_are_within_two_of_the_deviations_that_are_stated() -> 
                 within.setdefault(name, []).append(bool(off <= 2.0 * deviation))
     shares = {name: np.mean(each) for name, each in within.items()}
     assert min(shares.values()) >= 0.9, shares
-    assert sum(map(len, within.values())) >= 400, "nearly all are predicted, not refused"
+    assert sum(map(len, within.values())) >= 80 * len(counts), "nearly all are predicted"
 
 
 def test_a_line_of_few_runs_and_numbers_that_are_mostly_zero_have_wide_errors() -> None:

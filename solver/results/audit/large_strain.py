@@ -18,7 +18,8 @@ where f are nodal forces. Forces of loads and contact are those of T. Thus the d
 what the body is free to relax, such as the shortening of a beam that bends. Where material has
 yielded, E - e is left out, and x is the plastic strain with the least energy of s, by conjugate
 gradients; elsewhere x is zero. It does not change the part of s that f(R N - T) causes, which no
-stress with less energy balances.
+stress with less energy balances. What a rigid body turns by links, by an angle w, v moves back by
+the stretch of its linear displacements: by -ln(1 + w^2) / 2 times the distance from its centre.
 
 The share is the energy norm of s over that of T, or that of s + N - T, the change of nominal
 stress, where a displacement is prescribed and the force on it errs.
@@ -38,6 +39,7 @@ import numpy as np
 from solver.contact.candidates import no_candidates
 from solver.contact.system import LEAST
 from solver.fem.frame import turning
+from solver.fem.rigid import RigidPart
 from solver.loading.step import newton_step
 from solver.results.audit.plain import GHOST
 from solver.results.audit.theory import Neglected
@@ -48,7 +50,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from solver.contact.state import Converged
+    from solver.contact.state import Converged, State
     from solver.contact.system import System
     from solver.materials.elasticity import Elasticity
     from solver.results.audit.plain import PlainBody
@@ -191,7 +193,7 @@ class _Joined:
         self._system, self._bodies = system.during(converged.start), bodies
         state = converged.state
         apart = no_candidates(self._system, state.u, np.zeros_like(state.links))
-        self._links = replace(apart, motion=np.zeros_like(apart.motion))
+        self._links = replace(apart, motion=-_turned(self._system, state))
         self._ends = np.cumsum([len(each.yielded) for each in bodies])
         self.yielded = np.concatenate([each.yielded for each in bodies])
         self.strain = np.hstack([each.strain for each in bodies])
@@ -200,10 +202,13 @@ class _Joined:
         """Return the values (..., n_points) of each body."""
         return np.split(values, self._ends[:-1], axis=-1)
 
-    def stress(self, strain: Array, forces: Sequence[Array] | None = None) -> Array:
+    def stress(
+        self, strain: Array, forces: Sequence[Array] | None = None, *, turned: bool = True
+    ) -> Array:
         """Return the stress (4, n_points) that an eigenstrain, with forces, causes [MPa].
 
-        Its nodal forces are minus those given (n,), of each body.
+        Its nodal forces are minus those given (n,), of each body. What links hold moves from where
+        small rotations of rigid bodies have it to where they have ``turned`` it.
         """
         parts, strains = self._system.parts, self.each(strain)
         own, begun = [np.zeros(part.n) for part in parts], []
@@ -212,7 +217,9 @@ class _Joined:
             begun.append(parts[body.number].begin(force if forces is None else force - forces[k]))
             own[body.number] = begun[-1].condensed
         operators = [each.elastic for each in self._system.operators]
-        step = newton_step(self._system, tuple(own), operators, self._links)
+        links = self._links
+        links = links if turned else replace(links, motion=np.zeros_like(links.motion))
+        step = newton_step(self._system, tuple(own), operators, links)
         if step is None:  # stress is not finite
             return np.full_like(strain, np.nan)
         return np.hstack(
@@ -241,10 +248,31 @@ class _Joined:
             if not now > level:
                 break
             way = down + now / last * way
-            along = self.stress(way)
+            along = self.stress(way, turned=False)
             made += now / float((way * along).sum(axis=0) @ volumes) * along
             last = now
         return made
+
+
+def _turned(system: System, state: State) -> Array:
+    """Return the motions (c,) that take from what links turn the stretch of linear rotation [mm].
+
+    A boundary turned by w has the displacements w J (X - c), and I + w J stretches by
+    sqrt(1 + w^2). The logarithm of that is no strain: what holds the boundary draws it back.
+    """
+    links, found = system.links, np.zeros(len(system.links))
+    for k, link in enumerate(system.model.links):
+        if link.rigid is None:
+            continue
+        number, reference = system.part(link.slave[0]), system.part(link.rigid)
+        part, rigid, rows = system.parts[number], system.parts[reference], links.rows[number]
+        assert isinstance(rigid, RigidPart) and rows is not None
+        slave = system.full(link.slave[0]).chain(link.slave[1], any_shape=link.master is None)
+        stretch = math.log1p(rigid.motion_of(state.u[reference]).rotation ** 2) / 2
+        back = np.zeros(part.n)
+        back[part.surface(slave).dofs] = stretch * (rigid.frame.centre[:, None] - slave.X).T.ravel()
+        found += np.where(links.whose == k, rows.block @ back[rows.dofs], 0.0)
+    return found
 
 
 def _product(one: Array, other: Array) -> Array:

@@ -107,6 +107,11 @@ def test_a_surface_goes_before_a_set_of_nodes_of_its_name() -> None:
     assert edges(deck(NODES + SQUARES + data).mesh(None), "Top") == [(0.5, 1.0)]
 
 
+def test_a_surface_of_nodes_may_have_the_name_of_a_set_of_the_same_nodes() -> None:
+    data = "*NSET, NSET=Top\n5, 4\n*SURFACE, NAME=Top, TYPE=NODE\nTop, 1.\n5\n"
+    assert edges(deck(NODES + SQUARES + data).mesh(None), "Top") == [(0.5, 1.0)]
+
+
 def test_numbers_of_nodes_and_elements_may_have_gaps_and_any_order() -> None:
     text = "*ELEMENT, TYPE=CAX4, ELSET=A\n 900, 70, 30, 10, 50\n*NODE\n10, 1, 1\n50, 0, 1\n70,\n"
     mesh = deck(text + "30, 1\n*NSET, NSET=Low\n 30, 70\n").mesh("A")
@@ -229,6 +234,8 @@ def test_collapsed_quadrilaterals_and_triangles_make_a_body_of_triangles() -> No
     ("*NSET, NSET=A, GENERATE\n1, 3, 0\n", "line 18: must have a first and a last number"),
     ("*NSET, NSET=A, GENERATE\n,\n1, 2\n", "line 18: must have a first and a last number"),
     ("*ELEMENT, TYPE=T2D2, ELSET=T\n3, 4, 5\n*SURFACE, NAME=T\n1, S1\n", "line 20: a surface and"),
+    ("*NSET, NSET=T\n4, 5\n*SURFACE, NAME=T, TYPE=NODE\n6\n", "line 20: a surface has other"),
+    ("*SURFACE, NAME=T\n1, S1\n*SURFACE, NAME=t, TYPE=NODE\n6\n", "line 19: the surface t"),
     ("*NSET, NSET=A, INSTANCE=I\n1\n", "line 17: there is no instance I"),
     ("*SURFACE, NAME=A\n1, S5\n", "line 18: S5 must be an edge of a CPS4: S1, S2, S3, S4"),
     ("*ELEMENT, TYPE=MASS\n9, 1\n*SURFACE, NAME=A\n9, S1\n", "line 20: element 9 is MASS, which"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Callable
 from pathlib import Path
 
 import meshio
@@ -141,7 +143,12 @@ def test_curved_sides_of_quad8_stay_curved(tmp_path: Path) -> None:
                 ("quad8", [[0, 2, 5, 3, 1, 2, 4, 3]]),
                 ("triangle", [[0, 1, 4]]),
             ],
-            "all straight or all quadratic, not quad8, triangle",
+            "quadrilaterals of one kind with triangles of the same order.*, not quad8, triangle",
+        ),
+        (
+            SQUARE,
+            [("quad8", [[0, 2, 5, 3, 1, 2, 4, 3]]), ("quad9", [[0, 2, 5, 3, 1, 2, 4, 3, 4]])],
+            "quadrilaterals of one kind with triangles of the same order.*, not quad8, quad9",
         ),
         (None, [("quad", [[0, 1, 4, 3]])], "lie in the xy plane: its z differ by 4 mm"),
     ],
@@ -238,6 +245,35 @@ def test_groups_of_gmsh_that_share_a_name_or_a_cell_or_run_backwards() -> None:
     some = GROUPS.replace("1 0 0 0 1 0 0 1 -1 0", "1 0 0 0 1 0 0 0 0")
     with pytest.raises(ModelError, match=r"no physical group: save it with Mesh\.SaveAll = 0"):
         MeshFile("a.msh", some.encode()).mesh("side")
+
+
+def binary_of_gmsh(text: str) -> bytes:
+    """Return the binary form of GROUPS."""
+    forms = {"Entities": "4qi6dqiqi6dq2iq", "Nodes": "4q3i5q12d", "Elements": "4q3i4q3i6q"}
+    made = text.partition("$Entities")[0].replace("4.1 0 8\n", "4.1 1 8\n\1\0\0\0\n").encode()
+    for name, form in forms.items():
+        numbers = text.partition(f"${name}\n")[2].partition("$")[0].split()
+        values = struct.pack("=" + form, *map(int, numbers))
+        made += b"$%b\n%b\n$End%b\n" % (name.encode(), values, name.encode())
+    return made
+
+
+@pytest.mark.parametrize("form", [str.encode, binary_of_gmsh])
+@pytest.mark.parametrize("named", [2, 1, 0])
+def test_every_group_of_an_entity_of_gmsh_is_read_with_or_without_a_name(
+    form: Callable[[str], bytes], named: int
+) -> None:
+    """A group without a name has its number, also on a line that runs backwards."""
+    text = GROUPS.replace("-1 0\n", "-3 0\n")
+    for number, name in list(enumerate(("whole", "side"), start=1))[named:]:
+        text = text.replace(f'2 {number} "{name}"\n', "")
+    text = text.replace("$PhysicalNames\n3", f"$PhysicalNames\n{1 + named}")
+    mesh = MeshFile("a.msh", form(text)).mesh(None)
+    whole, side = ["whole", "side"][:named] + ["1", "2"][named:]
+    assert {name: len(own) for name, own in mesh.subdomains.items()} == {whole: 1, side: 1}
+    assert mesh.p[1, mesh.facets[:, mesh.boundaries["3"]]] == pytest.approx(0.0)
+    assert set(mesh.boundaries) == {"3", OUTLINE}
+    assert MeshFile("a.msh", form(text)).mesh(side).nelements == 1
 
 
 def test_cells_that_are_there_twice_are_one(tmp_path: Path) -> None:
