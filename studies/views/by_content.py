@@ -48,4 +48,4 @@ def _key(given: object) -> object:
     """Return what stands for an argument: for an array its shape, kind, and digest."""
     if not isinstance(given, np.ndarray):
         return given
-    return given.shape, given.dtype.str, sha256(np.ascontiguousarray(given)).digest()
+    return given.shape, given.dtype.str, sha256(np.ascontiguousarray(given).data).digest()
