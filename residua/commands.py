@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import gc
+import os
 import signal
 import sys
 from collections.abc import Iterator, Sequence
@@ -405,7 +406,7 @@ def _interruption(*others: signal.Signals) -> Iterator[list[int]]:
         if received:
             raise KeyboardInterrupt
         received.append(number)
-        print("\nstopping; finished runs are kept", file=sys.stderr)
+        os.write(2, b"\nstopping; finished runs are kept\n")  # `print` may be what it interrupts
 
     before = {each: signal.signal(each, receive) for each in (signal.SIGINT, *others)}
     try:

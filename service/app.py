@@ -42,7 +42,7 @@ from service.routes.manual import ASSETS
 from service.runner import Runner
 from service.settings import Settings, chosen
 from service.table import Tables
-from service.turns import COMPUTING, READING, Turns
+from service.turns import COMBINING, COMPUTING, READING, Turns
 from studies import Store, StoreBusy, StudyError
 from studies.errors import CatalogueDamaged, StoreFull
 from studies.scratch import remove_left
@@ -134,6 +134,7 @@ def assembled(settings: Settings, store: Store, jobs: Jobs, held: int | None) ->
         "details": Details(jobs, store), "tables": Tables(jobs, store),
         "pictures": Pictures(settings.map_bytes),
         "reading": Turns(READING, budget), "computing": Turns(COMPUTING, budget),
+        "combining": Turns(COMBINING, budget),
     }  # fmt: skip
     app.state.only_shows, app.state.closing = held is None, False
     for name, part in parts.items():

@@ -1,7 +1,8 @@
 """The data set of a study: as its last end left it, and before its first one of the runs there are.
 
 The latter is made in another process, in a folder for temporary files, when somebody asks for it,
-and again when runs have been added. One that took long is made seldom: a study that adds a run each
+and again when runs have been added. For this callers have turns of their own, one at a time, so
+that nothing else waits for it. One that took long is made seldom: a study that adds a run each
 second would keep a processor busy.
 """
 
@@ -13,7 +14,7 @@ import math
 import time
 from collections import OrderedDict
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ SECONDS = 600.0
 """Longest time of making one [s]."""
 
 PATIENCE = 20.0
-"""Time that a request waits for one [s]; then it is told to ask later."""
+"""Longest time that a request waits for one [s]; then the answer is to ask later."""
 
 LARGE = (
     "the data set of the runs that are there takes too long, or too much memory, to be made in "
@@ -53,14 +54,19 @@ class _Offered:
     """A data set: of which state of the catalogue, where it is, and until when it stays.
 
     It is nowhere if none could be made; then it is tried again after this time. If one of more runs
-    cannot be made, the one before stays.
+    cannot be made, the one before stays. Each caller has a task, which waits for the caller's turn.
     """
 
     of: State | None = None
     path: Path | None = None
     until: float = 0.0
     number: int = 0
-    task: asyncio.Task[Path] | None = None
+    tasks: dict[str, asyncio.Task[Path]] = field(default_factory=dict)
+
+    @property
+    def busy(self) -> bool:
+        """Whether a caller waits for it, in its turn."""
+        return not all(each.done() for each in self.tasks.values())
 
 
 class Datasets:
@@ -97,77 +103,89 @@ class Datasets:
             f"no data set yet: it is written when the work ends, and the study is {job.state}"
         )
 
-    async def current(self, job: Job, share: Share) -> Path:
+    async def current(self, job: Job, reading: Share, combining: Share) -> Path:
         """Return the path of that of `ended`, or before the first end of one of the runs there are.
 
         Raise `NotFound` if the study chooses its runs and has not ended, `Busy` if it is made now.
         """
         try:
-            return await asyncio.to_thread(self.ended, job)
+            return await reading.here(self.ended, job)
         except NotFound:
             if job.stood == StudyState.SUCCESSFUL and not job.state.final:
                 raise Busy(AGAIN) from None
-            return await self._partial(job, share)
+            return await self._partial(job, await reading.here(self.jobs.study, job.id), combining)
 
-    async def tiles(self, job: Job, share: Share) -> Tiles:
+    async def tiles(self, job: Job, reading: Share, combining: Share) -> Tiles:
         """Return the current data set of a study as a Zarr store; errors as `current`."""
-        return await asyncio.to_thread(self._tiles, job.id, await self.current(job, share))
+        path = await self.current(job, reading, combining)
+        return await reading.read(self._tiles, job.id, path)
 
     def _tiles(self, study_id: str, path: Path) -> Tiles:
         found = Tiles(path)
         turn = self.jobs.layout_turn(study_id, found.layout)
         return Tiles(path, turn) if turn else found
 
-    async def _partial(self, job: Job, share: Share) -> Path:
+    async def _partial(self, job: Job, study: dict[str, Any], share: Share) -> Path:
         """Return the path of the data set of a study as it is now, or was a little before."""
-        study = await asyncio.to_thread(self.jobs.study, job.id)
         if chooses(study):
             raise NotFound(
                 f"no data set yet: what the study finds is known at its end, and it is {job.state}"
             )
         made = self.made.setdefault(job.id, _Offered())
         self.made.move_to_end(job.id)
-        if made.task is None or made.task.done():
-            made.task = asyncio.create_task(self._current(job.id, study, made, share))
+        if path := self._offered(made):
+            return path
+        task = made.tasks.get(share.caller)
+        if task is None or task.done():
+            task = asyncio.create_task(self._combined(job.id, study, made, share))
+            made.tasks[share.caller] = task
         try:
-            return await asyncio.wait_for(asyncio.shield(made.task), PATIENCE)
+            return await asyncio.wait_for(asyncio.shield(task), PATIENCE)
         except TimeoutError:
             raise Busy("the data set is being made of the runs that are there: ask later") from None
 
-    async def _current(
-        self, study_id: str, content: dict[str, Any], made: _Offered, share: Share
-    ) -> Path:
-        of = await asyncio.to_thread(state_of, self.store.catalogue.path)
+    def _offered(self, made: _Offered) -> Path | None:
+        """Return the data set if it may still be used; raise `Busy` if it may not be made now."""
         began = time.monotonic()
-        if made.path and (made.of == of or began < made.until):
+        if made.path and (began < made.until or made.of == state_of(self.store.catalogue.path)):
             return made.path
         if began < made.until:
             raise Busy(LARGE, math.ceil(made.until - began))
-        if self.folder is None:
-            self.folder = self.folders.enter_context(scratch())
-        target = self.folder / f"{study_id}-{made.number + 1}.nc"
-        given = content, self.store.directory.resolve(), self.store.aside, target
-        try:
-            await share.apart(combined, *given, field="data set", name=study_id, seconds=SECONDS)
-        except StoreFull:  # not the data directory
-            raise OSError(errno.ENOSPC, "no room is left for temporary files") from None
-        except Beyond:
+        return None
+
+    async def _combined(
+        self, study_id: str, content: dict[str, Any], made: _Offered, share: Share
+    ) -> Path:
+        """Return the data set, made in the turn of a caller unless it was made before it."""
+        async with share.turn() as turn:
+            if path := self._offered(made):
+                return path
+            of, began = state_of(self.store.catalogue.path), time.monotonic()
+            if self.folder is None:
+                self.folder = self.folders.enter_context(scratch())
+            target = self.folder / f"{study_id}-{made.number + 1}.nc"
+            given = content, self.store.directory.resolve(), self.store.aside, target
+            try:
+                await turn.apart(combined, *given, field="data set", name=study_id, seconds=SECONDS)
+            except StoreFull:  # not the data directory
+                raise OSError(errno.ENOSPC, "no room is left for temporary files") from None
+            except Beyond:
+                made.until = rested(began)
+                if made.path is None:
+                    raise Busy(LARGE, math.ceil(made.until - time.monotonic())) from None
+                return made.path
+            finally:
+                for part in target.parent.glob(f"{target.name}.*"):  # of a process that was ended
+                    part.unlink(missing_ok=True)
+            made.of, made.path, made.number = of, target, made.number + 1
             made.until = rested(began)
-            if made.path is None:
-                raise Busy(LARGE, math.ceil(made.until - time.monotonic())) from None
-            return made.path
-        finally:
-            for part in target.parent.glob(f"{target.name}.*"):  # of a process that was ended
-                part.unlink(missing_ok=True)
-        made.of, made.path, made.number = of, target, made.number + 1
-        made.until = rested(began)
-        self._forget(study_id, made.number - 2)  # the one before may still be sent
-        self._keep_few(study_id)
-        return target
+            self._forget(study_id, made.number - 2)  # the one before may still be sent
+            self._keep_few(study_id)
+            return target
 
     def _keep_few(self, latest: str) -> None:
         """Delete what was asked for longest ago; what is being made, and the latest, stay."""
-        rest = [each for each, old in self.made.items() if old.task is None or old.task.done()]
+        rest = [each for each, old in self.made.items() if not old.busy]
         over = max(len(self.made) - KEPT, 0)
         for gone in [each for each in rest if each != latest][:over]:
             self._forget(gone, self.made.pop(gone).number)

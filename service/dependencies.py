@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Callable, Coroutine
+from functools import partial, wraps
+from inspect import Parameter, signature
+from typing import Annotated, Any, TypeVar
 
 from fastapi import Depends, Request
 
@@ -24,6 +27,8 @@ from service.settings import Settings
 from service.table import Tables
 from service.turns import Share
 from studies import Store
+
+Found = TypeVar("Found")
 
 
 def held(name: str) -> Any:
@@ -56,16 +61,8 @@ TheTables = Annotated[Tables, held("tables")]
 
 
 def get_job(study_id: ContentId, jobs: TheJobs) -> Job:
-    """Return the study named in the path."""
+    """Return the study named in the path: a row of the queue, so that it needs no turn."""
     return jobs.get(study_id)
-
-
-def get_run(run_id: ContentId, store: TheStore) -> dict[str, Any]:
-    """Return the catalogue's row of the run in the path, whose file has been verified."""
-    row = store.run(run_id)
-    if row is None:
-        raise NotFound(f"no run has the id {run_id}")
-    return row
 
 
 async def get_caller(request: Request) -> Scope | None:
@@ -85,6 +82,32 @@ def share(name: str) -> Any:
 
 TheReading = Annotated[Share, share("reading")]
 TheComputing = Annotated[Share, share("computing")]
+TheCombining = Annotated[Share, share("combining")]
+
+
+def in_turn(function: Callable[..., Found]) -> Callable[..., Coroutine[Any, Any, Found]]:
+    """Return a route that calls a plain function in the caller's turn to read."""
+
+    @wraps(function)
+    async def route(*, its_turn: Share, **given: Any) -> Found:
+        return await its_turn.here(partial(function, **given))
+
+    known = signature(function, eval_str=True)
+    own = Parameter("its_turn", Parameter.KEYWORD_ONLY, annotation=TheReading)
+    route.__signature__ = known.replace(  # type: ignore[attr-defined]
+        parameters=[*known.parameters.values(), own]
+    )
+    return route
+
+
+async def get_run(run_id: ContentId, store: TheStore, reading: TheReading) -> dict[str, Any]:
+    """Return the catalogue's row of the run in the path, whose file has been verified."""
+    row = await reading.here(store.run, run_id)
+    if row is None:
+        raise NotFound(f"no run has the id {run_id}")
+    return row
+
+
 TheCaller = Annotated[Scope | None, Depends(get_caller)]
 TheJob = Annotated[Job, Depends(get_job)]
 TheRun = Annotated[dict[str, Any], Depends(get_run)]

@@ -58,7 +58,7 @@ class Busy(RuntimeError):
 
     def __init__(self, reason: str, seconds: int = 10) -> None:
         super().__init__(reason)
-        self.later = {"retry-after": str(seconds)}
+        self.seconds, self.later = seconds, {"retry-after": str(seconds)}
 
 
 class TooMany(Busy):

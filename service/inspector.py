@@ -50,7 +50,7 @@ class Inspector:
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
-        self.told = ""
+        self.reported = ""
 
     async def inspect(
         self, text: bytes, meshes: Mapping[str, bytes], share: Share
@@ -72,14 +72,14 @@ class Inspector:
                 allowed = f"must be the name of a file and end in one of {', '.join(known)}"
                 raise StudyError("meshes", name, allowed)
         slow = SLOW * self.seconds
-        async with share.turns.turn(share.caller) as turn:
-            left, files = min(turn.left, self.seconds), {**meshes, _FILE: text}
+        async with share.turn() as turn:
+            most, files = min(turn.remaining, self.seconds), {**meshes, _FILE: text}
             answer = await turn.apart(
-                inspected, files, left, field="scene", name=_FILE, seconds=slow
+                inspected, files, most, field="scene", name=_FILE, seconds=slow
             )
-        if answer.failed == errno.ETIME and left < self.seconds:
-            share.turns.left(share.caller)
-            raise TooMany("too little processor time was left: ask later", ceil(MINUTE))
+        if answer.failed == errno.ETIME and most < self.seconds:
+            share.turns.remaining(share.caller)
+            raise TooMany("too little processor time remained: ask later", ceil(MINUTE))
         found = self._read(answer)
         if mistakes := found.get("mistakes"):
             raise SceneError(_FILE, [StudyError(*each) for each in mistakes], found["count"])
@@ -88,8 +88,8 @@ class Inspector:
         return KeptScene(**found["scene"]), Description(_FILE, found["content"], given)
 
     def _read(self, answer: Answer) -> dict[str, Any]:
-        if answer.open != self.told:
-            self.told = answer.open
+        if answer.open != self.reported:
+            self.reported = answer.open
             log.warning("this system does not take from a process that reads: %s", answer.open)
         if answer.failed == errno.ENOSPC:
             raise OSError(errno.ENOSPC, "no room is left for temporary files")
@@ -114,7 +114,7 @@ def inspected(files: Mapping[str, bytes], seconds: float) -> Answer:
     with scratch() as folder:
         for name, data in files.items():
             (folder / name).write_bytes(data)
-        return alone(_told, folder, folder=folder, seconds=seconds)
+        return alone(_checked, folder, folder=folder, seconds=seconds)
 
 
 def drawn(directory: Path, name: str, query: SketchQuery) -> bytes:
@@ -132,7 +132,7 @@ def pictured(directory: Path, content: dict[str, Any]) -> bytes:
     return draw_scene(first.scene, first.values, SketchQuery())
 
 
-def _told(folder: Path) -> str:
+def _checked(folder: Path) -> str:
     """Return the scene in a folder and its content, or its mistakes, as JSON."""
     answer: dict[str, Any]
     try:

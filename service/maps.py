@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fastapi.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
 
@@ -46,7 +45,7 @@ class Pictures:
         """Return the picture with this tag, drawn in the turn of a caller unless it is kept."""
         picture = self._kept(tag)
         if picture is None:
-            async with share.turns.turn(share.caller) as turn:
+            async with share.turn() as turn:
                 picture = self._kept(tag)  # it may have been drawn meanwhile
                 if picture is None:
                     picture = await turn.apart(draw, *given, field="picture", name=name)
@@ -90,12 +89,13 @@ class Pictures:
         request: Request,
         path: Path,
         query: Drawn,
-        share: Share,
+        reading: Share,
+        computing: Share,
         draw: Callable[[Path, Drawn], bytes],
     ) -> Response:
         """Return the answer with a picture of the file of a run or a study."""
-        what = path.name, await run_in_threadpool(digest, path), query
-        return await self.answer(request, what, share, draw, path, query, name=path.stem)
+        what = path.name, await reading.here(digest, path), query
+        return await self.answer(request, what, computing, draw, path, query, name=path.stem)
 
 
 def draw_map(path: Path, query: MapQuery) -> bytes:

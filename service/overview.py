@@ -11,12 +11,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from anyio.to_thread import run_sync
 
 from service.job import Job
 from service.jobs import Jobs
 from service.scenes import scene_name
 from service.schemas import StudyDetail, StudyRun, StudySummary, Window
+from service.turns import Share
 from studies import Store
 from studies.definition.sweep import labels, positions
 from studies.definition.vocabulary import taken
@@ -59,16 +59,16 @@ class Details:
         self.store = store
         self.kept: OrderedDict[tuple[str, int, int], Detail] = OrderedDict()
 
-    async def get(self, study_id: str, window: Window) -> bytes:
-        """Return a study, with those of its runs that are in ``window``."""
+    async def get(self, study_id: str, window: Window, share: Share) -> bytes:
+        """Return a study, with those of its runs that are in ``window``, in a caller's turn."""
         requested = time.monotonic()
         key = study_id, window.limit, window.offset
         detail = self.kept.setdefault(key, Detail())
         self.kept.move_to_end(key)
         try:
-            async with detail.one:
+            async with share.turn() as turn, detail.one:
                 if detail.looked < requested:
-                    await run_sync(self._look, study_id, window, detail)
+                    await turn.here(self._look, study_id, window, detail)
             return detail.content
         finally:
             if not detail.content:

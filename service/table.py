@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from fastapi.concurrency import run_in_threadpool
 
 from service.job import Job
 from service.jobs import Jobs
@@ -46,14 +45,12 @@ class Tables:
 
     async def get(self, study_id: str, share: Share) -> RunTable:
         """Return the table of a study, made in the turn of a caller unless it is kept."""
-        job, state = await run_in_threadpool(self._state, study_id)
-        table = self._known(study_id, state)
-        if table is None:
-            async with share.turns.turn(share.caller) as turn:
-                table = self._known(study_id, state)  # it may have been made meanwhile
-                if table is None:
-                    table = await turn.here(self._made, job)
-                    self.kept[study_id] = state, table
+        async with share.turn() as turn:
+            job, state = await turn.here(self._state, study_id)
+            known, table = self.kept.get(study_id, (None, None))
+            if table is None or known != state:
+                table = await turn.here(self._made, job)
+        self.kept[study_id] = state, table
         self.kept.move_to_end(study_id)
         while len(self.kept) > KEPT:
             self.kept.popitem(last=False)
@@ -64,10 +61,6 @@ class Tables:
         job = self.jobs.get(study_id)
         asked = job.state, job.stage  # its runs may not all be known yet
         return job, (job.turn, job.size, job.digest, asked, state_of(self.store.catalogue.path))
-
-    def _known(self, study_id: str, state: object) -> RunTable | None:
-        known, table = self.kept.get(study_id, (None, None))
-        return table if known == state else None
 
     def _made(self, job: Job) -> RunTable:
         study, runs = self.jobs.study(job.id), self.jobs.runs(job.id)

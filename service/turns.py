@@ -19,9 +19,9 @@ import resource
 import signal
 import time
 from collections import Counter
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
+from dataclasses import dataclass, replace
 from io import BytesIO
 from math import ceil, inf
 from pathlib import Path
@@ -36,8 +36,8 @@ from service.errors import Busy, TooMany
 from solver.files import read_file
 from studies import StudyError
 
-READING, COMPUTING = 2, 2
-"""Number of calls at a time."""
+READING, COMPUTING, COMBINING = 2, 2, 1
+"""Number of calls at a time: answers wait for none of the data sets that are combined meanwhile."""
 
 FILES = Lock()
 """Held while a file is read: the netCDF library ends the process if two threads do it."""
@@ -81,7 +81,7 @@ def memory(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path("/sys/
 
 
 BYTES = min(max(memory() // 5, 2**30), 8 * 2**30)
-"""Address space of a process [bytes]: the service, two of them and studies share the memory."""
+"""Address space of a process [bytes]: the service, three of them and studies share the memory."""
 
 
 class Turns:
@@ -91,28 +91,40 @@ class Turns:
     ----------
     slots : number of calls at a time
     seconds : processor time that a caller may take in a minute [s]; None where there is one caller,
-        who has all slots and no limit
+        who has all slots and no limits
     """
 
     def __init__(self, slots: int, seconds: float | None = None) -> None:
         self.slots, self.seconds = CapacityLimiter(slots), seconds
         self.own: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
         self.waiting = Counter[str]()
-        self.even: dict[str, float] = {}
+        self.refilled: dict[str, float] = {}
+        """Time at which the budget of a caller is whole again [s]."""
 
     @asynccontextmanager
-    async def turn(self, caller: str) -> AsyncIterator[Turn]:
+    async def turn(self, caller: str, patient: bool = False) -> AsyncIterator[Turn]:
         """Give a caller its turn: those who wait are served in order, one call of each.
 
         What it takes is charged to the caller.
+
+        Parameters
+        ----------
+        patient : wait for the budget, and do not refuse: the answer has begun, or is part of one
 
         Raises
         ------
         TooMany
             if too many calls of the caller wait, or its budget is used
         """
-        self.left(caller)
-        if self.waiting[caller] >= WAITING:
+        while True:
+            try:
+                self.remaining(caller)
+                break
+            except TooMany as error:
+                if not patient:
+                    raise
+                await asyncio.sleep(error.seconds)
+        if self.seconds is not None and self.waiting[caller] >= WAITING and not patient:
             raise TooMany(f"{WAITING} of your requests wait already: ask later")
         self.waiting[caller] += 1
         own = asyncio.Lock()
@@ -120,7 +132,7 @@ class Turns:
             own = self.own.setdefault(caller, own)
         try:
             async with own, self.slots:
-                turn = Turn(self.left(caller))
+                turn = Turn(inf if patient else self.remaining(caller))
                 try:
                     yield turn
                 finally:
@@ -129,24 +141,28 @@ class Turns:
             self.waiting[caller] -= 1
             self.waiting += Counter()  # forgets those that have none
 
-    def left(self, caller: str) -> float:
-        """Return the processor time that a caller has left [s]; raise `TooMany` without any."""
+    def remaining(self, caller: str) -> float:
+        """Return the processor time that a caller may still take [s]; raise `TooMany` without any.
+
+        The budget refills steadily, in a minute from nothing.
+        """
         if self.seconds is None:
             return inf
-        whole = max(self.even.get(caller, 0.0) - time.monotonic(), 0.0)
-        left, least = self.seconds * (1.0 - whole / MINUTE), min(1.0, self.seconds / 2)
-        if left < least:
+        until = max(self.refilled.get(caller, 0.0) - time.monotonic(), 0.0)
+        remaining, least = self.seconds * (1.0 - until / MINUTE), min(1.0, self.seconds / 2)
+        if remaining < least:
             used = f"{self.seconds:g} s of processor time in a minute are used"
-            raise TooMany(f"{used}: ask later", ceil((least - left) / self.seconds * MINUTE))
-        return left
+            later = ceil((least - remaining) / self.seconds * MINUTE)
+            raise TooMany(f"{used}: ask later", later)
+        return remaining
 
     def charge(self, caller: str, seconds: float) -> None:
         """Take time from the budget of a caller."""
         if self.seconds is not None:
             now = time.monotonic()
-            self.even = {name: at for name, at in self.even.items() if at > now}
-            even = self.even.get(caller, now) + seconds / self.seconds * MINUTE
-            self.even[caller] = min(even, now + 2 * MINUTE)
+            self.refilled = {name: at for name, at in self.refilled.items() if at > now}
+            refilled = self.refilled.get(caller, now) + seconds / self.seconds * MINUTE
+            self.refilled[caller] = min(refilled, now + 2 * MINUTE)
 
 
 @dataclass(slots=True)
@@ -155,11 +171,11 @@ class Turn:
 
     Attributes
     ----------
-    left : processor time that the caller has left [s]
+    remaining : processor time that the caller may take [s]
     spent : processor time that the turn has taken [s]
     """
 
-    left: float
+    remaining: float
     spent: float = 0.0
 
     async def here(self, function: Callable[..., Found], *given: object) -> Found:
@@ -228,15 +244,27 @@ class Share:
     Attributes
     ----------
     turns, caller : the slots, and whose share it is
+    patient : as of `Turns.turn`
     """
 
     turns: Turns
     caller: str
+    patient: bool = False
+
+    def turn(self) -> AbstractAsyncContextManager[Turn]:
+        """Give the caller its turn."""
+        return self.turns.turn(self.caller, self.patient)
 
     async def here(self, function: Callable[..., Found], *given: object) -> Found:
         """Return what `Turn.here` does, in the caller's turn."""
-        async with self.turns.turn(self.caller) as turn:
+        async with self.turn() as turn:
             return await turn.here(function, *given)
+
+    async def each(self, pieces: Iterator[Found]) -> AsyncIterator[Found]:
+        """Yield the pieces of an answer that has begun, each made in a turn."""
+        share = replace(self, patient=True)
+        while (piece := await share.here(next, pieces, None)) is not None:
+            yield piece
 
     async def read(self, function: Callable[..., Found], *given: object) -> Found:
         """Return what a function returns that opens files, called while no other one does."""
@@ -249,7 +277,7 @@ class Share:
 
     async def apart(self, function: Callable[..., Found], *given: object, **limits: Any) -> Found:
         """Return what `Turn.apart` does, in the caller's turn."""
-        async with self.turns.turn(self.caller) as turn:
+        async with self.turn() as turn:
             return await turn.apart(function, *given, **limits)
 
 

@@ -261,17 +261,16 @@ class RemoteStudy:
 
         Parameters
         ----------
-        lazy : read values when they are used, if zarr is installed here (the extra ``zarr``);
-            otherwise the whole data set is fetched
+        lazy : read values when they are used, if zarr is installed here (the extra ``zarr``). The
+            service checks the seal of its file; the parts that arrive have none. Otherwise the
+            whole data set is fetched, and its seal is checked here
         """
         import xarray as xr
 
         from studies.views.reading import indexed, loaded
 
         if lazy and _has_zarr():
-            self.client.ask(
-                "GET", f"{self._path}/zarr/zarr.json"
-            )  # an error is told by the service
+            self.client.ask("GET", f"{self._path}/zarr/zarr.json")  # reports the service's error
             options = {"headers": self.client.headers}
             return indexed(xr.open_zarr(f"{self.url}/zarr", chunks=None, storage_options=options))
         content = self.client.ask("GET", f"{self._path}/dataset.nc").content

@@ -12,7 +12,15 @@ from fastapi import APIRouter, File, Request, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse, RedirectResponse
 
-from service.dependencies import TheComputing, TheExaminer, TheInspector, TheKeeper, TheStore
+from service.dependencies import (
+    TheComputing,
+    TheExaminer,
+    TheInspector,
+    TheKeeper,
+    TheReading,
+    TheStore,
+    in_turn,
+)
 from service.errors import NoRoom
 from service.examiner import Examined
 from service.inspector import pictured
@@ -34,6 +42,7 @@ LISTED = 25
 
 
 @router.get("/new")
+@in_turn
 def new_page(request: Request, store: TheStore, scene: str = USUAL) -> Response:
     """Show the form of a new study; parameters in the address fill it."""
     given = _given(request.query_params.multi_items())
@@ -49,15 +58,17 @@ def _given(fields: Iterable[tuple[str, object]]) -> dict[str, list[str]]:
 
 
 @router.get("/scene.png")
-async def draw_scene(request: Request, store: TheStore, computing: TheComputing) -> Response:
+async def draw_scene(
+    request: Request, store: TheStore, reading: TheReading, computing: TheComputing
+) -> Response:
     """Draw the scene of the first run that the fields describe; of a scene without a model nothing.
 
     A page asks for what may not be there, which no browser takes for an error.
     """
     given = _given(request.query_params.multi_items())
     name = given.get("scene", [""])[0]
-    scene = await run_in_threadpool(known_scene, store, name)
-    content, wrong = await run_in_threadpool(form.study_of, name, scene, given)
+    scene = await reading.here(known_scene, store, name)
+    content, wrong = await reading.here(form.study_of, name, scene, given)
     for field, allowed in wrong.items():
         raise StudyError(field, given.get(f"p.{field}"), allowed)
     try:
@@ -77,6 +88,7 @@ async def take_scene(
     inspector: TheInspector,
     keeper: TheKeeper,
     store: TheStore,
+    reading: TheReading,
     computing: TheComputing,
     meshes: Annotated[list[UploadFile], File(default_factory=list)],
 ) -> Response:
@@ -88,7 +100,7 @@ async def take_scene(
         )
     except StudyError as error:
         refused = {"file": scene.filename or "", "mistakes": error.listed}
-        return await run_in_threadpool(_form, request, store, USUAL, {}, {}, None, refused)
+        return await reading.here(_form, request, store, USUAL, {}, {}, None, refused)
     where = request.url_for("new_page").include_query_params(scene=found.id)
     return RedirectResponse(f"{where.path}?{where.query}", HTTPStatus.SEE_OTHER)
 
@@ -99,13 +111,14 @@ async def make(
     store: TheStore,
     examiner: TheExaminer,
     keeper: TheKeeper,
+    reading: TheReading,
     computing: TheComputing,
 ) -> Response:
-    """Tell what a study costs and what is wrong in the form, or accept the study and show it."""
+    """Show what a study costs and what is wrong in the form, or accept the study and show it."""
     given = _given((await request.form()).multi_items())
     scene_name = given.get("scene", [""])[0]
-    scene = await run_in_threadpool(known_scene, store, scene_name)
-    content, wrong = await run_in_threadpool(form.study_of, scene_name, scene, given)
+    scene = await reading.here(known_scene, store, scene_name)
+    content, wrong = await reading.here(form.study_of, scene_name, scene, given)
     found: Examined | None = None
     if not wrong:
         try:
@@ -122,7 +135,7 @@ async def make(
     if "application/json" in request.headers.get("accept", ""):
         costs = None if found is None else dataclasses.asdict(found.estimate)
         return JSONResponse({"wrong": wrong, "estimate": costs, **_copies(request, content, scene)})
-    return await run_in_threadpool(_form, request, store, scene_name, given, wrong, found)
+    return await reading.here(_form, request, store, scene_name, given, wrong, found)
 
 
 def _copies(request: Request, content: dict[str, Any], scene: Scene) -> dict[str, str]:

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Form, Query, Request, Response
-from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import RedirectResponse
 
 from service import overview
@@ -33,6 +32,7 @@ from service.dependencies import (
     TheRunner,
     TheStore,
     TheTables,
+    in_turn,
 )
 from service.errors import Busy, Conflict, NotFound
 from service.job import Job, StudyState
@@ -45,7 +45,7 @@ from service.pages.run import audited, numbers_shown, parameters_shown
 from service.routes.health import health
 from service.routes.numbers import outlined
 from service.scenes import scene_name, scene_of
-from service.schemas import ContentId, StudyFilter, Window
+from service.schemas import ContentId, Health, StudyFilter, Window
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
@@ -68,13 +68,13 @@ KEPT = 16
 
 
 @home.get("/")
-def lead(request: Request) -> Response:
+async def lead(request: Request) -> Response:
     """Lead to the pages."""
     return RedirectResponse(request.url_for("studies_page").path, HTTPStatus.SEE_OTHER)
 
 
 @router.get("/static/{version}/{name}")
-def get_asset(version: str, name: str, request: Request) -> Response:
+async def get_asset(version: str, name: str, request: Request) -> Response:
     """Return a static file."""
     found = asset(version, name)
     if found is None:
@@ -86,6 +86,7 @@ def get_asset(version: str, name: str, request: Request) -> Response:
 
 
 @router.get("")
+@in_turn
 def studies_page(
     request: Request,
     jobs: TheJobs,
@@ -140,13 +141,13 @@ async def study_page(
     reading: TheReading,
 ) -> Response:
     """Show a study: what it found, numbers over its sweep, one of its runs, a part of its table."""
-    study = json.loads(await details.get(study_id, Window(limit=1)))
+    study = json.loads(await details.get(study_id, Window(limit=1), reading))
     found = None
     if overview.chooses(study):
         with suppress(Busy, NotFound):  # it is there at the end
             found = await reading.read(_found, tables.jobs.get(study_id), datasets)
     table = await tables.get(study_id, reading)
-    return await run_in_threadpool(_study, request, study, tables.store, table, found)
+    return await reading.here(_study, request, study, tables.store, table, found)
 
 
 def _found(job: Job, datasets: Datasets) -> Found | None:
@@ -236,7 +237,7 @@ def _cell(column: Any, at: int) -> str:
 async def run_page(run: TheRun, request: Request, store: TheStore, reading: TheReading) -> Response:
     """Show a run: its maps and lines, its numbers, its audit."""
     drawn = await reading.read(outlined, store.run_path(run["id"]))
-    return await run_in_threadpool(_run, request, run, store, drawn)
+    return await reading.here(_run, request, run, store, drawn)
 
 
 def _run(
@@ -264,6 +265,7 @@ def _scene_of_run(store: Store, name: str) -> Scene | None:
 
 
 @router.get("/compare")
+@in_turn
 def compare_page(
     request: Request, store: TheStore, run: Annotated[list[str] | None, Query()] = None
 ) -> Response:
@@ -290,20 +292,24 @@ async def health_page(
     store: TheStore,
     probe: TheProbe,
     caller: TheCaller,
+    reading: TheReading,
 ) -> Response:
     """Show the queue and whether the service can do its work."""
     state = await health(runner, jobs, store, probe, caller, Response())
-    states = await run_in_threadpool(jobs.states)
-    runs = await run_in_threadpool(store.catalogue.counts)
+    return await reading.here(_health, request, jobs, store, state)
+
+
+def _health(request: Request, jobs: Jobs, store: Store, state: Health) -> Response:
     queue = []
     for wanted in (StudyState.RUNNING, StudyState.ACCEPTED):
-        found, _ = await run_in_threadpool(jobs.page, limit=50, offset=0, state=wanted)
+        found, _ = jobs.page(limit=50, offset=0, state=wanted)
         queue += [overview.summary(job) for job in found]
+    states, runs = jobs.states(), store.catalogue.counts()
     return page(request, "health", health=state, states=states, runs=runs, queue=queue)
 
 
 @router.get("/sign-in")
-def sign_in(request: Request, then: str = "") -> Response:
+async def sign_in(request: Request, then: str = "") -> Response:
     """Show the form for a key."""
     return page(request, "sign-in", then=inside(request, then), refused=False)
 
@@ -359,8 +365,8 @@ def again(study_id: ContentId, request: Request, jobs: TheJobs) -> Response:
 
 
 @router.get("/{rest:path}")
-def nothing(rest: str, request: Request) -> Response:
+async def nothing(rest: str, request: Request) -> Response:
     """Say that there is no such page."""
     if not rest:
-        return lead(request)
+        return await lead(request)
     raise NotFound(f"there is no page {ROOT}/{rest[:100]}")

@@ -27,12 +27,12 @@ SCRIPT = 'SwaggerUIBundle({url: "openapi.json", dom_id: "#page", deepLinking: tr
 
 
 @router.get("")
-def page() -> HTMLResponse:
+async def page() -> HTMLResponse:
     """Return the page."""
     return HTMLResponse(PAGE)
 
 
 @router.get("/start.js")
-def start() -> Response:
+async def start() -> Response:
     """Return the script that starts it."""
     return Response(SCRIPT, media_type="text/javascript")

@@ -11,7 +11,6 @@ from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, HTTPException, Query, Request, Response
-from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 import solver
@@ -66,17 +65,18 @@ async def table(
 
     Beside the queries named below, every column is one: `?friction=0.1..0.4&hardening=none`. In CSV
     a text that a spreadsheet would take for a formula has an apostrophe before it. JSON has an
-    object for each run in `rows`; `columns` tells meaning and unit. Parquet needs pyarrow.
+    object for each run in `rows`; `columns` states meaning and unit. Parquet needs pyarrow.
     """
     ending = request.scope["path"].rpartition(".")[2]
     if ending == "parquet" and find_spec("pyarrow") is None:
         raise HTTPException(HTTPStatus.NOT_ACCEPTABLE, MISSING)
     found = await tables.get(study_id, reading)
-    at = await run_in_threadpool(found.chosen, which.sort, which.selection)
+    at = await reading.here(found.chosen, which.sort, which.selection)
     names = dict.fromkeys(which.columns.split(",") if which.columns else found.columns)
     form, columns = FORMS[ending], [found.column(name) for name in names]
     named = {"content-disposition": f'attachment; filename="table.{ending}"'}
-    return StreamingResponse(form.write(columns, at), media_type=form.media_type, headers=named)
+    pieces = reading.each(form.write(columns, at))
+    return StreamingResponse(pieces, media_type=form.media_type, headers=named)
 
 
 @router.get("/studies/{study_id}/numbers", tags=["studies"], responses={**OCTETS, **REFUSED})
@@ -93,12 +93,12 @@ async def numbers(
     column is a query, as of the table; `at` has the positions of the runs that meet them.
     """
     found = await tables.get(study_id, reading)
-    content = await run_in_threadpool(_numbers, found, which)
+    content = await reading.here(_numbers, found, which)
     return Response(content, media_type=MEDIA_TYPE)
 
 
 def _numbers(found: RunTable, which: NumbersFilter) -> bytes:
-    """Return what `numbers` tells."""
+    """Return the answer of `numbers`."""
     at = found.chosen("", which.selection)
     arrays, words = {"at": at}, {}
     for each in dict.fromkeys(which.name):
@@ -116,30 +116,30 @@ def _numbers(found: RunTable, which: NumbersFilter) -> bytes:
 
 
 @router.get("/studies/{study_id}/audit", tags=["studies"])
-async def tell_audit(
+async def get_audit(
     study_id: ContentId, tables: TheTables, reading: TheReading
 ) -> list[AuditFigure]:
     """Return the largest value of each figure of the audit, the nearest to its limit first.
 
     Figures whose limit depends on the run are left out.
     """
-    return await run_in_threadpool(_audit, await tables.get(study_id, reading))
+    return await reading.here(_audit, await tables.get(study_id, reading))
 
 
 def _audit(table: RunTable) -> list[AuditFigure]:
-    """Return what `tell_audit` tells."""
+    """Return the answer of `get_audit`."""
     found = worst({each.name: each.values for each in table.numbers})
     runs = table.columns[RUN].values
     places = {each.name: each.values for each in varied(table)}
 
-    def told(each: Worst) -> AuditFigure:
+    def figure(each: Worst) -> AuditFigure:
         words, run = table.columns[each.name].words, runs[each.at]
         at = {name: values[each.at] for name, values in places.items()}
         return AuditFigure(
             name=each.name, words=words, value=each.value, limit=each.limit, run=run, at=at
         )
 
-    return [*map(told, found)]
+    return [*map(figure, found)]
 
 
 @router.get("/runs/{run_id}/fields", tags=["runs"])
@@ -165,10 +165,10 @@ async def values(
 
     With `minus`, the map of another run is subtracted at the points of this one.
     """
-    if minus and await run_in_threadpool(store.run, minus) is None:
+    if minus and await reading.here(store.run, minus) is None:
         raise StudyError("minus", minus, "must be the id of a run")
     files = [store.run_path(each) for each in (run["id"], minus) if each]
-    digests = await run_in_threadpool(lambda: [*map(digest, files)])
+    digests = await reading.here(lambda: [*map(digest, files)])
     headers = tagged((solver.__version__, digests, field, component, stage))
     if known := unchanged(request, headers):
         return known

@@ -11,7 +11,15 @@ from fastapi.responses import FileResponse
 from starlette.convertors import StringConvertor, register_url_convertor
 
 from service import maps
-from service.dependencies import TheComputing, TheKeeper, ThePictures, TheRun, TheStore
+from service.dependencies import (
+    TheComputing,
+    TheKeeper,
+    ThePictures,
+    TheReading,
+    TheRun,
+    TheStore,
+    in_turn,
+)
 from service.errors import REFUSED
 from service.files import NETCDF, netcdf
 from service.maps import PICTURE
@@ -36,6 +44,7 @@ register_url_convertor("stem", Stem())
 
 
 @router.get("", responses=REFUSED)
+@in_turn
 def list_runs(which: Annotated[RunFilter, Query()], store: TheStore) -> RunPage:
     """List the runs that match, in order of creation, whichever study they belong to.
 
@@ -46,7 +55,7 @@ def list_runs(which: Annotated[RunFilter, Query()], store: TheStore) -> RunPage:
 
 
 @router.get("/{run_id}.nc", responses=NETCDF)
-def fetch_run(run: TheRun, store: TheStore) -> FileResponse:
+async def fetch_run(run: TheRun, store: TheStore) -> FileResponse:
     """Return the data set of a run."""
     return netcdf(store.run_path(run["id"]), f"{run['id']}.nc")
 
@@ -77,7 +86,7 @@ def nodal_fields(path: Path, stage: str | None) -> bytes:
 
 
 @router.get("/{run_id:stem}")
-def get_run(run: TheRun) -> Run:
+async def get_run(run: TheRun) -> Run:
     """Return the outcome and the figures of a run."""
     return Run(**run)
 
@@ -94,12 +103,13 @@ async def draw_map(
     query: Annotated[MapQuery, Query()],
     store: TheStore,
     pictures: ThePictures,
+    reading: TheReading,
     computing: TheComputing,
     request: Request,
 ) -> Response:
     """Draw a field of a run around the contact."""
     path = store.run_path(run["id"])
-    return await pictures.of_file(request, path, query, computing, maps.draw_map)
+    return await pictures.of_file(request, path, query, reading, computing, maps.draw_map)
 
 
 @router.get("/{run_id}/line.png", responses={**PICTURE, **REFUSED})
@@ -108,6 +118,7 @@ async def draw_lines(
     query: Annotated[LineQuery, Query()],
     store: TheStore,
     pictures: ThePictures,
+    reading: TheReading,
     computing: TheComputing,
     request: Request,
 ) -> Response:
@@ -116,4 +127,4 @@ async def draw_lines(
     Beside the queries named below, every dimension of the field is one: `?stage=loaded&pass=2`.
     """
     path = store.run_path(run["id"])
-    return await pictures.of_file(request, path, query, computing, maps.draw_lines)
+    return await pictures.of_file(request, path, query, reading, computing, maps.draw_lines)

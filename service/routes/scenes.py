@@ -8,7 +8,15 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, File, Query, Request, Response, UploadFile
 
-from service.dependencies import TheComputing, TheInspector, TheKeeper, ThePictures, TheStore
+from service.dependencies import (
+    TheComputing,
+    TheInspector,
+    TheKeeper,
+    ThePictures,
+    TheReading,
+    TheStore,
+    in_turn,
+)
 from service.errors import REFUSED
 from service.inspector import drawn
 from service.maps import PICTURE
@@ -27,6 +35,7 @@ FIRST_WORDS = (
 
 
 @router.get("")
+@in_turn
 def list_scenes(which: Annotated[Window, Query()], store: TheStore) -> list[SceneSummary]:
     """List the scenes: those of the product, of installed packages, then the latest posted ones."""
     known = [*known_scenes()]
@@ -77,6 +86,7 @@ async def post_scene(
 
 
 @router.get("/{name}")
+@in_turn
 def get_scene(name: str, store: TheStore) -> dict[str, Any]:
     """Return the JSON Schema of a scene's parameters, with units, ranges and defaults.
 
@@ -95,6 +105,7 @@ async def draw_scene(
     query: Annotated[SketchQuery, Query()],
     store: TheStore,
     pictures: ThePictures,
+    reading: TheReading,
     computing: TheComputing,
     request: Request,
 ) -> Response:
@@ -103,8 +114,8 @@ async def draw_scene(
     Beside the queries named below, every parameter of the scene is one: `?friction=0.3`. `name` is
     that of a scene, or the id of a posted one.
     """
-    known = await asyncio.to_thread(store.scene_id, name)
-    await asyncio.to_thread(known_scene, store, known)
+    known = await reading.here(store.scene_id, name)
+    await reading.here(known_scene, store, known)
     what, given = (known, query), (store.directory, known, query)
     return await pictures.answer(request, what, computing, drawn, *given, name=known)
 

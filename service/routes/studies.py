@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from http import HTTPStatus
 from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query, Request, Response
-from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse, PlainTextResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import WithJsonSchema
@@ -18,6 +18,7 @@ from pydantic import WithJsonSchema
 from service import maps, overview
 from service.datasets import Datasets
 from service.dependencies import (
+    TheCombining,
     TheComputing,
     TheDatasets,
     TheDetails,
@@ -30,6 +31,7 @@ from service.dependencies import (
     TheRunner,
     TheSettings,
     TheStore,
+    in_turn,
 )
 from service.errors import REFUSED, Conflict, NotFound, QueueLost
 from service.files import NETCDF, UNCHANGED, netcdf, tagged, unchanged
@@ -117,6 +119,7 @@ async def submit(
 
 
 @router.get("")
+@in_turn
 def list_studies(which: Annotated[StudyFilter, Query()], jobs: TheJobs) -> StudyPage:
     """List studies, the latest first."""
     page, total = jobs.page(
@@ -128,10 +131,13 @@ def list_studies(which: Annotated[StudyFilter, Query()], jobs: TheJobs) -> Study
 
 @router.get("/{study_id}", response_model=StudyDetail)
 async def get_study(
-    study_id: ContentId, window: Annotated[Window, Query()], details: TheDetails
+    study_id: ContentId,
+    window: Annotated[Window, Query()],
+    details: TheDetails,
+    reading: TheReading,
 ) -> Response:
     """Return where a study stands, and a page of its runs in the order of the sweep."""
-    return Response(await details.get(study_id, window), media_type="application/json")
+    return Response(await details.get(study_id, window, reading), media_type="application/json")
 
 
 @router.delete(
@@ -184,6 +190,7 @@ async def events(
 
 
 @router.get("/{study_id}/log", response_class=PlainTextResponse)
+@in_turn
 def tell_log(job: TheJob, jobs: TheJobs, store: TheStore) -> str:
     """Return a line for each thing that happened: states, what was waited for, ends of runs."""
     return log_of(job, jobs, store)
@@ -196,6 +203,7 @@ async def predict(
     jobs: TheJobs,
     store: TheStore,
     datasets: TheDatasets,
+    reading: TheReading,
     computing: TheComputing,
 ) -> Prediction:
     """Tell a number between the runs of a study, with its error.
@@ -204,8 +212,8 @@ async def predict(
     `?of=peak_residual_tension&load_ratio=0.62&friction=0.21`. A place outside of the runs, or
     across failed ones, is refused.
     """
-    path = await run_in_threadpool(datasets.ended, job)
-    content = await run_in_threadpool(jobs.study, job.id)
+    path = await reading.here(datasets.ended, job)
+    content = await reading.here(jobs.study, job.id)
     given = path, content, store.directory, store.aside, query
     return await computing.apart(_predicted, *given, field="of", name=query.of)
 
@@ -229,7 +237,7 @@ def _predicted(
 
 @router.get("/{study_id}/sensitivity", responses=REFUSED)
 async def tell_sensitivity(
-    job: TheJob, datasets: TheDatasets, computing: TheComputing, of: str
+    job: TheJob, datasets: TheDatasets, reading: TheReading, computing: TheComputing, of: str
 ) -> dict[str, Any]:
     """Tell which parameter matters for a number of the runs: indices of sensitivity.
 
@@ -237,7 +245,7 @@ async def tell_sensitivity(
     alone, and with others, and how well they are known. A sample that does not bear it is refused
     with the reason.
     """
-    path = await run_in_threadpool(datasets.ended, job)
+    path = await reading.here(datasets.ended, job)
     return await computing.apart(_indices, path, of, field="of", name=of)
 
 
@@ -259,6 +267,7 @@ async def draw_study(
     query: Annotated[PlotQuery, Query()],
     datasets: TheDatasets,
     pictures: ThePictures,
+    reading: TheReading,
     computing: TheComputing,
     request: Request,
 ) -> Response:
@@ -267,8 +276,8 @@ async def draw_study(
     Beside the queries named below, every axis of the sweep and dimension of the field is one:
     `?field=contact_pressure&over=friction&load_ratio=0.5&stage=loaded`.
     """
-    found = await run_in_threadpool(datasets.ended, job)
-    return await pictures.of_file(request, found, query, computing, maps.draw_study)
+    found = await reading.here(datasets.ended, job)
+    return await pictures.of_file(request, found, query, reading, computing, maps.draw_study)
 
 
 @router.get("/{study_id}/fit", responses=REFUSED)
@@ -295,31 +304,40 @@ def _fitted(job: Job, jobs: Jobs, datasets: Datasets) -> dict[str, Any]:
 
 
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)
-async def dataset(job: TheJob, datasets: TheDatasets, computing: TheComputing) -> FileResponse:
+async def dataset(
+    job: TheJob, datasets: TheDatasets, reading: TheReading, combining: TheCombining
+) -> FileResponse:
     """Return the combined data set of a study, as its last end left it.
 
     Before the first end it has the runs that are there; those to come are NaN, and `missing`.
     """
-    return netcdf(await datasets.current(job, computing), f"{job.name}.nc")
+    return netcdf(await datasets.current(job, reading, combining), f"{job.name}.nc")
 
 
 @router.get(
     "/{study_id}/zarr/{key:path}", responses={200: {"content": {MEDIA_TYPE: {}}}, **UNCHANGED}
 )
 async def tile(
-    job: TheJob, datasets: TheDatasets, computing: TheComputing, request: Request, key: str
+    job: TheJob,
+    datasets: TheDatasets,
+    reading: TheReading,
+    combining: TheCombining,
+    request: Request,
+    key: str,
 ) -> Response:
     """Return a part of the data set as a Zarr store has it (version 3, consolidated metadata).
 
     `xarray.open_zarr("http://…/studies/{study_id}/zarr")` opens it and reads the parts it needs. A
-    run that is missing has no chunks: readers take its values as NaN.
+    run that is missing has no chunks: readers take its values as NaN. The service has checked the
+    seal of the data set; the parts themselves have none. A key whose time is used waits for them.
     """
-    tiles = await datasets.tiles(job, computing)
-    headers = tagged((await asyncio.to_thread(digest, tiles.path), key))
+    reading, combining = (replace(each, patient=True) for each in (reading, combining))
+    tiles = await datasets.tiles(job, reading, combining)
+    headers = tagged((await reading.here(digest, tiles.path), key))
     if known := unchanged(request, headers):
         return known
     try:
-        content = await asyncio.to_thread(tiles.content, key)
+        content = await reading.read(tiles.content, key)
     except LookupError as error:
         raise Conflict(str(error)) from None
     if content is None:

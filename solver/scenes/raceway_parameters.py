@@ -98,31 +98,49 @@ class RacewayParameters(PrismParameters):
         self._check_ellipse()
 
     def _check_ellipse(self) -> None:
-        """Raise `ModelError` if the elastic Hertz contact is too long or too wide."""
-        ratio, wide = self.ellipse.ratio, self.ellipse.b > self.ellipse.a
-        if ratio > MOST_LONG:
-            relative = self.rolling * radii_of(MOST_LONG) ** (1 if wide else -1)
-            name, limit, least = "crown_radius", relative, not wide
-            if self.groove < math.inf and relative > self.across:
-                by_conformity = self.groove_radius == "conformity"
-                name = "conformity" if by_conformity else "groove_radius"
-                limit, least = 1 / (1 / self.across - 1 / relative), wide
-                limit /= 2 * self.across if by_conformity else 1
-            digit = 10.0 ** (math.floor(math.log10(limit)) - 4)
-            limit = digit * (math.ceil if least else math.floor)(limit / digit)
+        """Raise `ModelError` if the elastic Hertz contact is too long or too wide.
+
+        The bound that it names is one that is taken.
+        """
+        ellipse = self.ellipse
+        if ellipse.ratio > MOST_LONG:
+            name, limit, least = self._bound(wide=ellipse.b > ellipse.a)
             raise ModelError(
                 name, getattr(self, name),
-                f"must be {'at least' if least else 'at most'} {limit:.5g}: the semi-axes of its "
-                f"Hertz ellipse have a ratio of {ratio:.3g}; the largest is {MOST_LONG:g}",
+                f"must be {'at least' if least else 'at most'} {limit:.12g}: the semi-axes of its "
+                f"Hertz ellipse have a ratio of {ellipse.ratio:.3g}; the largest is {MOST_LONG:g}",
             )  # fmt: skip
         sizes = (
-            ("along x", self.size[0], _LONGEST * self.rolling),
-            ("across", self.size[1], self.room / BESIDE),
+            ("along x", ellipse.a, _LONGEST * self.rolling),
+            ("across", ellipse.b, self.room / BESIDE),
         )
-        for way, axis, most in sizes:
-            if axis > most:
-                allowed = f"must make a semi-axis {way} of at most {most:.4g} mm, here {axis:.4g}"
-                raise ModelError(self.load_by, getattr(self, self.load_by), allowed)
+        way, axis, most = min(sizes, key=lambda each: each[2] / each[1])
+        if axis > most:
+            power = 3 if self.load_by == "force" else 1  # of a semi-axis
+            given = getattr(self, self.load_by)
+            raise ModelError(
+                self.load_by, given,
+                f"must be at most {_rounded(given * (most / axis) ** power):.12g}: the semi-axis "
+                f"{way} is {axis:.4g} mm; the largest is {most:.4g} mm",
+            )  # fmt: skip
+
+    def _bound(self, wide: bool) -> tuple[str, float, bool]:
+        """Return a parameter, its value at the largest ratio, and whether it is the least one.
+
+        It is the groove or its conformity, where they can give this ratio; otherwise the crown.
+        """
+        relative = self.rolling * radii_of(MOST_LONG) ** (1 if wide else -1)
+        by_conformity = self.groove_radius == "conformity"
+        name, lowest, most = "groove_radius", self.across, 1e6
+        if by_conformity:
+            name, lowest, most = "conformity", 0.5, 100.0
+        straight = 1 - self.across / relative
+        limit = lowest / straight if straight > 0 else math.inf
+        if self.groove < math.inf and limit <= most:
+            return name, _rounded(limit, lowest, up=wide), wide
+        of_groove = 1 - 1 / (2 * self.conformity) if by_conformity else 1.0
+        limit = 1 / (1 / relative + (0.0 if by_conformity else 1 / self.groove)) * of_groove
+        return "crown_radius", _rounded(limit, up=not wide), not wide
 
     @property
     def across(self) -> float:
@@ -182,3 +200,10 @@ class RacewayParameters(PrismParameters):
     def elements(self) -> int:
         """Elements per semi-axis."""
         return ELEMENTS[self.accuracy]
+
+
+def _rounded(limit: float, lowest: float = 0.0, *, up: bool = False) -> float:
+    """Return a limit with five digits of what it is above the lowest value, rounded up or down."""
+    above = max(limit - lowest, 1e-9 * limit)
+    digit = 10.0 ** (math.floor(math.log10(above)) - 4)
+    return digit * (math.ceil if up else math.floor)(limit / digit)

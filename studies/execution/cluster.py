@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field
 from multiprocessing import resource_tracker
 from pathlib import Path
@@ -192,7 +192,7 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
     """
     check_script()
     method = prepare_workers()
-    with ThreadPoolExecutor(1, initializer=_ignore_interrupts) as starter:
+    with ExitStack() as ends, ThreadPoolExecutor(1, initializer=_ignore_interrupts) as starter:
         import dask  # takes half a second to import, while the workers' process loads the solver
         import distributed.utils
         from distributed import LocalCluster, Security
@@ -202,39 +202,41 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
         distributed.utils._forkserver_preload_set = True  # or dask would load pandas everywhere
         started = {"distributed.worker.multiprocessing-method": method}
         security = Security.temporary()
-        with (
-            scratch() as folder,
-            dask.config.set(
-                {**CONFIGURATION, **_CLOSED, **started, "temporary-directory": str(folder)}
-            ),
-        ):
-            try:
-                cluster = starter.submit(
-                    LocalCluster,
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    host="127.0.0.1",
-                    protocol="tls://",
-                    security=security,
-                    dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
-                    scheduler_kwargs={"dashboard": False},
-                    env={**os.environ, **FROM_THE_START},  # through a pipe
-                    silence_logs=logging.CRITICAL,
-                    memory_limit=memory or MEMORY_LIMIT // max(workers, 1),
-                ).result()
-            except RuntimeError as error:  # as where a thread of the script asks for them
-                raise RuntimeError(
-                    "worker processes did not start; they import the calling script again, so it "
-                    f"must do its work under: {GUARD}"
-                ) from error
-            with cluster, _kept(cluster, workers):
-                yield Access(
-                    cluster.scheduler_address,
-                    security.tls_ca_file,
-                    security.tls_client_cert,
-                    security.tls_client_key,
-                )
+        folder = ends.enter_context(scratch())
+        own = {**CONFIGURATION, **_CLOSED, **started, "temporary-directory": str(folder)}
+        ends.enter_context(dask.config.set(own))
+
+        def start() -> LocalCluster:
+            """Start the cluster; it is closed at the end even if nobody waits for it any more."""
+            cluster = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                protocol="tls://",
+                security=security,
+                dashboard_address="127.0.0.1:0",  # any free port: None would claim 8787
+                scheduler_kwargs={"dashboard": False},
+                env={**os.environ, **FROM_THE_START},  # through a pipe
+                silence_logs=logging.CRITICAL,
+                memory_limit=memory or MEMORY_LIMIT // max(workers, 1),
+            )
+            return ends.enter_context(cluster)
+
+        try:
+            cluster = starter.submit(start).result()
+        except RuntimeError as error:  # as where a thread of the script asks for them
+            raise RuntimeError(
+                "worker processes did not start; they import the calling script again, so it "
+                f"must do its work under: {GUARD}"
+            ) from error
+        with _kept(cluster, workers):
+            yield Access(
+                cluster.scheduler_address,
+                security.tls_ca_file,
+                security.tls_client_cert,
+                security.tls_client_key,
+            )
 
 
 @contextmanager

@@ -130,7 +130,8 @@ def test_one_that_took_long_stays_though_others_were_asked_for_meanwhile(
         made(content, *given)
 
     async def current(study_id: str) -> Path:
-        return await held.current(running.jobs.get(study_id), Share(turns, study_id))
+        share = Share(turns, study_id)
+        return await held.current(running.jobs.get(study_id), share, share)
 
     async def both() -> Path:
         ids = (running.study.id, later.id)

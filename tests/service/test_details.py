@@ -15,6 +15,7 @@ from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.overview import KEPT, Detail, Details
 from service.schemas import StudyDetail, Window
+from service.turns import Share, Turns
 from studies import Store
 
 STUDY = {"name": "a", "scene": "fake", "parameters": {}, "sweep": {}}
@@ -45,6 +46,10 @@ def details(tmp_path: Path) -> Counted:
     return Counted(jobs, Store(tmp_path))
 
 
+def anyone() -> Share:
+    return Share(Turns(2), "anyone")
+
+
 def status(content: bytes) -> Any:
     return json.loads(content)["status"]
 
@@ -53,7 +58,7 @@ def test_one_look_serves_all_who_asked_before_it(details: Counted) -> None:
     async def crowd() -> None:
         for progress in range(1, 5):  # something changes all the time
             details.jobs.note("a", progress)
-            await asyncio.gather(*(details.get("a", Window()) for _ in range(50)))
+            await asyncio.gather(*(details.get("a", Window(), anyone()) for _ in range(50)))
 
     asyncio.run(crowd())
     assert 4 <= details.looks <= 8
@@ -61,8 +66,8 @@ def test_one_look_serves_all_who_asked_before_it(details: Counted) -> None:
 
 def test_what_has_not_changed_is_not_looked_up(details: Counted) -> None:
     async def twice() -> None:
-        first = await details.get("a", Window())
-        assert first == await details.get("a", Window())
+        first = await details.get("a", Window(), anyone())
+        assert first == await details.get("a", Window(), anyone())
 
     asyncio.run(twice())
     assert details.made == 1
@@ -70,10 +75,10 @@ def test_what_has_not_changed_is_not_looked_up(details: Counted) -> None:
 
 def test_who_asks_after_a_change_sees_it_although_others_look_already(details: Counted) -> None:
     async def change() -> None:
-        before = asyncio.create_task(details.get("a", Window()))
+        before = asyncio.create_task(details.get("a", Window(), anyone()))
         await asyncio.sleep(0.03)  # its look has begun
         details.jobs.finish("a", StudyState.FAILED, "why")
-        assert status(await details.get("a", Window())) == "failed"
+        assert status(await details.get("a", Window(), anyone())) == "failed"
         assert status(await before) in ("running", "failed")
 
     asyncio.run(change())
@@ -84,7 +89,7 @@ def test_answers_are_kept_in_a_limited_number(details: Counted) -> None:
 
     async def pages() -> None:
         for offset in range(KEPT + 20):
-            await details.get("a", Window(offset=offset))
+            await details.get("a", Window(offset=offset), anyone())
 
     asyncio.run(pages())
     assert len(details.kept) == KEPT
@@ -92,10 +97,10 @@ def test_answers_are_kept_in_a_limited_number(details: Counted) -> None:
 
 def test_nothing_is_kept_of_a_study_that_does_not_exist(details: Counted) -> None:
     async def unknown() -> None:
-        await details.get("a", Window())
+        await details.get("a", Window(), anyone())
         for _ in range(3):
             with pytest.raises(NotFound):
-                await details.get("b", Window())
+                await details.get("b", Window(), anyone())
 
     asyncio.run(unknown())
     assert list(details.kept) == [("a", 100, 0)]

@@ -355,6 +355,9 @@ def test_a_study_larger_than_the_free_disk_or_the_default_limits_is_refused(
 
 MANY = {"start": 0.1, "stop": 0.5, "num": 2000}
 SAMPLE = {"method": "sobol", "num": 99_999, "ranges": {"friction": [0.0, 0.5]}}
+BASE: dict[str, Any] = {"name": "b", "scene": "punch", "parameters": COARSE_PUNCH}
+EXTENDING = {"extends": BASE | {"sweep": {"friction": [0.1, 0.2, 0.3, 0.4]}}, "parameters": {}}
+HALF = {"start": 0.1, "stop": 0.5, "num": 24_997}
 
 
 @pytest.mark.parametrize(
@@ -363,8 +366,15 @@ SAMPLE = {"method": "sobol", "num": 99_999, "ranges": {"friction": [0.0, 0.5]}}
         ({"sample": SAMPLE}, r"estimate\.bytes = 197998020000: at most 5e\+10", 10_000),
         ({"sweep": {"a": SAMPLE, "load_ratio": [0.2, 0.3]}}, "at most 100000 runs", 10_000),
         ({"sweep": {"friction": MANY}}, r"estimate\.cpu_seconds = 100: at most 100", 1_300_000),
+        (EXTENDING | {"sample": SAMPLE}, r"estimate\.bytes = 197998020000", 10_000),
+        (
+            {"extends": BASE | {"sample": SAMPLE}, "sweep": {"friction": [0.1]}},
+            "bytes = 1979",
+            10_000,
+        ),
+        (EXTENDING | {"sweep": {"load_ratio": HALF}}, r"estimate\.bytes = 1979", 2_500_000),
     ],
-    ids=["bytes", "axes", "time"],
+    ids=["bytes", "axes", "time", "added", "extended", "both"],
 )
 def test_a_study_too_large_is_refused_before_its_runs_are_made(
     tmp_path: Path, content: dict[str, Any], allowed: str, most: int

@@ -6,6 +6,7 @@ import asyncio
 import base64
 import errno
 import os
+import re
 import resource
 import signal
 import socket
@@ -19,13 +20,19 @@ from typing import Any
 
 import httpx
 import pytest
+from fastapi import FastAPI
+from fastapi.routing import APIRoute
 
+from service import datasets
 from service import turns as turning
 from service.alone import CRASHED, FAILED, Answer, alone
 from service.app import create_app
 from service.errors import Busy, TooMany
 from service.inspector import Inspector
 from service.keys import Keys, Scope
+from service.pages import new
+from service.pages import routes as pages
+from service.routes import ROUTERS
 from service.settings import Settings
 from service.turns import BYTES, Share, Turn, Turns, memory
 from studies import Study, StudyError
@@ -111,7 +118,7 @@ def test_who_has_many_calls_waiting_may_not_have_more(monkeypatch: pytest.Monkey
     monkeypatch.setattr(turning, "WAITING", 3)
 
     async def calls() -> None:
-        turns, clerk = Turns(1), Clerk()
+        turns, clerk = Turns(1, 60.0), Clerk()
         tasks = [asyncio.create_task(clerk.serve(turns, "anna")) for _ in range(5)]
         tasks.append(asyncio.create_task(clerk.serve(turns, "bert")))
         await settled()
@@ -128,18 +135,18 @@ def test_a_caller_has_its_budget_again_within_a_minute(monkeypatch: pytest.Monke
     monkeypatch.setattr(turning.time, "monotonic", lambda: now)
     turns = Turns(1, 10.0)
     for seconds, left in ((4.0, 10.0), (4.0, 6.0)):
-        assert turns.left("anna") == pytest.approx(left)
+        assert turns.remaining("anna") == pytest.approx(left)
         turns.charge("anna", seconds)
-    assert turns.left("anna") == pytest.approx(2.0)
+    assert turns.remaining("anna") == pytest.approx(2.0)
     turns.charge("anna", 11.0)
     with pytest.raises(
         TooMany, match="10 s of processor time in a minute are used: ask later"
     ) as told:
-        turns.left("anna")
+        turns.remaining("anna")
     assert told.value.later == {"retry-after": "60"}, "until 1 s of 10 is left again"
-    assert turns.left("bert") == 10.0
+    assert turns.remaining("bert") == 10.0
     now += 60.0 + 24.0
-    assert turns.left("anna") == pytest.approx(5.0)
+    assert turns.remaining("anna") == pytest.approx(5.0)
 
 
 def spent(seconds: float) -> int:
@@ -156,8 +163,8 @@ def test_a_call_is_charged_the_time_that_it_takes_wherever_it_runs() -> None:
             turns = Turns(1, 60.0)
             limits = {} if way == "here" else {"field": "study", "name": "a"}
             await getattr(Share(turns, "anna"), way)(spent, 0.3, **limits)
-            assert 50.0 < turns.left("anna") < 59.8
-            assert turns.left("bert") == 60.0
+            assert 50.0 < turns.remaining("anna") < 59.8
+            assert turns.remaining("bert") == 60.0
 
     asyncio.run(calls())
 
@@ -334,7 +341,7 @@ def test_a_process_that_gives_no_answer_is_charged_its_time() -> None:
         turns = Turns(1, 10.0)
         with pytest.raises(StudyError, match=r"within 1 s"):
             await Share(turns, "anna").apart(time.sleep, 60, field="scene", name="a", seconds=1.0)
-        assert turns.left("anna") <= 9.0
+        assert turns.remaining("anna") <= 9.0
 
     asyncio.run(call())
 
@@ -348,9 +355,31 @@ def test_a_scene_that_takes_too_long_is_told_and_charged(tmp_path: Path) -> None
         share = Share(Turns(1, 20.0), "anna")
         with pytest.raises(StudyError, match=r"within 10? s and [\d.]+ GiB of memory"):
             await inspector.inspect(text, {}, share)
-        assert share.turns.left("anna") < 19.1
+        assert share.turns.remaining("anna") < 19.1
 
     asyncio.run(post(Inspector(1.0)))
+
+
+QUERIES = {
+    "/studies/{study_id}/numbers": "?name=friction",
+    "/studies/{study_id}/predict": "?of=a",
+    "/studies/{study_id}/sensitivity": "?of=a",
+    "/studies/{study_id}/plot.png": "?field=a",
+    "/runs/{run_id}/values": "?field=a",
+    "/runs/{run_id}/map.png": "?field=a",
+    "/runs/{run_id}/line.png": "?field=a",
+    "/ui/scene.png": "?scene=punch",
+}
+FREE = re.compile(
+    r"/(health|docs.*|studies/{study_id}/(events|zarr/.*))|/ui/(static.*|sign-in|{.*)"
+)
+"""What needs no key, what is sent as it changes, and parts of a data set, which wait."""
+READ = [
+    (route.path + QUERIES.get(route.path, ""))
+    for router in (*ROUTERS, new.router, pages.router)
+    for route in router.routes
+    if isinstance(route, APIRoute) and "GET" in route.methods and not FREE.fullmatch(route.path)
+]
 
 
 @pytest.mark.parametrize(
@@ -359,16 +388,11 @@ def test_a_scene_that_takes_too_long_is_told_and_charged(tmp_path: Path) -> None
         ("POST", "/scenes", {"files": [("scene", ("a.toml", b""))]}),
         ("POST", "/estimate", {"json": {"name": "a", "scene": "punch"}}),
         ("POST", "/studies", {"json": {"name": "a", "scene": "punch"}}),
-        ("GET", "/scenes/punch/draw.png", {}),
-        ("GET", "/ui/scene.png?scene=punch", {}),
-        ("GET", "/studies/{study}/table.csv", {}),
-        ("GET", "/studies/{study}/audit", {}),
-        ("GET", "/studies/{study}/numbers?name=friction", {}),
-        ("GET", "/ui/studies/{study}", {}),
-        ("GET", "/studies/{study}/dataset.nc", {}),
+        ("POST", "/ui/new", {"data": {"scene": "punch"}}),
+        *(("GET", path, {}) for path in READ),
     ],
 )
-def test_whatever_is_computed_takes_the_budget_of_the_key(
+def test_whatever_is_read_or_computed_takes_the_budget_of_the_key(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str, path: str, request_: Any
 ) -> None:
     keys = Keys(tmp_path)
@@ -382,12 +406,15 @@ def test_whatever_is_computed_takes_the_budget_of_the_key(
 
     for way in ("here", "apart"):
         monkeypatch.setattr(Turn, way, called)
-    for turns in (app.state.reading, app.state.computing):
+    for turns in (app.state.reading, app.state.computing, app.state.combining):
         turns.charge("anna", 30.0)
+    given = {"study_id": study.id, "run_id": "0" * 32, "run_id:stem": "0" * 32, "name": "punch"}
+    for name, value in given.items():
+        path = path.replace(f"{{{name}}}", value)
     answers = {
         name: asking(app)(
             method,
-            path.format(study=study.id),
+            path,
             headers={"authorization": f"Bearer {text}"},
             **request_,
         )
@@ -428,12 +455,76 @@ def test_reading_does_not_wait_for_computing(tmp_path: Path) -> None:
     assert asyncio.run(asyncio.wait_for(read(), 60.0)) == [200] * 4
 
 
+def running(app: FastAPI, names: str) -> dict[str, str]:
+    """Accept studies, and return their ids by name."""
+    studies = [Study.from_dict({"name": name, "scene": "punch"}) for name in names]
+    for each in studies:
+        app.state.jobs.accept(each.id, each.to_dict(), each.run_ids())
+    return {each.name: each.id for each in studies}
+
+
+def test_combining_has_turns_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing else that is computed waits for it; each waits for its own turn, not another's."""
+    monkeypatch.setattr(datasets, "PATIENCE", 0.05)
+    keys = Keys(tmp_path)
+    texts = {name: keys.add(name, Scope.READ) for name in ("anna", "bert")}
+    app = create_app(Settings(data=tmp_path, require_keys=True))
+    ids, go = running(app, "abcd"), asyncio.Semaphore(0)
+    names, made = {study: name for name, study in ids.items()}, list[str]()
+
+    async def apart(self: Turn, function: object, *given: Any, **limits: Any) -> bytes:
+        if function is datasets.combined:
+            await go.acquire()
+            made.append(names[limits["name"]])
+            given[-1].write_bytes(b"")
+        return b"png"
+
+    async def asked() -> tuple[list[int], list[list[str]]]:
+        transport = httpx.ASGITransport(app)
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as one:
+
+            async def status(caller: str, path: str) -> int:
+                head = {"authorization": f"Bearer {texts[caller]}"}
+                return (await one.get(path, headers=head)).status_code
+
+            combined = "/studies/{}/dataset.nc".format
+            wanted = [("anna", each) for each in "abcd"] + [("bert", "d")]
+            found = [await status(caller, combined(ids[each])) for caller, each in wanted]
+            found.append(await status("anna", "/scenes/punch/draw.png"))
+            order = []
+            for _ in range(4):
+                go.release()
+                await settled()
+                order.append([*made])
+            found.append(await status("bert", combined(ids["d"])))
+            return found, order
+
+    monkeypatch.setattr(Turn, "apart", apart)
+    found, order = asyncio.run(asyncio.wait_for(asked(), 30.0))
+    assert found == [503] * 5 + [200, 200]
+    assert order == [["a"], ["a", "d"], ["a", "d", "b"], ["a", "d", "b", "c"]]
+    app.state.datasets.close()
+
+
+def test_an_answer_that_has_begun_waits_for_the_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(turning, "MINUTE", 0.2)
+
+    async def calls() -> list[int]:
+        share = Share(Turns(1, 10.0), "anna")
+        share.turns.charge("anna", 20.0)
+        with pytest.raises(TooMany):
+            await share.here(spent, 0.0)
+        return [each async for each in share.each(iter([1, 2, 3]))]
+
+    assert asyncio.run(calls()) == [1, 2, 3]
+
+
 def test_without_keys_nobody_has_a_budget(tmp_path: Path) -> None:
     for require_keys, seconds in ((False, None), (True, 30.0)):
         data = tmp_path / str(require_keys)
         Keys(data).add("anna", Scope.READ)
         app = create_app(Settings(data=data, require_keys=require_keys))
-        for name in ("reading", "computing"):
+        for name in ("reading", "computing", "combining"):
             assert getattr(app.state, name).seconds == seconds
 
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import gc
+import resource
 import sys
 import weakref
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +50,24 @@ def nothing_kept() -> Iterator[None]:
 @pytest.fixture
 def ten(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(memory.SETTING, "10MB")
+
+
+def holding_much(bytes_free: int) -> int:
+    """Hold 100 MB again and again in a process with so much address space."""
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    space = pages * resource.getpagesize() + bytes_free
+    resource.setrlimit(resource.RLIMIT_AS, (space, space))
+    for k in range(20):
+        hold(f"{k}", 100)
+        hold(f"{k}", 100)
+    return made.total()
+
+
+@pytest.mark.processes
+def test_what_is_kept_leaves_room_in_a_small_address_space() -> None:
+    """What is kept usually, 300 MB, would not fit."""
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        assert pool.submit(holding_much, 250 * MB).result() == 20
 
 
 @pytest.mark.usefixtures("ten")

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import weakref
 from typing import Any
 
 import numpy as np
 import pytest
 
+from solver.memory import SETTING
 from studies import StudyError, predict
 from studies.views import gaussian, sensitivity
-from studies.views.by_content import KEPT, by_content
+from studies.views.by_content import by_content
 from tests.studies.test_predict import rough, sampled, smooth
 
 
@@ -28,7 +30,31 @@ def test_equal_arrays_are_taken_for_one_and_others_are_not() -> None:
     total(np.arange(6), 1.0)
     values[0] = 1.0
     assert total(values, 1.0) == 16.0 and len(made) == 5
-    assert total(np.arange(6.0), 1.0) == 15.0 and len(made) == 5 + (KEPT < 5), "only the latest"
+    assert total(np.asfortranarray(values.reshape(2, 3)), 1.0) == 16.0 and len(made) == 6
+    assert total(np.arange(6.0), 1.0) == 15.0 and len(made) == 6
+
+
+def test_results_are_kept_up_to_a_number_of_bytes_and_the_arrays_are_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(SETTING, "8MB")
+    made: list[float] = []
+
+    @by_content
+    def spread(values: np.ndarray, factor: float) -> np.ndarray:
+        made.append(factor)
+        return factor * values[:200_000]
+
+    long = np.ones(4_000_000)
+    for factor in (1.0, 2.0, 3.0, 4.0, 5.0):  # 1.6 MB each
+        spread(long, factor)
+    assert spread(long, 3.0).mean() == 3.0 and len(made) == 5
+    for factor in (6.0, 7.0, 8.0, 9.0, 1.0):
+        spread(long, factor)
+    assert made[-1] == 1.0 and len(made) == 10
+    before = weakref.ref(long)
+    del long
+    assert before() is None, "a digest is the key"
 
 
 def test_what_is_refused_is_refused_again_without_a_second_look() -> None:
