@@ -26,7 +26,7 @@ from solver.fem.window import Region, Windowed
 from solver.model.friction import ContactPlaces, lines_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -468,15 +468,19 @@ class System:
     def set_down(self, state: State, time: float) -> State:
         """Return the state at the time a lap begins: its wheels undeformed and just touching."""
         u, contacts = list(state.u), list(state.contacts)
+
+        def gaps(pairs: Sequence[int]) -> list[Array]:
+            return [self.interfaces[k].pairing(tuple(u), time).gap for k in pairs]
+
         for number, part in enumerate(self.parts):
             if not isinstance(part, Wheel):
                 continue
             u[number] = part.placed(time)
             own = [k for k, i in enumerate(self.interfaces) if number in (i.slave, i.master)]
-            gaps = [self.interfaces[k].pairing(tuple(u), time).gap for k in own]
-            least = min(gap.min() for gap in gaps)
-            u[number] = part.lowered(u[number], least)
-            for k, gap in zip(own, gaps, strict=True):
+            u[number] = part.lowered(u[number], min(gap.min() for gap in gaps(own)))
+            lowered = gaps(own)
+            least = min(gap.min() for gap in lowered)
+            for k, gap in zip(own, lowered, strict=True):
                 touching = gap < least + _SET_DOWN * part.frame.radius
                 finite = self.interfaces[k].finite
                 contacts[k] = ContactState.at_rest(gap, touching, finite=finite, before=contacts[k])

@@ -267,10 +267,12 @@ class _At(Generic[S]):
 
 
 def searched(at: Callable[[float], Sized], size: float, shortest: float = _SHORTEST) -> Sized:
-    """Return the iterate after a step, or after the largest share of it that lowers the residual.
+    """Return the iterate after a step, or after a share of it if only that lowers the residual.
 
-    The residual has kinks where points begin to yield, open, close or slip. If no share lowers it,
-    the whole step is taken to leave the kink, unless the residual grows by more than `_AWAY`.
+    The residual has kinks where points begin to yield, open, close or slip. Shares are halved until
+    one lowers the residual, and on as long as the next one lowers it further: a share that barely
+    does lies beyond kinks, where plastic strain may run away. If no share lowers it, the whole step
+    is taken to leave the kink, unless the residual grows by more than `_AWAY`.
 
     Parameters
     ----------
@@ -279,7 +281,8 @@ def searched(at: Callable[[float], Sized], size: float, shortest: float = _SHORT
     size : norm of the residual before the step
     shortest : smallest share that is tried
     """
-    tried = []
+    tried: list[Sized] = []
+    best: Sized | None = None
     share = 1.0
     while share >= shortest:
         try:
@@ -289,10 +292,16 @@ def searched(at: Callable[[float], Sized], size: float, shortest: float = _SHORT
         except NotConverged as error:  # no contact was found for this shape of the surface
             failure = error
         else:
-            if there.size < (1 - 1e-4 * share) * size:
-                return there
             tried.append(there)
+            if best is not None and there.size >= best.size:
+                break
+            if there.size < (1 - 1e-4 * share) * size:
+                best = there
+                if share == 1.0:
+                    break
         share /= 2
+    if best is not None:
+        return best
     if not tried:
         raise failure
     return tried[0] if tried[0].size < _AWAY * size else min(tried, key=lambda a: a.size)

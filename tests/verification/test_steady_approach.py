@@ -13,8 +13,10 @@ from solver.fem.fields import recovery
 from solver.results.steady import TrackBody
 from solver.scenes.rolling_grids import wheel_nodes
 from solver.scenes.rolling_parameters import RollingParameters
+from solver.scenes.rolling_steady import load_on, track_for
 from solver.steady import search as steady_search
 from solver.steady import track_of
+from solver.steady.passing import passing, searched
 from solver.steady.rolling import Expected
 from solver.steady.search import _HARDEST, _LIGHTER, _SOFTEST, _approached, _fading, search
 
@@ -215,6 +217,39 @@ def test_nodes_of_the_surface_have_values_of_their_own():
     below = recovery(part) @ depth
     np.testing.assert_allclose(values[~top], below[~top])
     assert abs(below[top]).max() < 0.1 * depth.min()
+
+
+@pytest.mark.parametrize(
+    ("sizes", "share"),
+    [
+        ({1: 0.9, 1 / 2: 0.5}, 1),
+        ({1: 2.4, 1 / 2: 1.3, 1 / 4: 0.996, 1 / 8: 0.85, 1 / 16: 0.9, 1 / 32: 0.8}, 1 / 8),
+        ({1: 2.4, 1 / 2: 0.99, 1 / 4: 0.95, 1 / 8: 0.9, 1 / 16: 0.8, 1 / 32: 0.7}, 1 / 32),
+        ({1: 2.4, 1 / 2: 1.3, 1 / 4: 1.2, 1 / 8: 1.1, 1 / 16: 1.1, 1 / 32: 1.1}, 1),
+        ({1: 3.4, 1 / 2: 1.3, 1 / 4: 1.2, 1 / 8: 1.1, 1 / 16: 1.2, 1 / 32: 1.3}, 1 / 8),
+        ({1: 2.4, 1 / 2: 0.9, 1 / 4: np.nan, 1 / 8: 0.8, 1 / 16: 0.9, 1 / 32: 1.0}, 1 / 8),
+    ],
+    ids=["whole", "least", "shortest", "none lowers", "none may grow", "no contact"],
+)
+def test_shares_of_a_step_are_halved_as_long_as_that_lowers_the_residual(sizes, share):
+    def at(tried):
+        if np.isnan(sizes[tried]):
+            raise NotConverged("no contact")
+        return SimpleNamespace(size=sizes[tried], share=tried)
+
+    assert searched(at, 1.0).share == share
+
+
+def test_newtons_method_finds_a_pass_with_little_hardening():
+    """A step that barely lowers the residual led to plastic strain without end."""
+    p = RollingParameters(
+        hardening="mixed", hardening_ratio=0.005, traction=-0.9, friction=0.05, load_ratio=6.0,
+        element_size=6.5, growth=1.6,
+    )  # fmt: skip
+    track = track_for(p, 2.5)
+    found = passing(track, p.material(), load_on(track, p, p), track.rows.virgin(p.material()))
+    assert found.steps < 40
+    assert 0.2 < found.most_added < 0.4
 
 
 def test_rim_and_track_have_sides_of_one_length():
