@@ -173,7 +173,7 @@ class _Equations:
     def moved(self) -> Array:
         """Return the back stresses (n_back, n_components, n) [MPa]."""
         each = zip(self._rules, self._back, strict=True)
-        return np.stack([rule.evolve(X, self.growth, self.normal) for rule, X in each])
+        return np.stack([rule.moved(X, self.growth, self.normal) for rule, X in each])
 
     def residual(self) -> Array:
         """Return the residual of the equations (n_components + 1, n) [MPa]."""

@@ -28,6 +28,9 @@ class Plain(BackStress):
         fade = np.exp(-self.recall * growth)
         return old * fade + 2 / 3 * self.limit * (1 - fade) * normal
 
+    def moved(self, old, growth, normal):
+        return self.evolve(old, growth, normal)
+
     def recalled(self, X, N):
         """What the rate loses over dp."""
         return self.recall * X
@@ -52,6 +55,32 @@ class BurletCailletaud(Plain):
     def recalled(self, X, N):
         along = 2 / 3 * (X * N).sum(axis=0) * N
         return self.recall * (self.share * X + (1 - self.share) * along)
+
+
+@dataclass(frozen=True)
+class Threshold(BackStress):
+    """It fades with what is above a threshold: that of `examples/own_back_stress.py`."""
+
+    modulus: float
+    recall: float
+    threshold: float
+
+    @property
+    def limit(self) -> float:
+        return self.threshold + self.modulus / self.recall
+
+    def in_tension(self, p):
+        later = np.maximum(p - self.threshold / self.modulus, 0.0)
+        return self.modulus * (p - later - np.expm1(-self.recall * later) / self.recall)
+
+    def evolve(self, old, growth, normal):
+        grown, fade = old + 2 / 3 * self.modulus * growth * normal, self.recall * growth
+        size = np.maximum(von_mises(grown), self.threshold)
+        return grown * (1 + fade * self.threshold / size) / (1 + fade)
+
+    def recalled(self, X, N):
+        size = np.maximum(von_mises(X), self.threshold)
+        return self.recall * (1 - self.threshold / size) * X
 
 
 @dataclass(frozen=True)
@@ -80,7 +109,7 @@ class OhnoWang(BackStress):
             power = (a / self.limit) ** 3
             step = (a * (1 + k * power) - size) / (1 + 4 * k * power)
             a = a - step
-            if (np.abs(step) <= 1e-15 * size).all():
+            if (np.abs(step) <= 1e-12 * size).all():
                 break
         return grown * a / size
 

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from solver import (
     Amplitude,
     Body,
     ContactPair,
+    Link,
     Material,
     Model,
     PathControl,
@@ -18,11 +22,12 @@ from solver import (
     Stage,
     solve,
 )
-from solver.materials import ArmstrongFrederick, Chaboche, Elasticity, Law
+from solver.materials import ArmstrongFrederick, Chaboche, Elasticity, Law, Layered
 from solver.materials.curves import Voce
 from solver.mesh import grid
 from solver.model.loads import Displacement, Load, Temperature, Traction
 from solver.model.rigid import RigidBody, RigidSurface
+from tests.solver.back_stress_rules import BurletCailletaud, OhnoWang, Plain, Threshold
 
 ELASTIC = Elasticity(youngs_modulus=2e5, poisson_ratio=0.3)
 PLAIN = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
@@ -92,23 +97,83 @@ def test_proportional_flow_is_exact_in_one_increment_and_is_not_divided():
     assert found.audit("up").figures["audit_increment_error"] < 1e-12
 
 
+KINK = 40.0
+RULES: dict[str, Any] = {
+    "armstrong frederick": Plain(50_000.0, 300.0),
+    "burlet cailletaud": BurletCailletaud(50_000.0, 300.0, 0.1),
+    "ohno wang": OhnoWang(50_000.0, 160.0),
+    "threshold": Threshold(50_000.0, 400.0, KINK),
+}
+NORMAL = np.array([[-0.5], [1.0], [-0.5], [0.0]])
+
+
+def flow(rule: Any, start: float, end: float) -> float:
+    """Return the plastic strain in tension over which a back stress goes from start to end."""
+
+    def slope(X: float) -> float:
+        return float(rule.modulus - (rule.recalled(2 / 3 * X * NORMAL, NORMAL) * NORMAL).sum())
+
+    ways = pairwise([start, -KINK, KINK, end])
+    return sum(quad(lambda X: 1 / slope(X), *way)[0] for way in ways)
+
+
 @pytest.mark.parametrize("steps", [1, 5])
-def test_a_bar_ratchets_by_the_closed_form_in_any_number_of_increments(steps: int):
-    """The back stress goes from s1 + Re to s2 - Re and back along exponentials."""
-    C, gamma, Re, high, low = 50_000.0, 300.0, 200.0, 320.0, -280.0
-    law = Chaboche(
-        elasticity=ELASTIC,
-        curve=Voce(yield_stress=Re),
-        back_stresses=(ArmstrongFrederick(C, gamma),),
+@pytest.mark.parametrize("name", RULES)
+def test_a_bar_ratchets_by_the_integrated_rate_in_any_number_of_increments(name: str, steps: int):
+    """Back stress goes between Re above the lower and Re below the higher stress."""
+    Re, high, low = 200.0, 320.0, -280.0
+    rule = RULES[name]
+    own = ArmstrongFrederick(rule.modulus, rule.recall) if type(rule) is Plain else rule
+    law = Chaboche(elasticity=ELASTIC, curve=Voce(yield_stress=Re), back_stresses=(own,))
+    times = np.arange(4)
+    cycled = Amplitude(times, [0, high, low, high])
+    stages = [Stage(name=f"{k}", target=float(k), steps=steps) for k in (1, 2, 3)]
+    load = Traction(boundary="top", y=1.0, amplitude=cycled)
+    found = solve(bar(law, load, kinematics="axisymmetric"), stages=stages)
+    strains = [found.displacement("bar", stage)[1].max() for stage in ("1", "3")]
+    wanted = flow(rule, low + Re, high - Re) - flow(rule, Re - high, -Re - low)
+    assert found.audit("3").passed
+    assert strains[1] - strains[0] == pytest.approx(wanted, rel=0.02)
+
+
+TWO = Chaboche(
+    elasticity=ELASTIC,
+    curve=Voce(yield_stress=200.0),
+    back_stresses=(ArmstrongFrederick(60_000.0, 600.0), ArmstrongFrederick(20_000.0, 200.0)),
+)
+LAYERS = Layered.of_curve(
+    ELASTIC, strain=(0.001, 0.003, 0.01), stress=(200.0, 280.0, 340.0), slope=2000.0
+)
+
+
+@pytest.mark.parametrize("law", [TWO, LAYERS], ids=["fading", "layered"])
+def test_tension_with_cyclic_shear_ratchets_as_with_many_increments(law: Law):
+    times = np.arange(5)
+    pulled = Amplitude(times, np.minimum(times, 1.0))
+    cycled = Amplitude(times, [0, 0, 1, -1, 1])
+    sides = ("top", "x", 1), ("bottom", "x", -1), ("right", "y", 1), ("left", "y", -1)
+    body = Body(
+        name="bar",
+        mesh=grid(np.array([0.0, 1.0]), np.array([0.0, 1.0])),
+        material=law,
+        kinematics="plane_stress",
+        supports={"bottom": "y"},
+        loads=(
+            Traction(boundary="top", y=100.0, amplitude=pulled),
+            *(
+                Traction(boundary=side, amplitude=cycled, **{axis: sign * 130.0})
+                for side, axis, sign in sides
+            ),
+        ),
     )
-    times = np.arange(7)
-    cycled = Amplitude(times, np.where(times % 2, high, low) * (times > 0))
-    stages = [Stage(name=f"{k}", target=float(k), steps=steps) for k in range(1, len(times))]
-    found = solve(bar(law, Traction(boundary="top", y=1.0, amplitude=cycled)), stages=stages)
-    strains = [found.displacement("bar", str(k))[1].max() for k in (3, 5)]
-    limit = (C / gamma) ** 2
-    wanted = np.log((limit - (low + Re) ** 2) / (limit - (high - Re) ** 2)) / gamma
-    assert strains[1] - strains[0] == pytest.approx(wanted, rel=1e-3)
+    spring = Link(slave=("bar", "bottom"), components="x", stiffness=1e-2)
+
+    def ratchet(steps: int, control: PathControl | None = None) -> float:
+        stages = [Stage(name=f"{k}", target=float(k), steps=steps) for k in times[1:]]
+        found = solve(Model(bodies=(body,), links=(spring,)), stages=stages, control=control)
+        return float(np.diff([found.displacement("bar", k)[1].max() for k in "24"])[0])
+
+    assert ratchet(1) == pytest.approx(ratchet(30, GIVEN), rel=0.02)
 
 
 @pytest.mark.parametrize("law", [LINEAR, replace(LINEAR, hardening="isotropic")])
