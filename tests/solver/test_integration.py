@@ -133,7 +133,8 @@ def test_a_bar_ratchets_by_the_integrated_rate_in_any_number_of_increments(name:
     strains = [found.displacement("bar", stage)[1].max() for stage in ("1", "3")]
     wanted = flow(rule, low + Re, high - Re) - flow(rule, Re - high, -Re - low)
     assert found.audit("3").passed
-    assert strains[1] - strains[0] == pytest.approx(wanted, rel=0.02)
+    error = 1e-3 if type(rule) is Plain else 0.02  # the package's own rule is exact along the flow
+    assert strains[1] - strains[0] == pytest.approx(wanted, rel=error)
 
 
 TWO = Chaboche(
