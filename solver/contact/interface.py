@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from solver.fem.rigid import RigidPart
     from solver.fem.softening import Softening
     from solver.fem.surface import Surface
+    from solver.model.contact_pair import ContactPair
     from solver.model.friction import FrictionLaw
-    from solver.model.model import ContactPair, Model
+    from solver.model.model import Model
 
 
 @dataclass(frozen=True, slots=True)

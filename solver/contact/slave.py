@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
     from solver.fem.surface import Surface
-    from solver.model.model import ContactPair, Model
+    from solver.model.contact_pair import ContactPair
+    from solver.model.model import Model
 
 _RIGID = (0.4, 1.1)
 """Permitted range of the edge length of a rigid slave over that of its partner."""

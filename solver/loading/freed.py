@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from solver.contact.system import System
     from solver.fem.part import Part
     from solver.loading.program import Program
-    from solver.model.model import ContactPair
+    from solver.model.contact_pair import ContactPair
 
     Array = NDArray[np.float64]
 

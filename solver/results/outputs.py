@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from typing import Any, Literal, NamedTuple, TypeVar
 
 from solver.errors import ModelError
@@ -35,6 +36,11 @@ class NamedOutput(NamedTuple):
 
 
 _OUTPUTS: dict[str, NamedOutput] = {}
+_MODULES = (
+    "contact", "corner", "extremes", "figures", "increments", "indentation", "maps", "places",
+    "pressure_error", "stick",
+)  # fmt: skip
+"""Modules of `solver.results` whose outputs, or what these declare, scene files request."""
 
 
 def output(word: str, *needs: Need) -> Callable[[T], T]:
@@ -59,7 +65,9 @@ def output(word: str, *needs: Need) -> Callable[[T], T]:
 def outputs() -> Mapping[str, NamedOutput]:
     """Return the outputs by word, including those of the user's files.
 
-    The outputs of the package are complete once `solver.scenes` has been imported.
+    The modules of the package that have some are imported first.
     """
+    for module in _MODULES:
+        import_module(f"solver.results.{module}")
     load_own_parts()
     return _OUTPUTS

@@ -20,13 +20,14 @@ from solver.loading.stepper import Stepper
 from solver.loading.walker import Walker
 from solver.model.model import Model
 from solver.results import saved
+from solver.results.at_all_nodes import mesh_fields
 from solver.results.audit.pairs import untouched
 from solver.results.audit.report import Audit, audit
 from solver.results.contact_result import ContactResult, contact_result
 from solver.results.cycles import decided, shakedown_of
 from solver.results.fields import SystemFields
 from solver.results.history import Observed, observe
-from solver.results.mesh_fields import MeshFields, mesh_fields
+from solver.results.mesh_fields import MeshFields
 from solver.results.view import Places
 from solver.tensors import to_tensor
 

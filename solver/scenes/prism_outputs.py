@@ -23,8 +23,8 @@ from solver.scenes.passes import (
     PASS_PLASTIC_INCREMENT,
     PASS_SURFACE_ADVANCE,
 )
-from solver.scenes.rolling import CREEPAGE, LONGITUDINAL_FORCE
-from solver.scenes.scene import Sketch
+from solver.scenes.rolling_setup import CREEPAGE, LONGITUDINAL_FORCE
+from solver.scenes.sketch import Sketch
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from solver.loading.refinement import HALVINGS
 from solver.mesh.endless import track_lines
-from solver.scenes.effort import Effort, grid_size
+from solver.scenes.effort import Effort
+from solver.scenes.grid_size import grid_size
 from solver.scenes.rolling_grids import half_space_nodes, rim_elements, wheel_nodes
 from solver.scenes.rolling_model import track_grid
 

@@ -19,9 +19,9 @@ from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
 from solver.results.steady import SteadyTractions, TrackBody
 from solver.results.tractions import PrescribedTractions
+from solver.scenes.driver import by_increments
 from solver.scenes.passes import Trace, shakedown_of
 from solver.scenes.rolling_steady import steady_passes, track_for
-from solver.scenes.scene import by_increments
 from solver.steady import RollingContact, standing_pressure
 from solver.steady.passing import SolveBudget
 from solver.tensors import to_tensor

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.materials.material import Material
-from solver.mesh import grid, mapped, merged, within
 from solver.mesh.endless import track_lines
+from solver.mesh.grids import grid, mapped, merged, within
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.model.motion import Axle, TravellingPressure
 from solver.scenes.rolling_grids import half_space_nodes, wheel_nodes
-from solver.scenes.scene import Sketch
+from solver.scenes.sketch import Sketch
 
 if TYPE_CHECKING:
     from skfem import Mesh

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from solver.errors import ModelError
+from solver.mesh.meshed_rail import MeshedRail
 from solver.mesh.rail import rail_60e1
-from solver.mesh.section_mesh import RUNNING, MeshedRail, SectionMesh
+from solver.mesh.section_mesh import RUNNING, SectionMesh
 from solver.mesh.wheel_profile import conical, crowned, measured, s1002
 from solver.prism.profiled_wheel import ProfiledWheel
 

@@ -14,8 +14,8 @@ from solver.fem.loads import travelling_forces
 from solver.fem.surface import extract
 from solver.materials.material import Material
 from solver.memory import kept
-from solver.mesh import grid, within
 from solver.mesh.endless import MOST_COLUMNS, track_lines, window_depth, window_elements
+from solver.mesh.grids import grid, within
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.motion import TravellingPressure

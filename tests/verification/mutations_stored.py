@@ -38,8 +38,8 @@ from solver.contact.interface import Interface
 from solver.fem.fields import Sampler
 from solver.fem.loads import Superposed
 from solver.fem.softening import Softening
+from solver.model.contact_pair import ContactPair
 from solver.model.loads import InitialStress, Load, Temperature
-from solver.model.model import ContactPair
 from solver.results.contact_result import ContactResult
 from solver.results.fields import SystemFields
 from solver.results.requested import RequestedNumber

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from solver.contact.state import Converged, State
     from solver.contact.system import System
-    from solver.model.model import ContactPair
+    from solver.model.contact_pair import ContactPair
     from solver.results.audit.surfaces import PairState
 
     Array = NDArray[np.float64]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from solver.contact.state import State
     from solver.contact.system import System
     from solver.fem.surface import Surface
-    from solver.model.model import ContactPair
+    from solver.model.contact_pair import ContactPair
 
     Array = NDArray[np.float64]
 
