@@ -5,24 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+from skfem import Mesh, MeshQuad2
 
 from solver.errors import ModelError
 from solver.mesh.cells import facets_of, mesh_of_cells
 from solver.mesh.outline import Outline, smooth_curve
 from solver.mesh.rail import Rail
 from solver.mesh.section_mesh import FOOT, RUNNING, SectionMesh
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from skfem import Mesh, MeshQuad2
-
-    from solver.mesh.zone import Zone
-
-    Array = NDArray[np.float64]
-    Numbers = NDArray[np.int64]
+from solver.mesh.zone import Zone
+from solver.typing import Array, Bools, Ints
 
 _DIGITS = 6
 """Digits of a millimetre that are kept."""
@@ -78,12 +71,12 @@ def checked(section: SectionMesh, field: str) -> SectionMesh:
     return section
 
 
-def _made(section: SectionMesh) -> tuple[Mesh, Numbers]:
+def _made(section: SectionMesh) -> tuple[Mesh, Ints]:
     """The mesh, and the number of its corner at each point."""
     return mesh_of_cells(np.array(section.points), np.array(section.cells), 4)
 
 
-def _facets(section: SectionMesh, mesh: Mesh, number: Numbers, name: str) -> Numbers:
+def _facets(section: SectionMesh, mesh: Mesh, number: Ints, name: str) -> Ints:
     """Return the facets of a line."""
     return facets_of(mesh, number[np.array(getattr(section, name), dtype=np.int64).reshape(-1, 2)])
 
@@ -231,13 +224,12 @@ class MeshedRail(Rail):
             RUNNING: facets_of(whole, number[ends[chosen]]),
             FOOT: _facets(self.section, whole, number, FOOT),
         }
-        from skfem import MeshQuad2
 
         curved = whole if cells.shape[1] > 4 else MeshQuad2.from_mesh(whole)
         return ZonedMesh(curved.with_boundaries(boundaries), len(chosen), int(inside.sum()))
 
 
-def _nearest(points: Array, edges: Array) -> tuple[NDArray[np.bool_], Array]:
+def _nearest(points: Array, edges: Array) -> tuple[Bools, Array]:
     """Return whether the nearest place of a chain to points (n, 2) is not its end, and how far.
 
     Parameters
@@ -255,7 +247,7 @@ def _nearest(points: Array, edges: Array) -> tuple[NDArray[np.bool_], Array]:
 
 
 def _walked(
-    edges: Numbers, start: int | None = None, away: int | None = None, end: int | None = None
+    edges: Ints, start: int | None = None, away: int | None = None, end: int | None = None
 ) -> list[int]:
     """Return the corners along edges (n, 2), one after the other.
 

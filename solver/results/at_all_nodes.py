@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from solver.results.fields import Solved, SystemFields
 from solver.results.mesh_fields import MeshFields, counterclockwise
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from solver.results.fields import Solved, SystemFields
 
 
 def mesh_fields(

@@ -5,21 +5,15 @@ from __future__ import annotations
 import tempfile
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
+import meshio
 import numpy as np
 
 from solver.errors import ModelError
 from solver.files import appearing, read_file
-
-if TYPE_CHECKING:
-    import meshio
-    from numpy.typing import NDArray
-
-    from solver.results.mesh_fields import MeshFields
-
-    Array = NDArray[np.float64]
+from solver.results.mesh_fields import MeshFields
+from solver.typing import Array
 
 _CELLS = {
     3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9", 20: "hexahedron20",

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.results.body_fields import BODY_FIELDS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-    Nodes = NDArray[np.int64]
+from solver.typing import Array, Ints
 
 NO_NODE = -1
 """Fills the rows of faces and cells with fewer nodes than others."""
@@ -47,11 +40,11 @@ class MeshFields:
     """
 
     X: Array
-    bodies: Mapping[str, tuple[str, Nodes]]
+    bodies: Mapping[str, tuple[str, Ints]]
     stages: Mapping[str, Mapping[str, Array]]
 
     @property
-    def faces(self) -> tuple[Nodes, Nodes]:
+    def faces(self) -> tuple[Ints, Ints]:
         """Triangles and quadrilaterals through all nodes, and the number of the body of each.
 
         Elements with mid-side nodes are divided. The last node of a triangle is `NO_NODE`.
@@ -91,7 +84,7 @@ class MeshFields:
         )
 
 
-def counterclockwise(cells: Nodes, X: Array) -> Nodes:
+def counterclockwise(cells: Ints, X: Array) -> Ints:
     """Return the nodes of cells (n, k) in counterclockwise order, as other programs expect."""
     corners = 4 if cells.shape[1] in (4, 8, 9) else 3
     (x, y), ahead = X[:, cells[:, :corners]], np.roll(X[:, cells[:, :corners]], -1, axis=2)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Interval, Unit
@@ -12,11 +12,7 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.parameters import Pairs, described, pairs
 from solver.parts import Parts
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _XX = 0
 

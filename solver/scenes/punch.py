@@ -17,7 +17,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from annotated_types import Interval, Unit
 
@@ -29,10 +29,7 @@ from solver.results.record import Status
 from solver.scenes.late import late
 from solver.scenes.material_parameters import ContactParameters
 from solver.scenes.scene import Scene
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from solver.typing import Array
 
 _USUAL: Mapping[Accuracy, Mapping[str, float]] = {
     "draft": {"smallest_element": 5e-3, "growth": 1.6, "load_step": 0.1},
@@ -52,10 +49,10 @@ _DIAGONAL = 1.5
 class Lines(NamedTuple):
     """Grid lines [mm]: x under the punch and beyond it, y of the punch and of the half-plane."""
 
-    under: NDArray[np.float64]
-    beyond: NDArray[np.float64]
-    up: NDArray[np.float64]
-    down: NDArray[np.float64]
+    under: Array
+    beyond: Array
+    up: Array
+    down: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

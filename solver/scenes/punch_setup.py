@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,11 +21,7 @@ from solver.results.view import View
 from solver.scenes.effort import Effort
 from solver.scenes.grid_size import GridSize, grid_size
 from solver.scenes.punch import NEAREST, PunchParameters
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
+from solver.typing import Array
 
 
 def model(parameters: PunchParameters) -> Model:
@@ -110,7 +106,7 @@ def view(parameters: PunchParameters) -> View:
     )
 
 
-def _pixels(length: float, a: float) -> NDArray[np.float64]:
+def _pixels(length: float, a: float) -> Array:
     """Return distances of map positions from the corner, as fine as elements of ``standard``."""
     return cells(length, smallest=5e-4 * a, ratio=1.1, largest=0.0125 * a)
 

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from solver.results.quantities import declare
+from solver.results.run import FinishedRun, Values
 from solver.results.view import ACROSS_TRACK, View
+from solver.scenes.effort import Effort
 from solver.scenes.prism_effort import effort_of
 from solver.scenes.prism_outputs import sketched
+from solver.scenes.prism_passes import by_passes
 from solver.scenes.raceway_parameters import RacewayParameters
+from solver.scenes.raceway_track import RacewayGeometry, RolledRaceway, geometry, section_of
 from solver.scenes.rolling_setup import AXLE_HEIGHT
 from solver.scenes.scene import Method
 from solver.scenes.sketch import Sketch
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from solver.results.run import FinishedRun, Values
-    from solver.scenes.effort import Effort
-    from solver.scenes.raceway_track import RacewayGeometry
 
 HERTZ_PRESSURE = declare("hertz_pressure", "peak pressure p0 of the elastic Hertz contact", "MPa")
 HERTZ_A = declare("hertz_a", "semi-axis along x of the elastic Hertz contact", "mm")
@@ -39,8 +37,6 @@ _PIXELS = 24
 def method(parameters: RacewayParameters) -> Method:
     """Return the method of the passes."""
     del parameters
-    from solver.scenes.prism_passes import by_passes  # loads scipy
-    from solver.scenes.raceway_track import RolledRaceway
 
     return partial(by_passes, rolled=RolledRaceway)
 
@@ -66,8 +62,6 @@ def view(parameters: RacewayParameters) -> View:
 
 def sketch(parameters: RacewayParameters) -> Sketch:
     """Return the section of the raceway, and the ball or roller at first touch."""
-    from solver.scenes.raceway_track import geometry, section_of
-
     own, radius = geometry(parameters), parameters.across
     wide = own.block if own.groove is None else min(own.block, own.groove[1])
     z = min(0.95 * radius, wide) * np.linspace(-1.0, 1.0, 201)
@@ -92,14 +86,10 @@ def elastic(run: FinishedRun) -> Values:
 
 def setup(parameters: RacewayParameters) -> RacewayGeometry:
     """Return the geometry of the raceway, which decides its set-up."""
-    from solver.scenes.raceway_track import geometry
-
     return geometry(parameters)
 
 
 def effort(parameters: RacewayParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
-    from solver.scenes.raceway_track import geometry, section_of
-
     own = geometry(parameters)
     return effort_of(section_of(own), own.window.size, passes)

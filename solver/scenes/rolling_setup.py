@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from solver.loading.program import Program
 from solver.loading.refinement import StepRefinement
 from solver.results.cycles import (
     SHAKEDOWN_STATE,
@@ -13,19 +12,15 @@ from solver.results.cycles import (
     STEADY_PLASTIC_INCREMENT,
 )
 from solver.results.free_surface import FreeSurface
-from solver.results.quantities import declare
+from solver.results.quantities import Quantity, declare
 from solver.results.record import Status
+from solver.results.run import FinishedRun, Values
 from solver.scenes.driver import by_increments
 from solver.scenes.passes import Trace, passes, shakedown_of
+from solver.scenes.rolling_endless import by_steady_passes
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.scene import Method
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.loading.program import Program
-    from solver.results.quantities import Quantity
-    from solver.results.run import FinishedRun, Values
+from solver.typing import Array
 
 CREEPAGE = declare("creepage", "creepage of the last pass")
 TRAVEL = declare("travel", "length rolled in the last pass", "mm")
@@ -104,7 +99,6 @@ def method(parameters: RollingParameters) -> Method:
     """Return the method of the passes: steady on an endless track, else by increments."""
     if not parameters.endless:
         return by_increments
-    from solver.scenes.rolling_endless import by_steady_passes  # loads scipy
 
     return by_steady_passes
 
@@ -120,7 +114,7 @@ def refinement(parameters: RollingParameters) -> StepRefinement | None:
     return StepRefinement(measure=_under_mid_track, tolerance=tolerance) if tolerance else None
 
 
-def _under_mid_track(trace: Trace) -> NDArray[np.float64]:
+def _under_mid_track(trace: Trace) -> Array:
     """Return the residual stress xx and zz under mid-track (2, depth) [MPa]."""
     return trace.stress[len(trace.stress) // 2, [0, 2]]
 

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from solver.model.body import Body
+from solver.model.body import Body
+from solver.typing import Array
 
 
 class Sketch(NamedTuple):
@@ -26,4 +23,4 @@ class Sketch(NamedTuple):
     bodies: tuple[Body, ...]
     pairs: tuple[tuple[tuple[str, str], ...], ...] = ()
     springs: Mapping[str, Sequence[str]] = {}
-    curves: Mapping[str, NDArray[np.float64]] = {}
+    curves: Mapping[str, Array] = {}

@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
+from solver.prism.patch_contact import PatchContact
 from solver.results.quantities import declare
+from solver.results.run import FinishedRun, Values
 from solver.results.view import ACROSS_TRACK, View
+from solver.scenes.effort import Effort
 from solver.scenes.prism_effort import effort_of
 from solver.scenes.prism_outputs import cycles, sketched
+from solver.scenes.prism_passes import by_passes
 from solver.scenes.rolling_setup import AXLE_HEIGHT
 from solver.scenes.scene import Method
 from solver.scenes.sketch import Sketch
+from solver.scenes.wheel_rail_contact import expected_contact, wheel_of
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.prism.patch_contact import PatchContact
-    from solver.results.run import FinishedRun, Values
-    from solver.scenes.effort import Effort
-    from solver.scenes.wheel_rail_track import RailGeometry
-
-    Array = NDArray[np.float64]
+from solver.scenes.wheel_rail_track import RailGeometry, RolledRail, geometry, meshed
+from solver.typing import Array
 
 AXLE_LATERAL_CREEPAGE = declare(
     "axle_lateral_creepage", "velocity of the axle along z over that along x", "1"
@@ -56,16 +52,12 @@ _PIXEL = 0.5
 def method(parameters: WheelRailParameters) -> Method:
     """Return the method of the passes."""
     del parameters
-    from solver.scenes.prism_passes import by_passes  # loads scipy
-    from solver.scenes.wheel_rail_track import RolledRail
 
     return partial(by_passes, rolled=RolledRail)
 
 
 def view(parameters: WheelRailParameters) -> View:
     """Return the positions of results: the head of the rail, and profiles under the contact."""
-    from solver.scenes.wheel_rail_contact import expected_contact  # loads scikit-fem
-
     contact = expected_contact(parameters)
     beside = round(contact.across) / 2
     across, along = round(2 * _HALF_HEAD / _PIXEL), round(2 * _ALONG / _PIXEL)
@@ -85,8 +77,6 @@ def view(parameters: WheelRailParameters) -> View:
 
 def sketch(parameters: WheelRailParameters) -> Sketch:
     """Return the section of the rail, and the wheel of the last pass at first touch."""
-    from solver.scenes.wheel_rail_track import geometry, meshed
-
     z = np.linspace(-_HALF_HEAD, _HALF_HEAD, 20 * round(_HALF_HEAD) + 1)
     height = _at_first_touch(parameters.each_pass()[-1], z)
     there = np.isfinite(height)
@@ -107,8 +97,6 @@ def traffic(run: FinishedRun) -> Values:
 
 def setup(parameters: WheelRailParameters) -> RailGeometry:
     """Return the geometry of the rail, which decides its set-up."""
-    from solver.scenes.wheel_rail_track import geometry
-
     return geometry(parameters)
 
 
@@ -118,8 +106,6 @@ def wheel(run: FinishedRun) -> Values:
     The height is that of the axle over the one at which the undeformed bodies touch; the moment is
     that about the vertical through the running circle.
     """
-    from solver.scenes.wheel_rail_contact import expected_contact
-
     contact = cast("PatchContact", run.outcome.points[run.view.loaded].touching)
     p = run.parameters.each_pass()[-1]
     return {
@@ -132,16 +118,12 @@ def wheel(run: FinishedRun) -> Values:
 
 def _at_first_touch(p: WheelRailParameters, z: Array) -> Array:
     """Return the height of the undeformed wheel where it first touches, inf where it is not."""
-    from solver.scenes.wheel_rail_contact import expected_contact, wheel_of
-
     own = wheel_of(p)
     return own.surface(own.lowest(z), z) - expected_contact(p).gap
 
 
 def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
-    from solver.scenes.wheel_rail_track import geometry, meshed
-
     own, turns = geometry(parameters), len({id(each) for each in parameters.block})
     return effort_of(
         meshed(parameters, own), own.window.size, passes, turns=turns,

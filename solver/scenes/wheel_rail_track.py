@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,8 +19,9 @@ from solver.mesh.section_mesh import SectionMesh
 from solver.mesh.zone import Zone, rail_mesh
 from solver.prism.patch import RollingPatch
 from solver.prism.section import Section
-from solver.prism.straight import StraightPrism, check_elastic
-from solver.scenes.initial_stress import NoStress
+from solver.prism.straight import SettledStress, StraightPrism, check_elastic
+from solver.prism.track import PrismTrack
+from solver.scenes.initial_stress import NoStress, SectionStress
 from solver.scenes.prism_window import PrismWindow, split_rows, whole
 from solver.scenes.wheel_rail_contact import (
     canted,
@@ -31,17 +31,9 @@ from solver.scenes.wheel_rail_contact import (
     wheel_of,
     wheel_profile,
 )
+from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
 from solver.tensors import to_mandel
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.prism.straight import SettledStress
-    from solver.prism.track import PrismTrack
-    from solver.scenes.initial_stress import SectionStress
-    from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _FOOT = 150.0
 """Width of the foot of 60E1, over which the foundation acts [mm]."""

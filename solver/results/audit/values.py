@@ -7,24 +7,18 @@ from the layers before and behind a steady pass. `Located` finds the elements th
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.materials.state import PlasticState
 from solver.mesh.rounding import ROUNDED
 from solver.results.audit.plain import PlainBody
+from solver.results.audit.recomputed import BodyFields
+from solver.results.steady import TrackBody
+from solver.steady import Pass
+from solver.steady.layers import Layers
 from solver.tensors import SQRT2
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.state import PlasticState
-    from solver.results.audit.recomputed import BodyFields
-    from solver.results.steady import TrackBody
-    from solver.steady import Pass
-    from solver.steady.layers import Layers
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Ints
 
 _SLACK = 0.05
 """Ratio to the side of an element's bounding box by which curved edges may extend beyond it."""
@@ -188,7 +182,7 @@ class PassFields:
         return found, np.where(here, total[row + k, column], outside)
 
     @cached_property
-    def _top(self) -> NDArray[np.int64]:
+    def _top(self) -> Ints:
         y = self.plain.part.X[1]
         return np.flatnonzero(y > -_SAME_DEPTH * self._found.before.depth[0])
 
@@ -293,7 +287,7 @@ class Located:
         return out
 
 
-def _nearest(places: Array, at: Array) -> NDArray[np.int64]:
+def _nearest(places: Array, at: Array) -> Ints:
     """Return the number of the nearest place (n,) for each position in ``at``."""
     different, first = np.unique(places, return_index=True)
     middles = (different[1:] + different[:-1]) / 2
