@@ -62,8 +62,7 @@ class Body:
     periodic: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
-
-        check_kinds(Body, self, Mesh=Mesh)
+        check_kinds(Body, self)
         if self.kinematics not in KINEMATICS:
             raise ModelError(
                 "kinematics", self.kinematics, "must be one of " + ", ".join(KINEMATICS)

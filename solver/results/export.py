@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import tempfile
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
-import meshio
 import numpy as np
 
 from solver.errors import ModelError
@@ -66,14 +67,14 @@ def vtu_of(fields: MeshFields, stage: str) -> bytes:
         return file.read()
 
 
-def to_meshio(fields: MeshFields, stage: str) -> meshio.Mesh:
-    """Return a stage as one mesh of meshio with all bodies.
+def to_meshio(fields: MeshFields, stage: str) -> Any:
+    """Return a stage as one `meshio.Mesh` with all bodies.
 
     The cell field ``body`` is the number of the body. Displacement has three components for
     ParaView's *Warp By Vector*; stress is in the fields ``stress_xx`` and so on, and so are strain
     and plastic strain. Units: N, mm, MPa.
     """
-    import meshio  # imported here: only export needs it
+    meshio = import_module("meshio")  # only export needs it
 
     values = fields.stages[stage]
     every = list(fields.bodies.values())

@@ -9,12 +9,12 @@ import numpy as np
 from solver.materials.law import Law
 from solver.model.motion import TravellingPressure
 from solver.results.audit.flow import AuditedFlow, difference, largest
+from solver.results.audit.pass_fields import PassFields
 from solver.results.audit.plain import PlainBody, load_factor
 from solver.results.audit.recomputed import Acting, BodyFields
 from solver.results.audit.report import Audit, broken, estimated_error, limits_at, warnings
 from solver.results.audit.sources import between, hertz
 from solver.results.audit.theory import Neglected, equivalent, largest_strain
-from solver.results.audit.values import PassFields
 from solver.results.steady import TrackBody
 from solver.steady import Pass, RollingContact, Track
 from solver.steady.fields import of_layers, under_load
