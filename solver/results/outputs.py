@@ -36,11 +36,14 @@ class NamedOutput(NamedTuple):
 
 
 _OUTPUTS: dict[str, NamedOutput] = {}
-_MODULES = (
-    "contact", "corner", "extremes", "figures", "increments", "indentation", "maps", "places",
-    "pressure_error", "stick",
+MODULES = tuple(
+    f"solver.results.{module}"
+    for module in (
+        "contact", "corner", "extremes", "figures", "increments", "indentation", "maps", "places",
+        "pressure_error", "stick",
+    )
 )  # fmt: skip
-"""Modules of `solver.results` whose outputs, or what these declare, scene files request."""
+"""Modules with outputs that scene files request, or with what these declare."""
 
 
 def output(word: str, *needs: Need) -> Callable[[T], T]:
@@ -67,7 +70,7 @@ def outputs() -> Mapping[str, NamedOutput]:
 
     The modules of the package that have some are imported first.
     """
-    for module in _MODULES:
-        import_module(f"solver.results.{module}")
+    for module in MODULES:
+        import_module(module)
     load_own_parts()
     return _OUTPUTS

@@ -7,6 +7,7 @@ the functions that compute it as text: they are imported when they are called.
 
 from __future__ import annotations
 
+from solver.results.outputs import MODULES
 from solver.results.quantities import DECLARING
 from solver.scenes.effort import Effort
 from solver.scenes.punch import PUNCH
@@ -18,14 +19,8 @@ from solver.scenes.wheel_rail import WHEEL_RAIL
 SCENES: dict[str, Scene] = {scene.name: scene for scene in (PUNCH, ROLLING, WHEEL_RAIL, RACEWAY)}
 
 DECLARING += [
-    f"solver.{module}"
-    for module in (
-        "scenes.punch_setup", "scenes.rolling_setup", "scenes.wheel_rail_setup",
-        "scenes.raceway_setup", "scenes.driver", "results.contact", "results.corner",
-        "results.extremes", "results.figures",
-        "results.increments", "results.indentation", "results.named_places", "results.places",
-        "results.pressure_error", "results.stick",
-    )
+    *MODULES, "solver.results.named_places", "solver.scenes.driver", "solver.scenes.punch_setup",
+    "solver.scenes.rolling_setup", "solver.scenes.wheel_rail_setup", "solver.scenes.raceway_setup",
 ]  # fmt: skip
 
 __all__ = ["SCENES", "Effort", "Monitor", "Scene"]

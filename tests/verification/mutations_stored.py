@@ -31,7 +31,7 @@ import solver.results.shakedown
 import solver.results.singularity
 import solver.results.steady
 import solver.results.tractions
-import solver.scenes.rolling
+import solver.scenes.rolling_setup
 import solver.scenes.rolling_steady
 from solver.contact.candidates import Candidates
 from solver.contact.interface import Interface
@@ -523,7 +523,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "residual stress of layers without zz": _passed(times(Layers, "stress", 0.9), "stored"),
     "the first pass told as the last": _passed(
-        instead(solver.scenes.rolling, "passes", first_pass_last), "stored"
+        instead(solver.scenes.rolling_setup, "passes", first_pass_last), "stored"
     ),
     "shear of a wheel against its way": _passed(
         instead(SteadyTractions, "along", part_times(1, -1.0)),
