@@ -12,7 +12,7 @@ from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from math import ceil
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from service.alone import CRASHED, FAILED, Answer, alone
 from service.errors import TooMany
@@ -23,13 +23,14 @@ from solver.files import LARGEST
 from studies import Store, Study, StudyError
 from studies.definition.parameters import read_values
 from studies.errors import SceneError
-from studies.scenes.description import Description, file_names
+from studies.scenes.file_scene import FileScene
 from studies.scenes.formats import FORMATS, load_readers
-from studies.scenes.meshfile import TABLE, MeshFile
 from studies.scenes.registry import scene_named
-from studies.scenes.scene import FileScene, read_scene
 from studies.scenes.table import FILE_NAME
 from studies.scratch import scratch
+
+if TYPE_CHECKING:
+    from studies.scenes.description import Description
 
 log = logging.getLogger(__name__)
 
@@ -64,6 +65,9 @@ class Inspector:
         Busy
             if the budget of the caller is used, or the process was killed
         """
+        from studies.scenes.description import Description  # loads scipy
+        from studies.scenes.meshfile import TABLE, MeshFile
+
         if len(text) > LONGEST:
             raise StudyError("scene", f"{len(text)} bytes", f"must have at most {LONGEST} bytes")
         known = (*FORMATS, TABLE)
@@ -147,6 +151,9 @@ def _checked(folder: Path) -> str:
 
 def _read(folder: Path) -> FileScene:
     """Return the scene in a folder; every file must be needed and valid."""
+    from studies.scenes.description import Description, file_names  # loads scipy
+    from studies.scenes.scene import read_scene
+
     needed = file_names(Description.read(folder / _FILE).content)
     for name in sorted({each.name for each in folder.iterdir()} - {_FILE, *needed}):
         listed = ", ".join(needed) or "(it names none)"

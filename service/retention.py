@@ -19,13 +19,16 @@ from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from service.errors import Busy, Conflict, NoRoom, NotFound
 from service.examiner import Examined
 from service.job import Job, StudyState
 from service.jobs import Jobs, forget, put
 from studies import FileDamaged, Store
-from studies.scenes.description import Description
+
+if TYPE_CHECKING:
+    from studies.scenes.description import Description
 
 log = logging.getLogger(__name__)
 

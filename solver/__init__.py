@@ -11,36 +11,15 @@ points up.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from solver.version import __version__ as __version__
-
-if TYPE_CHECKING:
-    from solver.contact.system import System
-    from solver.errors import LimitLoad, ModelError, NotConverged, SolverError
-    from solver.loading.control import PathControl, Tolerances
-    from solver.loading.outcome import Outcome
-    from solver.loading.program import Program, Stage
-    from solver.loading.walker import Walker
-    from solver.materials.material import Material
-    from solver.model.amplitude import Amplitude
-    from solver.model.body import Body
-    from solver.model.link import Link
-    from solver.model.loads import Displacement, InitialStress, Pressure, Temperature, Traction
-    from solver.model.model import ContactPair, Model
-    from solver.model.rigid import Moved, Pushed, RigidBody
-    from solver.model.singular import SingularPoint
-    from solver.model.tabulated import Tabulated
-    from solver.results.audit.report import Audit
-    from solver.results.record import Record, Status
-    from solver.results.solution import Solution, solve
-    from solver.scenes import SCENES, Scene
 
 _HOMES = {
     "Amplitude": "model.amplitude",
     "Audit": "results.audit.report",
     "Body": "model.body",
-    "ContactPair": "model.model",
+    "ContactPair": "model.contact_pair",
     "Displacement": "model.loads",
     "InitialStress": "model.loads",
     "LimitLoad": "errors",
@@ -73,42 +52,7 @@ _HOMES = {
     "Walker": "loading.walker",
 }
 
-__all__ = [
-    "SCENES",
-    "Amplitude",
-    "Audit",
-    "Body",
-    "ContactPair",
-    "Displacement",
-    "InitialStress",
-    "LimitLoad",
-    "Link",
-    "Material",
-    "Model",
-    "ModelError",
-    "Moved",
-    "NotConverged",
-    "Outcome",
-    "PathControl",
-    "Pressure",
-    "Program",
-    "Pushed",
-    "Record",
-    "RigidBody",
-    "Scene",
-    "SingularPoint",
-    "Solution",
-    "SolverError",
-    "Stage",
-    "Status",
-    "System",
-    "Tabulated",
-    "Temperature",
-    "Tolerances",
-    "Traction",
-    "Walker",
-    "solve",
-]
+__all__ = list(_HOMES)
 
 
 def __getattr__(name: str) -> Any:

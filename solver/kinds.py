@@ -21,7 +21,7 @@ _PLAIN: dict[Any, tuple[Callable[[object], bool], str]] = {
 }
 
 
-def check_kinds(kind: Any, declared: Any, within: str = "", **names: type) -> None:
+def check_kinds(kind: Any, declared: Any, within: str = "") -> None:
     """Raise `ModelError` for the first value that is not of the kind that its field declares.
 
     Parameters
@@ -29,9 +29,8 @@ def check_kinds(kind: Any, declared: Any, within: str = "", **names: type) -> No
     kind : the dataclass; fields that a class derived from it adds are not checked
     declared : the object
     within : what stands before the name of the field in the message
-    names : classes of annotations that the module of ``kind`` does not import
     """
-    for name, hint in _hints(kind, **names):
+    for name, hint in _hints(kind):
         require(within + name, getattr(declared, name), hint)
 
 
@@ -42,8 +41,8 @@ def require(field: str, value: object, hint: Any) -> None:
 
 
 @cache
-def _hints(kind: Any, **names: type) -> tuple[tuple[str, Any], ...]:
-    hints = typing.get_type_hints(kind, localns=names)
+def _hints(kind: Any) -> tuple[tuple[str, Any], ...]:
+    hints = typing.get_type_hints(kind)
     return tuple((item.name, hints[item.name]) for item in fields(kind))
 
 

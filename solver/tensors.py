@@ -9,12 +9,9 @@ tensor components (``xy`` without the factor): `to_tensor`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from solver.typing import Array
 
 AXES = ("x", "y", "z")
 """Names of coordinates; a place has the first two or all of them."""
@@ -36,40 +33,40 @@ COMPONENTS = components(4)
 """Names of the components in two dimensions."""
 
 
-def to_tensor(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_tensor(mandel: Array) -> Array:
     """Return tensor components ``(n_components, ...)`` from Mandel components of that shape."""
     tensor = np.array(mandel, dtype=float)
     tensor[3:] /= SQRT2
     return tensor
 
 
-def to_mandel(tensor: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_mandel(tensor: Array) -> Array:
     """Return Mandel components ``(n_components, ...)`` from tensor components of that shape."""
     mandel = np.array(tensor, dtype=float)
     mandel[3:] *= SQRT2
     return mandel
 
 
-def identity(n_components: int) -> NDArray[np.float64]:
+def identity(n_components: int) -> Array:
     """Return the Mandel components (n_components,) of the unit tensor."""
     one = np.zeros(n_components)
     one[:3] = 1.0
     return one
 
 
-def deviator(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
+def deviator(mandel: Array) -> Array:
     """Return the deviator (n_components, ...) of Mandel components of that shape."""
     out = np.array(mandel)
     out[:3] -= mandel[:3].mean(axis=0)
     return out
 
 
-def von_mises(mandel: NDArray[np.float64]) -> NDArray[np.float64]:
+def von_mises(mandel: Array) -> Array:
     """Return the von Mises stress (...) of Mandel components (n_components, ...) [MPa]."""
     return np.asarray(np.sqrt(1.5 * (deviator(mandel) ** 2).sum(axis=0)))
 
 
-def not_below_zero(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def not_below_zero(values: Array) -> Array:
     """Return values of an invariant that cannot be negative, with negative ones set to zero.
 
     Interpolation can make them slightly negative.
@@ -77,9 +74,7 @@ def not_below_zero(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.maximum(values, 0.0)
 
 
-def stress_difference(
-    stress: NDArray[np.float64], plane: tuple[str, str] = ("x", "y")
-) -> NDArray[np.float64]:
+def stress_difference(stress: Array, plane: tuple[str, str] = ("x", "y")) -> Array:
     """Return sigma1 - sigma2 (...) of a plane, of tensor components (n_components, ...) [MPa].
 
     Parameters
@@ -88,7 +83,7 @@ def stress_difference(
     """
     names = components(len(stress))
 
-    def component(*axes: str) -> NDArray[np.float64]:
+    def component(*axes: str) -> Array:
         return stress[next(k for k, name in enumerate(names) if set(name) == set(axes))]
 
     a, b = plane

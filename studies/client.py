@@ -24,14 +24,15 @@ from studies.definition.study import Study
 from studies.definition.sweep import labels
 from studies.definition.vocabulary import OK
 from studies.errors import MOST_NAMES, StudyError
-from studies.scenes.description import Description
-from studies.scenes.scene import FileScene
+from studies.scenes.file_scene import FileScene
 from studies.toml import toml_file
 from studies.views.audited import Worst
 from studies.views.summary import Failed, Summary, bar, placed, summary_of
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from studies.scenes.description import Description
 
 _WAIT = 60.0
 """Time to wait for an answer, and for one that is put off [s]."""
@@ -138,6 +139,8 @@ class Client:
 
     def post_scene(self, path: Path | str) -> dict[str, Any]:
         """Send a scene file and its meshes; return its ``id``, ``name`` and ``summary``."""
+        from studies.scenes.description import Description  # loads scipy
+
         return self._post(Description.read(Path(path)), read_file(path))
 
     def _post(self, known: Description, text: bytes | None = None) -> dict[str, Any]:

@@ -23,8 +23,8 @@ from service.maps import PICTURE
 from service.scenes import known_scene
 from service.schemas import ContentId, KeptScene, SceneSummary, SketchQuery, Window
 from studies import StudyError, scene_schema
+from studies.scenes.file_scene import FileScene
 from studies.scenes.registry import known_scenes
-from studies.scenes.scene import FileScene
 
 router = APIRouter(prefix="/scenes", tags=["scenes"])
 

@@ -5,28 +5,21 @@ The conditions of links, which always hold, follow after the gaps and slips.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.geometry import Pairing
+from solver.contact.links import Links
 from solver.contact.problem import OPEN
 from solver.contact.rows import ContactRows, OnParts, joined
+from solver.contact.state import ContactState, State
+from solver.contact.system import System
+from solver.fem.operators import Operator
 from solver.model.friction import BoundLines
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.contact.geometry import Pairing
-    from solver.contact.links import Links
-    from solver.contact.state import ContactState, State
-    from solver.contact.system import System
-    from solver.fem.operators import Operator
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Ints
 
 _MARGIN = 0.25
 """Vertices nearer than this many element lengths are candidates."""
@@ -63,21 +56,21 @@ class Candidates(OnParts):
     links : the conditions of links, the last of the rows
     """
 
-    vertices: tuple[NDArray[np.int64], ...]
+    vertices: tuple[Ints, ...]
     lines: BoundLines
-    motion: NDArray[np.float64]
-    uncounted: NDArray[np.float64]
-    forces: NDArray[np.float64]
-    status: NDArray[np.int64]
-    unsure: NDArray[np.float64]
+    motion: Array
+    uncounted: Array
+    forces: Array
+    status: Ints
+    unsure: Array
     rows: tuple[ContactRows | None, ...]
-    turned: tuple[NDArray[np.float64], ...]
-    covered: tuple[NDArray[np.float64], ...]
-    gaps: tuple[NDArray[np.float64], ...]
-    slips: tuple[NDArray[np.float64], ...]
+    turned: tuple[Array, ...]
+    covered: tuple[Array, ...]
+    gaps: tuple[Array, ...]
+    slips: tuple[Array, ...]
     beyond: float
-    leaving: tuple[NDArray[np.float64] | None, ...]
-    pushes: tuple[NDArray[np.float64], ...]
+    leaving: tuple[Array | None, ...]
+    pushes: tuple[Array, ...]
     holds: tuple[bool, ...]
     links: Links
 
@@ -106,7 +99,7 @@ class Candidates(OnParts):
         """For each interface, the slice of its candidates in the arrays of all."""
         return _places(self.vertices)
 
-    def motions(self, part: int, rigid: NDArray[np.float64]) -> NDArray[np.float64]:
+    def motions(self, part: int, rigid: Array) -> Array:
         """Return the gaps and slips that the free rigid motions (n, k) of a part cause [mm].
 
         Gaps are those of ``turned``; `of_part` has what forces work on instead.
@@ -125,24 +118,24 @@ class Candidates(OnParts):
         """Return the same candidates without friction."""
         return replace(self, lines=BoundLines.none(self.n))
 
-    def all_on_part(self, part: int, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+    def all_on_part(self, part: int, forces: Array) -> Array:
         """Return the nodal forces on a part, with those of pairs that leave [N]."""
         pushes = self.pushes[part]
         return self.on_part(part, forces, len(pushes)) + pushes
 
-    def of_part(self, part: int, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def of_part(self, part: int, u: Array) -> Array:
         """Return the gaps and slips that displacements ``u`` (n, ...) of a part cause [mm]."""
         rows = self.rows[part]
         if rows is None:
             return np.zeros((len(self.motion), *u.shape[1:]))
         return np.asarray(rows.block @ u[rows.dofs])
 
-    def touched(self, part: int) -> NDArray[np.int64]:
+    def touched(self, part: int) -> Ints:
         """Return the unknowns of a part on which contact forces may act."""
         rows, pushed = self.rows[part], np.flatnonzero(self.pushes[part])
         return pushed if rows is None else np.union1d(rows.dofs, pushed)
 
-    def compliance(self, operators: Sequence[Operator]) -> NDArray[np.float64]:
+    def compliance(self, operators: Sequence[Operator]) -> Array:
         """Return the compliance W of the contact points: gaps and slips per force [mm/N]."""
         W = np.zeros((len(self.motion), len(self.motion)))
         for operator, rows in zip(operators, self.rows, strict=True):
@@ -150,7 +143,7 @@ class Candidates(OnParts):
                 W += operator.compliance(rows.dofs, rows.block)
         return W
 
-    def violation(self, stiffness: NDArray[np.float64]) -> float:
+    def violation(self, stiffness: Array) -> float:
         """Return the natural residual of the contact conditions, as a force [N].
 
         ``|N - max(0, N - k gap)|`` and, where N > 0, ``|T - clip(T - k slip, -s, s)|`` with
@@ -193,8 +186,8 @@ class Candidates(OnParts):
     def states(
         self,
         before: tuple[ContactState, ...],
-        forces: NDArray[np.float64],
-        status: NDArray[np.int64],
+        forces: Array,
+        status: Ints,
     ) -> tuple[ContactState, ...]:
         """Return the contact states with these forces and statuses."""
         out = []
@@ -233,15 +226,13 @@ class Candidates(OnParts):
         return tuple(out)
 
 
-def _places(vertices: Sequence[NDArray[np.int64]]) -> list[slice]:
+def _places(vertices: Sequence[Ints]) -> list[slice]:
     """Return for each interface the slice of its candidates in the arrays of all."""
     ends = accumulate(map(len, vertices), initial=0)
     return [slice(first, last) for first, last in pairwise(ends)]
 
 
-def no_candidates(
-    system: System, u: tuple[NDArray[np.float64], ...], links: NDArray[np.float64]
-) -> Candidates:
+def no_candidates(system: System, u: tuple[Array, ...], links: Array) -> Candidates:
     """Return an empty set of candidates, with the links: the bodies are separated."""
     empty, off = np.zeros(0), system.links.off(u, links)
     none = tuple(np.zeros(0, dtype=int) for _ in system.interfaces)
@@ -263,9 +254,9 @@ def no_candidates(
 def find_candidates(
     system: System,
     start: State,
-    u: tuple[NDArray[np.float64], ...],
+    u: tuple[Array, ...],
     contacts: tuple[ContactState, ...],
-    links: NDArray[np.float64],
+    links: Array,
     span: float = 0.0,
 ) -> Candidates:
     """Return the candidates at displacements ``u``, a ``span`` of time after ``start``.
@@ -305,7 +296,7 @@ def find_candidates(
     lines: list[BoundLines] = []
     unsure = np.zeros(n)
     pieces = [_below(m, rows) for rows in system.links.rows]
-    slips: list[NDArray[np.float64]] = []
+    slips: list[Array] = []
     turned = [np.zeros((n, part.rigid.shape[1])) for part in system.parts]
     for pair, (interface, pairing, at, before, normal) in enumerate(
         zip(system.interfaces, pairings, vertices, start.contacts, _places(vertices), strict=True)
@@ -341,7 +332,7 @@ def find_candidates(
             motion[tangent] = slip[at] - uncounted[normal]
         slips.append(slip)
 
-    def gather(name: str) -> NDArray[np.float64]:
+    def gather(name: str) -> Array:
         values = [getattr(c, name)[v] for c, v in zip(contacts, vertices, strict=True)]
         return np.concatenate([np.zeros(0), *values])
 
@@ -407,7 +398,7 @@ def _grew(before: Array, after: Array) -> bool:
     return bool(-change.sum(where=change < 0) <= _FELL * change.sum(where=change > 0))
 
 
-def _near(pairing: Pairing, contact: ContactState, floating: bool) -> NDArray[np.int64]:
+def _near(pairing: Pairing, contact: ContactState, floating: bool) -> Ints:
     """Return the vertices near contact.
 
     The nearest vertex of a body held by contact alone always counts, at any distance.

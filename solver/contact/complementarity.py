@@ -10,7 +10,6 @@ Ingenieur-Archiv 56 (1986) 529-541, ends in a ray for most instances: its matrix
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg
@@ -18,9 +17,7 @@ from scipy import linalg
 from solver.contact.given_bound import given_bound
 from solver.contact.problem import BACKWARD, FORWARD, OPEN, STICK, ContactProblem, ContactSolution
 from solver.model.friction import LEAST_FRICTION, BoundLines
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from solver.typing import Array, Ints
 
 _MAX_SETS = 40
 _MAX_PASSES = 20
@@ -39,7 +36,7 @@ _FIRST = 1e3
 _KNOWN = 1e-8
 
 
-def solve_contact(problem: ContactProblem, start: NDArray[np.int64]) -> ContactSolution | None:
+def solve_contact(problem: ContactProblem, start: Ints) -> ContactSolution | None:
     """Return the solution, or None when there is none or none was found.
 
     ``start`` (n,) is the initial status of the points, usually that of the previous iteration.
@@ -63,8 +60,8 @@ def _at_rest(problem: ContactProblem) -> bool:
 
 
 def change_of(
-    problem: ContactProblem, solution: ContactSolution, offset: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    problem: ContactProblem, solution: ContactSolution, offset: Array
+) -> tuple[Array, Array]:
     """Return the change of forces (m,) and rigid motions (k,) with the offset, at fixed status.
 
     Tangential forces at their bound stay there.
@@ -79,8 +76,8 @@ def change_of(
 
 
 def _forces(
-    problem: ContactProblem, status: NDArray[np.int64], piece: NDArray[np.int64], bound: BoundLines
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
+    problem: ContactProblem, status: Ints, piece: Ints, bound: BoundLines
+) -> tuple[Array, Array, Array] | None:
     """Return forces and rigid motions of given statuses, or None for a singular system.
 
     Where a point slips, ``piece`` says which line of the ``bound`` its tangential force is on.
@@ -145,16 +142,12 @@ def _forces(
     return P @ solution[:size] + known, solution[size:], rest
 
 
-def _solves(
-    S: NDArray[np.float64], solution: NDArray[np.float64], rhs: NDArray[np.float64]
-) -> bool:
+def _solves(S: Array, solution: Array, rhs: Array) -> bool:
     miss = np.abs(S @ solution - rhs).max(initial=0.0)
     return bool(miss <= _ACCURATE * np.abs(rhs).max(initial=0.0))
 
 
-def _active_sets(
-    problem: ContactProblem, start: NDArray[np.int64], piece: NDArray[np.int64]
-) -> ContactSolution | None:
+def _active_sets(problem: ContactProblem, start: Ints, piece: Ints) -> ContactSolution | None:
     """Return the solution that is reached from a status, or None if the active sets cycle.
 
     ``piece`` (n,) belongs to the status: the line of the bound that a sliding point is on.
@@ -209,9 +202,7 @@ def _active_sets(
     return None
 
 
-def _stopped(
-    status: NDArray[np.int64], motion: NDArray[np.float64], rate: NDArray[np.float64]
-) -> NDArray[np.int64] | None:
+def _stopped(status: Ints, motion: Array, rate: Array) -> Ints | None:
     """Return the statuses once a body has moved until one more point closes or sticks.
 
     ``rate`` is that of ``motion``, gaps and slips. None if it moves for ever.
@@ -272,7 +263,7 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
     return None
 
 
-def _holds(problem: ContactProblem, F: NDArray[np.float64], q: NDArray[np.float64]) -> bool:
+def _holds(problem: ContactProblem, F: Array, q: Array) -> bool:
     """Whether forces and motions meet all conditions.
 
     Passes can find a solution that belongs to no set of statuses: if no force rotates a body,

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from solver.contact.interface import Interface
-    from solver.contact.state import ContactState, State
-    from solver.contact.system import System
+from solver.contact.interface import Interface
+from solver.contact.state import ContactState, State
+from solver.contact.system import System
 
 _STILL, _FAR = 0.01, 0.5
 """Ratios of the slip to the length of an element edge. Below the first, small sliding is exact

@@ -7,21 +7,17 @@ surface ends at a corner of the body, contact may reach that end.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.candidates import Candidates
-    from solver.contact.interface import Interface
-    from solver.contact.system import System
+from solver.contact.candidates import Candidates
+from solver.contact.interface import Interface
+from solver.contact.system import System
+from solver.typing import Array, Ints
 
 _COVERED = 1 - 1e-6
 
 
-def beyond_end(system: System, u: tuple[NDArray[np.float64], ...], candidates: Candidates) -> str:
+def beyond_end(system: System, u: tuple[Array, ...], candidates: Candidates) -> str:
     """Return the message that contact has reached the end of a surface; empty if it has not."""
     for interface, vertices, covered, here in zip(
         system.interfaces, candidates.vertices, candidates.covered, candidates.places, strict=True
@@ -39,9 +35,9 @@ def beyond_end(system: System, u: tuple[NDArray[np.float64], ...], candidates: C
 
 def _side(
     interface: Interface,
-    u: tuple[NDArray[np.float64], ...],
-    vertices: NDArray[np.int64],
-    covered: NDArray[np.float64],
+    u: tuple[Array, ...],
+    vertices: Ints,
+    covered: Array,
 ) -> int | None:
     """Return the side (0 slave, 1 master) whose end the vertices in contact have reached."""
     slave, master = interface.slave_surface, interface.master_surface

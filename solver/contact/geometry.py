@@ -12,24 +12,15 @@ Int. J. Numer. Meth. Engng 79 (2009) 1354-1391.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.contact.normals import end_normals
-from solver.fem.surface import at_vertices
+from solver.fem.surface import Surface, at_vertices
 from solver.mesh.edges import shape_functions
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.fem.surface import Surface
-
-    Array = NDArray[np.float64]
-    Numbers = NDArray[np.int64]
+from solver.typing import Array, Bools, Ints
 
 _GAUSS_XI, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 _NEWTON_STEPS = 6
@@ -133,7 +124,7 @@ def _beside(points: Array, normals: Array, others: Array) -> Array:
     return np.stack([-normals[1], normals[0]], axis=-1) @ others - _cross(normals, points)[:, None]
 
 
-def _near(start: Array, end: Array) -> tuple[Numbers, ...]:
+def _near(start: Array, end: Array) -> tuple[Ints, ...]:
     """Return the edges that a line may cross, given its signed distances from their ends.
 
     The line is tested against the chord, extended for the curvature of the edge: it may cross the
@@ -148,7 +139,7 @@ def _project_on_slave(
     slave: Surface,
     powers: Array,
     points: Array,
-) -> tuple[Numbers, Array]:
+) -> tuple[Ints, Array]:
     """Return edges, and xi on them, where the slave's normal passes through a point."""
     ends = x[:, slave.edges[:, :2].T]
     edge, point = _near(*(_beside(ends[:, k], normals[:, k], points) for k in (0, 1)))
@@ -177,7 +168,7 @@ def _nearest(
     points: Array,
     normals: Array,
     reach: float,
-) -> tuple[Numbers, NDArray[np.bool_]]:
+) -> tuple[Ints, Bools]:
     """Return the master edge that faces each point and is nearest, and whether there is one.
 
     An edge faces a point if the normals are opposite within 75 degrees, at any distance in front
@@ -196,7 +187,7 @@ def _nearest(
     return partner, np.isfinite(distance[np.arange(len(partner)), partner])
 
 
-def _segments(edge: Numbers, xi: Array, n_edges: int) -> tuple[Numbers, Array, Array]:
+def _segments(edge: Ints, xi: Array, n_edges: int) -> tuple[Ints, Array, Array]:
     """Return edge, start and end of the pieces that breakpoints ``xi`` on ``edge`` cut."""
     inner = np.abs(xi) < 1 - _EDGE_TOLERANCE
     owner = np.concatenate([edge[inner], np.arange(n_edges), np.arange(n_edges)])
@@ -228,7 +219,7 @@ def pair(
     cut, xi = _project_on_slave(xs, normals, slave, own, xm[:, master.vertices])
     edge, start, end = _segments(cut, xi, len(slave.edges))
 
-    def on_slave(e: Numbers, at: Array) -> tuple[Array, Array]:
+    def on_slave(e: Ints, at: Array) -> tuple[Array, Array]:
         n = (1 - at) / 2 * normals[:, 0, e] + (1 + at) / 2 * normals[:, 1, e]
         return _value(own[..., e], at), n / np.sqrt(n[0] ** 2 + n[1] ** 2)
 
@@ -257,8 +248,8 @@ def pair(
 def _integrate(
     slave: Surface,
     master: Surface,
-    edge: Numbers,
-    partner: Numbers,
+    edge: Ints,
+    partner: Ints,
     xi: Array,
     eta: Array,
     ways: Array,

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import linalg
 
 from solver.contact.lemke import lemke
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.problem import ContactProblem
+from solver.contact.problem import ContactProblem
+from solver.typing import Array, Ints
 
 _PIVOTS_PER_UNKNOWN = 20
 
 
-def given_bound(
-    problem: ContactProblem, bound: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+def given_bound(problem: ContactProblem, bound: Array) -> tuple[Array, Array] | None:
     """Return forces and rigid motions when |T| <= bound is given, or None if there are none.
 
     z = (N, tau, back), w = (gap, fore, sigma) with tau = T / bound + 1, sigma = 1 - T / bound
@@ -72,13 +65,13 @@ def given_bound(
 
 
 def _eliminate(
-    M: NDArray[np.float64],
-    r: NDArray[np.float64],
-    A: NDArray[np.float64],
-    columns: NDArray[np.float64],
-    balance: NDArray[np.float64],
-    held: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    M: Array,
+    r: Array,
+    A: Array,
+    columns: Array,
+    balance: Array,
+    held: Ints,
+) -> tuple[Array, Array] | None:
     """Exchange the normal forces ``held`` with their gaps, and eliminate the rigid motions."""
     N, k = M.shape[0], len(held)
     rest = np.setdiff1d(np.arange(N), held)

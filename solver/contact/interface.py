@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,19 +11,15 @@ from solver.contact.geometry import Pairing, pair
 from solver.contact.normals import is_curved
 from solver.contact.overlap import check_overlap, largest_overlap
 from solver.errors import ModelError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from solver.fem.discretisation import Discretisation
-    from solver.fem.part import Part
-    from solver.fem.rigid import RigidPart
-    from solver.fem.softening import Softening
-    from solver.fem.surface import Surface
-    from solver.model.friction import FrictionLaw
-    from solver.model.model import ContactPair, Model
+from solver.fem.discretisation import Discretisation
+from solver.fem.part import Part
+from solver.fem.rigid import RigidPart
+from solver.fem.softening import Softening
+from solver.fem.surface import Surface
+from solver.model.contact_pair import ContactPair
+from solver.model.friction import FrictionLaw
+from solver.model.model import Model
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,9 +64,7 @@ class Interface:
         """Whether contact has to hold a rigid motion of either part."""
         return any(part.rigid.shape[1] for part in self.parts)
 
-    def pairing(
-        self, u: tuple[NDArray[np.float64], ...], time: float = 0.0, *, finite: bool = False
-    ) -> Pairing:
+    def pairing(self, u: tuple[Array, ...], time: float = 0.0, *, finite: bool = False) -> Pairing:
         """Return gap, area and derivative rows at displacements ``u`` and a time.
 
         With ``finite`` the surfaces are paired in their current positions; without it a pair of
@@ -79,12 +73,12 @@ class Interface:
         found = self.facing(u, time, finite=finite)
         return found.parted if self.declared.absent(time) else found
 
-    def facing(self, u: tuple[NDArray[np.float64], ...], time: float, *, finite: bool) -> Pairing:
+    def facing(self, u: tuple[Array, ...], time: float, *, finite: bool) -> Pairing:
         """Return the pairing as if the pair were there."""
         as_meshed = self._as_meshed(u, finite)
         return replace(as_meshed, gap=as_meshed.gap + self.declared.offset(time))
 
-    def strength(self, pairing: Pairing, time: float) -> NDArray[np.float64]:
+    def strength(self, pairing: Pairing, time: float) -> Array:
         """Return the shear yield stress (n,) of the weaker body at a time [MPa].
 
         The weaker body is the one with the lower mean shear yield stress under a vertex's hat.
@@ -99,9 +93,9 @@ class Interface:
     def slip(
         self,
         pairing: Pairing,
-        u: tuple[NDArray[np.float64], ...],
-        since: tuple[NDArray[np.float64], ...] | None = None,
-    ) -> NDArray[np.float64]:
+        u: tuple[Array, ...],
+        since: tuple[Array, ...] | None = None,
+    ) -> Array:
         """Return the slip (n,) of the slave's vertices at displacements ``u`` [mm].
 
         Slip counts from the displacements ``since``, or from those before loading if absent.
@@ -114,7 +108,7 @@ class Interface:
             slip += rows @ moved.T.ravel()
         return slip
 
-    def _as_meshed(self, u: tuple[NDArray[np.float64], ...], finite: bool) -> Pairing:
+    def _as_meshed(self, u: tuple[Array, ...], finite: bool) -> Pairing:
         motions = [part.motion(chain, u[number]) for number, part, chain in self.sides]
         if self.reference is not None and not finite:
             change = sum(
@@ -126,7 +120,7 @@ class Interface:
         return pair(self.slave_surface, motions[0], self.master_surface, motions[1], self.reach)
 
 
-def _mean(rows: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _mean(rows: Array, values: Array) -> Array:
     """Return the means (n,) under the hats of values at a surface's nodes; 1 without a partner.
 
     ``rows`` (n, 2 n_nodes) are those of gaps: the same means, times the normal.

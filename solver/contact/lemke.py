@@ -6,12 +6,11 @@ R.W. Cottle, J.-S. Pang, R.E. Stone, The Linear Complementarity Problem (1992), 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.typing import Array, Bools
 
 
-def lemke(
-    M: NDArray[np.float64], r: NDArray[np.float64], max_pivots: int
-) -> tuple[NDArray[np.float64], bool]:
+def lemke(M: Array, r: Array, max_pivots: int) -> tuple[Array, bool]:
     """Solve ``w = M z + r, w >= 0, z >= 0, w z = 0``.
 
     Returns
@@ -46,9 +45,7 @@ def lemke(
     return z, False
 
 
-def _leaving(
-    column: NDArray[np.float64], values: NDArray[np.float64], artificial: NDArray[np.bool_]
-) -> int:
+def _leaving(column: Array, values: Array, artificial: Bools) -> int:
     """Return the row of the least ratio, of equal ones that of z0; -1 if there is none."""
     rows = np.flatnonzero(column > 1e-11 * np.abs(column).max())
     ratios = np.maximum(values[rows], 0.0) / column[rows]

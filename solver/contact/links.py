@@ -8,9 +8,8 @@ hold and whose normals lean, see `solver.contact.problem`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg
@@ -21,22 +20,15 @@ from solver.contact.overlap import largest_overlap
 from solver.contact.problem import ContactProblem, ContactSolution
 from solver.contact.rows import ContactRows, OnParts, joined
 from solver.errors import ModelError
+from solver.fem.discretisation import Discretisation
 from solver.fem.loads import comparing
+from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
+from solver.fem.surface import Surface
 from solver.linear.solvers import Singular
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.fem.discretisation import Discretisation
-    from solver.fem.part import Part
-    from solver.fem.surface import Surface
-    from solver.model.link import Link, Side
-    from solver.model.model import Model
-
-    Array = NDArray[np.float64]
+from solver.model.link import Link, Side
+from solver.model.model import Model
+from solver.typing import Array, Bools, Ints
 
 _DEPENDENT = 1e-9
 """Ratio of what is left of a condition without the others to the condition; below it the condition
@@ -60,7 +52,7 @@ class Links(OnParts):
 
     rows: tuple[ContactRows | None, ...]
     compliance: Array
-    whose: NDArray[np.int64]
+    whose: Ints
 
     def __len__(self) -> int:
         """Return the number of conditions."""
@@ -98,7 +90,7 @@ class Links(OnParts):
 
 
 def solve_linked(
-    problem: ContactProblem, links: int, touched: NDArray[np.bool_], start: NDArray[np.int64]
+    problem: ContactProblem, links: int, touched: Bools, start: Ints
 ) -> ContactSolution | None:
     """Return the solution with links, or None when there is none or none was found.
 
@@ -118,7 +110,7 @@ def solve_linked(
 
 
 def eliminated(
-    problem: ContactProblem, links: int, touched: NDArray[np.bool_]
+    problem: ContactProblem, links: int, touched: Bools
 ) -> tuple[ContactProblem, Callable[[ContactSolution], ContactSolution]]:
     """Return the contact problem without its last conditions, and the way back to all unknowns.
 
@@ -305,7 +297,7 @@ def _mean(
     return (ways / sizes).T @ weighted @ block, ways.T
 
 
-def _independent(made: Links, parts: Sequence[Part], X: Array) -> NDArray[np.int64]:
+def _independent(made: Links, parts: Sequence[Part], X: Array) -> Ints:
     """Return the conditions that do not follow from supports and the others.
 
     Raises `ModelError` for one that follows from them but for prescribed motions, which contradict.

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from solver.fem.surface import Surface
 from solver.mesh.edges import shape_derivatives
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.surface import Surface
+from solver.typing import Array
 
 _CORNER = float(np.cos(np.radians(40.0)))
 """Cosine of the angle between the normals of two edges; at a larger angle they form a corner."""
@@ -20,7 +15,7 @@ _STRAIGHT = 1e-6
 cause it; the sagitta of an element is then 1e-7 of its length."""
 
 
-def _edge_normal(x: NDArray[np.float64], surface: Surface, xi: float) -> NDArray[np.float64]:
+def _edge_normal(x: Array, surface: Surface, xi: float) -> Array:
     """Return outward unit normals (2, n_edges) at ``xi`` of every edge."""
     count = surface.edges.shape[1]
     d = shape_derivatives(np.array(xi), count)
@@ -29,7 +24,7 @@ def _edge_normal(x: NDArray[np.float64], surface: Surface, xi: float) -> NDArray
     return np.asarray(n / np.linalg.norm(n, axis=0))
 
 
-def end_normals(x: NDArray[np.float64], surface: Surface) -> NDArray[np.float64]:
+def end_normals(x: Array, surface: Surface) -> Array:
     """Return unit normals (2, 2, n_edges) at the starts and the ends of the edges.
 
     Two edges share the mean of their normals at the vertex between them. At a corner of the

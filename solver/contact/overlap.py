@@ -6,20 +6,15 @@ the model: small strains cannot remove it, and the surface through which a point
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from skfem import Mesh
 
 from solver.errors import ModelError
+from solver.fem.surface import Surface
 from solver.mesh.edges import shape_functions
+from solver.model.body import Body
 from solver.model.rigid import RigidBody
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from skfem import Mesh
-
-    from solver.fem.surface import Surface
-    from solver.model.body import Body
+from solver.typing import Array
 
 _ALLOWED = 0.05
 
@@ -52,7 +47,7 @@ def check_overlap(
             )  # fmt: skip
 
 
-def _depth(points: NDArray[np.float64], body: Body, allowed: float) -> NDArray[np.float64]:
+def _depth(points: Array, body: Body, allowed: float) -> Array:
     """Return how deep points (2, n) are inside a body (n,) [mm], 0 for those outside."""
     mesh = body.mesh
     low, high = mesh.p.min(axis=1) + allowed, mesh.p.max(axis=1) - allowed
@@ -74,7 +69,7 @@ def _depth(points: NDArray[np.float64], body: Body, allowed: float) -> NDArray[n
     return depth
 
 
-def _outline(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _outline(mesh: Mesh) -> tuple[Array, Array]:
     """Return starts and ends (2, n) of the chords of a body's outline, four on a curved edge."""
     outside = mesh.boundary_facets()
     first, last = (mesh.p[:, nodes] for nodes in mesh.facets[:, outside])

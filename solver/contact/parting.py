@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from scipy.linalg import null_space
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.state import State
-    from solver.contact.system import System
+from solver.contact.state import State
+from solver.contact.system import System
+from solver.typing import Array
 
 _ROUNDS = 5
 """Number of times the motion is computed: surfaces that are curved need corrections."""
@@ -67,9 +65,7 @@ def parted(system: System, state: State) -> State:
     return state
 
 
-def _least_squares(E: NDArray[np.float64], f: NDArray[np.float64]) -> NDArray[np.float64]:
+def _least_squares(E: Array, f: Array) -> Array:
     """Return the vector y without negative numbers for which |E y - f| is smallest."""
-    from scipy.optimize import nnls  # few models overlap, and it takes a fifth of all imports
-
-    found: NDArray[np.float64] = nnls(E, f)[0]
+    found: Array = scipy.optimize.nnls(E, f)[0]
     return found

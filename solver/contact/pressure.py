@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.state import State
-    from solver.contact.system import System
-
-    Array = NDArray[np.float64]
+from solver.contact.state import State
+from solver.contact.system import System
+from solver.typing import Array
 
 
 def contact_pressure(system: System, state: State, interface: int) -> tuple[Array, Array]:

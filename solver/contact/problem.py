@@ -15,14 +15,11 @@ master's. Without this a ring that rests on two vertices could turn without open
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.model.friction import BoundLines
+from solver.model.friction import BoundLines
+from solver.typing import Array, Ints
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 """Status of a contact point."""
@@ -43,19 +40,19 @@ class ContactProblem:
     G : (m, k) gap and slip of the free rigid motions; A if absent
     """
 
-    W: NDArray[np.float64]
-    offset: NDArray[np.float64]
+    W: Array
+    offset: Array
     lines: BoundLines
-    A: NDArray[np.float64]
-    balance: NDArray[np.float64]
-    G: NDArray[np.float64] | None = None
+    A: Array
+    balance: Array
+    G: Array | None = None
 
     @property
-    def turned(self) -> NDArray[np.float64]:
+    def turned(self) -> Array:
         """G, or A if absent."""
         return self.A if self.G is None else self.G
 
-    def moved(self, F: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
+    def moved(self, F: Array, q: Array) -> Array:
         """Return gap and slip (m,) with forces F (m,) and rigid motions q (k,) [mm]."""
         return self.offset + self.W @ F + self.turned @ q
 
@@ -83,7 +80,7 @@ class ContactProblem:
 class ContactSolution:
     """Forces (m,), rigid motions (k,), status (n,), and whether it was found by pivoting."""
 
-    forces: NDArray[np.float64]
-    rigid: NDArray[np.float64]
-    status: NDArray[np.int64]
+    forces: Array
+    rigid: Array
+    status: Ints
     pivoted: bool

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from solver.typing import Array, Ints
 
 
 @dataclass(frozen=True, slots=True)
 class ContactRows:
     """Derivatives of all gaps (and slips) with respect to the unknowns ``dofs`` of one part."""
 
-    dofs: NDArray[np.int64]
-    block: NDArray[np.float64]
+    dofs: Ints
+    block: Array
 
 
 class OnParts:
@@ -25,7 +23,7 @@ class OnParts:
     __slots__ = ()
     rows: tuple[ContactRows | None, ...]
 
-    def on_part(self, part: int, forces: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    def on_part(self, part: int, forces: Array, size: int) -> Array:
         """Return the forces (size,) that forces of the conditions exert on a part [N]."""
         rows, nodal = self.rows[part], np.zeros(size)
         if rows is not None:

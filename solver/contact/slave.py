@@ -9,19 +9,16 @@ its own, which moves with it; on one of its partner any small moment turns it to
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.contact.normals import is_curved
+from solver.fem.surface import Surface
+from solver.model.contact_pair import ContactPair
+from solver.model.model import Model
 from solver.model.rigid import RigidBody
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
-
-    from solver.fem.surface import Surface
-    from solver.model.model import ContactPair, Model
 
 _RIGID = (0.4, 1.1)
 """Permitted range of the edge length of a rigid slave over that of its partner."""

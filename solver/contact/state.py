@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.contact.problem import OPEN, STICK
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.window import Region
-    from solver.materials.state import PlasticState, Response
+from solver.fem.window import Region
+from solver.materials.state import PlasticState, Response
+from solver.typing import Array, Bools, Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,21 +27,21 @@ class ContactState:
     current positions, or always as before loading.
     """
 
-    normal: NDArray[np.float64]
-    tangential: NDArray[np.float64]
-    status: NDArray[np.int64]
-    touching: NDArray[np.bool_]
-    gap: NDArray[np.float64]
-    rates: NDArray[np.float64]
-    earlier: NDArray[np.float64]
+    normal: Array
+    tangential: Array
+    status: Ints
+    touching: Bools
+    gap: Array
+    rates: Array
+    earlier: Array
     finite: bool
-    slipped: NDArray[np.float64]
+    slipped: Array
 
     @classmethod
     def at_rest(
         cls,
-        gap: NDArray[np.float64],
-        touching: NDArray[np.bool_],
+        gap: Array,
+        touching: Bools,
         *,
         finite: bool,
         before: ContactState | None,
@@ -77,11 +73,11 @@ class State:
     """
 
     time: float
-    u: tuple[NDArray[np.float64], ...]
+    u: tuple[Array, ...]
     plastic: tuple[PlasticState, ...]
     contacts: tuple[ContactState, ...]
     force_scale: float = 0.0
-    links: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    links: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +106,7 @@ class Energy:
     scale: float = 0.0
 
 
-def _none() -> NDArray[np.float64]:
+def _none() -> Array:
     return np.zeros(1)
 
 
@@ -133,11 +129,11 @@ class Timing:
     stuck : friction that the sticking vertices can carry; that of slipping vertices is known
     """
 
-    untimed: NDArray[np.float64] = field(default_factory=_none)
-    friction: NDArray[np.float64] = field(default_factory=_none)
-    passed: NDArray[np.float64] = field(default_factory=_none)
-    normal: NDArray[np.float64] = field(default_factory=_none)
-    stuck: NDArray[np.float64] = field(default_factory=_none)
+    untimed: Array = field(default_factory=_none)
+    friction: Array = field(default_factory=_none)
+    passed: Array = field(default_factory=_none)
+    normal: Array = field(default_factory=_none)
+    stuck: Array = field(default_factory=_none)
 
     @property
     def unknown(self) -> float:
@@ -168,7 +164,7 @@ class Timing:
         )
 
 
-def _worst(part: NDArray[np.float64], whole: NDArray[np.float64]) -> float:
+def _worst(part: Array, whole: Array) -> float:
     """Return the largest ratio of ``part`` to ``whole``, of the pairs whose force counts."""
     part, whole = np.broadcast_arrays(part, whole)
     counts = (whole > 0) & (whole >= _LITTLE * whole.max(initial=0.0))
@@ -204,8 +200,8 @@ class Converged:
 
     start: State
     state: State
-    forces: tuple[NDArray[np.float64], ...]
-    contact_forces: tuple[NDArray[np.float64], ...]
+    forces: tuple[Array, ...]
+    contact_forces: tuple[Array, ...]
     contact_work: tuple[float, float]
     responses: tuple[Response, ...]
     iterations: int
@@ -218,6 +214,6 @@ class Converged:
     energy: Energy = field(default_factory=Energy)
     timing: Timing = field(default_factory=Timing)
     added: float = 0.0
-    missed: tuple[NDArray[np.float64] | None, ...] = ()
+    missed: tuple[Array | None, ...] = ()
     lost: float = 0.0
     windows: tuple[Region | None, ...] = ()

@@ -3,50 +3,39 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import null_space
 from scipy.sparse import csr_array
 
-from solver.contact.interface import interface_of, surfaces_of
+from solver.contact.geometry import Pairing
+from solver.contact.interface import Interface, interface_of, surfaces_of
 from solver.contact.links import Links, links_of, surfaces_of_links
 from solver.contact.slave import with_slaves
-from solver.contact.state import ContactState, State
+from solver.contact.state import ContactState, Converged, State
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.fields import Sampler, recovery
+from solver.fem.frame import RigidMotion
+from solver.fem.operators import PartOperators
+from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
 from solver.fem.substructure import Substructure
+from solver.fem.surface import Surface
 from solver.fem.wheel import Wheel
 from solver.fem.window import Region, Windowed
-from solver.model.friction import ContactPlaces, lines_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.contact.geometry import Pairing
-    from solver.contact.interface import Interface
-    from solver.contact.state import Converged
-    from solver.fem.frame import RigidMotion
-    from solver.fem.operators import PartOperators
-    from solver.fem.part import Part
-    from solver.fem.surface import Surface
-    from solver.materials.law import Law
-    from solver.materials.state import Response
-    from solver.model.friction import BoundLines
-    from solver.model.link import Side
-    from solver.model.loads import Load
-    from solver.model.model import Model
-    from solver.model.rigid import RigidBody
-
-    Array = NDArray[np.float64]
-
+from solver.materials.law import Law
+from solver.materials.state import Response
+from solver.model.friction import BoundLines, ContactPlaces, lines_of
+from solver.model.link import Side
+from solver.model.loads import Load
+from solver.model.model import Model
+from solver.model.rigid import RigidBody
+from solver.typing import Array
 
 LEAST = 1e-7
 """Ratio of the rounding level of forces to the nodal forces of heat, initial stress and prescribed
@@ -359,7 +348,7 @@ class System:
         """Return a surface of a whole body, meshed or rigid."""
         return self._chains[name].chain(boundary)
 
-    def displacement(self, name: str, state: State) -> NDArray[np.float64]:
+    def displacement(self, name: str, state: State) -> Array:
         """Return the displacements (n,) of a whole body [mm]."""
         number = self.part(name)
         part, u, time = self.parts[number], state.u[number], state.time
@@ -389,7 +378,7 @@ class System:
         both = zip(self.parts, converged.state.u, strict=True)
         return next((part.motion_of(u) for part, u in both if isinstance(part, Wheel)), None)
 
-    def sampler(self, name: str, X: NDArray[np.float64]) -> Sampler:
+    def sampler(self, name: str, X: Array) -> Sampler:
         """Return the interpolation of nodal fields of a body at positions (2, n) [mm]."""
         return Sampler(self.full(name), X)
 
@@ -397,7 +386,7 @@ class System:
         """Return the matrix (n_nodes, n_points) from values at points to those at nodes."""
         return recovery(self.full(name))
 
-    def positions(self, name: str) -> NDArray[np.float64]:
+    def positions(self, name: str) -> Array:
         """Return the positions of the integration points of a body (2, n_points) [mm]."""
         return self.full(name).points.reshape(2, -1)
 

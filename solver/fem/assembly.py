@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import sparse
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from solver.typing import Array, Ints
 
 
 class Assembly:
@@ -27,10 +24,10 @@ class Assembly:
 
     def __init__(
         self,
-        dofs: NDArray[np.int64],
-        active: NDArray[np.int64],
+        dofs: Ints,
+        active: Ints,
         n: int,
-        block: NDArray[np.int64] | None = None,
+        block: Ints | None = None,
     ) -> None:
         number = np.full(n, -1)
         number[active] = np.arange(len(active))
@@ -49,25 +46,21 @@ class Assembly:
         at, self._block_place = np.split(place, [pairs[0].shape[1]])
         self._place = at.reshape(len(dofs), -1)
 
-    def values(
-        self, elements: NDArray[np.int64] | slice, matrices: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def values(self, elements: Ints | slice, matrices: Array) -> Array:
         """Return the values on `pattern` of the sum of some elements' matrices."""
         return self._summed(self._place[elements], matrices)
 
-    def block_values(self, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    def block_values(self, matrix: Array) -> Array:
         """Return the values on `pattern` of a dense matrix (b, b) on the block."""
         return self._summed(self._block_place, matrix)
 
-    def _summed(
-        self, place: NDArray[np.int64], matrices: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _summed(self, place: Ints, matrices: Array) -> Array:
         size = self.pattern.nnz + 1
         data = np.bincount(place.ravel(), weights=matrices.ravel(), minlength=size)
         return np.asarray(data[:-1], dtype=float)
 
 
-def _pairs(local: NDArray[np.int64]) -> NDArray[np.int64]:
+def _pairs(local: Ints) -> Ints:
     """Return row and column (2, n) of each entry of matrices on unknowns (n_matrices, m)."""
     n, m = local.shape
     rows = np.broadcast_to(local[:, :, None], (n, m, m))
@@ -75,9 +68,7 @@ def _pairs(local: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.stack([rows.ravel(), columns.ravel()])
 
 
-def whole_matrix(
-    dofs: NDArray[np.int64], matrices: NDArray[np.float64], n: int
-) -> sparse.csr_array:
+def whole_matrix(dofs: Ints, matrices: Array, n: int) -> sparse.csr_array:
     """Return the matrix (n, n) of all elements on all unknowns."""
     at = dofs.astype(np.int32)  # SciPy keeps the kind of index, and what is cut from it has it too
     rows = np.broadcast_to(at[:, :, None], matrices.shape)

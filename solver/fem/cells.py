@@ -9,19 +9,16 @@ than a sixth of the first cells may lie between all points of both, and is then 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from skfem import CellBasis
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from solver.typing import Array, Bools, Ints
 
-    from numpy.typing import NDArray
-    from skfem import CellBasis
+Rule = tuple[Array, Array]
 
-    Array = NDArray[np.float64]
-    Rule = tuple[Array, Array]
 
 _ACCURATE, _HALVINGS, _MOST = 1e-7, 40, 200_000
 """Error of the integral over a cell, over the largest integral over an element, above which the
@@ -46,7 +43,7 @@ class Cells:
     """
 
     basis: CellBasis
-    element: NDArray[np.int64]
+    element: Ints
     corner: Array
     size: Array
 
@@ -73,10 +70,10 @@ class Cells:
         area = area * np.abs(mapping.detDF(local, tind=self.element))
         return local, np.asarray(mapping.F(local, tind=self.element)), area
 
-    def __getitem__(self, some: NDArray[np.bool_]) -> Cells:
+    def __getitem__(self, some: Bools) -> Cells:
         return Cells(self.basis, self.element[some], self.corner[:, some], self.size[:, some])
 
-    def halves(self, axis: NDArray[np.int64]) -> Cells:
+    def halves(self, axis: Ints) -> Cells:
         """Return both halves of all cells, divided along an axis each (n,)."""
         across = axis == [[0], [1]]
         size = np.where(across, 0.5, 1.0) * self.size

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg, sparse
@@ -22,20 +21,16 @@ from solver.fem.nodes import Nodes
 from solver.fem.operators import Operators
 from solver.fem.part import Part, same_unknowns
 from solver.fem.softening import Softening
-from solver.fem.surface import edges_of, extract, gathered, shortest
+from solver.fem.surface import Surface, edges_of, extract, gathered, shortest
 from solver.linear import solvers as linear
+from solver.linear.solvers import LinearSolver
+from solver.materials import Law, PlasticState, Response
 from solver.mesh.elements import element_type
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.surface import Surface
-    from solver.linear.solvers import LinearSolver
-    from solver.materials import Law, PlasticState, Response
-    from solver.model.body import Body
+from solver.model.body import Body
+from solver.typing import Array, Bools, Ints
 
 
-def choose_pins(rigid: NDArray[np.float64], free: NDArray[np.int64]) -> NDArray[np.int64]:
+def choose_pins(rigid: Array, free: Ints) -> Ints:
     """Return the unknowns ``free`` without one pin for each of the rigid motions (n, n_rigid)."""
     if not rigid.shape[1]:
         return free
@@ -77,7 +72,7 @@ class Discretisation(Nodes, Part):
             self.B = kinematics.mean_dilatation(self.B, self.weights)
         self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
         self.moves = body.travelling is not None
-        self._travelling: tuple[float, NDArray[np.float64]] = (np.nan, np.zeros(0))
+        self._travelling: tuple[float, Array] = (np.nan, np.zeros(0))
         self.loads = nodal_forces(self)
         check_removed(self, self.loads)
         self.eigenstrains = eigenstrains(self)
@@ -111,11 +106,11 @@ class Discretisation(Nodes, Part):
         return Operators(self, np.concatenate([np.zeros(0, int), *contact]), linear_solver)
 
     @property
-    def volumes(self) -> NDArray[np.float64]:
+    def volumes(self) -> Array:
         """Volume of the points (n_points,) [mm3]."""
         return self.weights.ravel()
 
-    def external(self, time: float) -> NDArray[np.float64]:
+    def external(self, time: float) -> Array:
         """Return the external nodal forces (n,) at a time [N]."""
         if self.body.travelling is None:
             return super().external(time)
@@ -135,7 +130,7 @@ class Discretisation(Nodes, Part):
         position = self.body.travelling.position if self.body.travelling else None
         return position.at(after) - position.at(before) if position else 0.0
 
-    def sources(self, way: float) -> NDArray[np.int64]:
+    def sources(self, way: float) -> Ints:
         """Return for each unknown the one that lies ``way`` [mm] behind it along x, or -1."""
         places = self.nodes - np.array([[way], [0.0]])
         if self.period:
@@ -161,9 +156,7 @@ class Discretisation(Nodes, Part):
         """Return the internal variables of the body before any load."""
         return self.body.law.initial(self.weights.size, self.B.shape[2])
 
-    def strain(
-        self, u: NDArray[np.float64], elements: NDArray[np.bool_] | slice = slice(None)
-    ) -> NDArray[np.float64]:
+    def strain(self, u: Array, elements: Bools | slice = slice(None)) -> Array:
         """Return Mandel strain (4, n_points) for displacements (n,), of all or some elements."""
         flat = np.matmul(self._flat_B[elements], u[self.dofs[elements]][:, :, None])
         return np.asarray(flat.reshape(-1, self.B.shape[2]).T)
@@ -172,7 +165,7 @@ class Discretisation(Nodes, Part):
         """Return the material law of its points at a time; temperature may change it."""
         return self.softening.law(self.body.law, time) if self.softening else self.body.law
 
-    def gone(self, time: float) -> NDArray[np.bool_] | None:
+    def gone(self, time: float) -> Bools | None:
         """Return whether elements at the points (n_points,) are removed; None if none ever are."""
         lost = self.softening
         return lost.gone(time) if lost and lost.removed.cases else None
@@ -182,11 +175,11 @@ class Discretisation(Nodes, Part):
         heat = Softening.of(self, self.X[:, surface.nodes])
         return heat if heat and heat.strength.fields.any() else None
 
-    def eigenstrain(self, time: float) -> NDArray[np.float64]:
+    def eigenstrain(self, time: float) -> Array:
         """Return the eigenstrain (4, n_points, Mandel): thermal, or that of an initial stress."""
         return self.eigenstrains.at(time).reshape(4, -1)
 
-    def respond(self, u: NDArray[np.float64], state: PlasticState, time: float) -> Response:
+    def respond(self, u: Array, state: PlasticState, time: float) -> Response:
         """Return stress, tangent and new state at all points; the tangent is symmetric."""
         strain = self.strain(u)
         if self.eigenstrains.cases:
@@ -232,7 +225,7 @@ class Discretisation(Nodes, Part):
             energy += float(moved @ (self.diagonal * moved)) / 2
         return float(np.linalg.norm(nodal)), energy
 
-    def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    def moved(self, u: Array, time: float) -> Array:
         """Return ``u`` with prescribed displacements at their values for a time.
 
         The other unknowns follow elastically, so that no single element takes all of the motion.
@@ -252,21 +245,19 @@ class Discretisation(Nodes, Part):
         solver.factorise(self.elastic_data)
         return solver
 
-    def internal_force(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    def internal_force(self, stress: Array) -> Array:
         """Return nodal forces (n,) that balance ``stress`` (4, n_points) [N]."""
         weighted = (stress * self.weights.ravel()).T.reshape(len(self._flat_B), 1, -1)
         forces = np.matmul(weighted, self._flat_B)[:, 0]
         nodal = np.bincount(self.dofs.ravel(), weights=forces.ravel(), minlength=self.n)
         return np.asarray(nodal, dtype=float)
 
-    def residual(
-        self, time: float, u: NDArray[np.float64], response: Response
-    ) -> NDArray[np.float64]:
+    def residual(self, time: float, u: Array, response: Response) -> Array:
         """Return external minus internal forces (n,), without contact forces [N]."""
         del u
         return self.external(time) - self.internal_force(response.stress)
 
-    def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
+    def stiffness_along(self, step: Array, response: Response) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
         strain, yields = self.strain(step), response.yielding
         C = self.body.law.stiffness(len(strain))
@@ -290,9 +281,7 @@ class Discretisation(Nodes, Part):
 
     # -- stiffness ---------------------------------------------------------------------------
 
-    def _element_stiffness(
-        self, elements: NDArray[np.int64] | slice, tangent: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _element_stiffness(self, elements: Ints | slice, tangent: Array) -> Array:
         B = self.B[elements]
         DB = np.matmul(tangent, B) * self.weights[elements][:, :, None, None]
         flat = B.reshape(len(B), -1, B.shape[-1])
@@ -308,13 +297,13 @@ class Discretisation(Nodes, Part):
         return self._assembly.pattern
 
     @cached_property
-    def elastic_elements(self) -> NDArray[np.float64]:
+    def elastic_elements(self) -> Array:
         """Elastic stiffness of each element (n_elements, m, m)."""
         C = self.body.law.stiffness(self.B.shape[2])
         return self._element_stiffness(slice(None), C[None, None])
 
     @cached_property
-    def elastic_data(self) -> NDArray[np.float64]:
+    def elastic_data(self) -> Array:
         """Values of the elastic stiffness on `pattern`."""
         return self._assembly.values(slice(None), self.elastic_elements)
 
@@ -326,7 +315,7 @@ class Discretisation(Nodes, Part):
         """Return the elastic stiffness on all unknowns (n, n), supports not applied."""
         return self._elastic_matrix
 
-    def tangent_data(self, response: Response) -> NDArray[np.float64]:
+    def tangent_data(self, response: Response) -> Array:
         """Return the values of the consistent tangent on `pattern`.
 
         Only elements with a yielding point are integrated; the rest keep their elastic matrix.

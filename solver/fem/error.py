@@ -25,23 +25,16 @@ T. Blacker, T. Belytschko, Int. J. Numer. Meth. Engng 37 (1994) 517-536: step 3.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 from skfem.quadrature import get_quadrature
 
+from solver.fem.discretisation import Discretisation
 from solver.mesh.elements import element_type
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import NDArray
-
-    from solver.fem.discretisation import Discretisation
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Bools, Ints
 
 _INWARD = 1e-6
 """Fraction of the distance to the element's centre by which nodes are moved inside, for weights."""
@@ -134,7 +127,7 @@ class ErrorPoints:
         return out / total
 
     @cached_property
-    def _inner(self) -> NDArray[np.bool_]:
+    def _inner(self) -> Bools:
         """Whether a vertex (n_vertices,) is inside the body."""
         mesh = self._part.basis.mesh
         inner = np.ones(mesh.t.max() + 1, dtype=bool)
@@ -142,7 +135,7 @@ class ErrorPoints:
         return inner
 
     @cached_property
-    def _taken(self) -> NDArray[np.bool_]:
+    def _taken(self) -> Bools:
         """Which vertices of an element (corners, n_elements) count in its recovered stress."""
         inner = self._inner[self._part.basis.mesh.t]
         return inner | ~inner.any(axis=0)
@@ -198,7 +191,7 @@ class ErrorPoints:
             scale[:, vertex] = size
         return fitted, scale
 
-    def _patches(self) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    def _patches(self) -> Iterator[tuple[Ints, Ints]]:
         """Yield vertices (m,) and their patches (m, n), for each number n of elements."""
         mesh = self._part.basis.mesh
         elements = np.broadcast_to(np.arange(mesh.t.shape[1]), mesh.t.shape)

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import sparse
 
+from solver.fem.discretisation import Discretisation
+from solver.fem.part import Part
+from solver.materials.state import Response
 from solver.mesh.rounding import ROUNDED
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.discretisation import Discretisation
-    from solver.fem.part import Part
-    from solver.materials.state import Response
+from solver.typing import Array, Ints
 
 _INSIDE = 1e-7
 _NEWTON_STEPS = 6
@@ -23,7 +18,7 @@ _KNOWN = 1e-9
 """Share of a value by unknown points or nodes that counts as rounding."""
 
 
-def _monomials(x: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+def _monomials(x: Array, count: int) -> Array:
     """Return the first ``count`` of 1, x, y, xy at points (2, n) as (n, count)."""
     return np.stack([np.ones_like(x[0]), x[0], x[1], x[0] * x[1]][:count], axis=-1)
 
@@ -55,7 +50,7 @@ def recovery(part: Discretisation) -> sparse.csr_array:
     return sparse.csr_array(operator[part.same])
 
 
-def recovered_beside(matrix: sparse.csr_array, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def recovered_beside(matrix: sparse.csr_array, points: Array) -> Array:
     """Return nodal values (..., n_nodes) of point values (..., n_points) by `recovery`.
 
     Elements whose points are NaN do not count; nodes of these elements alone are NaN.
@@ -76,7 +71,7 @@ class Sampler:
     x : (2, n) positions before deformation [mm]
     """
 
-    def __init__(self, part: Discretisation, x: NDArray[np.float64]) -> None:
+    def __init__(self, part: Discretisation, x: Array) -> None:
         element, point, local = _locate(part, np.asarray(x, dtype=float))
         shape = part.basis.elem.lbasis
         nodes = part.basis.element_dofs[:, element]
@@ -88,7 +83,7 @@ class Sampler:
             shape=(x.shape[1], part.X.shape[1]),
         )
 
-    def __call__(self, nodal: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, nodal: Array) -> Array:
         """Return values (..., n) of nodal fields (..., n_nodes)."""
         flat = np.atleast_2d(nodal).reshape(-1, nodal.shape[-1])
         unknown = np.isnan(flat)
@@ -99,9 +94,7 @@ class Sampler:
         return np.asarray(out.reshape(*nodal.shape[:-1], len(self.inside)))
 
 
-def _locate(
-    part: Discretisation, x: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+def _locate(part: Discretisation, x: Array) -> tuple[Ints, Ints, Array]:
     """Return element, point number and reference coordinates of the points inside the body."""
     corners = part.X[:, part.basis.element_dofs]
     extent = np.ptp(corners, axis=1)
@@ -123,9 +116,7 @@ def _locate(
     return element[best], point[best], np.clip(local[:, best], 0.0, 1.0)
 
 
-def _within(
-    low: NDArray[np.float64], high: NDArray[np.float64], x: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _within(low: Array, high: Array, x: Array) -> tuple[Ints, Ints]:
     """Return box and point number of all points (2, n) in boxes with these corners (2, m)."""
     order = np.argsort(x[0], kind="stable")
     first = np.searchsorted(x[0, order], low[0], side="left")
@@ -137,9 +128,7 @@ def _within(
     return box[inside], point[inside]
 
 
-def _reference(
-    part: Discretisation, element: NDArray[np.int64], x: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _reference(part: Discretisation, element: Ints, x: Array) -> Array:
     """Return reference coordinates (2, n) of points in given elements by Newton's method."""
     mapping = part.basis.mapping
     local = np.full((2, len(element), 1), 0.5 if part.basis.mesh.t.shape[0] == 4 else 1 / 3)
@@ -153,7 +142,7 @@ def _reference(
     return np.asarray(local[:, :, 0])
 
 
-def elastic_energy(part: Part, u: NDArray[np.float64], response: Response, time: float) -> float:
+def elastic_energy(part: Part, u: Array, response: Response, time: float) -> float:
     """Return the elastic energy of a part [N mm]; without points, from its condensed stiffness."""
     if part.meshed:
         return float(part.law(time).energy_density(response.stress) @ part.volumes)

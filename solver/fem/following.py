@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import sparse
 
+from solver.fem.part import Part
 from solver.linear import solvers as linear
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.part import Part
+from solver.typing import Array
 
 
 class Following:
@@ -45,7 +40,7 @@ class Following:
             self._solver = linear.analyse(upper)
             self._solver.factorise(upper.data)
 
-    def carried(self, change: NDArray[np.float64]) -> NDArray[np.float64]:
+    def carried(self, change: Array) -> Array:
         """Return a change of the unknowns (n,), shifted by the distance [mm]."""
         moved = np.where(self._known, change[self.source], 0.0)
         if len(self._others):

@@ -8,14 +8,11 @@ at a radius R. A point at X before loading, displaced by d in the frame, is at
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 
 class RigidMotion(NamedTuple):

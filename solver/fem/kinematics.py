@@ -6,25 +6,21 @@ three dimensions sqrt(2) yz and sqrt(2) zx.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from solver.tensors import SQRT2
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from solver.typing import Array
 
 _SHEARS = ((0, 1), (1, 2), (2, 0))
 """Axes of the shear components xy, yz, zx."""
 
 
 def strain_operator(
-    values: NDArray[np.float64],
-    gradients: NDArray[np.float64],
-    radius: NDArray[np.float64],
+    values: Array,
+    gradients: Array,
+    radius: Array,
     kinematics: str,
-) -> NDArray[np.float64]:
+) -> Array:
     """Return B, which gives Mandel strain at the points of elements for nodal displacements.
 
     Parameters
@@ -53,7 +49,7 @@ def strain_operator(
     return B.reshape(n_elements, n_points, 3 + len(shears), dim * n_nodes)
 
 
-def mean_dilatation(B: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+def mean_dilatation(B: Array, weights: Array) -> Array:
     """Return B with its volumetric part averaged over each element (B-bar).
 
     T.J.R. Hughes, The Finite Element Method (1987), section 4.5: removes the locking of
@@ -66,7 +62,7 @@ def mean_dilatation(B: NDArray[np.float64], weights: NDArray[np.float64]) -> NDA
     return bar
 
 
-def rigid_motions(x: NDArray[np.float64], kinematics: str) -> NDArray[np.float64]:
+def rigid_motions(x: Array, kinematics: str) -> Array:
     """Return the rigid motions of nodes ``x`` (dim, n_nodes) as columns (dim n_nodes, n_rigid).
 
     Translations along the axes, then the rotations about the centroid (scaled to unit size): in

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.fem.cells import LOBATTO, smooth_cells
+from solver.fem.nodes import Nodes
 from solver.fem.surface import edges_of
 from solver.mesh.edges import shape_derivatives, shape_functions
-from solver.model.loads import checked
+from solver.model.loads import Load, checked
+from solver.model.motion import TravellingPressure
 from solver.tensors import to_mandel
+from solver.typing import Array, Bools, Ints
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+Push = Callable[[Array, Array], Array | None]
 
-    from numpy.typing import NDArray
-
-    from solver.fem.nodes import Nodes
-    from solver.model.loads import Load
-    from solver.model.motion import TravellingPressure
-
-    Array = NDArray[np.float64]
-    Push = Callable[[Array, Array], Array | None]
 
 _ACCURATE, _HALVINGS, _MOST = 1e-9, 40, 100_000
 """Error of the nodal force of a part of an edge, over the largest nodal force, above which the part
@@ -104,7 +98,7 @@ def _body_forces(part: Nodes, load: Load) -> Array | None:
     return nodal.ravel()
 
 
-def prescribed(part: Nodes) -> tuple[Superposed, NDArray[np.bool_]]:
+def prescribed(part: Nodes) -> tuple[Superposed, Bools]:
     """Return the displacements (n,) that loads prescribe [mm], and the unknowns that are held (n,).
 
     Loads on one boundary add up; a support prescribes zero. Where boundaries share a node, all must
@@ -151,7 +145,7 @@ class _Prescription:
     """
 
     name: str
-    dofs: NDArray[np.int64]
+    dofs: Ints
     loads: tuple[Load, ...]
     axis: int
 
@@ -260,9 +254,7 @@ def _tractions(part: Nodes, boundary: str, push: Push, points: int = 0) -> Array
     if push(X.mean(axis=2), X[..., 1] - X[..., 0]) is None:
         return None
 
-    def pushed(
-        row: NDArray[np.int64], start: Array, width: float, at: Array, weights: Array
-    ) -> Array:
+    def pushed(row: Ints, start: Array, width: float, at: Array, weights: Array) -> Array:
         """Return the forces (2, n, n_nodes) of parts of edges by a rule on [-1, 1]."""
         xi = start[:, None] + width * (1 + at) / 2
         N = shape_functions(xi, edges.shape[1])

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from skfem import CellBasis
 
 from solver.errors import ModelError
 from solver.mesh.elements import element_type
 from solver.mesh.rounding import ROUNDED
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.model.body import Body
+from solver.model.body import Body
+from solver.typing import Array, Ints
 
 
 class Nodes:
@@ -49,17 +44,17 @@ class Nodes:
         self.copied = np.stack([2 * self.same, 2 * self.same + 1], axis=1).ravel()
         self.points = np.asarray(self.basis.global_coordinates())
 
-    def measure(self, x: NDArray[np.float64]) -> NDArray[np.float64] | float:
+    def measure(self, x: Array) -> Array | float:
         """Return the depth across the plane at positions x [mm]: thickness or 2 pi r."""
         if self.body.kinematics == "axisymmetric":
             return np.asarray(2 * np.pi * x[0])
         return self.body.thickness
 
-    def boundary_nodes(self, boundary: str) -> NDArray[np.int64]:
+    def boundary_nodes(self, boundary: str) -> Ints:
         """Return the nodes on a named boundary."""
         return np.unique(self.basis.get_dofs(self.body.facets(boundary)).flatten())
 
-    def _copies(self) -> tuple[NDArray[np.int64], float]:
+    def _copies(self) -> tuple[Ints, float]:
         """Return the node whose unknowns each node uses, and the period."""
         same = np.arange(self.X.shape[1])
         if self.body.periodic is None:

@@ -3,31 +3,28 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
+from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
 
 from solver.linear import solvers as linear
 from solver.linear.solvers import Begun
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from scipy import sparse
-
-    from solver.materials.state import Response
+from solver.materials.state import Response
+from solver.typing import Array, Ints
 
 
 class Operator(Protocol):
     """The inverse of a part's stiffness, with its pins held."""
 
-    def begin(self, force: NDArray[np.float64]) -> Begun:
+    def begin(self, force: Array) -> Begun:
         """Return the displacements for nodal forces (n,); contact forces may still change.
 
         ``kept`` and the argument of ``finish`` are (n,); only entries on contact surfaces count.
         """
 
-    def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def compliance(self, dofs: Ints, rows: Array) -> Array:
         """Return ``rows K^-1 rows'`` for rows (m, len(dofs)) on unknowns of contact surfaces."""
 
 
@@ -39,18 +36,18 @@ class Stiff(Protocol):
     """
 
     n: int
-    active: NDArray[np.int64]
-    copied: NDArray[np.int64]
+    active: Ints
+    copied: Ints
 
     @property
     def pattern(self) -> sparse.csr_array:
         """Upper triangle of the stiffness on the active unknowns, values not set."""
 
     @property
-    def elastic_data(self) -> NDArray[np.float64]:
+    def elastic_data(self) -> Array:
         """Values of the elastic stiffness on ``pattern``."""
 
-    def tangent_data(self, response: Response) -> NDArray[np.float64]:
+    def tangent_data(self, response: Response) -> Array:
         """Return the values of the tangent on ``pattern``."""
 
 
@@ -65,7 +62,7 @@ class Analysed:
     solver : linear solver of the active unknowns
     """
 
-    def __init__(self, part: Stiff, contact: NDArray[np.int64], name: str) -> None:
+    def __init__(self, part: Stiff, contact: Ints, name: str) -> None:
         self.part = part
         kept = np.isin(part.active, contact)
         self.contact = part.active[kept]
@@ -77,25 +74,25 @@ class Analysed:
 class Factored:
     """A factorised tangent."""
 
-    def __init__(self, analysed: Analysed, data: NDArray[np.float64]) -> None:
+    def __init__(self, analysed: Analysed, data: Array) -> None:
         self._analysed = analysed
         analysed.solver.factorise(data)
 
-    def begin(self, force: NDArray[np.float64]) -> Begun:
+    def begin(self, force: Array) -> Begun:
         """See `Operator`."""
         part, contact = self._analysed.part, self._analysed.contact
         begun = self._analysed.solver.begin(force[part.active])
         motion = np.zeros(part.n)
         motion[contact] = begun.kept
 
-        def finish(change: NDArray[np.float64]) -> NDArray[np.float64]:
+        def finish(change: Array) -> Array:
             u = np.zeros(part.n)
             u[part.active] = begun.finish(change[contact])
             return u[part.copied]
 
         return Begun(motion[part.copied], finish)
 
-    def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def compliance(self, dofs: Ints, rows: Array) -> Array:
         """See `Operator`."""
         place = self._analysed.kept[dofs]
         if (place < 0).all():  # supports hold the surface
@@ -128,7 +125,7 @@ class Operators:
     def __init__(
         self,
         part: Stiff,
-        contact: NDArray[np.int64],
+        contact: Ints,
         linear_solver: str,
         elastic: Operator | None = None,
     ) -> None:
@@ -160,17 +157,17 @@ class Operators:
 class Dense:
     """The inverse of a small dense stiffness on the unknowns ``active`` of ``n``."""
 
-    def __init__(self, stiffness: NDArray[np.float64], active: NDArray[np.int64], n: int) -> None:
+    def __init__(self, stiffness: Array, active: Ints, n: int) -> None:
         inverse = cho_solve(cho_factor(stiffness), np.eye(len(stiffness)))
         self._inverse = np.zeros((n, n))
         self._inverse[np.ix_(active, active)] = 0.5 * (inverse + inverse.T)
 
-    def begin(self, force: NDArray[np.float64]) -> Begun:
+    def begin(self, force: Array) -> Begun:
         """See `Operator`."""
         u = self._inverse @ force
         return Begun(u, lambda change: u + self._inverse @ change)
 
-    def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def compliance(self, dofs: Ints, rows: Array) -> Array:
         """See `Operator`."""
         return np.asarray(rows @ self._inverse[np.ix_(dofs, dofs)] @ rows.T)
 
@@ -183,22 +180,22 @@ class Restricted:
     whole : operator of the body with all ``n`` unknowns
     """
 
-    def __init__(self, whole: Operator, kept: NDArray[np.int64], n: int) -> None:
+    def __init__(self, whole: Operator, kept: Ints, n: int) -> None:
         self._whole, self._kept, self._n = whole, kept, n
 
-    def _all(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _all(self, force: Array) -> Array:
         every = np.zeros(self._n)
         every[self._kept] = force
         return every
 
-    def begin(self, force: NDArray[np.float64]) -> Begun:
+    def begin(self, force: Array) -> Begun:
         """See `Operator`."""
         begun = self._whole.begin(self._all(force))
         return Begun(
             begun.kept[self._kept], lambda change: begun.finish(self._all(change))[self._kept]
         )
 
-    def compliance(self, dofs: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def compliance(self, dofs: Ints, rows: Array) -> Array:
         """See `Operator`."""
         return self._whole.compliance(self._kept[dofs], rows)
 

@@ -4,33 +4,28 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy  # loads spatial when it is used: few models look for places
+from scipy import sparse
 
+from solver.fem.loads import Superposed
+from solver.fem.operators import PartOperators
+from solver.fem.softening import Softening
+from solver.fem.surface import Surface
 from solver.linear.schur import Eliminated
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from scipy import sparse
-
-    from solver.fem.loads import Superposed
-    from solver.fem.operators import PartOperators
-    from solver.fem.softening import Softening
-    from solver.fem.surface import Surface
-    from solver.materials.law import Law
-    from solver.materials.state import PlasticState, Response
-    from solver.model.body import Body
-    from solver.model.rigid import RigidBody
-
+from solver.materials.law import Law
+from solver.materials.state import PlasticState, Response
+from solver.model.body import Body
+from solver.model.rigid import RigidBody
+from solver.typing import Array, Ints
 
 _ROUNDING = float(np.finfo(float).eps)
 _SAME = 1e-6
 """Ratio of a distance to the size of a body; below it two places are the same."""
 
 
-def same_unknowns(nodes: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.int64]:
+def same_unknowns(nodes: Array, places: Array) -> Ints:
     """Return the unknowns (2 n,) of nodes (2, m) at given places (2, n), -1 if no node is there."""
     near = _SAME * float(np.ptp(nodes, axis=1).max())
     _, at = scipy.spatial.cKDTree(nodes.T).query(places.T, distance_upper_bound=near)
@@ -58,14 +53,14 @@ class Part(ABC):
     """
 
     n: int
-    nodes: NDArray[np.float64]
+    nodes: Array
     body: Body | RigidBody
     loads: Superposed
     driven: Superposed
-    copied: NDArray[np.int64]
-    free: NDArray[np.int64]
-    active: NDArray[np.int64]
-    rigid: NDArray[np.float64]
+    copied: Ints
+    free: Ints
+    active: Ints
+    rigid: Array
     moves: bool = False
     meshed: bool = True
 
@@ -80,13 +75,11 @@ class Part(ABC):
         """Return the internal variables before any load."""
 
     @abstractmethod
-    def respond(self, u: NDArray[np.float64], state: PlasticState, time: float) -> Response:
+    def respond(self, u: Array, state: PlasticState, time: float) -> Response:
         """Return stress, tangent and new internal variables at all points."""
 
     @abstractmethod
-    def residual(
-        self, time: float, u: NDArray[np.float64], response: Response
-    ) -> NDArray[np.float64]:
+    def residual(self, time: float, u: Array, response: Response) -> Array:
         """Return external minus internal forces (n,), without contact forces [N]."""
 
     @abstractmethod
@@ -94,7 +87,7 @@ class Part(ABC):
         """Return the elastic stiffness on all unknowns (n, n), supports not applied."""
 
     @abstractmethod
-    def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
+    def stiffness_along(self, step: Array, response: Response) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
 
     @abstractmethod
@@ -109,21 +102,21 @@ class Part(ABC):
         """Return a surface of the whole body in this part's numbering."""
         return surface
 
-    def during(self, time: float, u: NDArray[np.float64]) -> Part:
+    def during(self, time: float, u: Array) -> Part:
         """Return the part in an increment that begins at a time with unknowns u, some locked."""
         del time, u
         return self
 
-    def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    def expand(self, u: Array, time: float) -> Array:
         """Return the whole body's displacements [mm]; those of a wheel in its hub's frame."""
         del time
         return u
 
-    def on_whole(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+    def on_whole(self, force: Array) -> Array:
         """Return the nodal forces of the whole body for those of this part [N]."""
         return force
 
-    def begin(self, force: NDArray[np.float64]) -> Eliminated:
+    def begin(self, force: Array) -> Eliminated:
         """Return nodal forces of the whole body on the unknowns of this part.
 
         ``finish`` returns the displacements of the whole body for those of this part.
@@ -131,15 +124,15 @@ class Part(ABC):
         return Eliminated(force, lambda u: u)
 
     @property
-    def volumes(self) -> NDArray[np.float64]:
+    def volumes(self) -> Array:
         """Volume of the points (n_points,) [mm3]; a part without points has none."""
         return np.zeros(0)
 
-    def start(self) -> NDArray[np.float64]:
+    def start(self) -> Array:
         """Return the unknowns (n,) before any load."""
         return np.zeros(self.n)
 
-    def external(self, time: float) -> NDArray[np.float64]:
+    def external(self, time: float) -> Array:
         """Return the external nodal forces (n,) at a time [N]."""
         return self.loads.at(time)
 
@@ -165,7 +158,7 @@ class Part(ABC):
         del surface
         return None
 
-    def eigenstrain(self, time: float) -> NDArray[np.float64]:
+    def eigenstrain(self, time: float) -> Array:
         """Return the eigenstrain (4, n_points, Mandel): thermal, or that of an initial stress."""
         del time
         return np.zeros((4, len(self.volumes)))
@@ -180,11 +173,11 @@ class Part(ABC):
         return self.loads.grows(before, after)
 
     @cached_property
-    def diagonal(self) -> NDArray[np.float64]:
+    def diagonal(self) -> Array:
         """The diagonal (n,) of the elastic stiffness [N/mm]."""
         return np.asarray(self.elastic_matrix().diagonal())
 
-    def rounding(self, u: NDArray[np.float64]) -> float:
+    def rounding(self, u: Array) -> float:
         """Return the out-of-balance force that rounding can cause at displacements u [N].
 
         Internal forces are differences of stiffness times displacement. Both may be large where
@@ -192,7 +185,7 @@ class Part(ABC):
         """
         return _ROUNDING * float(np.linalg.norm(self.diagonal * u))
 
-    def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    def moved(self, u: Array, time: float) -> Array:
         """Return the unknowns with prescribed motions at their values for a time."""
         del time
         return u
@@ -212,7 +205,7 @@ class Part(ABC):
         del before, after
         return 0.0
 
-    def passed(self, before: NDArray[np.float64], after: NDArray[np.float64], way: float) -> float:
+    def passed(self, before: Array, after: Array, way: float) -> float:
         """Return how far a load that moves by ``way`` goes over this part's material [mm].
 
         ``before`` and ``after`` are the unknowns (n,) of the part.
@@ -220,7 +213,7 @@ class Part(ABC):
         del before, after
         return way
 
-    def sources(self, way: float) -> NDArray[np.int64]:
+    def sources(self, way: float) -> Ints:
         """Return for each unknown (n,) the one a distance ``way`` [mm] behind along x, or -1."""
         return same_unknowns(self.nodes, self.nodes - np.array([[way], [0.0]]))
 
@@ -229,13 +222,11 @@ class Part(ABC):
         del point
         return np.nan, np.nan
 
-    def motion(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def motion(self, surface: Surface, u: Array) -> Array:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
         return u[surface.dofs].reshape(-1, 2).T
 
-    def pull_back(
-        self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64], gaps: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def pull_back(self, surface: Surface, u: Array, block: Array, gaps: int) -> tuple[Ints, Array]:
         """Return unknowns (m,) of this part and derivative rows (n_rows, m) on these.
 
         ``block`` (n_rows, 2 n_nodes) has the derivatives by the displacements of a surface; its

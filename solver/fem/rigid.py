@@ -7,7 +7,6 @@ motion with a force (`Pushed`) is free, the others are prescribed.
 from __future__ import annotations
 
 from copy import copy
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
@@ -18,15 +17,10 @@ from solver.fem.operators import Fixed
 from solver.fem.part import Part
 from solver.fem.surface import Surface
 from solver.linear.solvers import Begun
+from solver.materials import PlasticState, Response
 from solver.mesh.rounding import ROUNDED
 from solver.model.rigid import Moved, Pushed, RigidBody
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials import PlasticState, Response
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Ints
 
 
 class Unmoved:
@@ -40,7 +34,7 @@ class Unmoved:
         del force
         return Begun(self._nothing, lambda change: self._nothing)
 
-    def compliance(self, dofs: NDArray[np.int64], rows: Array) -> Array:
+    def compliance(self, dofs: Ints, rows: Array) -> Array:
         """See `Operator`."""
         del dofs
         return np.zeros((len(rows), len(rows)))
@@ -130,9 +124,7 @@ class RigidPart(Part):
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
         return self.frame.displacements(u, surface.X)
 
-    def pull_back(
-        self, surface: Surface, u: Array, block: Array, gaps: int
-    ) -> tuple[NDArray[np.int64], Array]:
+    def pull_back(self, surface: Surface, u: Array, block: Array, gaps: int) -> tuple[Ints, Array]:
         """Return the three unknowns and derivative rows (n_rows, 3) on them."""
         del gaps
         return np.arange(3), self.frame.rows(u, block, self.frame.passing(surface.X))
@@ -162,7 +154,7 @@ class RigidPart(Part):
         del before, after, way
         return 0.0
 
-    def sources(self, way: float) -> NDArray[np.int64]:
+    def sources(self, way: float) -> Ints:
         """Return the unknowns themselves."""
         del way
         return np.arange(3)

@@ -9,19 +9,15 @@ their form. Its yield stress stays, so that it does not yield on the way.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.fem.loads import Superposed
+from solver.fem.nodes import Nodes
+from solver.materials import Law
 from solver.materials.heated import Heated
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.nodes import Nodes
-    from solver.materials import Law
+from solver.typing import Array, Bools, Ints
 
 _LEAST = 0.05
 """Least permitted ratio of Young's modulus, and of the yield stress, to its value when cold."""
@@ -41,9 +37,7 @@ class Softening:
     removed: Superposed
 
     @classmethod
-    def of(
-        cls, part: Nodes, x: NDArray[np.float64], elements: NDArray[np.int64] | None = None
-    ) -> Softening | None:
+    def of(cls, part: Nodes, x: Array, elements: Ints | None = None) -> Softening | None:
         """Return the losses that the loads of a body cause at places x (2, n); None if none.
 
         ``elements`` (n,) are those that the places belong to; without them nothing is removed.
@@ -72,16 +66,16 @@ class Softening:
         unchanged = (stiff == 1).all() and (strong == 1).all()
         return cold if unchanged else Heated(law=cold, stiff=stiff, strong=strong)
 
-    def gone(self, time: float) -> NDArray[np.bool_]:
+    def gone(self, time: float) -> Bools:
         """Return whether elements at the places (n,) are removed at a time."""
         return np.asarray(self.removed.at(time) >= 1)
 
-    def strong(self, time: float) -> NDArray[np.float64]:
+    def strong(self, time: float) -> Array:
         """Return the ratio (n,) of the yield stress at a time to its value when cold."""
         return _left(self.strength, "yield_drop", time)
 
 
-def _left(lost: Superposed, name: str, time: float) -> NDArray[np.float64]:
+def _left(lost: Superposed, name: str, time: float) -> Array:
     """Return the remaining ratios at a time, or raise `ModelError` if one is below `_LEAST`."""
     share = 1 - lost.at(time)
     if not share.min() >= _LEAST:

@@ -10,30 +10,25 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cached_property
 from hashlib import sha256
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 
-from solver.fem.discretisation import choose_pins
+from solver.fem.discretisation import Discretisation, choose_pins
 from solver.fem.loads import Superposed
 from solver.fem.operators import Dense, Fixed
 from solver.fem.part import Part
 from solver.fem.surface import Surface
 from solver.linear.schur import Eliminated, SchurComplement
+from solver.materials import PlasticState, Response
 from solver.memory import remembered
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.discretisation import Discretisation
-    from solver.materials import PlasticState, Response
+from solver.typing import Array, Ints
 
 
 class _CondensedBody:
     """The condensation of one body to some of its unknowns."""
 
-    def __init__(self, part: Discretisation, kept: NDArray[np.int64], linear_solver: str) -> None:
+    def __init__(self, part: Discretisation, kept: Ints, linear_solver: str) -> None:
         K = part.elastic_matrix()
         inside = np.setdiff1d(part.free, kept)
         self._schur = SchurComplement(K, kept, inside, linear_solver)
@@ -44,16 +39,16 @@ class _CondensedBody:
         stiffness[np.ix_(at, at)] -= self._schur.taken
         self.stiffness = _without_motions(stiffness, part.rigid[kept])
 
-    def begin(self, force: NDArray[np.float64]) -> Eliminated:
+    def begin(self, force: Array) -> Eliminated:
         """Eliminate the inner unknowns of forces (n,)."""
         return self._schur.begin(force)
 
-    def expand(self, u: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
+    def expand(self, u: Array, factors: Array) -> Array:
         """Return all displacements (n,) from those kept, at the factors of the loads."""
         return self.begin(self._loads @ factors).finish(u)
 
 
-def _without_motions(S: NDArray[np.float64], rigid: NDArray[np.float64]) -> NDArray[np.float64]:
+def _without_motions(S: Array, rigid: Array) -> Array:
     """Return a symmetric stiffness projected so that rigid motions (n, n_rigid) cause no force.
 
     Rounding of the elimination leaves a small force, in proportion to the largest entries of the
@@ -118,14 +113,12 @@ class Substructure(Part):
         """Return the law's state for zero points: nothing here can yield."""
         return self.body.law.initial(0, self.whole.B.shape[2])
 
-    def respond(self, u: NDArray[np.float64], state: PlasticState, time: float) -> Response:
+    def respond(self, u: Array, state: PlasticState, time: float) -> Response:
         """Return the law's response for zero points."""
         del u, time
         return self.body.law.respond(np.zeros_like(state.plastic_strain), state)
 
-    def residual(
-        self, time: float, u: NDArray[np.float64], response: Response
-    ) -> NDArray[np.float64]:
+    def residual(self, time: float, u: Array, response: Response) -> Array:
         """Return external minus internal forces (n,) [N]."""
         del response
         force = self.external(time)
@@ -137,7 +130,7 @@ class Substructure(Part):
         rest = np.zeros((self.n - len(self._kept),) * 2)
         return sparse.csr_array(sparse.block_diag([self._condensed.stiffness, rest]))
 
-    def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
+    def stiffness_along(self, step: Array, response: Response) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
         del response
         energy = float(step[self.elastic] @ self._condensed.stiffness @ step[self.elastic])
@@ -150,25 +143,25 @@ class Substructure(Part):
         del before, response
         return 0.0, 0.0
 
-    def on_whole(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+    def on_whole(self, force: Array) -> Array:
         """Return the nodal forces (n,) of the whole body for those of this part [N]."""
         whole = np.zeros(self.whole.n)
         whole[self._kept] = force[self.elastic]
         return whole
 
-    def begin(self, force: NDArray[np.float64]) -> Eliminated:
+    def begin(self, force: Array) -> Eliminated:
         """See `Part.begin`."""
         own, begun = np.zeros(self.n), self._condensed.begin(force)
         own[self.elastic] = begun.condensed
         return Eliminated(own, lambda u: begun.finish(u[self.elastic])[self.whole.copied])
 
-    def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    def expand(self, u: Array, time: float) -> Array:
         """Return the whole body's displacements [mm]; those of a wheel in its hub's frame."""
         factors = self.loads.factors(time)
         return self._condensed.expand(u[self.elastic], factors)[self.whole.copied]
 
 
-def _key(part: Discretisation, kept: NDArray[np.int64], linear_solver: str) -> str:
+def _key(part: Discretisation, kept: Ints, linear_solver: str) -> str:
     """Return a key made from the content: equal bodies share their condensation."""
     digest, body = sha256(), part.body
     elastic = body.law.stiffness(part.B.shape[2])
@@ -185,6 +178,6 @@ def _key(part: Discretisation, kept: NDArray[np.int64], linear_solver: str) -> s
     return digest.hexdigest()
 
 
-def _condense(part: Discretisation, kept: NDArray[np.int64], linear_solver: str) -> _CondensedBody:
+def _condense(part: Discretisation, kept: Ints, linear_solver: str) -> _CondensedBody:
     key = _key(part, kept, linear_solver)
     return remembered(key, lambda: _CondensedBody(part, kept, linear_solver))

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
+from solver.fem.nodes import Nodes
 from solver.mesh.edges import shape_derivatives, shape_functions
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.nodes import Nodes
-
+from solver.typing import Array, Ints
 
 _CORNER = float(np.cos(np.radians(30.0)))
 
@@ -33,20 +28,20 @@ class Surface:
     goes_on : whether the boundary of the body continues smoothly beyond the start and the end
     """
 
-    nodes: NDArray[np.int64]
-    edges: NDArray[np.int64]
-    X: NDArray[np.float64]
+    nodes: Ints
+    edges: Ints
+    X: Array
     thickness: float | None
     goes_on: tuple[bool, bool] = (False, False)
 
-    def depth(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def depth(self, x: Array) -> Array:
         """Return the depth across the plane at positions x (2, ...): thickness or 2 pi r [mm]."""
         if self.thickness is None:
             return np.asarray(2 * np.pi * x[0])
         return np.full(x.shape[1:], self.thickness)
 
     @cached_property
-    def vertices(self) -> NDArray[np.int64]:
+    def vertices(self) -> Ints:
         """(n_edges + 1,) positions in ``nodes`` of the edge ends, along the chain."""
         return np.append(self.edges[:, 0], self.edges[-1, 1])
 
@@ -56,34 +51,34 @@ class Surface:
         return shortest(self.X, self.edges)
 
     @cached_property
-    def lengths(self) -> NDArray[np.float64]:
+    def lengths(self) -> Array:
         """Lengths (n_edges,) of the edges between their ends [mm]."""
         return np.asarray(np.linalg.norm(np.diff(self.X[:, self.vertices]), axis=0))
 
     @cached_property
-    def tributary(self) -> NDArray[np.float64]:
+    def tributary(self) -> Array:
         """Tributary length (n_edges + 1,) of each vertex: half of the edges at it [mm]."""
         return at_vertices(self.lengths / 2)
 
     @cached_property
-    def spacing(self) -> NDArray[np.float64]:
+    def spacing(self) -> Array:
         """Mean length (n_edges + 1,) of the one or two edges at each vertex [mm]."""
         return at_vertices(self.lengths) / at_vertices(np.ones(len(self.edges)))
 
     @cached_property
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Array:
         """Area (n_nodes,) of each node: the integral of its shape function [mm2]."""
         each = self._integrated(self.edges.shape[1])
         areas = np.bincount(self.edges.ravel(), each.ravel(), len(self.nodes))
         return np.asarray(areas, dtype=float)
 
     @cached_property
-    def hats(self) -> NDArray[np.float64]:
+    def hats(self) -> Array:
         """Area (n_edges + 1,) of each vertex: the integral of its linear hat [mm2]."""
         start, end = self._integrated(2).T
         return np.append(start, 0.0) + np.append(0.0, end)
 
-    def _integrated(self, functions: int) -> NDArray[np.float64]:
+    def _integrated(self, functions: int) -> Array:
         """Return the integrals (n_edges, functions) of shape functions of this number [mm2]."""
         xi, weights = np.polynomial.legendre.leggauss(4)
         count = self.edges.shape[1]
@@ -93,7 +88,7 @@ class Surface:
         return np.asarray(weights @ shape_functions(xi, functions))
 
     @cached_property
-    def normals(self) -> NDArray[np.float64]:
+    def normals(self) -> Array:
         """Outward unit normals (2, n_nodes): means over the shape function of each node."""
         xi, weights = np.polynomial.legendre.leggauss(4)
         count = self.edges.shape[1]
@@ -103,22 +98,22 @@ class Surface:
         return np.asarray(sums / np.hypot(*sums))
 
     @cached_property
-    def dofs(self) -> NDArray[np.int64]:
+    def dofs(self) -> Ints:
         """(2 n_nodes,) unknowns of the body, node by node."""
         return np.stack([2 * self.nodes, 2 * self.nodes + 1], axis=1).ravel()
 
 
-def at_vertices(of_edges: NDArray[np.float64]) -> NDArray[np.float64]:
+def at_vertices(of_edges: Array) -> Array:
     """Return the sum over the one or two edges at each vertex of a chain."""
     return np.append(of_edges, 0.0) + np.append(0.0, of_edges)
 
 
-def shortest(X: NDArray[np.float64], edges: NDArray[np.int64]) -> float:
+def shortest(X: Array, edges: Ints) -> float:
     """Return the length of the shortest edge between its ends [mm], nodes at X (2, n_nodes)."""
     return float(np.linalg.norm(X[:, edges[:, 1]] - X[:, edges[:, 0]], axis=0).min())
 
 
-def edges_of(part: Nodes, boundary: str) -> NDArray[np.int64]:
+def edges_of(part: Nodes, boundary: str) -> Ints:
     """Return the edges (n_edges, 2 or 3) of a boundary: start, end (, middle) node.
 
     Each has the body on its left. Facet bases of scikit-fem are not used here: they invert the
@@ -183,7 +178,7 @@ def extract(part: Nodes, boundary: str) -> Surface:
     return Surface(nodes, chain, X, _thickness(part), (True, True) if part.period else beyond)
 
 
-def _goes_on(part: Nodes, edge: NDArray[np.int64], at: int) -> bool:
+def _goes_on(part: Nodes, edge: Ints, at: int) -> bool:
     """Return whether a boundary continues smoothly beyond the start (0) or end (1) of an edge.
 
     A change of direction by more than `_CORNER` is a corner. Tangents are compared, not chords,
@@ -205,18 +200,14 @@ def _goes_on(part: Nodes, edge: NDArray[np.int64], at: int) -> bool:
     return False
 
 
-def _leaving(
-    X: NDArray[np.float64], end: int, other: int, middle: int | None
-) -> NDArray[np.float64]:
+def _leaving(X: Array, end: int, other: int, middle: int | None) -> Array:
     """Return the direction (2,) in which an edge leaves its end."""
     if middle is None:
         return np.asarray(X[:, other] - X[:, end])
     return np.asarray(4 * X[:, middle] - 3 * X[:, end] - X[:, other])
 
 
-def _repeated(
-    nodes: NDArray[np.int64], X: NDArray[np.float64], chain: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+def _repeated(nodes: Ints, X: Array, chain: Ints) -> tuple[Ints, Array, Ints]:
     """Return nodes, positions and edges of a chain with half a copy of it at either end."""
     start, end = chain[0, 0], chain[-1, 1]
     shift = X[0, end] - X[0, start]

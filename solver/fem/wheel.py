@@ -9,21 +9,15 @@ is prescribed.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from solver.fem.discretisation import Discretisation
 from solver.fem.frame import MovingFrame, RigidMotion, turning
 from solver.fem.loads import Superposed
 from solver.fem.part import same_unknowns
 from solver.fem.substructure import Substructure
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.discretisation import Discretisation
-    from solver.fem.surface import Surface
-
+from solver.fem.surface import Surface
+from solver.typing import Array, Ints
 
 _X, _Y, _TURN = range(3)
 
@@ -48,7 +42,7 @@ class Wheel(Substructure):
         self.rigid[self._hub + np.array(free), np.arange(len(free))] = 1.0
         self.free = np.concatenate([self.free, self._hub + np.array(free)])
 
-    def external(self, time: float) -> NDArray[np.float64]:
+    def external(self, time: float) -> Array:
         """Return the force and moment on the hub at a time."""
         force = np.zeros(self.n)
         force[self._hub + _Y] = -self.axle.force.at(time)
@@ -61,13 +55,13 @@ class Wheel(Substructure):
         loads = (self.axle.force, self.axle.moment)
         return any(abs(load.at(after)) > abs(load.at(before)) for load in loads)
 
-    def motion_of(self, u: NDArray[np.float64]) -> RigidMotion:
+    def motion_of(self, u: Array) -> RigidMotion:
         """Return the motion of the hub."""
         return self.frame.motion(u[self._hub :])
 
     # -- kinematics ----------------------------------------------------------------------------
 
-    def passing(self, surface: Surface, d: NDArray[np.float64]) -> NDArray[np.float64]:
+    def passing(self, surface: Surface, d: Array) -> Array:
         """Return the derivative (2, n_nodes) of positions by the arc, for a fixed shape of the rim.
 
         ``d`` (2, n_nodes) are the displacements of its nodes in the frame of the hub [mm].
@@ -79,14 +73,12 @@ class Wheel(Substructure):
         out[:, chain] += np.gradient(d[:, chain], arc, axis=1)
         return out
 
-    def motion(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def motion(self, surface: Surface, u: Array) -> Array:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
         d = u[surface.dofs].reshape(-1, 2).T
         return self.frame.displacements(u[self._hub :], surface.X, d)
 
-    def pull_back(
-        self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64], gaps: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def pull_back(self, surface: Surface, u: Array, block: Array, gaps: int) -> tuple[Ints, Array]:
         """Return the unknowns of rim, hub and rotation, and derivative rows on them.
 
         Rotation moves material along the rim, whose shape stays (`passing`). In a round elastic
@@ -103,7 +95,7 @@ class Wheel(Substructure):
         rows = np.hstack([rim.reshape(block.shape), hub])
         return np.append(surface.dofs, self._hub + np.arange(3)), rows
 
-    def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    def moved(self, u: Array, time: float) -> Array:
         """Return ``u`` with the hub at its position for a time.
 
         A wheel free to turn rolls there; a prescribed rotation takes its value at that time.
@@ -121,13 +113,13 @@ class Wheel(Substructure):
         """Return how far the axle moves along x between two times [mm]."""
         return self.axle.position.at(after) - self.axle.position.at(before)
 
-    def passed(self, before: NDArray[np.float64], after: NDArray[np.float64], way: float) -> float:
+    def passed(self, before: Array, after: Array, way: float) -> float:
         """Return how far the contact moves along the rim [mm]: 0 if the wheel is locked."""
         del way
         turn = self._hub + _TURN
         return float(before[turn] - after[turn])
 
-    def sources(self, way: float) -> NDArray[np.int64]:
+    def sources(self, way: float) -> Ints:
         """Return for each unknown the one at the arc ``way`` [mm] behind it along the rim, or -1.
 
         Unknowns of the hub are their own. Directions of displacements are not turned: over one
@@ -138,17 +130,17 @@ class Wheel(Substructure):
         rim = same_unknowns(self.nodes, places)
         return np.concatenate([rim, self._hub + np.arange(3)])
 
-    def lowered(self, u: NDArray[np.float64], by: float) -> NDArray[np.float64]:
+    def lowered(self, u: Array, by: float) -> Array:
         """Return ``u`` with the hub lowered [mm]."""
         out = u.copy()
         out[self._hub + _Y] -= by
         return out
 
-    def start(self) -> NDArray[np.float64]:
+    def start(self) -> Array:
         """Return the undeformed wheel at the time its motion begins."""
         return self.placed(float(self.axle.position.time[0]))
 
-    def placed(self, time: float) -> NDArray[np.float64]:
+    def placed(self, time: float) -> Array:
         """Return the unknowns of the undeformed wheel at its position for a time.
 
         A wheel free to turn has rolled there from the position at which it was meshed.

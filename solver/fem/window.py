@@ -11,30 +11,23 @@ An iteration then costs as much as its window: stress, tangent, factor and solve
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.fem.assembly import Assembly
 from solver.fem.discretisation import Discretisation, choose_pins
 from solver.fem.loads import Superposed
-from solver.fem.operators import Operators, Restricted
+from solver.fem.operators import Operator, Operators, Restricted
 from solver.fem.softening import Softening
-from solver.linear.schur import SchurComplement
+from solver.fem.surface import Surface
+from solver.linear.schur import Eliminated, SchurComplement
 from solver.linear.solvers import Singular
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.fem.operators import Operator
-    from solver.fem.surface import Surface
-    from solver.linear.schur import Eliminated
-    from solver.materials import PlasticState, Response
+from solver.materials import PlasticState, Response
+from solver.typing import Array, Bools, Ints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,8 +40,8 @@ class Region:
     contact : (n,) on which of its unknowns contact forces may act
     """
 
-    elements: NDArray[np.bool_]
-    contact: NDArray[np.bool_]
+    elements: Bools
+    contact: Bools
 
     @classmethod
     def around(
@@ -78,7 +71,7 @@ class Region:
         return np.packbits(np.concatenate([self.elements, self.contact])).tobytes()
 
 
-def _layered(whole: Discretisation, elements: NDArray[np.bool_], layers: int) -> NDArray[np.bool_]:
+def _layered(whole: Discretisation, elements: Bools, layers: int) -> Bools:
     """Return some elements (n_elements,) with layers of neighbours around them."""
     for _ in range(layers):
         within = np.zeros(whole.n, dtype=bool)
@@ -100,7 +93,7 @@ class Windowed(Discretisation):
     kept : (n,) unknowns of the whole body
     """
 
-    _begin: NDArray[np.float64]
+    _begin: Array
     _outer: Eliminated
     _plastic: PlasticState
 
@@ -126,7 +119,7 @@ class Windowed(Discretisation):
         self._condense(whole, linear_solver)
         self._touches = region.contact[kept]
 
-    def _mesh(self, whole: Discretisation, number: NDArray[np.int64]) -> None:
+    def _mesh(self, whole: Discretisation, number: Ints) -> None:
         """Take the elements of the window, and what belongs to their points."""
         self.dofs = number[whole.dofs[self.elements]]
         self.B, self.weights = whole.B[self.elements], whole.weights[self.elements]
@@ -156,7 +149,7 @@ class Windowed(Discretisation):
         at = np.searchsorted(edge, self._schur.boundary)
         self._rest[np.ix_(at, at)] -= self._schur.taken
 
-    def at(self, u: NDArray[np.float64], plastic: PlasticState, time: float) -> Windowed:
+    def at(self, u: Array, plastic: PlasticState, time: float) -> Windowed:
         """Return the window for an increment from displacements and a state of the whole body."""
         here = copy(self)
         response = self.whole.respond(u, plastic, time)
@@ -166,7 +159,7 @@ class Windowed(Discretisation):
         here._plastic = plastic.at(self._at)
         return here
 
-    def expand(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    def expand(self, u: Array, time: float) -> Array:
         """Return the whole body's displacements [mm]."""
         del time
         change = self._outer.finish(u - self._begin[self.kept])
@@ -177,14 +170,12 @@ class Windowed(Discretisation):
         restricted = Restricted(elastic, self.kept, self.whole.n)
         return Operators(self, np.flatnonzero(self._touches), linear_solver, restricted)
 
-    def motion(self, surface: Surface, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def motion(self, surface: Surface, u: Array) -> Array:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
         at = self._number[surface.dofs]
         return np.where(at < 0, self._begin[surface.dofs], u[at]).reshape(-1, 2).T
 
-    def pull_back(
-        self, surface: Surface, u: NDArray[np.float64], block: NDArray[np.float64], gaps: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def pull_back(self, surface: Surface, u: Array, block: Array, gaps: int) -> tuple[Ints, Array]:
         """See `Part.pull_back`; raises `Singular` if contact has left the region."""
         del u, gaps
         at = self._number[surface.dofs]
@@ -195,21 +186,19 @@ class Windowed(Discretisation):
 
     # -- the window as a body ------------------------------------------------------------------
 
-    def respond(self, u: NDArray[np.float64], state: PlasticState, time: float) -> Response:
+    def respond(self, u: Array, state: PlasticState, time: float) -> Response:
         """Return the response from the beginning of the increment, whose state is known."""
         del state
         return super().respond(u, self._plastic, time)
 
-    def residual(
-        self, time: float, u: NDArray[np.float64], response: Response
-    ) -> NDArray[np.float64]:
+    def residual(self, time: float, u: Array, response: Response) -> Array:
         """Return external minus internal forces (n,), those of the rest condensed [N]."""
         del time
         force = self._outer.condensed - self.internal_force(response.stress)
         force[self._edge] -= self._rest @ (u - self._begin[self.kept])[self._edge]
         return force
 
-    def external(self, time: float) -> NDArray[np.float64]:
+    def external(self, time: float) -> Array:
         """Return the external nodal forces (n,) at a time, those on the rest condensed [N]."""
         return self._schur.begin(self.whole.external(time)).condensed
 
@@ -221,18 +210,18 @@ class Windowed(Discretisation):
         """See `Discretisation.clamped`."""
         return self.whole.clamped(time)
 
-    def moved(self, u: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    def moved(self, u: Array, time: float) -> Array:
         """Return the unknowns, whose prescribed motions have their values already."""
         del time
         return u
 
-    def rounding(self, u: NDArray[np.float64]) -> float:
+    def rounding(self, u: Array) -> float:
         """Return the out-of-balance force that rounding can cause in the whole body [N]."""
         moved = self._begin.copy()
         moved[self.kept] = u
         return self.whole.rounding(moved)
 
-    def stiffness_along(self, step: NDArray[np.float64], response: Response) -> tuple[float, float]:
+    def stiffness_along(self, step: Array, response: Response) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
         edge = step[self._edge]
         rest = float(edge @ self._rest @ edge)
@@ -244,7 +233,7 @@ class Windowed(Discretisation):
         return Assembly(self.dofs, self.active, self.n, self._edge)
 
     @cached_property
-    def elastic_data(self) -> NDArray[np.float64]:
+    def elastic_data(self) -> Array:
         """Values of the elastic stiffness on `pattern`."""
         rest = self._assembly.block_values(self._rest)
         return rest + self._assembly.values(slice(None), self.elastic_elements)

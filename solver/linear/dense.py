@@ -5,15 +5,10 @@ N.J. Higham, Accuracy and Stability of Numerical Algorithms (2nd edition, 2002),
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy.linalg import lapack
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _REFINED = 1e-12
 """Largest norm of the residual over that of the right-hand side."""

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 from scipy.linalg.blas import daxpy, ddot
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    Vector = NDArray[np.float64]
-
+from solver.typing import Array
 
 _NEW = 1e-14
 """Length of what a product adds to the directions so far, over its own; below it adds nothing."""
 
 
 def gmres(
-    product: Callable[[Vector], Vector], b: Vector, tolerance: float, most: int
-) -> tuple[Vector, bool]:
+    product: Callable[[Array], Array], b: Array, tolerance: float, most: int
+) -> tuple[Array, bool]:
     """Return a solution x (n,) of A x = b, and whether its residual is small enough.
 
     It begins with x = 0, does not restart, and ends before a product that is not finite.

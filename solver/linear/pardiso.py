@@ -11,14 +11,14 @@ import ctypes
 import weakref
 from functools import cache
 from importlib import metadata
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, solve_triangular
+from scipy.sparse import csr_array
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from scipy.sparse import csr_array
+from solver.typing import Array, Ints
 
 _SEQUENTIAL = 1
 _ANALYSE, _FACTORISE, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 11, 22, 33, 331, 333, -1
@@ -70,7 +70,7 @@ class Pardiso:
     def __init__(
         self,
         upper: csr_array,
-        kept: NDArray[np.int64] | None = None,
+        kept: Ints | None = None,
         kind: int = POSITIVE_DEFINITE,
         ordering: int = DISSECTION,
         count: int = 1,
@@ -97,7 +97,7 @@ class Pardiso:
         self._call(_ANALYSE, nothing, nothing)
         weakref.finalize(self, _release, self._handle, kind, self._iparm, count)
 
-    def factorise(self, data: NDArray[np.float64], which: int = 0) -> None:
+    def factorise(self, data: Array, which: int = 0) -> None:
         """Factorise the matrix with these values on the analysed pattern, as number ``which``."""
         schur = self.eliminate(data, which)
         if len(self._kept):
@@ -106,7 +106,7 @@ class Pardiso:
             except LinAlgError as failure:
                 raise PardisoError(_FACTORISE, NOT_POSITIVE) from failure
 
-    def eliminate(self, data: NDArray[np.float64], which: int = 0) -> NDArray[np.float64]:
+    def eliminate(self, data: Array, which: int = 0) -> Array:
         """Eliminate all unknowns but those kept; return the Schur complement (m, m) on these."""
         self._data = np.ascontiguousarray(data, dtype=self._precision)
         m = len(self._kept)
@@ -114,7 +114,7 @@ class Pardiso:
         self._call(_FACTORISE, np.zeros(1, self._precision), schur, which)
         return schur
 
-    def solve(self, b: NDArray[np.float64], which: int = 0) -> NDArray[np.float64]:
+    def solve(self, b: Array, which: int = 0) -> Array:
         """Return the solution for ``b`` (n,) or (n, k) with the matrix number ``which``."""
         # PARDISO reads right-hand sides column by column
         b = np.asfortranarray(b, dtype=self._precision)
@@ -127,7 +127,7 @@ class Pardiso:
         half = self.forward(b)
         return self.backward(half, self.on_kept(half[self._kept]))
 
-    def forward(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
+    def forward(self, b: Array) -> Array:
         """Return the right-hand side (n,) or (n, k) after the unknowns not kept are eliminated.
 
         Its values on the kept unknowns are the right-hand side of the Schur complement.
@@ -138,11 +138,11 @@ class Pardiso:
             self._call(_FORWARD, b, half)
         return half
 
-    def on_kept(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
+    def on_kept(self, right: Array) -> Array:
         """Return the kept unknowns (m,) for the right-hand side of the Schur complement."""
         return np.asarray(cho_solve(self._schur, right, check_finite=False))
 
-    def backward(self, half: NDArray[np.float64], kept: NDArray[np.float64]) -> NDArray[np.float64]:
+    def backward(self, half: Array, kept: Array) -> Array:
         """Return the solution after `forward`, given the unknowns ``kept`` (m,)."""
         half = half.copy(order="F")
         half[self._kept] = kept
@@ -150,7 +150,7 @@ class Pardiso:
         self._call(_BACKWARD, half, x)
         return x
 
-    def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def compliance(self, rows: Array) -> Array:
         """Return ``rows F rows'``, F (m, m) the inverse matrix's part on the kept unknowns."""
         half = solve_triangular(self._schur[0], rows.T, lower=True, check_finite=False)
         return np.asarray(half.T @ half)
@@ -160,9 +160,7 @@ class Pardiso:
         highest, analysis, factors = self._iparm[14:17]
         return object.__sizeof__(self) + 1024 * int(max(highest, analysis + factors))
 
-    def _call(
-        self, phase: int, b: NDArray[np.float64], x: NDArray[np.float64], which: int = 0
-    ) -> None:
+    def _call(self, phase: int, b: Array, x: Array, which: int = 0) -> None:
         _pardiso(
             phase, self._handle, self.kind, self._iparm, self.n, b.shape[1] if b.ndim == 2 else 1,
             (self._data, self._indptr, self._indices), self._last, b, x,

@@ -10,22 +10,16 @@ boundary b.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from scipy import sparse
 
 from solver.linear import solvers as linear
 from solver.linear.pardiso import Pardiso
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-    Numbers = NDArray[np.int64]
+from solver.typing import Array, Ints
 
 _COLUMNS = 64
 """Number of right-hand sides that are solved at once."""
@@ -155,7 +149,7 @@ class SchurComplement:
     """
 
     def __init__(
-        self, matrix: sparse.csr_array, kept: Numbers, inside: Numbers, linear_solver: str = "auto"
+        self, matrix: sparse.csr_array, kept: Ints, inside: Ints, linear_solver: str = "auto"
     ) -> None:
         self.kept, self.inside = kept, inside
         self.boundary = np.unique(sparse.csr_array(matrix[inside][:, kept]).indices)
@@ -183,8 +177,8 @@ class SchurComplement:
 
 
 def with_block(
-    row: Numbers, column: Numbers, block: Numbers, size: int
-) -> tuple[sparse.csr_array, Numbers, Numbers]:
+    row: Ints, column: Ints, block: Ints, size: int
+) -> tuple[sparse.csr_array, Ints, Ints]:
     """Return the pattern of a sparse matrix with a dense block on some unknowns, values zero.
 
     Parameters

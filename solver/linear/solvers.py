@@ -9,20 +9,18 @@ this choice.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from solver.errors import ModelError
 from solver.linear import pardiso
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
+from solver.typing import Array, Ints
 
 SOLVERS = ("auto", "pardiso", "superlu")
 
@@ -34,16 +32,16 @@ class Singular(ArithmeticError):
 class LinearSolver(Protocol):
     """An analysed pattern; after `factorise`, a factor."""
 
-    def factorise(self, data: NDArray[np.float64]) -> None:
+    def factorise(self, data: Array) -> None:
         """Factorise the upper triangle with these values; raise `Singular` if that fails."""
 
-    def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
+    def solve(self, b: Array) -> Array:
         """Return the solution for ``b`` (n,) or (n, k)."""
 
-    def begin(self, b: NDArray[np.float64]) -> Begun:
+    def begin(self, b: Array) -> Begun:
         """Begin the solution for ``b`` (n,): compute its kept unknowns only."""
 
-    def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def compliance(self, rows: Array) -> Array:
         """Return ``rows A^-1 rows'`` (k, k) for ``rows`` (k, m) on the m kept unknowns."""
 
 
@@ -57,14 +55,14 @@ class Begun:
     finish : (change (m,) of the right-hand side on the kept unknowns) -> solution (n,)
     """
 
-    kept: NDArray[np.float64]
-    finish: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    kept: Array
+    finish: Callable[[Array], Array]
 
 
 class SuperLU:
     """SuperLU, which comes with SciPy."""
 
-    def __init__(self, upper: sparse.csr_array, kept: NDArray[np.int64]) -> None:
+    def __init__(self, upper: sparse.csr_array, kept: Ints) -> None:
         self._upper = upper.copy()
         self._kept = kept
 
@@ -73,7 +71,7 @@ class SuperLU:
         entries = self._factor.nnz if hasattr(self, "_factor") else 0
         return object.__sizeof__(self) + 12 * entries
 
-    def factorise(self, data: NDArray[np.float64]) -> None:
+    def factorise(self, data: Array) -> None:
         """See `LinearSolver`."""
         self._upper.data = np.asarray(data, dtype=float)
         full = self._upper + sparse.triu(self._upper, 1, format="csr").T
@@ -87,15 +85,15 @@ class SuperLU:
         except RuntimeError as error:
             raise Singular(str(error)) from error
 
-    def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
+    def solve(self, b: Array) -> Array:
         """See `LinearSolver`."""
         return np.asarray(self._factor.solve(np.ascontiguousarray(b)))
 
-    def begin(self, b: NDArray[np.float64]) -> Begun:
+    def begin(self, b: Array) -> Begun:
         """See `LinearSolver`."""
         return _twice(self, b, self._kept)
 
-    def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def compliance(self, rows: Array) -> Array:
         """See `LinearSolver`."""
         return _compliance(self, rows, self._upper.shape[0], self._kept)
 
@@ -106,7 +104,7 @@ class PardisoSolver:
     def __init__(
         self,
         upper: sparse.csr_array,
-        kept: NDArray[np.int64],
+        kept: Ints,
         ordering: int,
     ) -> None:
         self._upper = upper
@@ -115,7 +113,7 @@ class PardisoSolver:
         self._indefinite: pardiso.Pardiso | None = None
         self._current = self._definite
 
-    def factorise(self, data: NDArray[np.float64]) -> None:
+    def factorise(self, data: Array) -> None:
         """See `LinearSolver`."""
         if not np.isfinite(data).all():
             raise Singular("the matrix is not finite")
@@ -133,23 +131,23 @@ class PardisoSolver:
                 raise Singular(str(error)) from error
             self._current = self._indefinite
 
-    def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
+    def solve(self, b: Array) -> Array:
         """See `LinearSolver`."""
         return self._current.solve(b)
 
-    def begin(self, b: NDArray[np.float64]) -> Begun:
+    def begin(self, b: Array) -> Begun:
         """See `LinearSolver`."""
         if self._current is not self._definite or not len(self._kept):
             return _twice(self, b, self._kept)
         half = self._definite.forward(b)
         right = half[self._kept]
 
-        def finish(change: NDArray[np.float64]) -> NDArray[np.float64]:
+        def finish(change: Array) -> Array:
             return self._definite.backward(half, self._definite.on_kept(right + change))
 
         return Begun(self._definite.on_kept(right), finish)
 
-    def compliance(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def compliance(self, rows: Array) -> Array:
         """See `LinearSolver`."""
         if self._current is self._definite:
             return self._definite.compliance(rows)
@@ -159,7 +157,7 @@ class PardisoSolver:
 class Factors(Protocol):
     """The factors of several positive definite matrices of one pattern."""
 
-    def factorise(self, data: NDArray[np.float64], which: int) -> None:
+    def factorise(self, data: Array, which: int) -> None:
         """Factorise the upper triangle with these values, as matrix number ``which``.
 
         Raises `Singular` if that fails.
@@ -178,7 +176,7 @@ class _SuperLUFactors:
     def __init__(self, upper: sparse.csr_array, count: int) -> None:
         self._each = [SuperLU(upper, np.zeros(0, dtype=np.int64)) for _ in range(count)]
 
-    def factorise(self, data: NDArray[np.float64], which: int) -> None:
+    def factorise(self, data: Array, which: int) -> None:
         """See `Factors`."""
         self._each[which].factorise(data)
 
@@ -200,7 +198,7 @@ class _PardisoFactors:
         )
         self._in_single = np.zeros(count, dtype=bool)
 
-    def factorise(self, data: NDArray[np.float64], which: int) -> None:
+    def factorise(self, data: Array, which: int) -> None:
         """See `Factors`."""
         try:
             self._double.factorise(data, which)
@@ -219,11 +217,11 @@ class _PardisoFactors:
         return self._double.solve(b, which).astype(b.dtype, copy=False)
 
 
-def _twice(solver: LinearSolver, b: NDArray[np.float64], kept: NDArray[np.int64]) -> Begun:
+def _twice(solver: LinearSolver, b: Array, kept: Ints) -> Begun:
     """Return a solution that a second full solve finishes, if the right-hand side changes."""
     first = solver.solve(b)
 
-    def finish(change: NDArray[np.float64]) -> NDArray[np.float64]:
+    def finish(change: Array) -> Array:
         if not change.any():
             return first
         changed = b.copy()
@@ -233,9 +231,7 @@ def _twice(solver: LinearSolver, b: NDArray[np.float64], kept: NDArray[np.int64]
     return Begun(first[kept], finish)
 
 
-def _compliance(
-    solver: LinearSolver, rows: NDArray[np.float64], n: int, kept: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _compliance(solver: LinearSolver, rows: Array, n: int, kept: Ints) -> Array:
     """Return ``rows A^-1 rows'`` by one solve per row."""
     columns = np.zeros((n, len(rows)))
     columns[kept] = rows.T
@@ -262,7 +258,7 @@ def chosen(name: str = "auto") -> str:
 def analyse(
     upper: sparse.csr_array,
     name: str = "auto",
-    kept: NDArray[np.int64] | None = None,
+    kept: Ints | None = None,
     *,
     coupled: bool = False,
 ) -> LinearSolver:

@@ -6,13 +6,10 @@ seven times as long.
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from functools import cache
-from typing import TYPE_CHECKING
 
 from threadpoolctl import ThreadpoolController
-
-if TYPE_CHECKING:
-    from contextlib import AbstractContextManager
 
 
 @cache

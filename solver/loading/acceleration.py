@@ -12,17 +12,15 @@ D.G. Anderson, J. ACM 12 (1965) 547-560; H.F. Walker, P. Ni, SIAM J. Numer. Anal
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from solver.contact.candidates import Candidates
+from solver.loading.step import NewtonStep
+from solver.typing import Array
 
-    from solver.contact.candidates import Candidates
-    from solver.loading.step import NewtonStep
+Vectors = tuple[Array, ...]
 
-    Vectors = tuple[NDArray[np.float64], ...]
 
 _SLOW = 0.6
 """Ratio |step_k| / |step_k-1|; above it convergence counts as slow."""
@@ -46,12 +44,12 @@ class Series:
 
     _key: bytes = b""
     _slow: int = 0
-    _places: list[NDArray[np.float64]] = field(default_factory=list)
-    _steps: list[NDArray[np.float64]] = field(default_factory=list)
+    _places: list[Array] = field(default_factory=list)
+    _steps: list[Array] = field(default_factory=list)
 
     def sum(
         self, u: Vectors, candidates: Candidates, step: NewtonStep, share: float
-    ) -> tuple[Vectors, NDArray[np.float64]] | None:
+    ) -> tuple[Vectors, Array] | None:
         """Return accelerated displacements and contact forces after a step.
 
         None if convergence is fast, as it nearly always is: the step itself is then used.

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from solver.contact.system import System
 from solver.errors import LimitLoad
-
-if TYPE_CHECKING:
-    from solver.contact.system import System
-    from solver.materials.law import Law
+from solver.materials.law import Law
 
 
 def excess_shear(system: System) -> LimitLoad | None:

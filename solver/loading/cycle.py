@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Self
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from typing import Self
-
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged
-
-    Array = NDArray[np.float64]
+from solver.contact.state import Converged
+from solver.typing import Array, Ints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,7 +25,7 @@ class Cycle:
     before : largest plastic strain accumulated before it
     """
 
-    points: NDArray[np.int64]
+    points: Ints
     accumulated: Array
     net: Array
     dissipated: float

@@ -10,19 +10,14 @@ this integration.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-from solver.contact.state import Energy
+from solver.contact.state import Converged, Energy
+from solver.contact.system import System
+from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from solver.contact.state import Converged
-    from solver.contact.system import System
-    from solver.fem.part import Part
 
 
 def worked(system: System, before: Converged, now: Converged) -> Energy:

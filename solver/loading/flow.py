@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
+from solver.contact.candidates import Candidates
+from solver.contact.system import System
+from solver.fem.discretisation import Discretisation
+from solver.fem.part import Part
 from solver.loading.outcome import Mechanism
 from solver.loading.step import moving
+from solver.materials import Response
 from solver.tensors import deviator
+from solver.typing import Array
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+Vectors = Sequence[Array]
 
-    from numpy.typing import NDArray
-
-    from solver.contact.candidates import Candidates
-    from solver.contact.system import System
-    from solver.fem.discretisation import Discretisation
-    from solver.fem.part import Part
-    from solver.materials import Response
-
-    Vectors = Sequence[NDArray[np.float64]]
 
 _ELSE = 0.01
 """Largest work of what a mechanism does not do, change volume, overlap, violate links, over its

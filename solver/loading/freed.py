@@ -6,23 +6,16 @@ links hold it, a load may not move it: no equilibrium exists.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from solver.contact.system import System
 from solver.errors import ModelError
+from solver.fem.part import Part
 from solver.fem.wheel import Wheel
+from solver.loading.program import Program
 from solver.loading.step import moving
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.system import System
-    from solver.fem.part import Part
-    from solver.loading.program import Program
-    from solver.model.model import ContactPair
-
-    Array = NDArray[np.float64]
+from solver.model.contact_pair import ContactPair
+from solver.typing import Array
 
 _LITTLE = 1e-6
 """Ratio of a resultant to the largest load on its body; below it the resultant is rounding."""

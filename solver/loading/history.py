@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from solver.contact.state import Converged
-    from solver.contact.system import System
+from solver.contact.state import Converged
+from solver.contact.system import System
 
 _APART = 1e-4
 """Ratio of the gap of a vertex without force to the edge length; above it the vertex is open."""

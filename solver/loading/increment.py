@@ -20,15 +20,16 @@ plastic tangent of the previous step would make Newton's method diverge.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.contact.candidates import Candidates, find_candidates, no_candidates
 from solver.contact.ends import beyond_end
-from solver.contact.state import Converged, State, Timing
+from solver.contact.state import ContactState, Converged, State, Timing
+from solver.contact.system import System
 from solver.fem.window import Windowed
 from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
@@ -48,17 +49,11 @@ from solver.loading.step import (
     unheld,
 )
 from solver.loading.timing import timing
+from solver.materials import Response
+from solver.typing import Array
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+Vectors = tuple[Array, ...]
 
-    from numpy.typing import NDArray
-
-    from solver.contact.state import ContactState
-    from solver.contact.system import System
-    from solver.materials import Response
-
-    Vectors = tuple[NDArray[np.float64], ...]
 
 _BLENDS = (0.0, 1e-3, 0.02, 0.1, 0.3, 1.0)
 _SHORT = 0.1
@@ -85,7 +80,7 @@ class Balanced:
 
     u: Vectors
     contacts: tuple[ContactState, ...]
-    links: NDArray[np.float64]
+    links: Array
     responses: tuple[Response, ...]
     residuals: Vectors
     candidates: Candidates
@@ -124,7 +119,7 @@ class Increment:
         elastic_only: bool = False,
         patient: bool = False,
         tolerances: Tolerances | None = None,
-        compliance: dict[tuple[bytes, ...], NDArray[np.float64]] | None = None,
+        compliance: dict[tuple[bytes, ...], Array] | None = None,
     ) -> None:
         self.system = system = system.during(start)
         self.start = start
@@ -283,7 +278,7 @@ class Increment:
         return tuple(part.residual(self.time, ui, response) for part, ui, response in each)
 
     def _candidates(
-        self, u: Vectors, contacts: tuple[ContactState, ...], links: NDArray[np.float64]
+        self, u: Vectors, contacts: tuple[ContactState, ...], links: Array
     ) -> Candidates:
         if not self.contact:
             return no_candidates(self.system, u, links)
@@ -310,9 +305,7 @@ class Increment:
         stiffness = 1 / np.diag(self._compliance(candidates))
         return scale, error, candidates.violation(stiffness) / scale
 
-    def _unbalanced(
-        self, residuals: Vectors, candidates: Candidates, forces: NDArray[np.float64]
-    ) -> float:
+    def _unbalanced(self, residuals: Vectors, candidates: Candidates, forces: Array) -> float:
         """Return the norm of the out-of-balance forces of all parts under contact forces [N]."""
         left = out_of_balance(self.system, residuals, candidates, forces)
         return norm([r[part.free] for part, r in zip(self.system.parts, left, strict=True)])
@@ -333,7 +326,7 @@ class Increment:
             met = violation * scale <= stiffest * self.system.blur
         return balanced and met and candidates.beyond >= 0
 
-    def _compliance(self, candidates: Candidates) -> NDArray[np.float64]:
+    def _compliance(self, candidates: Candidates) -> Array:
         """Return the elastic compliance of the contact points [mm/N], a scale; computed once."""
         key = tuple(vertices.tobytes() for vertices in candidates.vertices)
         if key not in self.compliance:

@@ -9,19 +9,13 @@ path leave is of first order.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.state import Converged
+from solver.contact.system import System
 from solver.fem.discretisation import Discretisation
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged
-    from solver.contact.system import System
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Bools
 
 _PARTS = 4
 """Number of parts; two would not see the turn of a flow that begins in the second half."""
@@ -53,7 +47,7 @@ def missed(system: System, now: Converged) -> float:
     return float(np.max(errors, initial=0.0))
 
 
-def _missed(part: Discretisation, now: Converged, number: int, flows: NDArray[np.bool_]) -> Array:
+def _missed(part: Discretisation, now: Converged, number: int, flows: Bools) -> Array:
     """Return what ever shorter parts would add to stress (n_components, n_points) [MPa]."""
     within = np.asarray(flows.reshape(part.weights.shape).any(axis=1))
     points = np.flatnonzero(np.repeat(within, part.weights.shape[1]))
@@ -82,7 +76,7 @@ def _carried(part: Discretisation, now: Converged, number: int, error: Array) ->
     return left
 
 
-def _mean(part: Discretisation, error: Array, flows: NDArray[np.bool_]) -> float:
+def _mean(part: Discretisation, error: Array, flows: Bools) -> float:
     """Return the root mean square over the volume that flows, over the yield stress."""
     square = 1.5 * (error**2).sum(axis=0) @ part.volumes / part.volumes[flows].sum()
     return float(np.sqrt(square)) / part.body.law.yield_stress

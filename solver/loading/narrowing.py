@@ -8,32 +8,26 @@ windows grow. A window is kept from increment to increment until elements outsid
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.candidates import find_candidates
+from solver.contact.candidates import Candidates, find_candidates
+from solver.contact.state import Converged, State
+from solver.contact.system import System
 from solver.fem.discretisation import Discretisation
+from solver.fem.part import Part
 from solver.fem.window import Region, Windowed
 from solver.linear.solvers import Singular
-from solver.loading.increment import Increment
+from solver.loading.control import Tolerances
+from solver.loading.increment import Balanced, Increment
 from solver.loading.outcome import IncrementFailed
+from solver.materials import Response
+from solver.typing import Array, Bools
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+Yields = list[Bools | None]
 
-    from numpy.typing import NDArray
-
-    from solver.contact.candidates import Candidates
-    from solver.contact.state import Converged, State
-    from solver.contact.system import System
-    from solver.fem.part import Part
-    from solver.loading.control import Tolerances
-    from solver.loading.increment import Balanced
-    from solver.materials import Response
-
-    Yields = list[NDArray[np.bool_] | None]
 
 _LAYERS = 5
 """Number of layers of elements around those that yield, in a new window."""
@@ -81,7 +75,7 @@ def narrowed(
         return None
     touched: Candidates | None = None  # contact that leaves the windows so far is told by them
     needed = _needed(system, touched, yields)
-    compliance: dict[tuple[bytes, ...], NDArray[np.float64]] = {}
+    compliance: dict[tuple[bytes, ...], Array] = {}
     for _ in range(_ROUNDS):
         if touched is None and not _hold(windows, needed):
             touched = find_candidates(system, start, at.u, at.contacts, at.links, time - start.time)

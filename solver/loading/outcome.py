@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from solver.contact.state import Converged, State
 from solver.errors import NotConverged, SolverError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from solver.contact.state import Converged, State
-    from solver.loading.cycle import Cycle
-    from solver.loading.slide import Slide
+from solver.loading.cycle import Cycle
+from solver.loading.slide import Slide
 
 _CLOSE = 1e-3
 """Relative distance of a load below one that is excluded; up to it the load is at the limit."""

@@ -7,25 +7,18 @@ therefore taken from an increment so many sides back: no value is interpolated.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.interface import Interface
 from solver.contact.problem import OPEN
+from solver.contact.state import ContactState, State
+from solver.contact.system import System
 from solver.fem.following import Following
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.contact.interface import Interface
-    from solver.contact.state import ContactState, State
-    from solver.contact.system import System
-
-    Numbers = NDArray[np.int64]
+from solver.typing import Ints
 
 MEMORY = 8
 """Number of earlier states that are kept: the most increments per element side."""
@@ -95,7 +88,7 @@ class Predictor:
         return self._known[number, steps]
 
 
-def _on_vertices(interface: Interface, sources: Numbers) -> Numbers:
+def _on_vertices(interface: Interface, sources: Ints) -> Ints:
     """Return for each slave vertex the one that lies behind it by the shift, -1 if there is none.
 
     ``sources`` has this for the unknowns of the slave.
@@ -108,7 +101,7 @@ def _on_vertices(interface: Interface, sources: Numbers) -> Numbers:
 
 
 def _follow(
-    before: ContactState, after: ContactState, now: ContactState, source: Numbers
+    before: ContactState, after: ContactState, now: ContactState, source: Ints
 ) -> ContactState:
     """Return the contact ``now`` after another increment like an earlier one, moved."""
     known = source >= 0

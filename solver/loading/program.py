@@ -7,15 +7,12 @@ time is the load factor, which returns to zero when they are released.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise, takewhile
-from typing import TYPE_CHECKING
 
 from solver.errors import ModelError
 from solver.kinds import check_kinds
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
 
 ROUNDING = 1e-9
 """Relative difference below which two times are the same."""

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import numpy as np
-    from numpy.typing import NDArray
+from solver.typing import Array
 
 HALVINGS = 6
 """How often `StepRefinement` halves the increments at most."""
@@ -28,5 +25,5 @@ class StepRefinement:
     tolerance : largest change that is accepted
     """
 
-    measure: Callable[[Any], NDArray[np.float64]]
+    measure: Callable[[Any], Array]
     tolerance: float

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.contact.candidates import Candidates
-    from solver.contact.state import State
-    from solver.contact.system import System
+from solver.contact.candidates import Candidates
+from solver.contact.state import State
+from solver.contact.system import System
+from solver.typing import Array
 
 _SPENT = 0.95
 """Ratio of the tangential force of a pair to its friction bound; above it a hint is given."""
@@ -65,9 +61,7 @@ def spent(system: System, state: State) -> str:
     return f"; just before, friction between {', '.join(found)}" if found else ""
 
 
-def slide(
-    system: System, residuals: Sequence[NDArray[np.float64]], candidates: Candidates
-) -> Slide | None:
+def slide(system: System, residuals: Sequence[Array], candidates: Candidates) -> Slide | None:
     """Return how a floating body slides under the normal forces of the candidates, if it does.
 
     Only motions along all closed contacts are considered, which leave normal forces unchanged.

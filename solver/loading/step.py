@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.candidates import Candidates
 from solver.contact.links import solve_linked
 from solver.contact.problem import ContactProblem
+from solver.contact.system import System
+from solver.fem.operators import Operator
+from solver.fem.part import Part
+from solver.typing import Array, Ints
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.contact.candidates import Candidates
-    from solver.contact.system import System
-    from solver.fem.operators import Operator
-    from solver.fem.part import Part
-
-    Vectors = tuple[NDArray[np.float64], ...]
+Vectors = tuple[Array, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +23,8 @@ class NewtonStep:
     """Displacements of each part, contact forces, status, and whether pivoting was needed."""
 
     u: Vectors
-    forces: NDArray[np.float64]
-    status: NDArray[np.int64]
+    forces: Array
+    status: Ints
     pivoted: bool
 
     def slope(
@@ -37,20 +32,20 @@ class NewtonStep:
         system: System,
         residual: Vectors,
         candidates: Candidates,
-        forces: NDArray[np.float64],
+        forces: Array,
     ) -> float:
         """Return minus the derivative of the energy along the step under given contact forces."""
         left = out_of_balance(system, residual, candidates, forces)
         return sum(float(du @ r) for du, r in zip(self.u, left, strict=True))
 
 
-def on_parts(system: System, candidates: Candidates, forces: NDArray[np.float64]) -> Vectors:
+def on_parts(system: System, candidates: Candidates, forces: Array) -> Vectors:
     """Return the nodal forces that contact forces exert on each part [N]."""
     return tuple(candidates.all_on_part(i, forces) for i, _ in enumerate(system.parts))
 
 
 def out_of_balance(
-    system: System, residuals: Vectors, candidates: Candidates, forces: NDArray[np.float64]
+    system: System, residuals: Vectors, candidates: Candidates, forces: Array
 ) -> Vectors:
     """Return the out-of-balance forces of all parts under contact forces [N].
 
@@ -61,7 +56,7 @@ def out_of_balance(
     return tuple(r + c - moving(part, r + c) if stays else r + c for part, r, c, stays in each)
 
 
-def moving(part: Part, force: NDArray[np.float64]) -> NDArray[np.float64]:
+def moving(part: Part, force: Array) -> Array:
     """Return the share (n,) of nodal forces that works on the rigid motions of a part [N]."""
     Q, _ = np.linalg.qr(part.rigid[part.free])
     out = np.zeros(part.n)
@@ -125,7 +120,7 @@ def newton_step(
     return NewtonStep(u, solution.forces, solution.status, solution.pivoted)
 
 
-def norm(vectors: Sequence[NDArray[np.float64]]) -> float:
+def norm(vectors: Sequence[Array]) -> float:
     """Return the Euclidean norm of all vectors together."""
     return float(np.sqrt(sum(float(v @ v) for v in vectors)))
 

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 import time as clock
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from solver.contact.drift import followed
 from solver.contact.parting import parted
-from solver.contact.state import Converged, Energy, State
+from solver.contact.state import ContactState, Converged, Energy, State, Timing
+from solver.contact.system import System
 from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.fem.fields import elastic_energy
 from solver.linear.threads import one_thread
+from solver.loading.control import Control
 from solver.loading.energy import worked
 from solver.loading.history import lost
 from solver.loading.increment import Increment
@@ -23,20 +26,12 @@ from solver.loading.narrowing import FailedInWindows, narrowed
 from solver.loading.outcome import IncrementFailed, Mechanism, PathEnded, Point, Tally, Yielded
 from solver.loading.prediction import MEMORY, Predictor
 from solver.loading.program import ROUNDING
-from solver.loading.slide import spent
+from solver.loading.slide import Slide, spent
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from solver.contact.state import ContactState, Timing
-    from solver.contact.system import System
-    from solver.loading.control import Control
-    from solver.loading.slide import Slide
-
-    Attempt = tuple[float, Mechanism | Slide | None]
-    """Time of an increment that failed, and why; None if it failed in windows alone."""
-    Report = Callable[[], None]
-    Watch = Callable[[Converged], Any]
+Attempt = tuple[float, Mechanism | Slide | None]
+"""Time of an increment that failed, and why; None if it failed in windows alone."""
+Report = Callable[[], None]
+Watch = Callable[[Converged], Any]
 
 
 _NEAR = 8

@@ -8,24 +8,15 @@ width has passed over vertices that never carried force. Smaller increments redu
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import linalg
 
+from solver.contact.candidates import Candidates
+from solver.contact.interface import Interface
 from solver.contact.problem import STICK
-from solver.contact.state import Timing
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.candidates import Candidates
-    from solver.contact.interface import Interface
-    from solver.contact.state import ContactState, State
-    from solver.contact.system import System
-
-    Array = NDArray[np.float64]
-
+from solver.contact.state import ContactState, State, Timing
+from solver.contact.system import System
+from solver.typing import Array, Ints
 
 _SHARE = 0.25
 """Error of the slip before touch, over its change by the last term of its series (measured)."""
@@ -70,7 +61,7 @@ def timing(system: System, start: State, candidates: Candidates, compliance: Arr
 
 
 def _passed(
-    interface: Interface, before: ContactState, at: NDArray[np.int64], normal: Array, slip: Array
+    interface: Interface, before: ContactState, at: Ints, normal: Array, slip: Array
 ) -> float:
     """Return the force of a contact times (its motion along a surface / its width) [N].
 

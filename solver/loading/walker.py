@@ -7,33 +7,27 @@ others that are walked with it: it equals, bit for bit, that of the program walk
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from solver.contact.state import Converged
+from solver.contact.system import System
 from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.loading.bearing import excess_shear
+from solver.loading.control import Control
 from solver.loading.cycle import Cycle
 from solver.loading.freed import check_freed
-from solver.loading.outcome import Outcome, PathEnded, Settled, Tally
-from solver.loading.program import shared
-from solver.loading.refinement import HALVINGS
-from solver.loading.stepper import Stepper, turned
+from solver.loading.outcome import Outcome, PathEnded, Point, Settled, Tally
+from solver.loading.program import Program, Target, shared
+from solver.loading.refinement import HALVINGS, StepRefinement
+from solver.loading.stepper import Report, Stepper, Watch, turned
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+Points = Mapping[str, Converged]
 
-    from solver.contact.state import Converged
-    from solver.contact.system import System
-    from solver.loading.control import Control
-    from solver.loading.outcome import Point
-    from solver.loading.program import Program, Target
-    from solver.loading.refinement import StepRefinement
-    from solver.loading.stepper import Report, Watch
-
-    Points = Mapping[str, Converged]
 
 _NOTHING = 1e-6
 """Ratio of the plastic work of a lap to the plastic work so far; below it the lap is elastic."""

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from solver.materials.back_stress import ArmstrongFrederick, BackStress
+from solver.materials.curves import Curve
 from solver.materials.radial_return import SQRT23
 from solver.materials.scalar import falling_root
 from solver.tensors import identity, von_mises
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.back_stress import ArmstrongFrederick, BackStress
-    from solver.materials.curves import Curve
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Ints
 
 _ROUNDING = 8 * float(np.finfo(float).eps)
 """Ratio of residual to trial stress; up to it the residual is rounding."""
@@ -131,7 +126,7 @@ def general_return(
     least, share = np.full(count, np.inf), np.ones(count)
     step, going = np.zeros_like(found), np.arange(count)
 
-    def at(points: NDArray[np.int64], x: Array) -> _Equations:
+    def at(points: Ints, x: Array) -> _Equations:
         own = s[:, points], back[:, :, points], accumulated[points]
         return _Equations(*own, x[:n], x[n], rules, curve, G)
 

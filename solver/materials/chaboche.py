@@ -8,27 +8,20 @@ Other rules of back stresses are subclasses of `BackStress`.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from solver.materials.back_stress import ArmstrongFrederick
+from solver.materials.back_stress import ArmstrongFrederick, BackStress
 from solver.materials.back_stress_return import fading_return, general_return
+from solver.materials.curves import Curve
 from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
 from solver.materials.state import PlasticState, Response
 from solver.tensors import deviator
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import NDArray
-
-    from solver.materials.back_stress import BackStress
-    from solver.materials.curves import Curve
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True)

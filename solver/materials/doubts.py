@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from solver.materials.law import Law
+from solver.materials.law import Law
 
 _YIELD_STRAIN = 0.05
 """Ratio of yield stress to Young's modulus; no metal (hardest wires: 0.02) or hard polymer reaches

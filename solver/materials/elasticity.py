@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.tensors import identity
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,26 +38,26 @@ class Elasticity:
         """E / (1 - nu^2): slope of stress over strain if one lateral strain is zero [MPa]."""
         return self.youngs_modulus / (1 - self.poisson_ratio**2)
 
-    def stiffness(self, n_components: int) -> NDArray[np.float64]:
+    def stiffness(self, n_components: int) -> Array:
         """Return the stiffness (n_components, n_components) on Mandel strain [MPa]."""
         one = identity(n_components)
         deviator = np.eye(n_components) - np.outer(one, one) / 3.0
         return self.bulk_modulus * np.outer(one, one) + 2 * self.shear_modulus * deviator
 
-    def strain(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    def strain(self, stress: Array) -> Array:
         """Return the Mandel strain (n_components, ...) of Mandel stress of that shape [MPa]."""
         E, nu = self.youngs_modulus, self.poisson_ratio
         out = (1 + nu) / E * stress
         out[:3] -= nu / E * stress[:3].sum(axis=0)
         return np.asarray(out)
 
-    def energy_density(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    def energy_density(self, stress: Array) -> Array:
         """Return the elastic energy (...) of Mandel stress (n_components, ...) [N mm/mm3]."""
         E, nu = self.youngs_modulus, self.poisson_ratio
         square = (1 + nu) * (stress**2).sum(axis=0) - nu * stress[:3].sum(axis=0) ** 2
         return np.asarray(square / (2 * E))
 
-    def biaxial_stress(self, strain: NDArray[np.float64]) -> NDArray[np.float64]:
+    def biaxial_stress(self, strain: Array) -> Array:
         """Return the two normal stresses (2, n) of two normal elastic strains (2, n) [MPa].
 
         The third normal stress is zero, as at a free surface.

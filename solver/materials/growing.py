@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from solver.materials.curves import Curve
 from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from solver.materials.curves import Curve
-    from solver.materials.state import PlasticState
+from solver.materials.state import PlasticState
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +35,6 @@ class GrowingLaw(Law):
         """Shear stress equivalent to the limit of the curve [MPa]."""
         return self.surface.shear(self.curve.limit)
 
-    def flow_stress(self, state: PlasticState) -> NDArray[np.float64]:
+    def flow_stress(self, state: PlasticState) -> Array:
         """Return the stress of the curve (n_points,) [MPa]."""
         return self.curve.flow_stress(state.accumulated)

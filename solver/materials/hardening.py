@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,14 +32,14 @@ class LinearHardening:
         """2/3 Hk: ratio of back stress to plastic strain, as tensors [MPa]."""
         return 2 / 3 * self.kinematic_modulus
 
-    def flow_stress(self, accumulated: NDArray[np.float64]) -> NDArray[np.float64]:
+    def flow_stress(self, accumulated: Array) -> Array:
         """Return the size Re + Hi p (n,) of the yield surface at plastic strain p (n,) [MPa]."""
         return self.yield_stress + self.isotropic_modulus * accumulated
 
-    def strength(self, accumulated: NDArray[np.float64]) -> NDArray[np.float64]:
+    def strength(self, accumulated: Array) -> Array:
         """Return the stress Re + H p (n,) of the tension curve at plastic strain p (n,) [MPa]."""
         return self.yield_stress + self.modulus * accumulated
 
-    def back_stress(self, plastic_strain: NDArray[np.float64]) -> NDArray[np.float64]:
+    def back_stress(self, plastic_strain: Array) -> Array:
         """Return the centre of the yield surface (n_components, n) for Mandel strain [MPa]."""
         return self.prager_modulus * plastic_strain

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
+from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
 from annotated_types import Interval, Unit
@@ -16,18 +16,14 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.materials.back_stress import ArmstrongFrederick, BackStress
 from solver.materials.chaboche import Chaboche
-from solver.materials.curves import Table, Voce
+from solver.materials.curves import Curve, Table, Voce
+from solver.materials.elasticity import Elasticity
+from solver.materials.law import Law
 from solver.materials.layered import Layered
 from solver.materials.material import Hardening, Material
 from solver.parameters import Fraction, HardeningRatio, Pairs, described, pairs
 from solver.parts import Parts
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.curves import Curve
-    from solver.materials.elasticity import Elasticity
-    from solver.materials.law import Law
+from solver.typing import Array
 
 
 class HardeningRule(ABC):
@@ -188,9 +184,7 @@ class _Measured:
         "hardening; the first is [0, yield_stress]",
     )  # fmt: skip
 
-    def points(
-        self, yield_stress: float, word: str
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def points(self, yield_stress: float, word: str) -> tuple[Array, Array]:
         """Return plastic strain (n,) and stress (n,) [MPa] of the points.
 
         Raises `ModelError` unless they begin at [0, yield_stress] and rise.

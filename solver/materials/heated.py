@@ -13,19 +13,11 @@ of `Chaboche` fall with Young's modulus too.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from solver.materials.state import Response
+from solver.materials.law import Law
+from solver.materials.state import PlasticState, Response
 from solver.materials.wrapped import Wrapped
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.materials.state import PlasticState
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Ints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +44,7 @@ class Heated(Wrapped):
     def _stretch(self) -> Array:
         return self.stiff / self.strong
 
-    def at(self, points: NDArray[np.int64]) -> Heated:
+    def at(self, points: Ints) -> Heated:
         """Return the law of some points."""
         law = self.law.at(points)
         return Heated(law=law, stiff=self.stiff[points], strong=self.strong[points])

@@ -22,22 +22,14 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.materials.attribute import attribute
-from solver.materials.state import PlasticState
-from solver.materials.yield_surface import VonMises
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.elasticity import Elasticity
-    from solver.materials.state import Response
-    from solver.materials.yield_surface import YieldSurface
-
-    Array = NDArray[np.float64]
+from solver.materials.elasticity import Elasticity
+from solver.materials.state import PlasticState, Response
+from solver.materials.yield_surface import VonMises, YieldSurface
+from solver.typing import Array, Ints
 
 _ROUNDING = 8 * float(np.finfo(float).eps)
 
@@ -102,7 +94,7 @@ class Law(ABC):
         """Return the elastic energy (n_points,) of Mandel stress [N mm/mm3]."""
         return self.elasticity.energy_density(stress)
 
-    def at(self, points: NDArray[np.int64]) -> Law:
+    def at(self, points: Ints) -> Law:
         """Return the law of some points: the law itself if it is the same at all points."""
         del points
         return self

@@ -7,8 +7,9 @@ yield early, as metals do (the Bauschinger effect), along twice the curve of fir
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -17,13 +18,7 @@ from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
 from solver.materials.material import Material
 from solver.materials.state import PlasticState, Response
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 from solver.errors import ModelError
 from solver.kinds import check_kinds
@@ -13,12 +13,8 @@ from solver.materials.hardening import LinearHardening
 from solver.materials.law import Law
 from solver.materials.projected_return import ProjectedReturn
 from solver.materials.radial_return import radial_return
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from solver.materials.state import PlasticState, Response
+from solver.materials.state import PlasticState, Response
+from solver.typing import Array
 
 Hardening = Literal["none", "isotropic", "kinematic", "mixed"]
 
@@ -123,19 +119,19 @@ class Material(Law):
         """The shear yield stress without hardening, inf with it [MPa]."""
         return math.inf if self.hardens else self.shear_yield_stress
 
-    def flow_stress(self, state: PlasticState) -> NDArray[np.float64]:
+    def flow_stress(self, state: PlasticState) -> Array:
         """Return the yield stress plus its isotropic growth (n_points,) [MPa]."""
         return self.hardening_rule.flow_stress(state.accumulated)
 
-    def back_stress(self, state: PlasticState) -> NDArray[np.float64]:
+    def back_stress(self, state: PlasticState) -> Array:
         """Return Prager's back stress (n_components, n_points), Mandel [MPa]."""
         return self.hardening_rule.back_stress(state.plastic_strain)
 
-    def strength(self, state: PlasticState) -> NDArray[np.float64]:
+    def strength(self, state: PlasticState) -> Array:
         """Return the stress of the uniaxial curve at this plastic strain (n_points,) [MPa]."""
         return self.hardening_rule.strength(state.accumulated)
 
-    def respond(self, strain: NDArray[np.float64], state: PlasticState) -> Response:
+    def respond(self, strain: Array, state: PlasticState) -> Response:
         """Return stress, tangent and new state by the radial return."""
         return radial_return(strain, state, self.elasticity, self.hardening_rule)
 

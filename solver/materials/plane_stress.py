@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.materials.state import Response
+from solver.materials.law import Law
+from solver.materials.state import PlasticState, Response
 from solver.materials.wrapped import Wrapped
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.materials.state import PlasticState
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Bools, Ints
 
 _ZZ = 2
 _ROUNDING = float(np.finfo(float).eps)
@@ -68,7 +61,7 @@ class PlaneStress(Wrapped):
 
     law: Law
 
-    def at(self, points: NDArray[np.int64]) -> PlaneStress:
+    def at(self, points: Ints) -> PlaneStress:
         """Return the law of some points."""
         return replace(self, law=self.law.at(points))
 
@@ -107,7 +100,7 @@ class PlaneStress(Wrapped):
 
     def _thickness_strain(
         self, strain: Array, state: PlasticState, scale: Array, stiff: float
-    ) -> tuple[Array, NDArray[np.bool_]]:
+    ) -> tuple[Array, Bools]:
         """Return the strain zz (n,) of points, and whether it makes stress zz zero there (n,)."""
         zz = strain[_ZZ].copy()
         n = len(zz)

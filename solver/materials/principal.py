@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from solver.tensors import SQRT2
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 """Row and column of each Mandel component; in two dimensions the first four."""

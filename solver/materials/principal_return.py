@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from solver.materials.curves import Curve
+from solver.materials.elasticity import Elasticity
 from solver.materials.principal import PAIRS, dyad, principal
 from solver.materials.scalar import falling_root
 from solver.materials.state import PlasticState, Response
 from solver.tensors import von_mises
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from solver.materials.curves import Curve
-    from solver.materials.elasticity import Elasticity
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _ALIKE = 1e-10
 """Ratio of the difference of two principal stresses to the largest one; up to it they are equal."""

@@ -8,20 +8,14 @@ projection P are diagonal, and the return is one scalar equation per point.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.materials.hardening import LinearHardening
 from solver.materials.plane_stress import PlaneStress
 from solver.materials.radial_return import SQRT23
 from solver.materials.state import PlasticState, Response
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.hardening import LinearHardening
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _IN_PLANE = np.array([0, 1, 3])
 _MODES = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, np.sqrt(2.0)]]) / np.sqrt(2.0)

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from solver.materials.elasticity import Elasticity
+from solver.materials.hardening import LinearHardening
 from solver.materials.state import PlasticState, Response
 from solver.tensors import deviator, identity
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.elasticity import Elasticity
-    from solver.materials.hardening import LinearHardening
+from solver.typing import Array
 
 SQRT23 = float(np.sqrt(2.0 / 3.0))
 
 
 def radial_return(
-    strain: NDArray[np.float64],
+    strain: Array,
     state: PlasticState,
     elasticity: Elasticity,
     hardening: LinearHardening,

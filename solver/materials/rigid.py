@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
-from solver.materials.state import Response
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.state import PlasticState
+from solver.materials.state import PlasticState, Response
+from solver.typing import Array
 
 
 class Rigid(Law):
@@ -24,11 +18,11 @@ class Rigid(Law):
         """Elastic constants with an infinite modulus."""
         return Elasticity(youngs_modulus=np.inf, poisson_ratio=0.0)
 
-    def flow_stress(self, state: PlasticState) -> NDArray[np.float64]:
+    def flow_stress(self, state: PlasticState) -> Array:
         """Return inf: it never yields."""
         return np.full(state.accumulated.shape, np.inf)
 
-    def respond(self, strain: NDArray[np.float64], state: PlasticState) -> Response:
+    def respond(self, strain: Array, state: PlasticState) -> Response:
         """Return the empty response of zero points; a rigid body has no others."""
         if strain.shape[1]:
             raise ValueError("a rigid body has no points")

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.materials.curves import Curve
 from solver.materials.growing import GrowingLaw
 from solver.materials.principal_return import Returned, grown, principal_return
 from solver.materials.smooth_surface import SmoothSurface, base, falling_angle, polar
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.curves import Curve
-    from solver.materials.state import PlasticState, Response
-
-    Array = NDArray[np.float64]
+from solver.materials.state import PlasticState, Response
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

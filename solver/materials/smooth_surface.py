@@ -9,22 +9,16 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.materials.principal import dyad, principal
 from solver.materials.scalar import falling_root
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from solver.materials.yield_surface import Tension
-
-    Array = NDArray[np.float64]
+from solver.materials.yield_surface import Tension
+from solver.typing import Array
 
 SIXTH = math.pi / 3
 """Lode angle of uniaxial compression; it is 0 in tension and half of this in pure shear."""

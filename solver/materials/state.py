@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from typing import Self
-
-    from numpy.typing import NDArray
-
-    Points = NDArray[np.bool_]
+from solver.typing import Array, Bools, Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +27,8 @@ class PlasticState:
         strain, the sum of sqrt(2/3) |d plastic_strain|
     """
 
-    plastic_strain: NDArray[np.float64]
-    accumulated: NDArray[np.float64]
+    plastic_strain: Array
+    accumulated: Array
     TENSORS: ClassVar[tuple[str, ...]] = ("plastic_strain",)
 
     @classmethod
@@ -41,7 +36,7 @@ class PlasticState:
         """Return the state of a material that has never yielded."""
         return PlasticState(np.zeros((n_components, n_points)), np.zeros(n_points))
 
-    def at(self, points: NDArray[np.int64]) -> Self:
+    def at(self, points: Ints) -> Self:
         """Return the internal variables of some points."""
         return replace(self, **{f.name: getattr(self, f.name)[..., points] for f in fields(self)})
 
@@ -53,14 +48,14 @@ class PlasticState:
         return replace(self, **{name: getattr(self, name) * sign for name in self.TENSORS})
 
     @property
-    def packed(self) -> NDArray[np.float64]:
+    def packed(self) -> Array:
         """All internal variables as one array (n, n_points), plastic strain first."""
         points = self.accumulated.shape
         return np.concatenate(
             [getattr(self, name).reshape(size, *points) for name, _, size in self._layout]
         )
 
-    def unpacked(self, packed: NDArray[np.float64]) -> Self:
+    def unpacked(self, packed: Array) -> Self:
         """Return internal variables of the same law from an array like `packed` (n, ...)."""
         found, begin = {}, 0
         for name, shape, size in self._layout:
@@ -76,13 +71,11 @@ class PlasticState:
         each = [(name, shape[: len(shape) - points]) for name, shape in shapes]
         return [(name, shape, math.prod(shape)) for name, shape in each]
 
-    def stretched(self, factor: NDArray[np.float64]) -> Self:
+    def stretched(self, factor: Array) -> Self:
         """Return the internal variables with all strains multiplied by factors (n_points,)."""
         return replace(self, **{f.name: getattr(self, f.name) * factor for f in fields(self)})
 
-    def stepped(
-        self, own: PlasticState, after: PlasticState, factor: NDArray[np.float64], flows: Points
-    ) -> Self:
+    def stepped(self, own: PlasticState, after: PlasticState, factor: Array, flows: Bools) -> Self:
         """Return these internal variables after a step computed with stretched strains.
 
         Values that the step did not change are kept exactly: the rounding of stretching and its
@@ -110,7 +103,7 @@ class Response(NamedTuple):
     ``yielding`` (n_points,) bool, true where the tangent is not the elastic stiffness.
     """
 
-    stress: NDArray[np.float64]
-    tangent: NDArray[np.float64]
+    stress: Array
+    tangent: Array
     state: PlasticState
-    yielding: NDArray[np.bool_]
+    yielding: Bools

@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from solver.materials.growing import GrowingLaw
 from solver.materials.principal_return import Returned, principal_return
+from solver.materials.state import PlasticState, Response
 from solver.materials.tresca_return import tresca_return
 from solver.materials.yield_surface import Tresca
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from solver.materials.state import PlasticState, Response
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

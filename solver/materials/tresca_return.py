@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from solver.materials.curves import Curve
 from solver.materials.principal_return import Returned, grown
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.curves import Curve
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _FACE = np.array([1.0, 0.0, -1.0])
 _EDGES = np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0]])

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 from solver.materials.attribute import attribute
 from solver.materials.law import Law
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from solver.materials.state import PlasticState
-
-    Array = NDArray[np.float64]
+from solver.materials.state import PlasticState
+from solver.typing import Array
 
 
 class Wrapped(Law):

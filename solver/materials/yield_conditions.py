@@ -8,18 +8,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from solver.errors import ModelError
+from solver.materials.elasticity import Elasticity
 from solver.materials.hardening_rules import GrowingRule, HardeningRule
+from solver.materials.law import Law
 from solver.materials.smooth import SmoothMaterial
 from solver.materials.smooth_surface import SmoothSurface
 from solver.materials.tresca import TrescaMaterial
 from solver.parts import Parts
-
-if TYPE_CHECKING:
-    from solver.materials.elasticity import Elasticity
-    from solver.materials.law import Law
 
 
 class YieldCondition(ABC):

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
+from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
 
 from solver.materials.principal import PAIRS, dyad, principal
 from solver.tensors import deviator, von_mises
+from solver.typing import Array
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+Tension = TypeVar("Tension", float, Array)
 
-    Tension = TypeVar("Tension", float, NDArray[np.float64])
 
 _NOTHING = 1e-300
 
@@ -25,13 +24,13 @@ class YieldSurface(Protocol):
     def shear(self, tension: Tension) -> Tension:
         """Return the pure shear stress that is equivalent to a tensile stress [MPa]."""
 
-    def equivalent(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    def equivalent(self, stress: Array) -> Array:
         """Return the equivalent tensile stress (n_points,) of a stress [MPa]."""
 
-    def normal(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    def normal(self, stress: Array) -> Array:
         """Return the derivative (n_components, n_points) of `equivalent` by Mandel stress."""
 
-    def power(self, strain: NDArray[np.float64]) -> NDArray[np.float64]:
+    def power(self, strain: Array) -> Array:
         """Return the largest work (n_points,) of a stress inside on the deviator of Mandel strain.
 
         The surface has the tensile stress 1.
@@ -46,16 +45,16 @@ class VonMises:
         """Return k = tension / sqrt(3) [MPa]."""
         return tension / math.sqrt(3)
 
-    def equivalent(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    def equivalent(self, stress: Array) -> Array:
         """Return q = sqrt(3/2 s:s) (n_points,) of Mandel stress (n_components, n_points) [MPa]."""
         return von_mises(stress)
 
-    def normal(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    def normal(self, stress: Array) -> Array:
         """Return 3/2 s / q (n_components, n_points); zero where there is no deviator."""
         s = deviator(stress)
         return np.asarray(1.5 * s / np.maximum(np.sqrt(1.5 * (s**2).sum(axis=0)), _NOTHING))
 
-    def power(self, strain: NDArray[np.float64]) -> NDArray[np.float64]:
+    def power(self, strain: Array) -> Array:
         """Return sqrt(2/3 e:e) (n_points,) of the deviator e of Mandel strain."""
         return np.asarray(np.sqrt(2 / 3 * (deviator(strain) ** 2).sum(axis=0)))
 
@@ -74,31 +73,31 @@ class Tresca:
         """Return k = tension / 2 [MPa]."""
         return tension / 2
 
-    def of_principal(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def of_principal(self, values: Array) -> Array:
         """Return s1 - s3 (n,) of principal stresses (3, n), the largest first [MPa]."""
         return np.asarray(values[0] - values[2])
 
-    def equivalent(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    def equivalent(self, stress: Array) -> Array:
         """Return s1 - s3 (n_points,) of Mandel stress (n_components, n_points) [MPa]."""
         return self.of_principal(principal(stress)[0])
 
-    def normal(self, stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    def normal(self, stress: Array) -> Array:
         """Return e1 e1 - e3 e3 (n_components, n_points); on an edge, the normal of one face."""
         _, directions = principal(stress)
         return dyad(directions, 0, 0, len(stress)) - dyad(directions, 2, 2, len(stress))
 
-    def power(self, strain: NDArray[np.float64]) -> NDArray[np.float64]:
+    def power(self, strain: Array) -> Array:
         """Return the largest absolute principal value (n_points,) of the deviator of strain."""
         values, _ = principal(deviator(strain))
         return np.asarray(np.abs(values).max(axis=0))
 
     def flow_rule_error(
         self,
-        stress: NDArray[np.float64],
-        flow: NDArray[np.float64],
-        growth: NDArray[np.float64],
+        stress: Array,
+        flow: Array,
+        growth: Array,
         unit: float,
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Return the deviation (n_points,) of a flow from the associated flow rule, a strain.
 
         For associated flow:

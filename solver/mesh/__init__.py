@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
-from solver.mesh.grids import grid, mapped, marked, merged, within, without
-from solver.mesh.lines import graded, refined
-from solver.mesh.shapes import Near, ball, disc, fillet, half_plane, pad, rectangle, ring
+from importlib import import_module
+from typing import Any
 
-__all__ = [
-    "Near",
-    "ball",
-    "disc",
-    "fillet",
-    "graded",
-    "grid",
-    "half_plane",
-    "mapped",
-    "marked",
-    "merged",
-    "pad",
-    "rectangle",
-    "refined",
-    "ring",
-    "within",
-    "without",
-]
+_HOMES = {
+    "Near": "shapes",
+    "ball": "shapes",
+    "disc": "shapes",
+    "fillet": "shapes",
+    "graded": "lines",
+    "grid": "grids",
+    "half_plane": "shapes",
+    "mapped": "grids",
+    "marked": "grids",
+    "merged": "grids",
+    "pad": "shapes",
+    "rectangle": "shapes",
+    "refined": "lines",
+    "ring": "shapes",
+    "within": "grids",
+    "without": "grids",
+}
+
+__all__ = list(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used: grid lines need no mesh."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from skfem import Mesh, MeshQuad, MeshQuad2, MeshTri, MeshTri2
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from skfem import Mesh
-
-    Array = NDArray[np.float64]
-    Numbers = NDArray[np.int64]
+from solver.typing import Array, Ints
 
 
-def mesh_of_cells(points: Array, cells: Numbers, corners: int) -> tuple[Mesh, Numbers]:
+def mesh_of_cells(points: Array, cells: Ints, corners: int) -> tuple[Mesh, Ints]:
     """Return the mesh of cells, and the number of its corner at each point, -1 at other points.
 
     Parameters
@@ -24,8 +18,6 @@ def mesh_of_cells(points: Array, cells: Numbers, corners: int) -> tuple[Mesh, Nu
         from the first corner on, then the middle, or only some of these
     corners : 3 or 4
     """
-    from skfem import MeshQuad, MeshQuad2, MeshTri, MeshTri2
-
     straight, curved = (MeshQuad, MeshQuad2) if corners == 4 else (MeshTri, MeshTri2)
     used, local = np.unique(cells[:, :corners], return_inverse=True)
     number = np.full(len(points), -1)
@@ -44,7 +36,7 @@ def mesh_of_cells(points: Array, cells: Numbers, corners: int) -> tuple[Mesh, Nu
     return curved(doflocs=at, t=bent.t, sort_t=False, validate=False), number
 
 
-def triangles_of(points: Array, cells: Numbers) -> tuple[Array, Numbers]:
+def triangles_of(points: Array, cells: Ints) -> tuple[Array, Ints]:
     """Return quadrilaterals as triangles: the points, and two cells for each, in its order.
 
     The shorter diagonal divides a quadrilateral; its middle is a new point if there are middles.
@@ -63,7 +55,7 @@ def triangles_of(points: Array, cells: Numbers) -> tuple[Array, Numbers]:
     return points, np.array(halves).transpose(2, 0, 1).reshape(2 * len(cells), -1)
 
 
-def collapsed(cells: Numbers) -> tuple[Numbers, Numbers]:
+def collapsed(cells: Ints) -> tuple[Ints, Ints]:
     """Return which quadrilaterals have two corners at one point (n,), and their triangles."""
     same = cells[:, :4] == np.roll(cells[:, :4], -1, axis=1)
     which = np.flatnonzero(same.any(axis=1))
@@ -73,7 +65,7 @@ def collapsed(cells: Numbers) -> tuple[Numbers, Numbers]:
     return which, np.take_along_axis(cells[which], kept, axis=1)
 
 
-def _middles(points: Array, cells: Numbers) -> Array:
+def _middles(points: Array, cells: Ints) -> Array:
     """Return the middles (n, 2) of quadrilaterals with middles of sides."""
     if cells.shape[1] == 9:
         return np.asarray(points[cells[:, 8]])
@@ -81,7 +73,7 @@ def _middles(points: Array, cells: Numbers) -> Array:
     return np.asarray(X[:, 4:8].sum(1) / 2 - X[:, :4].sum(1) / 4)
 
 
-def facets_of(mesh: Mesh, edges: Numbers) -> Numbers:
+def facets_of(mesh: Mesh, edges: Ints) -> Ints:
     """Return the facets (n,) of edges (n, 2), pairs of corners; -1 where there is none."""
     known = {ends: k for k, ends in enumerate(map(tuple, np.sort(mesh.facets, axis=0).T.tolist()))}
     pairs = map(tuple, np.sort(edges, axis=1).tolist())

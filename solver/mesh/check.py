@@ -7,21 +7,18 @@ nearby edges and with the rounding of coordinates, so that unit, grading and ori
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from skfem import Mesh
 from skfem.quadrature import get_quadrature
 
 from solver.errors import ModelError
 from solver.mesh.edges import shape_derivatives, shape_functions
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from skfem import Mesh
-
-    from solver.mesh.elements import ElementType
+from solver.mesh.elements import ElementType
+from solver.typing import Array, Ints
 
 # Ratio of least to greatest Jacobian below which an element is folded, and sine of the angle
 # between shortest and longest side below which it is flat. Rectangles and right triangles pass.
@@ -67,7 +64,7 @@ def _check_nodes(mesh: Mesh, where: str) -> None:
         _refuse(f"node {node}", where, f"at {_at(mesh, node)} belongs to no element: leave it out")
 
 
-def _jacobians(mesh: Mesh, kind: ElementType) -> NDArray[np.float64]:
+def _jacobians(mesh: Mesh, kind: ElementType) -> Array:
     """Return signed Jacobians (n_elements, n_points), at nodes and integration points.
 
     The Jacobian of a straight element is linear: its extremes are at the corners.
@@ -82,7 +79,7 @@ def _jacobians(mesh: Mesh, kind: ElementType) -> NDArray[np.float64]:
     return np.asarray(J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0])
 
 
-def _check_elements(mesh: Mesh, where: str, kind: ElementType) -> NDArray[np.float64]:
+def _check_elements(mesh: Mesh, where: str, kind: ElementType) -> Array:
     """Return the orientation of every element: 1 counterclockwise, -1 clockwise."""
     jacobian = _jacobians(mesh, kind)
     low, high = jacobian.min(axis=1), jacobian.max(axis=1)
@@ -103,7 +100,7 @@ def _check_elements(mesh: Mesh, where: str, kind: ElementType) -> NDArray[np.flo
     return sense
 
 
-def _check_neighbours(mesh: Mesh, where: str, sense: NDArray[np.float64]) -> None:
+def _check_neighbours(mesh: Mesh, where: str, sense: Array) -> None:
     """Refuse elements that overlap at an edge.
 
     Counterclockwise numbering puts an element on the left of its edges: two neighbours on opposite
@@ -144,14 +141,12 @@ def _check_cracks(mesh: Mesh, where: str) -> None:
         _refuse(f"node {node}", where, allowed)
 
 
-def _close(mesh: Mesh, nodes: NDArray[np.int64], edges: NDArray[np.float64]) -> NDArray[np.float64]:
+def _close(mesh: Mesh, nodes: Ints, edges: Array) -> Array:
     """Return the distance below which nodes with edges of these lengths count as coincident."""
     return np.asarray(_CLOSED * edges + _ROUNDING * np.abs(mesh.p[:, nodes]).max(axis=0))
 
 
-def _within(
-    centres: NDArray[np.float64], places: NDArray[np.float64], radii: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _within(centres: Array, places: Array, radii: Array) -> tuple[Ints, Ints]:
     """Return pairs of a centre (2, n) and a place (2, m) within its radius (n,), by centres.
 
     Places are sorted along a direction in which sides of bodies seldom lie. A tree of `scipy` would
@@ -167,9 +162,7 @@ def _within(
     return centre[near], place[near]
 
 
-def _hanging(
-    mesh: Mesh, nodes: NDArray[np.int64], shortest: NDArray[np.float64]
-) -> NDArray[np.int64]:
+def _hanging(mesh: Mesh, nodes: Ints, shortest: Array) -> Ints:
     """Return (n, 2): boundary nodes on a boundary facet between its ends, and that facet."""
     facets = mesh.boundary_facets()
     X = mesh.p[:, mesh.facets[:, facets]]

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.mesh.lines import continued, graded
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _AHEAD, _BEHIND, _DEEP = 3.0, 5.0, 4.0
 """Extent of the window ahead of, behind and below the load, over the half-width. Only 3 half-widths

@@ -5,28 +5,23 @@ A body takes any scikit-fem mesh with named boundaries, also one of `studies.sce
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
+from skfem import Mesh, MeshQuad, MeshQuad2, MeshTri
 
 from solver.errors import ModelError
 from solver.mesh.rounding import ROUNDED, in_box
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from numpy.typing import NDArray
-    from skfem import Mesh, MeshQuad2
+from solver.typing import Array, Ints
 
 _SAME = 1e-9
 """Ratio of a distance to the size of a mesh; below it two places are the same."""
 
 
-def grid(x: NDArray[np.float64], y: NDArray[np.float64], cells: str = "quad") -> Mesh:
+def grid(x: Array, y: Array, cells: str = "quad") -> Mesh:
     """Return the tensor grid with boundaries ``left``, ``right``, ``bottom``, ``top``."""
-    from skfem import MeshQuad, MeshTri  # a third of a second to import, and `graded` needs none
-
     make = MeshTri if cells == "tri" else MeshQuad
     mesh = make.init_tensor(np.asarray(x, float), np.asarray(y, float))
     tolerance = 1e-9 * max(np.ptp(x), np.ptp(y))
@@ -144,14 +139,12 @@ def without(mesh: Mesh, name: str, x: tuple[float, float], y: tuple[float, float
     return mesh.restrict(kept).with_boundaries({name: np.flatnonzero(opened)})
 
 
-def mapped(mesh: Mesh, function: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Mesh:
+def mapped(mesh: Mesh, function: Callable[[Array], Array]) -> Mesh:
     """Return a quadrilateral mesh with curved quadratic edges, its points moved by ``function``.
 
     ``function`` takes and returns coordinates (2, n); boundary names are kept. It must keep
     orientation.
     """
-    from skfem import MeshQuad2
-
     curved = MeshQuad2.from_mesh(mesh)
     moved = MeshQuad2(
         doflocs=np.asarray(function(curved.doflocs)), t=curved.t, sort_t=False, validate=False
@@ -164,13 +157,10 @@ def merged(mesh: MeshQuad2) -> MeshQuad2:
 
     A grid bent until its ends coincide becomes a closed ring, whose ends are no longer a boundary.
     """
-    from scipy.spatial import cKDTree
-    from skfem import MeshQuad, MeshQuad2
-
     corners = mesh.p[:, : mesh.nvertices]
     tolerance = _SAME * float(np.ptp(corners, axis=1).max())
     first = np.arange(mesh.nvertices)
-    pairs = cKDTree(corners.T).query_pairs(tolerance, output_type="ndarray")
+    pairs = scipy.spatial.cKDTree(corners.T).query_pairs(tolerance, output_type="ndarray")
     np.minimum.at(first, pairs.max(axis=1), pairs.min(axis=1))
     kept, number = np.unique(first, return_inverse=True)
     straight = MeshQuad(np.ascontiguousarray(corners[:, kept]), number[mesh.t], sort_t=False)
@@ -180,7 +170,7 @@ def merged(mesh: MeshQuad2) -> MeshQuad2:
     ring = MeshQuad2(doflocs=nodes, t=ring.t, sort_t=False, validate=False)
     facets = {frozenset(ends): k for k, ends in enumerate(ring.facets.T.tolist())}
 
-    def renumbered(which: NDArray[np.int64]) -> NDArray[np.int64]:
+    def renumbered(which: Ints) -> Ints:
         found = [facets[frozenset(ends)] for ends in number[mesh.facets[:, which]].T.tolist()]
         return np.intersect1d(found, ring.boundary_facets())
 
@@ -190,8 +180,6 @@ def merged(mesh: MeshQuad2) -> MeshQuad2:
 
 def joined(blocks: Sequence[MeshQuad2]) -> MeshQuad2:
     """Return quadratic meshes joined to one, without boundaries; coincident nodes are merged."""
-    from skfem import MeshQuad, MeshQuad2
-
     corners = [block.p[:, : block.nvertices] for block in blocks]
     first = np.cumsum([0, *(c.shape[1] for c in corners)])
     cells = np.hstack([block.t + k for block, k in zip(blocks, first, strict=False)])

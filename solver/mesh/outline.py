@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 
 from solver.errors import ModelError
 from solver.mesh.points import checked_points
+from solver.typing import Array, Ints
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+Pair = tuple[float, float]
 
-    Array = NDArray[np.float64]
-    Pair = tuple[float, float]
 
 _POINTS = 16
 """Gauss points of each piece in integrals; exact to rounding for arcs up to a half circle."""
@@ -134,7 +132,7 @@ class Outline:
         chords = self._chords
         return np.arctan2(chords[1], chords[0]) - self.bends * self.lengths / 2
 
-    def _found(self, s: Array) -> tuple[NDArray[np.int64], Array]:
+    def _found(self, s: Array) -> tuple[Ints, Array]:
         """Return the pieces at lengths ``s``, and the lengths from their beginnings."""
         starts = np.cumsum([0.0, *self.lengths[:-1]])
         s = np.asarray(s, dtype=float) % self.length
@@ -143,15 +141,15 @@ class Outline:
 
     def highest(self, between: Pair) -> float:
         """Return the length of the highest point of a part [mm]."""
-        from scipy.optimize import brentq
-
         s = np.linspace(*between, _SAMPLES)
         k = int(self.at(s)[1].argmax())
         near = s[max(k - 1, 0)], s[min(k + 1, _SAMPLES - 1)]
         before, after = self.direction(np.array(near))[1]
         if not before > 0 > after:
             return float(s[k])
-        return float(brentq(lambda s: self.direction(np.array(s))[1], *near, xtol=1e-12))
+        return float(
+            scipy.optimize.brentq(lambda s: self.direction(np.array(s))[1], *near, xtol=1e-12)
+        )
 
     # -- area ----------------------------------------------------------------------------------
 
@@ -230,11 +228,9 @@ def smooth_curve(points: Array, spacing: float = 0.1) -> tuple[Array, Array]:
     ModelError
         for ``points``, if they are fewer than four, or do not increase
     """
-    from scipy.interpolate import CubicSpline
-
     X = checked_points(points)
     t = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(X)))])
-    curve = CubicSpline(t, X, axis=1)
+    curve = scipy.interpolate.CubicSpline(t, X, axis=1)
     at = np.linspace(0.0, t[-1], max(2, round(t[-1] / spacing)) + 1)
     (dx, dy), (ax, ay) = curve((at[1:] + at[:-1]) / 2, 1), curve((at[1:] + at[:-1]) / 2, 2)
     return curve(at), (dx * ay - dy * ax) / np.hypot(dx, dy) ** 3

@@ -7,22 +7,19 @@ put it, so that the element may have 8 nodes or 9.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+import scipy
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
+from skfem import MeshQuad2
 
 from solver.mesh.grids import grid, joined, mapped
+from solver.typing import Array
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+Sides = tuple[Array, Array, Array, Array]
 
-    from numpy.typing import NDArray
-    from skfem import MeshQuad2
-
-    Array = NDArray[np.float64]
-    Sides = tuple[Array, Array, Array, Array]
 
 _STEPS, _SMALL = 30, 1e-3
 """Largest number of iterations for smooth lines; they end when no node moves by more than `_SMALL`
@@ -107,10 +104,8 @@ def joined_patches(patches: Sequence[Array], names: Mapping[str, Array]) -> Mesh
     ----------
     names : midsides (2, n) of the facets of each boundary, in the order that they shall have
     """
-    from scipy.spatial import cKDTree
-
     mesh = joined([_mesh(X) for X in patches])
-    tree = cKDTree(mesh.doflocs[:, mesh.dofs.facet_dofs[0]].T)
+    tree = scipy.spatial.cKDTree(mesh.doflocs[:, mesh.dofs.facet_dofs[0]].T)
     return mesh.with_boundaries({name: tree.query(X.T)[1] for name, X in names.items()})
 
 

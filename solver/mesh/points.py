@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.files import read_file
 from solver.parameters import Pairs, pairs
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _FEWEST = 4
 """Smallest number of points of a curve."""

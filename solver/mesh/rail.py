@@ -9,18 +9,16 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 
 from solver.errors import ModelError
 from solver.mesh.outline import Outline, RoundedCorner, arcs, smooth_curve
+from solver.typing import Array
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+Pair = tuple[float, float]
 
-    Array = NDArray[np.float64]
-    Pair = tuple[float, float]
 
 _HEIGHT, _FOOT, _HEAD, _WEB, _TOE = 172.0, 150.0, 72.0, 16.5, 11.5
 """Height; widths of foot, head and web; thickness of the foot at its ends [mm]."""
@@ -76,13 +74,13 @@ class Rail(ABC):
         ModelError
             for ``at``, if the head does not reach so far
         """
-        from scipy.optimize import brentq
-
         ends = np.sort(self.outline.at(np.array(self.running))[0])
         if not ends[0] <= at <= ends[1]:
             raise ModelError("at", at, f"must be from {ends[0]:.4g} to {ends[1]:.4g} [mm]")
         return float(
-            brentq(lambda s: self.outline.at(np.array(s))[0] - at, *self.running, xtol=1e-12)
+            scipy.optimize.brentq(
+                lambda s: self.outline.at(np.array(s))[0] - at, *self.running, xtol=1e-12
+            )
         )
 
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from skfem import Mesh
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from skfem import Mesh
+from solver.typing import Array, Bools
 
 ROUNDED = 1e-7
 """Ratio of a distance to the size of a mesh; below it two places are the same."""
@@ -30,9 +28,7 @@ def with_zeros(mesh: Mesh) -> Mesh:
     return replace(mesh, doflocs=np.where(np.abs(p) <= least, 0.0, p))
 
 
-def in_box(
-    places: NDArray[np.float64], spans: Sequence[tuple[float, float] | None], size: float
-) -> NDArray[np.bool_]:
+def in_box(places: Array, spans: Sequence[tuple[float, float] | None], size: float) -> Bools:
     """Return which places lie in a box, to the rounding of coordinates.
 
     Parameters

@@ -10,20 +10,17 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+from skfem import Mesh
 
 from solver.errors import ModelError
 from solver.mesh.grids import grid, joined, mapped, merged, renamed
 from solver.mesh.lines import continued, refined
+from solver.typing import Array
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from skfem import Mesh
+Pair = tuple[float, float]
 
-    Array = NDArray[np.float64]
-    Pair = tuple[float, float]
 
 _MOST_ELEMENTS = 200_000
 """Largest number of elements of a shape."""

@@ -8,21 +8,18 @@ wheel lies above the curve.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 
 from solver.errors import ModelError
 from solver.mesh.points import checked_points
+from solver.typing import Array
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+Curve = Callable[[Array, int], Array]  # height or derivative of this order, at z
 
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-    Curve = Callable[[Array, int], Array]  # height or derivative of this order, at z
 
 _S1002 = {
     "tread": (
@@ -157,10 +154,8 @@ def measured(points: Array) -> WheelProfile:
     ModelError
         for ``points``, if they are fewer than four or z does not increase
     """
-    from scipy.interpolate import CubicSpline
-
     z, y = checked_points(points)
-    spline: Curve = CubicSpline(z, y)
+    spline: Curve = scipy.interpolate.CubicSpline(z, y)
     return WheelProfile((float(z[0]), float(z[-1])), (spline,))
 
 

@@ -10,21 +10,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from skfem import MeshQuad2
 
 from solver.errors import ModelError
 from solver.mesh.lines import graded
 from solver.mesh.patches import even, halved, joined_patches, patch, smooth_patch, straight
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from skfem import MeshQuad2
-
-    from solver.mesh.rail import RailSection
-
-    Array = NDArray[np.float64]
+from solver.mesh.rail import RailSection
+from solver.typing import Array
 
 _GROWTH, _LARGEST = 2.0, 14.0
 """Ratio of neighbouring elements outside the zone; their largest side in a rail [mm]."""

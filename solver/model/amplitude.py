@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,8 +22,8 @@ class Amplitude:
     value : (n,) the number at the knots
     """
 
-    time: NDArray[np.float64]
-    value: NDArray[np.float64]
+    time: Array
+    value: Array
 
     def __post_init__(self) -> None:
         time, value = np.asarray(self.time, dtype=float), np.asarray(self.value, dtype=float)

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from skfem import Mesh
 
 from solver.errors import ModelError
 from solver.kinds import check_kinds
 from solver.materials import Law, PlaneStress
+from solver.mesh.check import check_mesh
+from solver.mesh.elements import element_type
+from solver.mesh.rounding import with_zeros
 from solver.model.amplitude import Amplitude
 from solver.model.kinematics import KINEMATICS, Kinematics
 from solver.model.loads import Load, Pressure
 from solver.model.motion import Axle, TravellingPressure
-
-if TYPE_CHECKING:
-    from skfem import Mesh
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,14 +62,7 @@ class Body:
     periodic: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
-        # scikit-fem takes a third of a second to import, and is needed only when a body is made
-        from skfem import Mesh
-
-        from solver.mesh.check import check_mesh
-        from solver.mesh.elements import element_type
-        from solver.mesh.rounding import with_zeros
-
-        check_kinds(Body, self, Mesh=Mesh)
+        check_kinds(Body, self)
         if self.kinematics not in KINEMATICS:
             raise ModelError(
                 "kinematics", self.kinematics, "must be one of " + ", ".join(KINEMATICS)

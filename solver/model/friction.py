@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from annotated_types import Interval, Unit
@@ -22,12 +22,9 @@ from solver.errors import ModelError
 from solver.kinds import check_kinds
 from solver.parameters import Friction, Other, described
 from solver.parts import Parts
+from solver.typing import Array, Bools, Ints
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-    Value = float | NDArray[np.float64]
+Value = float | Array
 
 
 class PatchStatus(IntEnum):
@@ -75,7 +72,7 @@ class BoundLines(NamedTuple):
         return whole
 
     @property
-    def rough(self) -> NDArray[np.bool_]:
+    def rough(self) -> Bools:
         """Whether places (n,) can carry shear."""
         return np.asarray(self.least(np.ones(self.slope.shape[1])) > 0)
 
@@ -83,11 +80,11 @@ class BoundLines(NamedTuple):
         """Return the bound (n,) for loads (n,)."""
         return np.asarray((self.slope * np.maximum(load, 0) + self.level).min(axis=0))
 
-    def piece(self, load: Array) -> NDArray[np.int64]:
+    def piece(self, load: Array) -> Ints:
         """Return the number (n,) of the line that is the least for loads (n,)."""
         return np.asarray((self.slope * load + self.level).argmin(axis=0))
 
-    def at(self, places: NDArray[np.int64]) -> BoundLines:
+    def at(self, places: Ints) -> BoundLines:
         """Return the lines of some places."""
         return BoundLines(self.slope[:, places], self.level[:, places])
 

@@ -16,16 +16,16 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
+import scipy
 from annotated_types import Interval, Unit
-from numpy.typing import NDArray
 
 from solver.errors import ModelError
 from solver.model.amplitude import Amplitude
 from solver.model.kinematics import Kinematics
 from solver.parameters import Coordinate
 from solver.parts import Parts
+from solver.typing import Array
 
-Array = NDArray[np.float64]
 Field = Callable[[Array], Array]
 Value = float | Field
 """A number, or a function of position: (positions (2, n) [mm]) -> (n,), such as a `Tabulated`."""
@@ -392,13 +392,11 @@ class InitialStress(Load):
         x, y : (n_x,), (n_y,) increasing positions [mm]; the grid must cover the body
         stress : (4, n_y, n_x) components xx, yy, zz, xy [MPa]
         """
-        from scipy.interpolate import RegularGridInterpolator
-
         name, values = "initial_stress.stress", np.asarray(stress, dtype=float)
         if values.shape != (4, len(y), len(x)):
             raise ModelError(name, values.shape, f"must have the shape {(4, len(y), len(x))}")
         try:
-            along = RegularGridInterpolator((y, x), np.moveaxis(values, 0, -1))
+            along = scipy.interpolate.RegularGridInterpolator((y, x), np.moveaxis(values, 0, -1))
         except ValueError as error:
             raise ModelError(
                 name, "this grid", f"must have increasing positions: {error}"

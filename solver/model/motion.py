@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.model.amplitude import Amplitude
+from solver.model.amplitude import Amplitude
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,9 +59,7 @@ class TravellingPressure:
         """Return the factor of the pressure, its centre [mm] and the ratio of shear to it."""
         return self.amplitude.at(time), self.position.at(time), self.shear_ratio.at(time)
 
-    def at(
-        self, time: float, x: NDArray[np.float64], period: float = 0.0
-    ) -> tuple[NDArray[np.float64], float]:
+    def at(self, time: float, x: Array, period: float = 0.0) -> tuple[Array, float]:
         """Return the pressure at positions x [MPa] and the ratio of shear to it.
 
         On a periodic body the pressure is repeated after each ``period`` [mm].
@@ -76,12 +71,10 @@ class TravellingPressure:
         inside = 1 - (away / self.half_width) ** 2
         return amplitude * self.peak * np.sqrt(np.maximum(inside, 0.0)), ratio
 
-    def pushing(
-        self, time: float, period: float = 0.0
-    ) -> Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]:
+    def pushing(self, time: float, period: float = 0.0) -> Callable[[Array, Array], Array]:
         """Return its traction at a time, as a function like `solver.model.loads.Load.push`."""
 
-        def push(x: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
+        def push(x: Array, along: Array) -> Array:
             pressure, ratio = self.at(time, x[0], period)
             return pressure * (np.stack([-along[1], along[0]]) - ratio * along)
 

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.kinds import check_kinds
+from solver.materials import Law
 from solver.materials.rigid import Rigid
 from solver.model.loads import Load
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials import Law
+from solver.typing import Array, Ints
 
 _RIGID = Rigid()
 _TURN = 0.1
@@ -56,7 +52,7 @@ class RigidSurface:
         reach such an end. It is ignored on the axis of axisymmetric bodies
     """
 
-    points: NDArray[np.float64]
+    points: Array
     quadratic: bool = False
     goes_on: tuple[bool, bool] = (False, False)
 
@@ -146,9 +142,7 @@ class RigidBody:
 
     law = material
 
-    def facets(
-        self, boundary: str, field: str = "boundary", outer: bool = False
-    ) -> NDArray[np.int64]:
+    def facets(self, boundary: str, field: str = "boundary", outer: bool = False) -> Ints:
         """Return the number of a surface (1,)."""
         del outer
         if boundary not in self.surfaces:
@@ -158,6 +152,6 @@ class RigidBody:
         return np.array([list(self.surfaces).index(boundary)])
 
     @property
-    def box(self) -> NDArray[np.float64]:
+    def box(self) -> Array:
         """Sides (2,) of the bounding box: infinite, as only the surface of the body is known."""
         return np.full(2, np.inf)

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.kinds import check_kinds
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from solver.typing import Array, Bools
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +35,7 @@ class SingularPoint:
         if not (np.isfinite(self.radius) and self.radius > 0):
             raise ModelError("radius", self.radius, "must be positive and finite [mm]")
 
-    def reaches(self, X: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def reaches(self, X: Array) -> Bools:
         """Return which of the positions (2, n) [mm] lie within its radius (n,)."""
         x, y = self.at
         return np.asarray(np.hypot(X[0] - x, X[1] - y) <= self.radius)

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import scipy
 
 from solver.errors import ModelError
 from solver.files import read_file
 from solver.mesh.rounding import ROUNDED
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 
 def columns_of(text: str, names: Sequence[str]) -> dict[str, Array]:
@@ -165,9 +161,8 @@ class Tabulated:
 
     @staticmethod
     def _triangulated(places: Array, values: Array) -> Callable[[Array], Array]:
-        from scipy.interpolate import LinearNDInterpolator
 
-        linear = LinearNDInterpolator(places.T, values)
+        linear = scipy.interpolate.LinearNDInterpolator(places.T, values)
         middle = places.mean(axis=1, keepdims=True)
 
         def between(x: Array) -> Array:

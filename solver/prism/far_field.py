@@ -19,22 +19,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
-from solver.prism.modes import superposed
+from solver.prism.modes import Modes, superposed
 from solver.prism.sampled import sampled_answers
 from solver.prism.section import I_AXIS, I_COMPONENTS
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.prism.modes import Modes
-
-    Array = NDArray[np.float64]
-    Points = NDArray[np.bool_]
+from solver.typing import Array, Bools
 
 _RATIO = 8
 """Ratio of the lengths of two levels, and of a length to the width of the spread load on it."""
@@ -145,7 +137,7 @@ class FarField:
         return self._basis[self._modes.unknowns]
 
     def _summed(
-        self, directions: Array, carrying: Points, apart: Array,
+        self, directions: Array, carrying: Bools, apart: Array,
         sources: list[_FarLoad] | None = None, power: int = 0,
     ) -> Array:  # fmt: skip
         """Return results (n_results, n, 4) at distances (n,), times k^power.
@@ -160,7 +152,7 @@ class FarField:
         return _combined(directions, np.sum(each, axis=0), carrying)
 
 
-def _combined(directions: Array, sums: Array, carrying: Points) -> Array:
+def _combined(directions: Array, sums: Array, carrying: Bools) -> Array:
     """Return results (n_results, n, q) from directions (n_results, r) and `_SectionLoad.summed`."""
     out = np.empty((len(carrying), *sums.shape[2:]))
     for flag in (False, True):
@@ -180,7 +172,7 @@ class _SectionLoad:
     made: Array
     k: Array
     share: Array
-    along: Points
+    along: Bools
 
     def summed(self, apart: Array, power: int = 0) -> Array:
         """Return the directions' shares (2, r, n, q) at distances (n,), times k^power.

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
+from solver.materials.law import Law
+from solver.materials.state import PlasticState
+from solver.prism.modes import Modes
 from solver.prism.state import PrismState
 from solver.steady.flow import allowed_inflow, sweep_of
 from solver.steady.load import Given
 from solver.steady.passing import passing
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.materials.state import PlasticState
-    from solver.prism.modes import Modes
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Ints
 
 
 class _Swept:
@@ -87,7 +80,7 @@ class PrismFlow(_Swept):
     """
 
     def __init__(
-        self, modes: Modes, rim: NDArray[np.int64], law: Law, virgin: Callable[[], PrismState],
+        self, modes: Modes, rim: Ints, law: Law, virgin: Callable[[], PrismState],
         before: PrismState, added: Array, parts: int,
     ) -> None:  # fmt: skip
         super().__init__(law, before, before, before.strain[:, None] + added, parts)

@@ -19,21 +19,15 @@ P. Alart, A. Curnier, Comput. Methods Appl. Mech. Engrg. 92 (1991) 353-375, sect
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import NoContact
 from solver.linear.dense import RefinedLU
 from solver.model.friction import PatchStatus
+from solver.prism.influence import Influence
 from solver.steady.passing import searched
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.prism.influence import Influence
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 OPEN, STICK, SLIP = map(int, PatchStatus)
 """Status of a point."""

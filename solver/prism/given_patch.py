@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError, WindowTooSmall
 from solver.prism.friction_cone import OPEN, SLIP
 from solver.prism.patch_contact import PatchContact
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.prism.patch_grid import PatchGrid
-    from solver.prism.stepped import SteppedContact
-
-    Array = NDArray[np.float64]
+from solver.prism.patch_grid import PatchGrid
+from solver.prism.stepped import SteppedContact
+from solver.typing import Array
 
 _POINTS = 8
 """Points of an edge across at which the pressure is integrated: it falls to 0 as a root."""

@@ -17,18 +17,11 @@ pressure on a rectangle: section 3.3 (A.E.H. Love, 1929).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from solver.materials import Elasticity
 from solver.prism.hats import Hats
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials import Elasticity
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 
 def half_space(s: Array, spacing: float, stations: int, elasticity: Elasticity) -> Array:

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 SHARES = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 """Positions of the two Gauss points of an edge, over its length."""

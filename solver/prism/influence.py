@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numba import float64, int64, njit
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-    Numbers = NDArray[np.int64]
+from solver.typing import Array, Ints
 
 
 class Influence:
@@ -52,7 +46,7 @@ class Influence:
         vertices = np.arange(self.shape[1])
         return self._blocks[0, vertices, vertices]
 
-    def between(self, at: Numbers, rows: Array, by: Numbers, columns: Array) -> Array:
+    def between(self, at: Ints, rows: Array, by: Ints, columns: Array) -> Array:
         """Return the effects (len(at), len(by)) of some combinations of values on others.
 
         Parameters
@@ -68,7 +62,7 @@ class Influence:
     (float64[:, :, :, :, ::1], int64[::1], float64[:, ::1], int64[::1], float64[:, ::1]), cache=True
 )
 def _between(
-    blocks: Array, at: Numbers, rows: Array, by: Numbers, columns: Array
+    blocks: Array, at: Ints, rows: Array, by: Ints, columns: Array
 ) -> Array:  # pragma: no cover - compiled
     length, m = blocks.shape[:2]
     out = np.empty((len(at), len(by)))

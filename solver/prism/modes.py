@@ -17,9 +17,10 @@ stress less than a station's spacing below the surface is not resolved.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import float32, float64, njit
@@ -28,18 +29,9 @@ from scipy import sparse
 from solver.errors import ModelError
 from solver.linear import solvers as linear
 from solver.linear.schur import Elimination, with_block
-from solver.prism.section import I_AXIS, I_COMPONENTS, Carried
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.linear.solvers import Factors
-    from solver.prism.section import Section
-
-    Array = NDArray[np.float64]
-    Numbers = NDArray[np.int64]
+from solver.linear.solvers import Factors
+from solver.prism.section import I_AXIS, I_COMPONENTS, Carried, Section
+from solver.typing import Array, Bools, Ints
 
 _ORDER = (0, 1, 2, 4, *I_COMPONENTS)
 """Mandel components inside: those that carry i come last."""
@@ -98,7 +90,7 @@ class Modes:
     def __init__(
         self,
         section: Section,
-        zone: NDArray[np.bool_],
+        zone: Bools,
         length: float,
         stations: int,
         *,
@@ -151,7 +143,7 @@ class Modes:
             setattr(other, name, tuple(each.astype(kind) for each in getattr(self, name)))
         return other
 
-    def _set_rows(self, surface: sparse.csr_array | None, zone: NDArray[np.bool_]) -> None:
+    def _set_rows(self, surface: sparse.csr_array | None, zone: Bools) -> None:
         """Restrict the surface rows to the zone."""
         section = self.section
         rows = sparse.csr_array((0, section.n)) if surface is None else sparse.csr_array(surface)
@@ -374,8 +366,8 @@ def superposed(
     amplitudes: Array,
     phase: Array,
     share: Array,
-    carrying: NDArray[np.bool_],
-    along: NDArray[np.bool_],
+    carrying: Bools,
+    along: Bools,
 ) -> Array:
     """Return results (n_results, n_loads, n_places) of loads as sums of waves.
 
@@ -403,7 +395,7 @@ def superposed(
 
 def _check(
     section: Section,
-    zone: NDArray[np.bool_],
+    zone: Bools,
     length: float,
     stations: int,
     window: int,
@@ -424,7 +416,7 @@ def _check(
 
 
 def _factorised(
-    section: Section, zone: Numbers, wavenumbers: Sequence[float]
+    section: Section, zone: Ints, wavenumbers: Sequence[float]
 ) -> tuple[Factors, Carried]:
     """Return the factors of each wave on some unknowns, the others condensed; the first k is 0."""
     rest = np.setdiff1d(section.free, zone)

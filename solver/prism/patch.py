@@ -18,30 +18,23 @@ J.J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), section
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING, Required, Self, TypedDict, Unpack
+from typing import Required, Self, TypedDict, Unpack
 
 import numpy as np
 
 from solver.errors import LimitLoad, ModelError, NoContact, Spins, WindowTooSmall
 from solver.linear.threads import one_thread
 from solver.model.friction import LEAST_FRICTION
-from solver.prism.friction_cone import NORMAL, OPEN, TANGENTS, ConeProblem, solve_cone
+from solver.prism.friction_cone import NORMAL, OPEN, TANGENTS, ConeProblem, ConeSolution, solve_cone
 from solver.prism.half_space import half_space
 from solver.prism.influence import Influence
 from solver.prism.patch_contact import PatchContact
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from solver.prism.friction_cone import ConeSolution
-    from solver.prism.patch_grid import PatchGrid
-    from solver.prism.profiled_wheel import ProfiledWheel
-
-    Array = NDArray[np.float64]
+from solver.prism.patch_grid import PatchGrid
+from solver.prism.profiled_wheel import ProfiledWheel
+from solver.typing import Array, Ints
 
 _MIRROR = np.array([1.0, -1.0, 1.0])
 """Local axes of the wheel's surface, in those of the prism's; (shear, pressure, shear) likewise."""
@@ -388,7 +381,7 @@ class RollingPatch:
         raise Spins(much, carried, 1.0)
 
 
-def _check_rim(status: NDArray[np.int64]) -> None:
+def _check_rim(status: Ints) -> None:
     """Raise `WindowTooSmall` if an outermost station or vertex (n, m) is closed."""
     rim = [status[0], status[-1], status[:, 0], status[:, -1]]
     if any((part != OPEN).any() for part in rim):

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from solver.prism.friction_cone import NORMAL, TANGENTS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from solver.prism.patch_grid import PatchGrid
-
-    Array = NDArray[np.float64]
+from solver.prism.patch_grid import PatchGrid
+from solver.typing import Array, Ints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,7 +38,7 @@ class PatchContact:
     traction: Array
     gap: Array
     slip: Array
-    status: NDArray[np.int64]
+    status: Ints
     along: Callable[[Array], Array]
     near: Callable[[Array], PatchContact] | None = None
     height: float = 0.0

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.prism.hats import SHARES, Hats
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _FEWEST = 3
 """Smallest number of vertices and of stations: the outermost ones must not touch."""

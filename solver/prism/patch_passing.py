@@ -3,18 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from solver.prism.patch_contact import PatchContact, PatchLoad
+from solver.prism.track import PrismField
 from solver.steady.load import AppliedLoad
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from solver.prism.patch_contact import PatchContact, PatchLoad
-    from solver.prism.track import PrismField
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True)

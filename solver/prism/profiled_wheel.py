@@ -7,22 +7,15 @@ gap to the straight prism is then part of the gap, and its turning part of the s
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from solver.materials import Elasticity
-    from solver.prism.patch_grid import PatchGrid
-
-    Array = NDArray[np.float64]
+from solver.materials import Elasticity
+from solver.prism.patch_grid import PatchGrid
+from solver.typing import Array
 
 _FAR = 10.0
 """Larger gaps are cut off here [mm]; no contact is so soft that one of them closes."""

@@ -11,19 +11,13 @@ A.K. Noor, J.M. Peters, AIAA Journal 18 (1980) 455-462 (reduced basis technique)
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from solver.linear import solvers as linear
-from solver.prism.section import I_AXIS, Carried
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.prism.section import Section
-
-    Array = NDArray[np.float64]
+from solver.prism.section import I_AXIS, Carried, Section
+from solver.typing import Array, Bools
 
 _FIRST = 24
 """Number of wavenumbers with which it begins."""
@@ -101,7 +95,7 @@ def _halfway(waves: list[int]) -> list[int]:
     return [(one + other) // 2 for one, other in pairwise(waves) if other - one > 1]
 
 
-def _split(answers: Array, along: NDArray[np.bool_]) -> Array:
+def _split(answers: Array, along: Bools) -> Array:
     """Return orthonormal directions (n, r) of answers (n, q), apart along x and across."""
     parts = []
     for some in (along, ~along):

@@ -17,13 +17,14 @@ semi-analytical finite elements.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 from scipy.linalg import null_space
+from skfem import Mesh
 
 from solver.errors import ModelError
 from solver.fem.assembly import Assembly
@@ -31,19 +32,10 @@ from solver.fem.kinematics import strain_operator
 from solver.fem.nodes import Nodes
 from solver.fem.surface import edges_of
 from solver.materials import Material
+from solver.materials.elasticity import Elasticity
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.model.body import Body
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from numpy.typing import NDArray
-    from skfem import Mesh
-
-    from solver.materials.elasticity import Elasticity
-
-    Array = NDArray[np.float64]
-    Numbers = NDArray[np.int64]
+from solver.typing import Array, Ints
 
 AXES = "xyz"
 I_AXIS = 0
@@ -117,7 +109,7 @@ class Section:
         self.free = np.setdiff1d(np.arange(self.n), held)
         self._check_held(held)
 
-    def _held(self, supports: Mapping[str, str]) -> Numbers:
+    def _held(self, supports: Mapping[str, str]) -> Ints:
         """Return the unknowns that supports hold."""
         held = [np.zeros(0, dtype=np.int64)]
         for boundary, axes in supports.items():
@@ -137,7 +129,7 @@ class Section:
         self.plane.body.facets(boundary, "springs", outer=True)
         return along
 
-    def _check_held(self, held: Numbers) -> None:
+    def _check_held(self, held: Ints) -> None:
         """Raise `ModelError` if neither supports nor springs hold a motion of the whole prism."""
         motions = self.rigid / np.abs(self.rigid).max(axis=0)
         rows = [motions[held]]
@@ -226,21 +218,21 @@ class Section:
                 each = spring * size[:, None, None] * np.outer(N, N)
                 np.add.at(K0, (elements[:, None, None], own[:, :, None], own[:, None, :]), each)
 
-    def rows(self, nodes: Numbers) -> sparse.csr_array:
+    def rows(self, nodes: Ints) -> sparse.csr_array:
         """Return the rows (3 n_nodes, n) of the displacements of nodes: along x, then y, then z."""
         unknowns = (3 * nodes + np.arange(3)[:, None]).ravel()
         indptr = np.arange(len(unknowns) + 1)
         shape = len(unknowns), self.n
         return sparse.csr_array((np.ones(len(unknowns)), unknowns, indptr), shape=shape)
 
-    def stiffness(self, unknowns: Numbers) -> Stiffness:
+    def stiffness(self, unknowns: Ints) -> Stiffness:
         """Return the stiffness on some unknowns, numbered in their order, for any wavenumber."""
         assembly = Assembly(self.dofs, unknowns, self.n)
         terms = [assembly.values(slice(None), each) for each in self._elements]
         return Stiffness(assembly.pattern, np.stack(terms))
 
     def strain_matrices(
-        self, elements: Numbers, unknowns: Numbers
+        self, elements: Ints, unknowns: Ints
     ) -> tuple[sparse.csr_array, sparse.csr_array]:
         """Return B0 and B1 of all points of some elements as sparse matrices on some unknowns.
 

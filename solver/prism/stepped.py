@@ -22,30 +22,24 @@ is solved by GMRES on the points that yield, on which alone the right side depen
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 
 from solver.errors import ModelError, NotConverged, WindowTooSmall
 from solver.linear.krylov import gmres
+from solver.materials.law import Law
+from solver.materials.state import PlasticState
 from solver.prism.friction_cone import OPEN
 from solver.prism.patch_contact import PatchContact
+from solver.prism.patch_grid import PatchGrid
+from solver.prism.track import PrismTrack
 from solver.steady.flow import allowed_inflow, sweep_of, usual_parts
 from solver.steady.passing import TOLERANCE, deviation, searched
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.materials.state import PlasticState
-    from solver.prism.patch_grid import PatchGrid
-    from solver.prism.track import PrismTrack
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _FORCING, _KRYLOV = 0.1, 60
 """Relative residual to which GMRES solves Newton's equation, and its most iterations."""

@@ -15,24 +15,17 @@ lateral force is given, the motion of the wheel in the increment is unknown, as 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.prism.friction_cone import NORMAL, TANGENTS
 from solver.prism.patch import UPSTREAM, RollingPatch
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.prism.patch_contact import PatchContact
-    from solver.prism.stepped import SteppedContact
-
-    Array = NDArray[np.float64]
+from solver.prism.patch_contact import PatchContact
+from solver.prism.stepped import SteppedContact
+from solver.typing import Array
 
 
 class SteppedPatch(RollingPatch):

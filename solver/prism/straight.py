@@ -11,21 +11,15 @@ S.P. Timoshenko, J.N. Goodier, Theory of Elasticity (3rd edition, 1970), chapter
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.linear.solvers import analyse
+from solver.materials.law import Law
+from solver.prism.section import Section
 from solver.tensors import SQRT2, to_tensor
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.prism.section import Section
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

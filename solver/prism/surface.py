@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import sparse
 
@@ -12,13 +10,7 @@ from solver.fem.surface import extract
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.prism.hats import SHARES
 from solver.prism.patch_grid import PatchGrid
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.prism.section import Section
-
-    Array = NDArray[np.float64]
+from solver.prism.section import Section
 
 
 class RunningSurface:

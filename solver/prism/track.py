@@ -11,27 +11,20 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
+from solver.materials.elasticity import Elasticity
+from solver.materials.law import Law
 from solver.prism.far_field import FarField
 from solver.prism.flow import PrismFlow
 from solver.prism.modes import Modes
+from solver.prism.section import Section
 from solver.prism.state import PrismState
-from solver.prism.straight import StraightPrism, check_elastic
+from solver.prism.straight import SettledStress, StraightPrism, check_elastic
 from solver.prism.surface import RunningSurface
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.elasticity import Elasticity
-    from solver.materials.law import Law
-    from solver.prism.section import Section
-    from solver.prism.straight import SettledStress
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Bools, Ints
 
 
 class PrismTrack:
@@ -69,7 +62,7 @@ class PrismTrack:
     def __init__(
         self,
         section: Section,
-        zone: NDArray[np.bool_],
+        zone: Bools,
         boundary: str,
         *,
         length: float,
@@ -305,7 +298,7 @@ def _fading(count: int) -> Array:
     return np.asarray(1 - t**3 * (10 - 15 * t + 6 * t**2))
 
 
-def _rim(section: Section, zone: NDArray[np.bool_], points: NDArray[np.int64]) -> NDArray[np.int64]:
+def _rim(section: Section, zone: Bools, points: Ints) -> Ints:
     """Return the numbers, among those of the zone, of points in elements beside others."""
     outside = np.unique(section.dofs[~zone])
     beside = np.flatnonzero(np.isin(section.dofs, outside).any(axis=1))

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from solver.results.contact_result import ContactResult
 from solver.results.outputs import output
 from solver.results.places import FRACTION
 from solver.results.quantities import declare, placed
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.results.contact_result import ContactResult
-    from solver.results.run import FinishedRun, Values
+from solver.results.run import FinishedRun, Values
+from solver.typing import Array
 
 _LINE = ("stage", "s")
 _PAIR, _PAIRS = ("contact", "fraction"), ("contact", "stage", "fraction")
@@ -78,7 +73,7 @@ def contacts(
     fraction = np.linspace(0.0, 1.0, samples)
     at = [fraction * pair[0].s[-1] for pair in results]
 
-    def spread(name: str) -> NDArray[np.float64]:
+    def spread(name: str) -> Array:
         return np.stack([
             np.stack([np.interp(s, each.s, getattr(each, name)) for each in pair])
             for s, pair in zip(at, results, strict=True)

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.contact.pressure import contact_pressure
 from solver.contact.problem import STICK
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged
-    from solver.contact.system import System
-    from solver.results.view import Axis
-
-    Array = NDArray[np.float64]
+from solver.contact.state import Converged
+from solver.contact.system import System
+from solver.results.view import Axis
+from solver.typing import Array, Bools
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,8 +43,8 @@ class ContactResult:
     gap: Array
     slip: Array
     area: Array
-    closed: NDArray[np.bool_]
-    sticking: NDArray[np.bool_]
+    closed: Bools
+    sticking: Bools
 
     @property
     def patches(self) -> list[tuple[float, float]]:
@@ -98,7 +92,7 @@ def contact_result(system: System, at: Converged, pair: int = 0) -> ContactResul
     )
 
 
-def contact_patches(s: Array, gap: Array, closed: NDArray[np.bool_]) -> list[tuple[float, float]]:
+def contact_patches(s: Array, gap: Array, closed: Bools) -> list[tuple[float, float]]:
     """Return start and end [mm] of each patch of contact, from the gaps beside its closed points.
 
     Outside a smooth contact the gap grows as the distance from its edge to the power 3/2, also if
@@ -118,7 +112,7 @@ def contact_patches(s: Array, gap: Array, closed: NDArray[np.bool_]) -> list[tup
     ]
 
 
-def _edge(s: Array, gap: Array, closed: NDArray[np.bool_], last: int, way: int) -> float:
+def _edge(s: Array, gap: Array, closed: Bools, last: int, way: int) -> float:
     """Return the edge of contact beyond its last closed point in one direction (``way``) [mm]."""
     beyond, near, far = last + way * np.array([1, 2, 3])  # the hat of the first is partly closed
     if not 0 <= far < len(s) or closed[[beyond, near, far]].any():

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import MISSING, dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.parameters import Length, Stress, check, described
+from solver.results.contact_result import ContactResult
 from solver.results.outputs import output
+from solver.results.run import FinishedRun, Values
 from solver.results.singularity import (
     APPARENT_POWER,
     NOWHERE,
@@ -18,10 +19,6 @@ from solver.results.singularity import (
     apparent_power,
     fit_singularity,
 )
-
-if TYPE_CHECKING:
-    from solver.results.contact_result import ContactResult
-    from solver.results.run import FinishedRun, Values
 
 _NEAREST, _FARTHEST = 10.0, 0.03
 """Range of the fit: lower end in elements at the corner, upper end in half-widths."""

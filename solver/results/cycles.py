@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from solver.loading.cycle import Cycle
+from solver.materials.law import Law
 from solver.results.quantities import declare
+from solver.results.run import Values
 from solver.results.shakedown import Shakedown, ShakedownState, classify
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.loading.cycle import Cycle
-    from solver.materials.law import Law
-    from solver.results.run import Values
+from solver.typing import Array, Ints
 
 _EACH = ("cycle",)
 
@@ -90,9 +85,9 @@ def decided(cycles: Sequence[Cycle], laws: Sequence[Law]) -> bool:
 
 
 def _table(
-    points: NDArray[np.int64],
-    each: Sequence[tuple[NDArray[np.int64], NDArray[np.float64]]],
-) -> NDArray[np.float64]:
+    points: Ints,
+    each: Sequence[tuple[Ints, Array]],
+) -> Array:
     """Return the values (n_cycles, n_points) of some points; they are zero where not given."""
     table = np.zeros((len(each), len(points)))
     for row, (own, values) in zip(table, each, strict=True):

@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import tempfile
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.files import appearing, read_file
-
-if TYPE_CHECKING:
-    import meshio
-    from numpy.typing import NDArray
-
-    from solver.results.mesh_fields import MeshFields
-
-    Array = NDArray[np.float64]
+from solver.results.mesh_fields import MeshFields
+from solver.typing import Array
 
 _CELLS = {
     3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9", 20: "hexahedron20",
@@ -72,14 +67,14 @@ def vtu_of(fields: MeshFields, stage: str) -> bytes:
         return file.read()
 
 
-def to_meshio(fields: MeshFields, stage: str) -> meshio.Mesh:
-    """Return a stage as one mesh of meshio with all bodies.
+def to_meshio(fields: MeshFields, stage: str) -> Any:
+    """Return a stage as one `meshio.Mesh` with all bodies.
 
     The cell field ``body`` is the number of the body. Displacement has three components for
     ParaView's *Warp By Vector*; stress is in the fields ``stress_xx`` and so on, and so are strain
     and plastic strain. Units: N, mm, MPa.
     """
-    import meshio  # imported here: only export needs it
+    meshio = import_module("meshio")  # only export needs it
 
     values = fields.stages[stage]
     every = list(fields.bodies.values())

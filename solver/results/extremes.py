@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from solver.results.outputs import output
 from solver.results.quantities import Quantity, along_axes, declare, declare_along
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.results.run import FinishedRun, Values
-
-    Array = NDArray[np.float64]
+from solver.results.run import FinishedRun, Values
+from solver.typing import Array
 
 _OVER = ("body", "component")
 _ROUNDING, _SAME = 1e-9, 1e-6

@@ -4,25 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
+from scipy.sparse import csr_array
 
+from solver.contact.state import State
+from solver.fem.discretisation import Discretisation
 from solver.fem.fields import recovered_beside
+from solver.fem.frame import RigidMotion
+from solver.materials.state import Response
 from solver.results.body_fields import BodyValues
+from solver.results.view import Places
 from solver.tensors import not_below_zero, to_tensor, von_mises
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from scipy.sparse import csr_array
-
-    from solver.contact.state import State
-    from solver.fem.discretisation import Discretisation
-    from solver.fem.frame import RigidMotion
-    from solver.materials.state import Response
-    from solver.results.view import Places
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Bools
 
 _MOST = 8
 """Number of values that `Remembered` keeps."""
@@ -45,7 +40,7 @@ class Interpolation(Protocol):
     inside : (n,) whether a position is in the body
     """
 
-    inside: NDArray[np.bool_]
+    inside: Bools
 
     def __call__(self, nodal: Array) -> Array:
         """Return values (..., n) of nodal fields (..., n_nodes); NaN outside the body."""

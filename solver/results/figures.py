@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from solver.results.outputs import output
 from solver.results.quantities import declare
-
-if TYPE_CHECKING:
-    from solver.results.run import FinishedRun, Values
+from solver.results.run import FinishedRun, Values
 
 MAX_PLASTIC_STRAIN = declare(
     "max_plastic_strain", "largest equivalent plastic strain after unloading"

@@ -36,20 +36,14 @@ J. Barlow, Int. J. Numer. Meth. Engng 10 (1976) 243-251: points of most accurate
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.fem.discretisation import Discretisation
 from solver.fem.surface import edges_of
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.tensors import SQRT2
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.discretisation import Discretisation
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Ints
 
 _ONE_ROW = 1e-6
 """Difference of reference coordinates; up to it points are in one row (rounding of the rules)."""
@@ -72,12 +66,12 @@ class FreeSurface:
     """
 
     part: Discretisation
-    nodes: NDArray[np.int64]
+    nodes: Ints
     N: Array
     dN: Array
     X: Array
     tangent: Array
-    points: NDArray[np.int64]
+    points: Ints
     depth: Array
 
     @classmethod

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.state import Converged
+from solver.contact.system import System
+from solver.fem.frame import RigidMotion
 from solver.fem.rigid import RigidPart
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged
-    from solver.contact.system import System
-    from solver.fem.frame import RigidMotion
-    from solver.results.quantities import Quantity
+from solver.results.quantities import Quantity
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +58,7 @@ def observe(system: System, converged: Converged) -> Observed:
     return Observed(state.time, motions, reactions, pairs)
 
 
-def curve(history: Sequence[Observed], body: str) -> NDArray[np.float64]:
+def curve(history: Sequence[Observed], body: str) -> Array:
     """Return the history (7, n) of a rigid body.
 
     Rows: time, displacement x and y [mm], rotation [rad], forces x and y [N], moment [N mm].

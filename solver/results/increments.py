@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from solver.results.contact import CONTACT
+from solver.results.history import Observed
 from solver.results.quantities import Quantity, declare
-
-if TYPE_CHECKING:
-    from solver.results.history import Observed
-    from solver.results.run import Values
+from solver.results.run import Values
 
 INCREMENT = declare(
     "increment", "number of the increment; 0 is the state before loading", dims=("increment",),

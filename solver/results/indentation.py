@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import MISSING, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from solver.mesh.rounding import ROUNDED
 from solver.parameters import Length, check, described
 from solver.results.contact_result import contact_patches
+from solver.results.fields import Bodies, Solved
 from solver.results.outputs import output
 from solver.results.quantities import declare
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.results.fields import Bodies, Solved
-    from solver.results.run import FinishedRun, Values
-
-    Array = NDArray[np.float64]
+from solver.results.run import FinishedRun, Values
+from solver.typing import Array
 
 FORCE = declare("force", "force of the contact on the ball, along its axis, under load", "N")
 APPROACH = declare("approach", "displacement of the ball's centre under load", "mm")

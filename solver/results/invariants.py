@@ -6,17 +6,11 @@ derives an invariant of this name when it is asked for.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from solver.materials.principal import principal
 from solver.tensors import components, to_mandel
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 PRINCIPAL = ("principal_1", "principal_2", "principal_3")
 """Principal values, the largest first."""

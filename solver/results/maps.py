@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from solver.results.body_fields import BODY_FIELDS, STORED
 from solver.results.outputs import output
-from solver.results.quantities import declare
+from solver.results.quantities import Quantity, declare
+from solver.results.run import FinishedRun, Values
 from solver.tensors import stress_difference
-
-if TYPE_CHECKING:
-    from solver.results.quantities import Quantity
-    from solver.results.run import FinishedRun, Values
 
 _MAP = ("y", "x")
 """Dimensions of a map: vertical, horizontal; a section has others, see `_on_map`."""

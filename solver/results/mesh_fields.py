@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.results.body_fields import BODY_FIELDS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-
-    from numpy.typing import NDArray
-
-    from solver.results.fields import Solved, SystemFields
-
-    Array = NDArray[np.float64]
-    Nodes = NDArray[np.int64]
+from solver.typing import Array, Ints
 
 NO_NODE = -1
 """Fills the rows of faces and cells with fewer nodes than others."""
@@ -49,11 +40,11 @@ class MeshFields:
     """
 
     X: Array
-    bodies: Mapping[str, tuple[str, Nodes]]
+    bodies: Mapping[str, tuple[str, Ints]]
     stages: Mapping[str, Mapping[str, Array]]
 
     @property
-    def faces(self) -> tuple[Nodes, Nodes]:
+    def faces(self) -> tuple[Ints, Ints]:
         """Triangles and quadrilaterals through all nodes, and the number of the body of each.
 
         Elements with mid-side nodes are divided. The last node of a triangle is `NO_NODE`.
@@ -93,36 +84,7 @@ class MeshFields:
         )
 
 
-def mesh_fields(
-    fields: SystemFields,
-    states: Mapping[str, Solved],
-    beside: Callable[[], MeshFields] | None = None,
-) -> MeshFields:
-    """Return the fields of all bodies in the given states.
-
-    Parameters
-    ----------
-    states : the state at each stage
-    beside : returns fields of other bodies at the same stages
-    """
-    wholes = {name: fields.system.full(name) for name in fields.system.names}
-    bodies, first = {}, 0
-    for name, whole in wholes.items():
-        cells = whole.basis.element_dofs.T
-        if len(whole.X) == 2:  # cells in three dimensions have no orientation to correct
-            cells = counterclockwise(cells, whole.X)
-        bodies[name] = (whole.body.element, first + cells)
-        first += whole.X.shape[1]
-    stages = {}
-    for stage, at in states.items():
-        each = [fields.at_nodes(at, name)._asdict() for name in wholes]
-        stages[stage] = {name: np.concatenate([f[name] for f in each], axis=-1) for name in each[0]}
-    X = np.hstack([whole.X for whole in wholes.values()])
-    found = MeshFields(X=X, bodies=bodies, stages=stages)
-    return found if beside is None else found.joined(beside())
-
-
-def counterclockwise(cells: Nodes, X: Array) -> Nodes:
+def counterclockwise(cells: Ints, X: Array) -> Ints:
     """Return the nodes of cells (n, k) in counterclockwise order, as other programs expect."""
     corners = 4 if cells.shape[1] in (4, 8, 9) else 3
     (x, y), ahead = X[:, cells[:, :corners]], np.roll(X[:, cells[:, :corners]], -1, axis=2)

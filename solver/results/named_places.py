@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from solver.results.contact import contacts
+from solver.results.contact_result import contact_result
 from solver.results.increments import over_increments
 from solver.results.places import along_lines, at_points
+from solver.results.requested import RequestedNumber
+from solver.results.run import FinishedRun, Values
 from solver.results.view import Places
-
-if TYPE_CHECKING:
-    from solver.results.requested import RequestedNumber
-    from solver.results.run import FinishedRun, Values
 
 
 class NamedPlaces(NamedTuple):
@@ -41,8 +40,6 @@ def at_named_places(run: FinishedRun, places: NamedPlaces, times: Sequence[float
     times : times at which the increments of the program end, after the initial time; empty if a
         run has no increments
     """
-    from solver.results.contact_result import contact_result  # needed only by runs
-
     system: Any = run.system
     fields = run.samples.fields
     states: list[Any] = [state for state, _ in run.stages]

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
 from solver.results.mesh_fields import counterclockwise
 from solver.results.quantities import declare, declare_along
+from solver.results.run import FinishedRun, Values
 from solver.tensors import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import NDArray
-
-    from solver.results.run import FinishedRun, Values
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Ints
 
 OUTLINE = declare("outline", "number of a point of the outlines", dims=("outline",), count=True)
 OUTLINE_AT = declare_along(
@@ -46,7 +39,7 @@ def outlines(run: FinishedRun) -> Values:
     return {OUTLINE: np.arange(points.shape[1]), **along}
 
 
-def closed_curves(X: Array, cells: NDArray[np.int64]) -> Iterator[Array]:
+def closed_curves(X: Array, cells: Ints) -> Iterator[Array]:
     """Yield the border of a mesh as closed curves (2, n), without points on straight pieces.
 
     Parameters

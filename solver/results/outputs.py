@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from typing import Any, Literal, NamedTuple, TypeVar
 
 from solver.errors import ModelError
@@ -35,6 +36,14 @@ class NamedOutput(NamedTuple):
 
 
 _OUTPUTS: dict[str, NamedOutput] = {}
+MODULES = tuple(
+    f"solver.results.{module}"
+    for module in (
+        "contact", "corner", "extremes", "figures", "increments", "indentation", "maps", "places",
+        "pressure_error", "stick",
+    )
+)  # fmt: skip
+"""Modules with outputs that scene files request, or with what these declare."""
 
 
 def output(word: str, *needs: Need) -> Callable[[T], T]:
@@ -59,7 +68,9 @@ def output(word: str, *needs: Need) -> Callable[[T], T]:
 def outputs() -> Mapping[str, NamedOutput]:
     """Return the outputs by word, including those of the user's files.
 
-    The outputs of the package are complete once `solver.scenes` has been imported.
+    The modules of the package that have some are imported first.
     """
+    for module in MODULES:
+        import_module(module)
     load_own_parts()
     return _OUTPUTS

@@ -7,22 +7,16 @@ share one index; the positions are stored too.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.results.body_fields import BODY_FIELDS, STORED
+from solver.results.fields import Solved, SystemFields
 from solver.results.quantities import along_axes, declare, declare_along, placed
+from solver.results.run import Values
+from solver.results.view import Places
 from solver.tensors import AXES
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.results.fields import Solved, SystemFields
-    from solver.results.run import Values
-    from solver.results.view import Places
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 FRACTION = declare(
     "fraction", "fraction of the length of a line or contact surface", dims=("fraction",)

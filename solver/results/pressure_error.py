@@ -6,16 +6,13 @@ K.L. Johnson, Contact Mechanics (1985), section 2.8.
 from __future__ import annotations
 
 from dataclasses import MISSING, dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.parameters import Friction, Length, Stress, check, described
 from solver.results.outputs import output
 from solver.results.quantities import declare
-
-if TYPE_CHECKING:
-    from solver.results.run import FinishedRun, Values
+from solver.results.run import FinishedRun, Values
 
 PRESSURE_ERROR = declare(
     "pressure_error",

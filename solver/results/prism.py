@@ -8,30 +8,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from solver.contact.state import State
 from solver.fem.fields import Sampler, recovery
-from solver.materials.state import Response
+from solver.materials.law import Law
+from solver.materials.state import PlasticState, Response
 from solver.memory import kept
 from solver.model.body import Body
+from solver.prism.patch_contact import PatchContact
+from solver.prism.section import Section
+from solver.prism.state import PrismState
+from solver.prism.track import PrismTrack
+from solver.steady import Pass
 from solver.tensors import to_tensor
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from scipy.sparse import csr_array
-
-    from solver.materials.law import Law
-    from solver.materials.state import PlasticState
-    from solver.prism.patch_contact import PatchContact
-    from solver.prism.section import Section
-    from solver.prism.state import PrismState
-    from solver.prism.track import PrismTrack
-    from solver.steady import Pass
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _LOADED, _RELEASED = 0.0, 1.0
 

@@ -7,23 +7,16 @@ mid-sides along x at those in between.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
+from solver.prism.state import PrismState
 from solver.results.mesh_fields import MeshFields, counterclockwise
+from solver.results.prism import PrismBody
+from solver.steady import Pass
 from solver.tensors import not_below_zero, to_tensor, von_mises
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from solver.prism.state import PrismState
-    from solver.results.prism import PrismBody
-    from solver.steady import Pass
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _CORNERS = 4
 _ELEMENT = "hexahedron20"

@@ -1,21 +1,21 @@
 """The name, meaning and unit of each number in a record, declared in the module that computes it.
 
-The data set, the captions of pictures and the pages read these declarations. `QUANTITIES` is
-complete when `solver.scenes` has been imported.
+The data set, the captions of pictures and the pages read these declarations. Other
+modules declare, when they are imported; `solver.scenes` names them, and they are imported when a
+name is asked for that is not known.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from enum import IntEnum
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 
 from solver.tensors import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from enum import IntEnum
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,8 +71,35 @@ class Quantity:
         return replace(self, dims=dims)
 
 
-QUANTITIES: dict[str, Quantity] = {}
-IN_SPACE: dict[str, Quantity] = {}
+class Quantities(Mapping[str, Quantity]):
+    """Quantities by name, also those of modules that are not imported yet."""
+
+    def __init__(self) -> None:
+        self.known: dict[str, Quantity] = {}
+
+    def __getitem__(self, name: str) -> Quantity:
+        """Return a quantity; if it is not known, first import all modules that declare some."""
+        return (self.known if name in self.known else self._all)[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names of all quantities."""
+        return iter(self._all)
+
+    def __len__(self) -> int:
+        """Return the number of all quantities."""
+        return len(self._all)
+
+    @property
+    def _all(self) -> dict[str, Quantity]:
+        while DECLARING:
+            import_module(DECLARING.pop())
+        return self.known
+
+
+DECLARING: list[str] = []
+"""Modules that declare quantities when they are imported."""
+QUANTITIES = Quantities()
+IN_SPACE = Quantities()
 """Quantities along the third axis, which only runs in three dimensions have: other scenes may use
 these names for parameters, axes of a sweep and requested numbers."""
 
@@ -95,10 +122,10 @@ def declare(
     ValueError
         if the name is declared already
     """
-    if name in QUANTITIES:
+    if name in QUANTITIES.known:
         known = QUANTITIES[name].long_name
         raise ValueError(f"{name} is declared already, as {known!r}: choose another name")
-    QUANTITIES[name] = Quantity(
+    QUANTITIES.known[name] = Quantity(
         name=name,
         long_name=long_name,
         units=units,
@@ -126,7 +153,7 @@ def declare_along(
 
 def in_space(name: str, long_name: str, units: str, **more: Any) -> Quantity:
     """Return a quantity along the third axis, see `IN_SPACE`; arguments are those of `Quantity`."""
-    IN_SPACE[name] = Quantity(name=name, long_name=long_name, units=units, **more)
+    IN_SPACE.known[name] = Quantity(name=name, long_name=long_name, units=units, **more)
     return IN_SPACE[name]
 
 

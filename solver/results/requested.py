@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -12,19 +12,14 @@ from solver.errors import ModelError
 from solver.mesh.rounding import in_box
 from solver.parameters import Coordinate
 from solver.results.body_fields import BODY_FIELDS, BodyField
+from solver.results.contact_result import ContactResult
+from solver.results.fields import Solved, SystemFields
 from solver.results.invariants import component, known_components
 from solver.results.quantities import Quantity
+from solver.results.run import Values
+from solver.results.view import Places
 from solver.tensors import AXES
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.results.contact_result import ContactResult
-    from solver.results.fields import Solved, SystemFields
-    from solver.results.run import Values
-    from solver.results.view import Places
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 Span = tuple[Coordinate, Coordinate]
 Take = Literal["maximum", "minimum", "integral", "extent"]

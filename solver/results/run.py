@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from solver.loading.outcome import Outcome
+from solver.model.singular import SingularPoint
+from solver.results.audit.recomputed import Recomputed
+from solver.results.audit.report import Audit
+from solver.results.fields import Bodies, Solved
+from solver.results.mesh_fields import MeshFields
 from solver.results.quantities import Quantity
-
-if TYPE_CHECKING:
-    from solver.loading.outcome import Outcome
-    from solver.model.singular import SingularPoint
-    from solver.results.audit.recomputed import Recomputed
-    from solver.results.audit.report import Audit
-    from solver.results.fields import Bodies, Solved
-    from solver.results.mesh_fields import MeshFields
-    from solver.results.samples import Samples
-    from solver.results.tractions import SurfaceTractions
-    from solver.results.view import View
+from solver.results.samples import Samples
+from solver.results.tractions import SurfaceTractions
+from solver.results.view import View
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

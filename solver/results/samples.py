@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from solver.errors import ModelError
 from solver.results.fields import Bodies, Solved, SystemFields, interpolated
+from solver.results.view import View
 from solver.tensors import to_tensor
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.results.view import View
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 
 class Samples:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from solver.errors import ModelError
 from solver.files import appearing, opened
 from solver.version import __version__
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _HEAD = b"residua solution "
 """Start of the file; the version of the solver and the end of the line follow."""

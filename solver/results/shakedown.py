@@ -19,14 +19,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 QUIET = 1e-3
 """Ratio of plastic strain accumulated in a cycle to the yield strain; up to it nothing flows."""

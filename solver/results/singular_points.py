@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from solver.results.quantities import declare
-
-if TYPE_CHECKING:
-    from solver.results.run import FinishedRun, Values
+from solver.results.run import FinishedRun, Values
 
 _EACH = ("singular",)
 SINGULAR = declare("singular", "number of the singular point", "", dims=_EACH)

@@ -10,16 +10,11 @@ equal materials, without friction and with friction up to 0.4.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.results.quantities import declare
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 SINGULAR_POWER = declare(
     "singular_power", "power p of the stress at the corner, proportional to r^(p-1)"

@@ -5,15 +5,10 @@ K.L. Johnson, Contact Mechanics (1985), sections 4.6, 7.1 and 9.2.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _X = np.linspace(-4.0, 4.0, 1601)
 

@@ -3,46 +3,44 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.errors import ModelError
+from solver.fem.frame import RigidMotion
 from solver.kinds import require
 from solver.loading.control import Control, PathControl
+from solver.loading.cycle import Cycle
 from solver.loading.outcome import Tally
 from solver.loading.program import ROUNDING, Lap, Program, Stage
 from solver.loading.stepper import Stepper
 from solver.loading.walker import Walker
+from solver.model.body import Body
 from solver.model.model import Model
+from solver.model.rigid import RigidBody
 from solver.results import saved
+from solver.results.at_all_nodes import mesh_fields
 from solver.results.audit.pairs import untouched
 from solver.results.audit.report import Audit, audit
+from solver.results.body_fields import BodyValues
 from solver.results.contact_result import ContactResult, contact_result
 from solver.results.cycles import decided, shakedown_of
+from solver.results.export import write_vtu
 from solver.results.fields import SystemFields
 from solver.results.history import Observed, observe
-from solver.results.mesh_fields import MeshFields, mesh_fields
+from solver.results.mesh_fields import MeshFields
+from solver.results.shakedown import Shakedown
 from solver.results.view import Places
 from solver.tensors import to_tensor
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from numpy.typing import ArrayLike, NDArray
-
-    from solver.contact.state import Converged
-    from solver.fem.frame import RigidMotion
-    from solver.loading.cycle import Cycle
-    from solver.model.body import Body
-    from solver.model.rigid import RigidBody
-    from solver.results.body_fields import BodyValues
-    from solver.results.shakedown import Shakedown
-
+from solver.typing import Array
 
 _LOG = logging.getLogger("solver")
 _STAGES = tuple[Stage, ...]
@@ -94,22 +92,22 @@ class Solution:
     def _at_nodes(self, body: str, stage: str) -> BodyValues:
         return self._fields.at_nodes(self._at(stage), self._known(body))
 
-    def nodes(self, body: str) -> NDArray[np.float64]:
+    def nodes(self, body: str) -> Array:
         """Return node positions (2, n_nodes) of a body [mm]."""
         return self.system.full(self._known(body)).X
 
-    def displacement(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
+    def displacement(self, body: str, stage: str = "unloaded") -> Array:
         """Return nodal displacements (2, n_nodes) [mm]."""
         return self.system.displacement(self._known(body), self._at(stage).state).reshape(-1, 2).T
 
-    def stress(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
+    def stress(self, body: str, stage: str = "unloaded") -> Array:
         """Return recovered nodal stress (4, n_nodes), components xx, yy, zz, xy [MPa].
 
         Unloaded, this is the residual stress.
         """
         return self._at_nodes(body, stage).stress
 
-    def initial_stress(self, body: str) -> tuple[NDArray[np.float64], ...]:
+    def initial_stress(self, body: str) -> tuple[Array, ...]:
         """Return positions (2, n) [mm], initial stress as given and in equilibrium (4, n) [MPa].
 
         They belong to the integration points; components are xx, yy, zz, xy. The difference is the
@@ -124,11 +122,11 @@ class Solution:
         given = sum((each for each in fields if each is not None), np.zeros((4, x.shape[1])))
         return x, given, to_tensor(system.response(body, rest).stress)
 
-    def plastic_strain(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
+    def plastic_strain(self, body: str, stage: str = "unloaded") -> Array:
         """Return the recovered equivalent plastic strain at the nodes (n_nodes,)."""
         return self._at_nodes(body, stage).plastic_strain
 
-    def strain(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
+    def strain(self, body: str, stage: str = "unloaded") -> Array:
         """Return the recovered nodal strain (4, n_nodes), components xx, yy, zz, xy.
 
         It is that of the displacements: elastic, plastic and of heat together. In plane stress zz
@@ -136,13 +134,11 @@ class Solution:
         """
         return self._at_nodes(body, stage).strain
 
-    def plastic_tensor(self, body: str, stage: str = "unloaded") -> NDArray[np.float64]:
+    def plastic_tensor(self, body: str, stage: str = "unloaded") -> Array:
         """Return the recovered nodal plastic strain (4, n_nodes), components xx, yy, zz, xy."""
         return self._at_nodes(body, stage).plastic_tensor
 
-    def at(
-        self, body: str, places: ArrayLike, stage: str = "unloaded"
-    ) -> dict[str, NDArray[np.float64]]:
+    def at(self, body: str, places: ArrayLike, stage: str = "unloaded") -> dict[str, Array]:
         """Return fields at places (2, n) [mm] of a body; NaN outside the body.
 
         They are ``displacement`` (2, n) [mm], ``stress`` (4, n) [MPa], components xx, yy, zz, xy,
@@ -190,8 +186,6 @@ class Solution:
         Returns the path of the .pvd file that lists them; see `solver.results.export.to_meshio` for
         the names of the fields.
         """
-        from solver.results.export import write_vtu
-
         return write_vtu(self.mesh_fields(), Path(folder))
 
     def mesh_fields(self) -> MeshFields:

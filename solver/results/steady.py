@@ -4,29 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array, hstack
 from scipy.spatial import cKDTree
 
 from solver.contact.state import State
+from solver.fem.discretisation import Discretisation
 from solver.fem.fields import Sampler, recovery
 from solver.fem.frame import RigidMotion
 from solver.materials.state import Response
 from solver.results.contact_result import contact_patches
-from solver.steady import RollingContact
-from solver.steady.fields import of_layers, under_load
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.discretisation import Discretisation
-    from solver.steady import Pass, Track
-    from solver.steady.fields import TrackFields
-    from solver.steady.layers import Layers
-
-    Array = NDArray[np.float64]
+from solver.steady import Pass, RollingContact, Track
+from solver.steady.fields import TrackFields, of_layers, under_load
+from solver.steady.layers import Layers
+from solver.typing import Array, Ints
 
 _LOADED, _RELEASED = 0.0, 1.0
 _LEVEL = 1e-6
@@ -101,7 +93,7 @@ class TrackBody:
         return csr_array(hstack([diags_array(below) @ recovery(part), at_surface]))
 
     @cached_property
-    def _first(self) -> NDArray[np.int64]:
+    def _first(self) -> Ints:
         """Indices of the points nearest to the surface."""
         y = self._part.points[1].ravel()
         return np.flatnonzero(y > y.max() * (1 + _LEVEL))

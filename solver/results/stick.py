@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from solver.results.contact_result import ContactResult
 from solver.results.outputs import output
 from solver.results.quantities import declare
-
-if TYPE_CHECKING:
-    from solver.results.contact_result import ContactResult
-    from solver.results.run import FinishedRun, Values
+from solver.results.run import FinishedRun, Values
 
 STICK_HALF_WIDTH = declare(
     "stick_half_width", "half-width of the stick zone of the contact under load", "mm"

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
+from solver.contact.state import Converged
+from solver.contact.system import System
 from solver.fem.wheel import Wheel
+from solver.model.motion import TravellingPressure
 from solver.results.contact_result import ContactResult, contact_result
-from solver.results.fields import Remembered
+from solver.results.fields import Remembered, Solved
 from solver.results.view import ALONG_X, Axis
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged
-    from solver.contact.system import System
-    from solver.model.motion import TravellingPressure
-    from solver.results.fields import Solved
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 
 class SurfaceTractions(Protocol):

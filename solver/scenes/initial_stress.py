@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Interval, Unit
@@ -12,15 +12,7 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.parameters import Pairs, described, pairs
 from solver.parts import Parts
-from solver.tensors import to_mandel
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.prism.section import Section
-    from solver.prism.straight import SettledStress
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _XX = 0
 
@@ -108,18 +100,3 @@ class OverHeight(SectionStress):
         stress = np.zeros((6, points.shape[1]))
         stress[_XX] = np.interp(points[1], *self._points)
         return stress
-
-
-def settled(section: Section, of: SectionStress, thermal_strain: float) -> SettledStress | None:
-    """Return a stress and that of a thermal strain that is held along x, in equilibrium.
-
-    None if there is neither.
-    """
-    from solver.prism.straight import StraightPrism  # loads scipy
-
-    if isinstance(of, NoStress) and thermal_strain == 0.0:
-        return None
-    given = to_mandel(of.stress(section.points.reshape(2, -1), section.weights.ravel()))
-    expanded = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) * thermal_strain
-    held = np.tile(section.elasticity.stiffness(6) @ -expanded, (given.shape[1], 1))
-    return StraightPrism(section).settled(given.T, held)

@@ -12,8 +12,8 @@ from solver.materials.elasticity import Elasticity
 from solver.materials.hardening_rules import HARDENING, LinearRule, NoHardening
 from solver.materials.law import Law
 from solver.materials.yield_conditions import YIELD_CONDITIONS
+from solver.model.contact_pair import ContactPair
 from solver.model.friction import FRICTION, FrictionLaw
-from solver.model.model import ContactPair
 from solver.parameters import Accuracy, Poisson, Stress, check, described
 from solver.parts import Parts
 

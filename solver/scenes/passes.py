@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.state import Converged
+from solver.results.fields import Bodies, Solved
 from solver.results.maps import PROFILE_PLASTIC_STRAIN, RESIDUAL_PROFILE
 from solver.results.quantities import declare
+from solver.results.run import Values
+from solver.results.samples import Samples
 from solver.results.shakedown import Shakedown, ShakedownState, classify
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged
-    from solver.results.fields import Bodies, Solved
-    from solver.results.run import Values
-    from solver.results.samples import Samples
-    from solver.scenes.rolling_parameters import RollingParameters
-
-    Array = NDArray[np.float64]
+from solver.scenes.rolling_parameters import RollingParameters
+from solver.typing import Array
 
 _EACH = ("pass",)
 

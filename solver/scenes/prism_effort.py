@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from solver.prism.section import Section
 from solver.scenes.effort import Effort
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from solver.prism.section import Section
 
 _FIRST, _FACTOR = 0.5, 2.2e-5
 """Seconds of a set-up: at least, and per wave and unknown of the zone."""

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import scipy
 
+from solver.materials.law import Law
 from solver.model.friction import PatchStatus
+from solver.prism.section import Section
 from solver.results.cycles import (
     SHAKEDOWN_STATE,
     STEADY_NET_INCREMENT,
     STEADY_PLASTIC_INCREMENT,
 )
 from solver.results.quantities import declare
+from solver.results.run import FinishedRun, Values
 from solver.results.shakedown import Shakedown, ShakedownState, classify
 from solver.scenes.passes import (
     PASS,
@@ -23,21 +28,10 @@ from solver.scenes.passes import (
     PASS_PLASTIC_INCREMENT,
     PASS_SURFACE_ADVANCE,
 )
-from solver.scenes.rolling import CREEPAGE, LONGITUDINAL_FORCE
-from solver.scenes.scene import Sketch
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.prism.section import Section
-    from solver.results.run import FinishedRun, Values
-    from solver.scenes.prism_passes import PassTrace
-
-    Array = NDArray[np.float64]
-
+from solver.scenes.prism_passes import PassTrace
+from solver.scenes.rolling_setup import CREEPAGE, LONGITUDINAL_FORCE
+from solver.scenes.sketch import Sketch
+from solver.typing import Array
 
 _PATCH = ("x", "z")
 PATCH_PRESSURE = declare(
@@ -122,15 +116,13 @@ def patch(run: FinishedRun) -> Values:
 
     Slip and status are those of the nearest station and vertex; slip is NaN where it is open.
     """
-    from scipy.interpolate import RegularGridInterpolator
-
     contact: Any = run.outcome.points[run.view.loaded].touching
     grid, pressure = contact.grid, contact.pressure
     X, Z = np.meshgrid(run.view.x, run.view.z, indexing="ij")
     places = _widened(grid.x[::-1]), _widened(grid.z)
 
     def sampled(values: Array, method: str = "linear", outside: float = 0.0) -> Array:
-        at = RegularGridInterpolator(
+        at = scipy.interpolate.RegularGridInterpolator(
             places, values[::-1], method, bounds_error=False, fill_value=outside
         )
         return np.asarray(at((X, Z)))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,31 +15,23 @@ from solver.linear.threads import one_thread
 from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
 from solver.memory import kept
+from solver.prism.patch_contact import PatchContact, PatchLoad
 from solver.prism.patch_passing import AppliedPatch, PatchPassing
+from solver.prism.state import PrismState
+from solver.prism.track import PrismTrack
 from solver.results.audit.plain_prism import PlainPrism
 from solver.results.audit.prism import audit_prism
 from solver.results.audit.prism_values import OfPrismPass
+from solver.results.audit.report import Audit
 from solver.results.prism import PatchTractions, PrismBody
 from solver.results.prism_fields import zone_fields
 from solver.results.run import FinishedRun
 from solver.results.samples import Samples
+from solver.scenes.scene import Monitor, Scene
+from solver.steady import Pass
 from solver.steady.passing import passing
 from solver.tensors import to_tensor
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-    from typing import Any
-
-    from numpy.typing import NDArray
-
-    from solver.prism.patch_contact import PatchContact, PatchLoad
-    from solver.prism.state import PrismState
-    from solver.prism.track import PrismTrack
-    from solver.results.audit.report import Audit
-    from solver.scenes.scene import Monitor, Scene
-    from solver.steady import Pass
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _REACHES = (1.0, 1.4, 2.0)
 """Ratios of the size of zone and window to the usual size, tried in turn."""

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.materials.law import Law
+from solver.prism.section import Section
 from solver.prism.track import PrismTrack
 from solver.scenes.prism_effort import PrismSize
+from solver.scenes.prism_parameters import PrismParameters
 from solver.tensors import SQRT2
-
-if TYPE_CHECKING:
-    from solver.materials.law import Law
-    from solver.prism.section import Section
-    from solver.scenes.prism_parameters import PrismParameters
 
 _AHEAD, _BEHIND, _LENGTH = 2.2, 2.6, 7.0
 """The window ahead and behind, and the length after which waves repeat, over half the length where

@@ -12,124 +12,33 @@ A.R.S. Ponter, A.D. Hearle, K.L. Johnson, J. Mech. Phys. Solids 33 (1985) 339-36
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-
-from solver.results.extremes import residual_extremes
-from solver.results.figures import cost, extremes
-from solver.results.maps import maps, profiles
-from solver.results.quantities import declare
 from solver.results.record import Status
-from solver.results.view import ACROSS_TRACK, View
-from solver.scenes.prism_effort import effort_of
-from solver.scenes.prism_outputs import cycles, patch, section, sketched
+from solver.scenes.late import late
 from solver.scenes.raceway_parameters import RacewayParameters
-from solver.scenes.rolling import AXLE_HEIGHT
-from solver.scenes.scene import Method, Scene, Sketch
+from solver.scenes.scene import Scene
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from solver.results.run import FinishedRun, Values
-    from solver.scenes.effort import Effort
-    from solver.scenes.raceway_track import RacewayGeometry
-
-HERTZ_PRESSURE = declare("hertz_pressure", "peak pressure p0 of the elastic Hertz contact", "MPa")
-HERTZ_A = declare("hertz_a", "semi-axis along x of the elastic Hertz contact", "mm")
-HERTZ_B = declare("hertz_b", "semi-axis along z of the elastic Hertz contact", "mm")
-HERTZ_APPROACH = declare(
-    "hertz_approach", "approach of the bodies in the elastic Hertz contact of half-spaces", "mm"
+_method, _view, _sketch, _effort, _setup = late(
+    "scenes.raceway_setup", "method", "view", "sketch", "effort", "setup"
 )
-_ALONG, _ACROSS, _DOWN = 1.6, 2.0, 2.4
-"""Half the length and half the width of maps over a and b, and their depth over
-`RacewayParameters.below`."""
-_PIXELS = 24
-"""Positions of maps per semi-axis, and per `RacewayParameters.below` in depth."""
-
-
-def method(parameters: RacewayParameters) -> Method:
-    """Return the method of the passes."""
-    del parameters
-    from solver.scenes.prism_passes import by_passes  # loads scipy
-    from solver.scenes.raceway_track import RolledRaceway
-
-    return partial(by_passes, rolled=RolledRaceway)
-
-
-def view(parameters: RacewayParameters) -> View:
-    """Return the positions of results, which depend on the ellipse and not on the mesh."""
-    a, b = parameters.size
-    below, wide = parameters.below, _ACROSS * b
-    along, across = round(_ALONG * _PIXELS), round(_ACROSS * _PIXELS)
-    down = round(_DOWN * _PIXELS)
-    return View(
-        x=np.linspace(-_ALONG * a, _ALONG * a, 2 * along + 1),
-        y=np.linspace(-_DOWN * below, 0.0, down + 1),
-        z=np.linspace(-wide, wide, 2 * across + 1),
-        depth=np.linspace(0.0, _DOWN * below, down + 1),
-        station=b / 2 * np.array([-1.0, 0.0, 1.0]),
-        s=np.zeros(0),
-        profile_body="raceway",
-        surfaces={"raceway": "running"},
-        axis=ACROSS_TRACK,
-    )
-
-
-def sketch(parameters: RacewayParameters) -> Sketch:
-    """Return the section of the raceway, and the ball or roller at first touch."""
-    from solver.scenes.raceway_track import geometry, section_of
-
-    own, radius = geometry(parameters), parameters.across
-    wide = own.block if own.groove is None else min(own.block, own.groove[1])
-    z = min(0.95 * radius, wide) * np.linspace(-1.0, 1.0, 201)
-    height = radius - np.sqrt(radius**2 - z**2)
-    rolls = {"ball or roller": np.stack([z, height])}
-    return sketched("raceway", section_of(own), parameters.material(), rolls)
-
-
-def elastic(run: FinishedRun) -> Values:
-    """Return the elastic Hertz contact, and the height of the ball or roller over first touch."""
-    p: Any = run.parameters
-    contact: Any = run.outcome.points[run.view.loaded].touching
-    ellipse = p.ellipse
-    return {
-        HERTZ_PRESSURE: ellipse.peak_pressure,
-        HERTZ_A: ellipse.a,
-        HERTZ_B: ellipse.b,
-        HERTZ_APPROACH: ellipse.approach,
-        AXLE_HEIGHT: contact.height if p.load == "contact" else np.nan,
-    }
-
-
-def setup(parameters: RacewayParameters) -> RacewayGeometry:
-    """Return the geometry of the raceway, which decides its set-up."""
-    from solver.scenes.raceway_track import geometry
-
-    return geometry(parameters)
-
-
-def effort(parameters: RacewayParameters, passes: Sequence[float]) -> Effort:
-    """Return the work of so many passes; the section is meshed for it."""
-    from solver.scenes.raceway_track import geometry, section_of
-
-    own = geometry(parameters)
-    return effort_of(section_of(own), own.window.size, passes)
-
 
 RACEWAY = Scene(
     name="raceway",
     summary="ball or roller rolling along an elastic-plastic raceway, in three dimensions",
     parameters=RacewayParameters,
     branch="passes",
-    method=method,
-    view=view,
-    sketch=sketch,
-    outputs=(maps, profiles, residual_extremes, extremes, patch, section, cycles, elastic),
-    costs=(cost,),
-    effort=effort,
-    setup=setup,
+    method=_method,
+    view=_view,
+    sketch=_sketch,
+    outputs=(
+        *late("results.maps", "maps", "profiles"),
+        *late("results.extremes", "residual_extremes"),
+        *late("results.figures", "extremes"),
+        *late("scenes.prism_outputs", "patch", "section", "cycles"),
+        *late("scenes.raceway_setup", "elastic"),
+    ),
+    costs=late("results.figures", "cost"),
+    effort=_effort,
+    setup=_setup,
     advice={
         Status.LIMIT_LOAD: "lower load or traction, or let the material harden",
         Status.NOT_CONVERGED: "lower load or traction, or choose another accuracy",

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from solver.errors import ModelError
 from solver.loading.bearing import too_much_shear
@@ -17,15 +16,12 @@ from solver.mesh.wheel_profile import crowned
 from solver.mesh.zone import Zone, raceway_mesh
 from solver.prism.given_patch import EllipticPatch
 from solver.prism.patch import RollingPatch
+from solver.prism.patch_contact import PatchLoad
 from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
+from solver.prism.track import PrismTrack
 from solver.scenes.prism_window import PrismWindow, split_rows, whole
-from solver.scenes.raceway_parameters import BESIDE
-
-if TYPE_CHECKING:
-    from solver.prism.patch_contact import PatchLoad
-    from solver.prism.track import PrismTrack
-    from solver.scenes.raceway_parameters import RacewayParameters
+from solver.scenes.raceway_parameters import BESIDE, RacewayParameters
 
 _BLOCK = 32.0
 """Depth and half the width of the block over the longer semi-axis: stress in the zone is within

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 from solver.loading.refinement import HALVINGS
 from solver.mesh.endless import track_lines
-from solver.scenes.effort import Effort, grid_size
+from solver.scenes.effort import Effort
+from solver.scenes.grid_size import grid_size
 from solver.scenes.rolling_grids import half_space_nodes, rim_elements, wheel_nodes
 from solver.scenes.rolling_model import track_grid
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from solver.scenes.rolling_parameters import RollingParameters
+from solver.scenes.rolling_parameters import RollingParameters
 
 _DECIDED = 3
 """Smallest number of passes after which a shakedown state may be decided."""

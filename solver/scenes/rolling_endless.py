@@ -3,46 +3,36 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from solver.errors import LimitLoad, ModelError, NotConverged, Spins, WindowTooSmall
 from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
+from solver.model.motion import TravellingPressure
+from solver.results.audit.report import Audit
 from solver.results.audit.steady import OfPass, audit_pass
 from solver.results.run import FinishedRun
 from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
-from solver.results.steady import SteadyTractions, TrackBody
-from solver.results.tractions import PrescribedTractions
+from solver.results.steady import SteadyTractions, TrackBody, TrackState
+from solver.results.tractions import PrescribedTractions, SurfaceTractions
+from solver.results.view import View
+from solver.scenes.driver import by_increments
 from solver.scenes.passes import Trace, shakedown_of
+from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import steady_passes, track_for
-from solver.scenes.scene import by_increments
-from solver.steady import RollingContact, standing_pressure
+from solver.scenes.scene import Monitor, Scene
+from solver.steady import Pass, RollingContact, Track, standing_pressure
+from solver.steady.layers import Layers
 from solver.steady.passing import SolveBudget
 from solver.tensors import to_tensor
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.model.motion import TravellingPressure
-    from solver.results.audit.report import Audit
-    from solver.results.steady import TrackState
-    from solver.results.tractions import SurfaceTractions
-    from solver.results.view import View
-    from solver.scenes.rolling_parameters import RollingParameters
-    from solver.scenes.scene import Monitor, Scene
-    from solver.steady import Pass, Track
-    from solver.steady.layers import Layers
-
-    Array = NDArray[np.float64]
-
+from solver.typing import Array
 
 _REACHES = (1.0, 1.5, 2.5, 4.0)
 """Ratios of the size of the window to the usual size, tried in turn."""

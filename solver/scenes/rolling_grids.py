@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.mesh.lines import continued, graded
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _DEEP = 4.0
 """Ratio of the depth in which element sides grow by ``growth`` to the Hertz half-width; below it

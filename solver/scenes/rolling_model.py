@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from skfem import Mesh
 
 from solver.materials.material import Material
-from solver.mesh import grid, mapped, merged, within
 from solver.mesh.endless import track_lines
+from solver.mesh.grids import grid, mapped, merged, within
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.model.motion import Axle, TravellingPressure
 from solver.scenes.rolling_grids import half_space_nodes, wheel_nodes
-from solver.scenes.scene import Sketch
-
-if TYPE_CHECKING:
-    from skfem import Mesh
-
-    from solver.scenes.rolling_parameters import RollingParameters
+from solver.scenes.rolling_parameters import RollingParameters
+from solver.scenes.sketch import Sketch
+from solver.steady.track import CONTACT, half_space_body, standing_pressure
 
 
 def track_grid(parameters: RollingParameters) -> tuple[float, float, float, float, float, bool]:
@@ -109,8 +106,6 @@ def _wheel(parameters: RollingParameters) -> Body:
 
 def sketch(parameters: RollingParameters) -> Sketch | None:
     """Return the bodies of steady passes, the load at x = 0; None of passes by increments."""
-    from solver.steady.track import CONTACT, half_space_body, standing_pressure
-
     p = parameters
     if not p.endless:
         return None

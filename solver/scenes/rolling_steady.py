@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.linear.threads import one_thread
@@ -17,21 +15,13 @@ from solver.model.amplitude import Amplitude
 from solver.model.friction import effective_friction
 from solver.model.motion import Axle
 from solver.scenes.rolling_model import wheel_body
-from solver.steady import Rim, RollingWheel, rolling, track_of
+from solver.scenes.rolling_parameters import RollingParameters
+from solver.steady import Pass, Rim, RollingWheel, Track, rolling, track_of
+from solver.steady.layers import Layers
+from solver.steady.load import PassingLoad
+from solver.steady.passing import SolveBudget
 from solver.steady.search import search
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import NDArray
-
-    from solver.scenes.rolling_parameters import RollingParameters
-    from solver.steady import Pass, Track
-    from solver.steady.layers import Layers
-    from solver.steady.load import PassingLoad
-    from solver.steady.passing import SolveBudget
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _PARTS, _TOLERANCE = 4, 0.01
 """Increments between two points of a row, and tolerance, of a pass on a coarser mesh."""

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.mesh.lines import cells
 from solver.results.view import View
 from solver.scenes.rolling_grids import recorded_step
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.scenes.rolling_parameters import RollingParameters
+from solver.scenes.rolling_parameters import RollingParameters
+from solver.typing import Array
 
 _EXTENT = 4.0
 """Ratio of the largest x of results on an endless track to the Hertz half-width."""
@@ -55,11 +51,11 @@ def _around_the_load(a: float) -> View:
     )
 
 
-def _pixels(a: float) -> NDArray[np.float64]:
+def _pixels(a: float) -> Array:
     """Return the depths of the map for the half-width a [mm]."""
     return cells(5 * a, smallest=a / 64, ratio=1.05, largest=a / 16)
 
 
-def _depths(a: float) -> NDArray[np.float64]:
+def _depths(a: float) -> Array:
     """Return the depths of profiles for the half-width a [mm]."""
     return np.concatenate([np.linspace(0.0, 3 * a, 121), np.linspace(3.1 * a, 6 * a, 30)])

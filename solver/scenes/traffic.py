@@ -8,19 +8,14 @@ good condition) to 0.3 (poor condition) of the load, more above 60 km/h.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from solver.errors import ModelError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 CUT = 3.0
 """Largest deviation from the mean, in standard deviations."""

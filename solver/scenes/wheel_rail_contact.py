@@ -5,25 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from solver.errors import ModelError
-from solver.mesh.rail import rail_60e1
-from solver.mesh.section_mesh import RUNNING, MeshedRail, SectionMesh
-from solver.mesh.wheel_profile import conical, crowned, measured, s1002
+from solver.materials import Elasticity
+from solver.mesh.meshed_rail import MeshedRail
+from solver.mesh.rail import Rail, RailSection, rail_60e1
+from solver.mesh.section_mesh import RUNNING, SectionMesh
+from solver.mesh.wheel_profile import WheelProfile, conical, crowned, measured, s1002
 from solver.prism.profiled_wheel import ProfiledWheel
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials import Elasticity
-    from solver.mesh.rail import Rail, RailSection
-    from solver.mesh.wheel_profile import WheelProfile
-    from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
-
-    Array = NDArray[np.float64]
+from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
+from solver.typing import Ints
 
 _PRESSED = 0.5
 """Ratio of the gap of undeformed bodies at the edge of contact to their approach, as for a ball."""
@@ -200,7 +194,7 @@ class _Gap:
             first, last = (first, at) if d > _PRESSED * approach else (at + 1, last)
         return float(level[first])
 
-    def within(self, ratio: float) -> NDArray[np.int64]:
+    def within(self, ratio: float) -> Ints:
         """Return the numbers of places with a gap of at most this ratio to that at the edge."""
         return np.flatnonzero(self.gap <= ratio * self.level)
 

@@ -15,6 +15,7 @@ from solver.mesh.section_mesh import SectionMesh
 from solver.parameters import Other, Stress, described
 from solver.parts import declared
 from solver.scenes.initial_stress import INITIAL_STRESS, SectionStress
+from solver.scenes.late import late
 from solver.scenes.prism_parameters import PrismParameters
 from solver.scenes.sequence import block_of
 from solver.scenes.traffic import CUT, check_spreads, deviations
@@ -42,6 +43,8 @@ _SPREADS = ("load_spread", "lateral_spread", "traction_spread")
 _POSITIONS = 13
 """Number of lateral positions that stand for those of random traffic, half a standard deviation
 apart."""
+
+(_checked,) = late("mesh.meshed_rail", "checked")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,7 +152,7 @@ class WheelRailParameters(PrismParameters):
         for name in ("rail_profile", "wheel_profile"):
             value = getattr(self, name)
             if isinstance(value, SectionMesh):
-                value.checked(name)
+                _checked(value, name)
             elif not isinstance(value, str):
                 object.__setattr__(self, name, as_points(name, value))
         self._check_head()

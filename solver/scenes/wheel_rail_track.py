@@ -8,19 +8,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.materials import Elasticity
 from solver.memory import kept
-from solver.mesh.section_mesh import MeshedRail, SectionMesh, ZonedMesh
+from solver.mesh.meshed_rail import MeshedRail, ZonedMesh
+from solver.mesh.section_mesh import SectionMesh
 from solver.mesh.zone import Zone, rail_mesh
 from solver.prism.patch import RollingPatch
 from solver.prism.section import Section
-from solver.prism.straight import check_elastic
-from solver.scenes.initial_stress import settled
+from solver.prism.straight import SettledStress, StraightPrism, check_elastic
+from solver.prism.track import PrismTrack
+from solver.scenes.initial_stress import NoStress, SectionStress
 from solver.scenes.prism_window import PrismWindow, split_rows, whole
 from solver.scenes.wheel_rail_contact import (
     canted,
@@ -30,16 +31,9 @@ from solver.scenes.wheel_rail_contact import (
     wheel_of,
     wheel_profile,
 )
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.prism.straight import SettledStress
-    from solver.prism.track import PrismTrack
-    from solver.scenes.initial_stress import SectionStress
-    from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
-
-    Array = NDArray[np.float64]
+from solver.scenes.wheel_rail_parameters import Points, WheelRailParameters
+from solver.tensors import to_mandel
+from solver.typing import Array
 
 _FOOT = 150.0
 """Width of the foot of 60E1, over which the foundation acts [mm]."""
@@ -307,3 +301,16 @@ class RolledRail:
         made = make(friction=p.friction, force=p.load, **p.motion)
         self._made = track, p, made
         return made
+
+
+def settled(section: Section, of: SectionStress, thermal_strain: float) -> SettledStress | None:
+    """Return a stress and that of a thermal strain that is held along x, in equilibrium.
+
+    None if there is neither.
+    """
+    if isinstance(of, NoStress) and thermal_strain == 0.0:
+        return None
+    given = to_mandel(of.stress(section.points.reshape(2, -1), section.weights.ravel()))
+    expanded = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) * thermal_strain
+    held = np.tile(section.elasticity.stiffness(6) @ -expanded, (given.shape[1], 1))
+    return StraightPrism(section).settled(given.T, held)

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
+from typing import Any, Protocol, Self, TypeVar
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.materials.state import PlasticState
-
-    Array = NDArray[np.float64]
+from solver.materials.law import Law
+from solver.materials.state import PlasticState
+from solver.typing import Array
 
 
 class LeftState(Protocol):

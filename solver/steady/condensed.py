@@ -6,20 +6,13 @@ for a dense block on the boundary of the window, and has a third of the unknowns
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import sparse
 
+from solver.fem.discretisation import Discretisation
 from solver.linear import solvers as linear
 from solver.linear.schur import SchurComplement
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.discretisation import Discretisation
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Ints
 
 
 class CondensedTrack:
@@ -35,7 +28,7 @@ class CondensedTrack:
     kept : (m,) unknowns of these nodes, increasing
     """
 
-    def __init__(self, part: Discretisation, nodes: NDArray[np.int64]) -> None:
+    def __init__(self, part: Discretisation, nodes: Ints) -> None:
         self.kept = np.sort(np.concatenate([2 * nodes, 2 * nodes + 1]))
         K = part.elastic_matrix()
         self._outside = SchurComplement(K, self.kept, np.setdiff1d(part.free, self.kept))
@@ -47,7 +40,7 @@ class CondensedTrack:
         self._window = linear.analyse(upper, coupled=True)
         self._window.factorise(upper.data)
 
-    def place(self, unknowns: NDArray[np.int64]) -> NDArray[np.int64]:
+    def place(self, unknowns: Ints) -> Ints:
         """Return the positions of unknowns of the body among the kept ones."""
         return np.searchsorted(self.kept, unknowns)
 

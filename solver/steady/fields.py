@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from solver.materials.law import Law
+from solver.materials.state import PlasticState
+from solver.steady.layers import Layers
+from solver.steady.passing import Pass
+from solver.steady.rows import FlowRows
+from solver.steady.track import Track
 from solver.tensors import SQRT2
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.materials.state import PlasticState
-    from solver.steady.layers import Layers
-    from solver.steady.passing import Pass
-    from solver.steady.rows import FlowRows
-    from solver.steady.track import Track
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Ints
 
 
 class TrackFields(NamedTuple):
@@ -37,7 +32,7 @@ def of_layers(track: Track, law: Law, layers: Layers) -> TrackFields:
     """Return the fields of a half-plane whose state is a function of depth alone."""
     rows, n = track.rows, track.part.weights.size
 
-    def at(every: NDArray[np.int64], size: int, layers: Layers) -> tuple[Array, PlasticState]:
+    def at(every: Ints, size: int, layers: Layers) -> tuple[Array, PlasticState]:
         strain, virgin = np.zeros((4, size)), law.initial(size, 4)
         strain[:, every] = layers.strain(track.elasticity).T[:, :, None]
         packed = virgin.packed
@@ -67,7 +62,7 @@ def under_load(track: Track, found: Pass[Layers]) -> TrackFields:
 
 def _passed(
     rows: FlowRows,
-    every: NDArray[np.int64],
+    every: Ints,
     before: PlasticState,
     flow: PlasticState,
     after: Layers,

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from solver.materials.law import Law
 from solver.materials.material import Material
+from solver.materials.state import PlasticState
+from solver.steady.layers import Layers
+from solver.steady.rows import FlowRows
 from solver.steady.stepped import SteppedFlow, SteppedSweep
 from solver.steady.sweep import CompiledFlow, CompiledSweep
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.materials.state import PlasticState
-    from solver.steady.layers import Layers
-    from solver.steady.rows import FlowRows
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 INFLOW = 0.1
 """Largest ratio of the plastic strain added in the first column of the window to that of the pass.

@@ -12,17 +12,12 @@ K. Dang Van, M.H. Maitournam, J. Mech. Phys. Solids 41 (1993) 1691-1710.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.elasticity import Elasticity
-    from solver.materials.state import PlasticState
-
-    Array = NDArray[np.float64]
+from solver.materials.elasticity import Elasticity
+from solver.materials.state import PlasticState
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True)

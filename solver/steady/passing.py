@@ -16,27 +16,20 @@ K. Dang Van, M.H. Maitournam, J. Mech. Phys. Solids 41 (1993) 1691-1710.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from solver.errors import LimitLoad, NotConverged, TooLong, WindowTooSmall
 from solver.linear.krylov import gmres
-from solver.steady.body import S
+from solver.materials.law import Law
+from solver.materials.state import PlasticState
+from solver.steady.body import FlowPast, PassedBody, S
 from solver.steady.flow import usual_parts
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.materials.state import PlasticState
-    from solver.steady.body import FlowPast, PassedBody
-    from solver.steady.load import AppliedLoad, PassingLoad
-
-    Array = NDArray[np.float64]
+from solver.steady.load import AppliedLoad, PassingLoad
+from solver.typing import Array
 
 TOLERANCE = 1e-4
 """Largest deviatoric strain of the residual, times 2 G / yield stress, of a converged pass."""

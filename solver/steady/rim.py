@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.fem.discretisation import Discretisation
 from solver.fem.frame import turning
-from solver.fem.surface import extract
+from solver.fem.surface import Surface, extract
 from solver.fem.wheel import Wheel
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.surface import Surface
-    from solver.model.body import Body
-
-    Array = NDArray[np.float64]
+from solver.model.body import Body
+from solver.typing import Array
 
 
 class Rim:

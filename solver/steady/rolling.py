@@ -3,30 +3,19 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 from solver.errors import ModelError
 from solver.linear.threads import one_thread
-from solver.steady.passing import TOLERANCE, SolveBudget
+from solver.materials.law import Law
+from solver.steady.layers import Layers
+from solver.steady.load import PassingLoad
+from solver.steady.passing import TOLERANCE, Pass, SolveBudget
 from solver.steady.search import search
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.steady.layers import Layers
-    from solver.steady.load import PassingLoad
-    from solver.steady.passing import Pass
-    from solver.steady.track import Track
-
-    Array = NDArray[np.float64]
-
+from solver.steady.track import Track
+from solver.typing import Array
 
 EXACT_AFTER = 4
 REPEATED = 1e-5

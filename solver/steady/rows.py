@@ -8,23 +8,17 @@ end of the mesh, plastic strain is that of the last column after unloading to th
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 from scipy.interpolate import RegularGridInterpolator
 
 from solver.errors import ModelError
+from solver.fem.discretisation import Discretisation
+from solver.materials.law import Law
+from solver.steady.condensed import CondensedTrack
 from solver.steady.layers import Layers
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.discretisation import Discretisation
-    from solver.materials.law import Law
-    from solver.steady.condensed import CondensedTrack
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Bools, Ints
 
 _LEVEL = 1e-6
 """Ratio of a difference of depth to the depth of the rows; up to it points lie on one row."""
@@ -98,17 +92,17 @@ class FlowRows:
         return Layers(self.depth, self._thickness, law.initial(len(self.depth), 4), surface)
 
     @property
-    def every(self) -> NDArray[np.int64]:
+    def every(self) -> Ints:
         """The points of each row along the whole body (n_rows, n), in and outside the window."""
         return np.hstack([self.points, self.ahead, self.behind])
 
     @cached_property
-    def highest(self) -> NDArray[np.int64]:
+    def highest(self) -> Ints:
         """The points of the uppermost rows (n,), increasing."""
         return np.sort(self.every[: self.uppermost].ravel())
 
     @cached_property
-    def above(self) -> NDArray[np.int64]:
+    def above(self) -> Ints:
         """Positions of the points of the uppermost rows (n_uppermost, n) in `highest`."""
         return np.searchsorted(self.highest, self.every[: self.uppermost])
 
@@ -121,19 +115,19 @@ class FlowRows:
         near, far = self.depth[0], self.depth[k]
         return np.asarray((far * values[:k] - near * values[k : 2 * k]) / (far - near))
 
-    def _length(self, points: NDArray[np.int64]) -> float:
+    def _length(self, points: Ints) -> float:
         """Return the length of the window [mm]."""
         elements = np.unique(points // self.part.weights.shape[1])
         corners = self.part.body.mesh.p[0, self.part.body.mesh.t[:, elements]]
         return float(np.ptp(corners))
 
-    def _force_of(self, points: NDArray[np.int64], strain: sparse.csr_array) -> sparse.csr_array:
+    def _force_of(self, points: Ints, strain: sparse.csr_array) -> sparse.csr_array:
         """Return the matrix from plastic strains at points to equivalent nodal forces."""
         stiff = 2 * self.part.body.law.elasticity.shear_modulus
         weights = stiff * np.repeat(self.part.volumes[points].ravel(), 4)
         return sparse.csr_array(strain.T @ sparse.diags_array(weights))
 
-    def _strain_at(self, points: NDArray[np.int64]) -> sparse.csr_array:
+    def _strain_at(self, points: Ints) -> sparse.csr_array:
         """Return the matrix from displacements to strains at points, row by row."""
         part = self.part
         n_points = part.weights.shape[1]
@@ -173,9 +167,7 @@ class FlowRows:
         return np.asarray(self._behind @ behind.ravel())
 
 
-def _in_rows(
-    part: Discretisation, elements: NDArray[np.bool_], deep: float, interleaved: bool
-) -> NDArray[np.int64]:
+def _in_rows(part: Discretisation, elements: Bools, deep: float, interleaved: bool) -> Ints:
     """Return the points of elements (n_rows, n_columns), downwards and downstream."""
     n_points = part.weights.shape[1]
     points = (np.flatnonzero(elements)[:, None] * n_points + np.arange(n_points)).ravel()

@@ -13,28 +13,21 @@ it does not; more than 30 % of plastic strain in a pass counts as the limit load
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from solver.errors import LimitLoad, NoContact, NotConverged, Spins, TooLong, WindowTooSmall
+from solver.materials.law import Law
 from solver.materials.material import Material
-from solver.steady.passing import TOLERANCE, SolveBudget, passing
+from solver.steady.layers import Layers
+from solver.steady.load import PassingLoad
+from solver.steady.passing import TOLERANCE, Pass, SolveBudget, passing
 from solver.steady.touching import RollingContact
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.steady.layers import Layers
-    from solver.steady.load import PassingLoad
-    from solver.steady.passing import Pass
-    from solver.steady.track import Track
-
-    Array = NDArray[np.float64]
+from solver.steady.track import Track
+from solver.typing import Array
 
 _HARDEST, _SOFTEST = 0.024, 1e-4
 """First and last hardening ratio, slope of the uniaxial curve over Young's modulus."""

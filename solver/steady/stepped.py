@@ -13,19 +13,14 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from solver.errors import NotConverged
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.materials.state import PlasticState
-
-    Array = NDArray[np.float64]
+from solver.materials.law import Law
+from solver.materials.state import PlasticState
+from solver.typing import Array, Ints
 
 _STEP = 1e-6
 """Ratio of the difference step to the largest value of a variable, or to the yield strain."""
@@ -54,7 +49,7 @@ class SteppedSweep:
         n_columns = strain.shape[2] - 1
         now = start.packed
         self._packed, self._ago = np.empty((2, *now.shape, n_columns))
-        self._flowing: list[NDArray[np.int64]] = []
+        self._flowing: list[Ints] = []
         C = law.stiffness(len(strain))
         for column in range(n_columns):
             first, last = strain[..., column], strain[..., column + 1]

@@ -15,20 +15,14 @@ or reads what an earlier import compiled; `make setup` does this.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import float64, int64, njit, types
 
+from solver.materials.material import Material
 from solver.materials.radial_return import SQRT23
 from solver.materials.state import PlasticState
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.material import Material
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _PLANE = (0, 0, 0, 0)
 """One entry for each component in two dimensions."""

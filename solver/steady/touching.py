@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.steady.load import AppliedLoad
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +33,7 @@ class RollingContact(AppliedLoad):
     tangential: Array
     area: Array
     gap: Array
-    status: NDArray[np.int64]
+    status: Ints
     bound: Array
     creepage: float
     height: float

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,28 +11,22 @@ from scipy.spatial import cKDTree
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.loads import travelling_forces
-from solver.fem.surface import extract
+from solver.fem.surface import Surface, extract
+from solver.materials.elasticity import Elasticity
+from solver.materials.law import Law
 from solver.materials.material import Material
 from solver.memory import kept
-from solver.mesh import grid, within
 from solver.mesh.endless import MOST_COLUMNS, track_lines, window_depth, window_elements
+from solver.mesh.grids import grid, within
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.motion import TravellingPressure
 from solver.steady.condensed import CondensedTrack
 from solver.steady.flow import RowFlow
+from solver.steady.layers import Layers
 from solver.steady.load import Given
 from solver.steady.rows import FlowRows
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.surface import Surface
-    from solver.materials.elasticity import Elasticity
-    from solver.materials.law import Law
-    from solver.steady.layers import Layers
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Ints
 
 CONTACT = 2.0
 """Ratio of half the length of the surface that may come into contact to the half-width."""
@@ -94,7 +88,7 @@ class Track:
         return Discretisation(half_space_body(-x[::-1], y, self._contact, self.elasticity))
 
     @cached_property
-    def mirror(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def mirror(self) -> tuple[Ints, Ints]:
         """Numbers of the points, and of the nodes, at the mirrored places."""
         own, seen = self.part, self.mirrored
         both = ((own.points.reshape(2, -1), seen.points.reshape(2, -1)), (own.X, seen.X))
@@ -145,7 +139,7 @@ class Track:
         return RowFlow(self.rows, law, before, added, parts)
 
     @cached_property
-    def at_surface(self) -> NDArray[np.int64]:
+    def at_surface(self) -> Ints:
         """Positions of the surface's unknowns among those of the window."""
         return self.operator.place(self.surface.dofs)
 

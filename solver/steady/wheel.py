@@ -19,27 +19,18 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.contact.complementarity import change_of, solve_contact
 from solver.contact.geometry import pair
-from solver.contact.problem import OPEN, ContactProblem
+from solver.contact.problem import OPEN, ContactProblem, ContactSolution
 from solver.errors import ModelError, NoContact, NotConverged, WindowTooSmall
-from solver.model.friction import ContactPlaces, lines_of
-from solver.steady.rim import flowed
+from solver.model.friction import BoundLines, ContactPlaces, FrictionLaw, lines_of
+from solver.steady.rim import Rim, flowed
 from solver.steady.touching import RollingContact
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.problem import ContactSolution
-    from solver.model.friction import BoundLines, FrictionLaw
-    from solver.steady.rim import Rim
-    from solver.steady.track import Track
-
-    Array = NDArray[np.float64]
+from solver.steady.track import Track
+from solver.typing import Array, Ints
 
 _ROUNDS = 40
 _NEAR = 0.01
@@ -63,7 +54,7 @@ class _Linearisation:
     on_wheel: Array
     height: float
     tilt: float
-    status: NDArray[np.int64]
+    status: Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +66,7 @@ class _Geometry:
     gaps and tangential displacements, ``moves`` those of gaps and slips.
     """
 
-    at: NDArray[np.int64]
+    at: Ints
     area: Array
     gap: Array
     creeping: Array

@@ -12,7 +12,6 @@ from typing import Any
 from solver.errors import ModelError
 from studies.errors import StudyError
 from studies.scenes.formats import FORMATS
-from studies.scenes.meshfile import MeshFile
 from studies.toml import CASE, read_given, read_toml
 
 _MAY_NAME_FILES, _OF_POINTS = ("parameters", "points", "sweep"), (".csv", ".txt")
@@ -193,6 +192,8 @@ def _with_files(value: Any, field: str, folder: Path) -> Any:
             from solver.mesh.points import read_points  # loads numpy
 
             return read_points(folder / value).T.tolist()
+        from studies.scenes.meshfile import MeshFile  # loads scipy
+
         return MeshFile(value, read_given(folder / value, field)).section()
     except ModelError as error:
         raise StudyError(field, value, f"{error.field} {error.allowed}") from None

@@ -32,7 +32,7 @@ NEEDED = (
     "solver.contact.lemke",
     "solver.linear.pardiso",
     "solver.results.solution",
-    "solver.scenes.punch",
+    "solver.scenes.punch_setup",
     "studies.execution.grid",
     "studies.execution.task",
     "studies.execution.loaded",

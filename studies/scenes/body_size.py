@@ -11,7 +11,7 @@ import numpy as np
 from solver.errors import ModelError
 from solver.mesh.rounding import in_box
 from solver.mesh.shapes import few
-from solver.scenes.effort import node_layout
+from solver.scenes.grid_size import node_layout
 from studies.scenes import tables
 from studies.scenes.building import default_element
 from studies.scenes.shape_tables import GridLines, GridTable, RoundTable, lines_of

@@ -12,7 +12,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.loading.program import Lap, Program, Stage, load_and_release, load_cycles
-from solver.mesh import marked, within, without
+from solver.mesh.grids import marked, within, without
 from solver.model.amplitude import Amplitude
 from solver.model.friction import FRICTION
 from solver.model.loads import LOADS
@@ -29,10 +29,11 @@ if TYPE_CHECKING:
 
     from solver.materials.law import Law
     from solver.model.body import Body
+    from solver.model.contact_pair import ContactPair
     from solver.model.friction import FrictionLaw
     from solver.model.link import Link
     from solver.model.loads import Load
-    from solver.model.model import ContactPair, Model
+    from solver.model.model import Model
     from solver.model.rigid import RigidBody
     from solver.model.tabulated import Tabulated
 
@@ -239,7 +240,7 @@ class Builder:
         return self.attempt(where, lambda: load_of(table, amplitude, files))
 
     def _contact(self, k: int, table: tables.ContactTable) -> ContactPair | None:
-        from solver.model.model import ContactPair
+        from solver.model.contact_pair import ContactPair
 
         slave, master = (tuple(side.split(".")) for side in (table.slave, table.master))
         for side, (body, boundary) in (("slave", slave), ("master", master)):

@@ -10,6 +10,7 @@ import numpy as np
 from solver.errors import ModelError
 from solver.memory import kept
 from solver.mesh.cells import collapsed, facets_of, mesh_of_cells, triangles_of
+from solver.mesh.meshed_rail import section_of
 from solver.mesh.rounding import ROUNDED, with_zeros
 from solver.mesh.section_mesh import FOOT, RUNNING, SectionMesh
 from solver.model.tabulated import Tabulated, columns_of
@@ -125,7 +126,7 @@ class MeshFile:
             if name not in known:
                 allowed = f"must name the lines {RUNNING} and {FOOT}; it has {', '.join(known)}"
                 raise ModelError("mesh", self.name, allowed)
-        return SectionMesh.of(mesh)
+        return section_of(mesh)
 
 
 @kept

@@ -28,5 +28,6 @@ def in_use(name: str, others: Collection[str]) -> bool:
     others : names of all parameters; a name made from one of them is in use
     """
     made = {name.removesuffix(end) for end in _ENDS} - {name}
-    grids = {*QUANTITIES, *IN_SPACE, *others}
-    return name in RESERVED or name.startswith(_BEGINNINGS) or not made.isdisjoint(grids)
+    if name in RESERVED or name.startswith(_BEGINNINGS):
+        return True
+    return any(each in names for names in (others, QUANTITIES, IN_SPACE) for each in made)

@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
 from solver.scenes import SCENES, Scene
+from solver.scenes.late import Late
 from studies.errors import StudyError, one_of
-from studies.scenes.description import Description
+from studies.scenes.file_scene import FileScene
 from studies.scenes.shipped import SHIPPED
+from studies.toml import read_toml
 
 GROUP = "residua.scenes"
 """Entry-point group of installed packages: each gives a `Scene`, or the path of a scene file."""
 
 Find = Callable[[str], Scene | None]
 """Returns the scene of a name or content id, or None."""
+
+_Make = Callable[..., FileScene]
+_read_scene: _Make = Late("studies.scenes.scene:read_scene")
+_shipped_scene: _Make = Late("studies.scenes.scene:shipped_scene")
+_stored_scene: _Make = Late("studies.scenes.scene:stored_scene")
 
 
 def nothing(name: str) -> Scene | None:
@@ -64,10 +70,17 @@ def known_scenes() -> Iterator[Scene]:
     return map(scene_named, known_names())
 
 
+def summaries() -> dict[str, str]:
+    """Return the summaries of the known scenes by name; of scene files nothing else is read."""
+    own = {name: read_toml(path, "scene") for name, path in SHIPPED.items()}
+    return {
+        name: own[name]["summary"] if name in own else scene_named(name).summary
+        for name in known_names()
+    }
+
+
 def name_of(scene: Scene) -> str:
     """Return the name of a scene in a study: its own, or the content id of one from a file."""
-    from studies.scenes.scene import FileScene
-
     return scene.id if isinstance(scene, FileScene) and scene.posted else scene.name
 
 
@@ -77,17 +90,13 @@ def beside(folder: Path) -> Find:
     def find(name: str) -> Scene | None:
         if not name.endswith(".toml"):
             return None
-        from studies.scenes.scene import read_scene
-
-        return read_scene(folder / name)
+        return _read_scene(folder / name)
 
     return find
 
 
 def attributes(scene: Scene) -> dict[str, str]:
     """Return the attributes of a data set that hold its scene, so that it needs no scene file."""
-    from studies.scenes.scene import FileScene
-
     if not (isinstance(scene, FileScene) and scene.posted):
         return {"scene": scene.name}
     content = scene.description.content
@@ -104,24 +113,12 @@ def scene_of(attributes: Mapping[str, Any]) -> Scene:
     """
     if "scene_file" not in attributes:
         return scene_named(attributes["scene"])
-    from studies.scenes.scene import file_scene
-
-    name, content = str(attributes["scene"]), json.loads(attributes["scene_file"])
-    return file_scene(Description(name, content, None))
+    return _stored_scene(str(attributes["scene"]), json.loads(attributes["scene_file"]))
 
 
 def _shipped(name: str) -> Scene | None:
     """Return the scene of this name from a file of the package, or None."""
-    if name not in SHIPPED:
-        return None
-    from studies.scenes.scene import file_scene
-
-    return file_scene(_description(SHIPPED[name]))
-
-
-@cache
-def _description(path: Path) -> Description:
-    return Description.read(path, shipped=True)
+    return _shipped_scene(SHIPPED[name]) if name in SHIPPED else None
 
 
 def _installed() -> dict[str, EntryPoint]:
@@ -132,9 +129,7 @@ def _loaded(entry: EntryPoint) -> Scene:
     """Return the scene that an installed package gives."""
     given = entry.load()
     if isinstance(given, str | Path):
-        from studies.scenes.scene import read_scene
-
-        return read_scene(given)
+        return _read_scene(given)
     if isinstance(given, Scene):
         return given
     allowed = f"must be a Scene or the path of a scene file, not {type(given).__name__}"

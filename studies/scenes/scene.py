@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, make_dataclass, replace
-from functools import lru_cache, partial
+from dataclasses import fields, make_dataclass, replace
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
@@ -21,7 +21,6 @@ from solver.results.record import Status
 from solver.results.run import FinishedRun, Output, Values
 from solver.scenes.effort import Effort
 from solver.scenes.material_parameters import ContactParameters
-from solver.scenes.scene import Scene
 from studies.errors import SceneError, StudyError
 from studies.scenes import tables
 from studies.scenes.building import Builder, friction_of, law_of, program_of
@@ -29,6 +28,7 @@ from studies.scenes.checking import contradictions, failed_checks, unmet_needs
 from studies.scenes.description import Description
 from studies.scenes.effort import effort_of, in_one_increment, too_large, too_long
 from studies.scenes.examining import examined
+from studies.scenes.file_scene import FileScene
 from studies.scenes.results import numbers_of, output_of, places_of, view_of
 from studies.scenes.tables import ACCURACY
 
@@ -37,31 +37,6 @@ if TYPE_CHECKING:
     from solver.model.model import Model
     from solver.results.samples import Samples
     from solver.results.view import View
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FileScene(Scene):
-    """A scene made from a file.
-
-    Attributes
-    ----------
-    description : the content of the file and its meshes
-    """
-
-    description: Description
-
-    @property
-    def posted(self) -> bool:
-        """Whether it is not of the package: studies call it by its content id."""
-        return not self.description.shipped
-
-    @property
-    def id(self) -> str:
-        """Content id of the file and its meshes."""
-        return self.description.digest
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return file_scene, (self.description,)
 
 
 def file_scene(description: Description, *, built: bool = False) -> FileScene:
@@ -127,6 +102,21 @@ def _scene_of(description: Description, scene: tables.SceneFile) -> FileScene:
         increment_error=scene.increment_error,
         description=description,
     )
+
+
+def shipped_scene(path: Path) -> FileScene:
+    """Return the scene of a file of the package."""
+    return file_scene(_shipped(path))
+
+
+@cache
+def _shipped(path: Path) -> Description:
+    return Description.read(path, shipped=True)
+
+
+def stored_scene(name: str, content: dict[str, Any]) -> FileScene:
+    """Return the scene of the content of a file, without its mesh files."""
+    return file_scene(Description(name, content, None))
 
 
 def read_scene(path: Path | str) -> FileScene:

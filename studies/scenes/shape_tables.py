@@ -12,8 +12,21 @@ from annotated_types import Interval
 from pydantic import Field
 
 from solver.errors import ModelError
-from solver.mesh import Near, ball, disc, fillet, grid, half_plane, pad, rectangle, refined, ring
-from solver.mesh.shapes import ball_lines, ball_sides, few
+from solver.mesh.grids import grid
+from solver.mesh.lines import refined
+from solver.mesh.shapes import (
+    Near,
+    ball,
+    ball_lines,
+    ball_sides,
+    disc,
+    few,
+    fillet,
+    half_plane,
+    pad,
+    rectangle,
+    ring,
+)
 from solver.parameters import Coordinate, Length
 from studies.scenes.table import Angles, Count, Place, SceneTable, Span
 

@@ -61,10 +61,12 @@ def attributes_of(name: str, scene: Scene | None = None) -> dict[str, str]:
 
     A ``scene`` may declare its own quantities.
     """
+    usual = {"long_name": name.replace("_", " ")}
+    if name in LABEL_ATTRIBUTES:
+        return usual | dict(LABEL_ATTRIBUTES[name])
     own = {each.name: each for each in scene.quantities} if scene else {}
-    quantity = QUANTITIES.get(name) or own.get(name) or IN_SPACE.get(name)
-    known = quantity.attributes if quantity else {"long_name": name.replace("_", " ")}
-    return known | dict(LABEL_ATTRIBUTES.get(name, {}))
+    quantity = own.get(name) or QUANTITIES.get(name) or IN_SPACE.get(name)
+    return quantity.attributes if quantity else usual
 
 
 def usual_dimensions(scene: Scene) -> tuple[str, ...]:

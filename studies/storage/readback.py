@@ -136,7 +136,7 @@ def _expected(
 def _words(name: str, scene: Scene) -> dict[str, Any]:
     """Return the declared attributes of a quantity; an undeclared one gets its name."""
     own = (each for each in scene.quantities if each.name == name)
-    declared = QUANTITIES.get(name) or next(own, None) or IN_SPACE.get(name)
+    declared = next(own, None) or QUANTITIES.get(name) or IN_SPACE.get(name)
     if declared is None:
         return {"long_name": name.replace("_", " "), "units": None}
     flags = list(declared.flags) if declared.flags else []

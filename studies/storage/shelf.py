@@ -14,17 +14,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from solver.files import appearing
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.errors import CatalogueDamaged, FileDamaged, StoreBusy
-from studies.scenes.description import Description, file_names
-from studies.scenes.meshfile import MeshFile
-from studies.scenes.scene import FileScene, file_scene
+from studies.scenes.file_scene import FileScene
 from studies.storage.database import Database
 from studies.storage.seal import State, bytes_of, check, content_of, sealed, sealed_json, state_of
+
+if TYPE_CHECKING:
+    from studies.scenes.description import Description
+    from studies.scenes.meshfile import MeshFile
 
 _FILE, _ARRAYS = "scene.json", ".arrays"
 _COLUMNS = "id, name, summary, branch, size, owner, added, parameters, state"
@@ -100,6 +102,9 @@ def _described(folder: Path, *states: State | None) -> Scene | None:
 
 def _made(folder: Path, whole: bool) -> FileScene | None:
     """Return a scene made from the content of its file."""
+    from studies.scenes.description import Description, file_names  # loads scipy
+    from studies.scenes.scene import file_scene
+
     scene_id, name = folder.name, f"scene {folder.name}"
     state = state_of(folder / _FILE) and state_of(folder)
     if state is None:
@@ -119,6 +124,8 @@ def _made(folder: Path, whole: bool) -> FileScene | None:
 
 def _mesh(path: Path, name: str) -> MeshFile:
     """Return a mesh of a scene, with its arrays if it was posted."""
+    from studies.scenes.meshfile import MeshFile  # loads scipy
+
     arrays, data = path.with_name(f"{path.name}{_ARRAYS}"), bytes_of(path, name)[0]
     if state_of(arrays) is None:
         return MeshFile(path.name, data)

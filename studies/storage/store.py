@@ -29,7 +29,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager, suppress
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from solver.files import appearing
 from solver.results.record import Record
@@ -40,15 +40,17 @@ from studies.definition.refine import OPEN
 from studies.definition.study import Study
 from studies.definition.vocabulary import STOPPED
 from studies.errors import CatalogueDamaged, FileDamaged, StoreFull, StudyError, Unusable
-from studies.scenes.description import Description
+from studies.scenes.file_scene import FileScene
 from studies.scenes.registry import known_names
-from studies.scenes.scene import FileScene
 from studies.storage import dataset as layout
 from studies.storage import runfile, seal, shelf
 from studies.storage.catalogue import BATCH, Catalogue, Row
 from studies.storage.lock import lock
 from studies.storage.readback import verified
 from studies.storage.room import needs_room
+
+if TYPE_CHECKING:
+    from studies.scenes.description import Description
 
 _STUDY = "study.json"
 _UNFINISHED = 600.0

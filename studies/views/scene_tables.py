@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from studies.definition.parameters import Parameter, parameters_of
-from studies.scenes.registry import beside, known_scenes, scene_named
+from studies.scenes.registry import beside, scene_named, summaries
 from studies.views.columns import aligned, value_text
 
 
 def scenes_table() -> str:
     """Return a line for each scene."""
-    return aligned([[scene.name, scene.summary] for scene in known_scenes()])
+    return aligned([list(each) for each in summaries().items()])
 
 
 def scene_table(name: str) -> str:

@@ -14,9 +14,9 @@ from tests.architecture.sources import ROOT, modules
 LAYERS = {
     # from the ground up; a module may import from its own layer and from those before it
     "solver": (
-        "version", "errors", "files", "parameters", "kinds", "parts", "memory", "tensors", "linear",
-        "mesh", "materials", "model", "fem", "contact", "loading", "steady", "prism", "results",
-        "scenes",
+        "version", "typing", "errors", "files", "parameters", "kinds", "parts", "memory", "tensors",
+        "linear", "mesh", "materials", "model", "fem", "contact", "loading", "steady", "prism",
+        "results", "scenes",
     ),
     "studies": (
         "units", "errors", "toml", "scratch", "scenes", "definition", "storage",

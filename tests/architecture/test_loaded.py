@@ -14,6 +14,7 @@ from tests.architecture.sources import ROOT
 
 NEVER = {"dask.array", "dask.dataframe", "matplotlib", "meshio", "numba", "pandas", "xarray"}
 """Each takes a tenth of a second to load, or much more, and memory of each worker."""
+ROLLING = ("solver.prism", "solver.steady", "solver.scenes.rolling_setup")
 
 PROGRAM = f"""
 import importlib, json, sys
@@ -49,5 +50,6 @@ def test_a_worker_loads_what_a_run_needs_before_it_is_forked_and_nothing_else(
     assert status == "ok"
     assert hashed == 1, "of the sources that are loaded, not of those after an update"
     assert not NEVER & set(after)
+    assert not [name for name in after if name.startswith(ROLLING)]
     first, last = ({name.partition(".")[0] for name in names} for names in (before, after))
     assert last - first <= sys.stdlib_module_names

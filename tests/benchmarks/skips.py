@@ -17,7 +17,8 @@ from solver import SCENES, Body, ContactPair, Material, Model, PathControl, solv
 from solver.contact import candidates
 from solver.memory import release
 from solver.mesh import grid
-from solver.scenes.punch import PunchParameters, model
+from solver.scenes.punch import PunchParameters
+from solver.scenes.punch_setup import model
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import steady_passes
 from tests.benchmarks.measure import timed

@@ -17,8 +17,8 @@ from fastapi.testclient import TestClient
 
 from service.app import create_app
 from service.settings import Settings
+from solver.mesh.meshed_rail import section_of
 from solver.mesh.rail import rail_60e1
-from solver.mesh.section_mesh import SectionMesh
 from solver.mesh.zone import Zone, rail_mesh
 from studies import Study, StudyError, open_study
 from studies.definition.files import read_study
@@ -453,7 +453,7 @@ def test_a_study_that_chooses_its_runs_has_the_same_id_everywhere(
 
 def test_a_study_holds_the_mesh_of_a_rail(service: Server) -> None:
     """It is data of the study as points are: no file is sent."""
-    mesh = SectionMesh.of(rail_mesh(rail_60e1(), Zone(at=0, half_width=20, depth=14, size=2.0)))
+    mesh = section_of(rail_mesh(rail_60e1(), Zone(at=0, half_width=20, depth=14, size=2.0)))
     study = {
         "name": "own-rail", "scene": "wheel_rail",
         "parameters": {"accuracy": "draft", "rail_profile": mesh},

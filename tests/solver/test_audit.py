@@ -22,7 +22,8 @@ from solver import (
 from solver.mesh import grid, mapped
 from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.report import audit
-from solver.scenes.punch import PunchParameters, model
+from solver.scenes.punch import PunchParameters
+from solver.scenes.punch_setup import model
 from tests.verification.bodies import block
 
 pytestmark = pytest.mark.solves

@@ -26,7 +26,7 @@ from solver.fem.discretisation import Discretisation
 from solver.mesh import grid, mapped
 from solver.model.friction import Coulomb
 from solver.scenes.punch import PunchParameters
-from solver.scenes.punch import model as punch_model
+from solver.scenes.punch_setup import model as punch_model
 from solver.scenes.rolling import ROLLING
 from solver.scenes.rolling_model import model as rolling_model
 from solver.scenes.rolling_parameters import RollingParameters

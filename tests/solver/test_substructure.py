@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from solver import ContactPair, Model, PathControl, System, solve
-from solver.scenes.punch import PunchParameters, model
+from solver.scenes.punch import PunchParameters
+from solver.scenes.punch_setup import model
 
 pytestmark = pytest.mark.solves
 

@@ -148,7 +148,7 @@ def judged(scene: Scene, audit: Audit) -> Status:
     plain = replace(scene, outputs=(), method=lambda run: one)
 
     def one(scene: Scene, runs: object, monitor: object) -> object:
-        from solver.scenes.scene import by_increments
+        from solver.scenes.driver import by_increments
 
         return (replace(look, check=lambda: audit) for look in by_increments(scene, runs, monitor))
 

@@ -33,7 +33,8 @@ from solver.mesh import grid
 from solver.model.amplitude import Amplitude
 from solver.model.loads import Temperature
 from solver.results.audit.report import audit
-from solver.scenes.punch import PunchParameters, model
+from solver.scenes.punch import PunchParameters
+from solver.scenes.punch_setup import model
 from tests.solver.laws import CURVES, LAYERED, STEEL, StoredCentre, chaboche, steel
 
 pytestmark = pytest.mark.solves

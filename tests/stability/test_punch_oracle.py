@@ -10,7 +10,8 @@ import pytest
 
 from solver import Outcome, PathControl, System, Walker
 from solver.contact.state import Converged
-from solver.scenes.punch import PunchParameters, model
+from solver.scenes.punch import PunchParameters
+from solver.scenes.punch_setup import model
 from tests.stability.kinds.punch_oracle import LIMITS, judge
 
 PARAMETERS = PunchParameters(

@@ -11,10 +11,12 @@ import pytest
 
 from residua.cli import main
 from solver.results.quantities import IN_SPACE, QUANTITIES
+from solver.scenes import SCENES, Scene
 from studies import Study, StudyError, open_study
+from studies.definition.parameters import parameters_of
 from studies.errors import SceneError
 from studies.scenes.description import Description
-from studies.scenes.names import RESERVED
+from studies.scenes.names import RESERVED, in_use
 from studies.scenes.scene import FileScene, file_scene
 from tests.studies.fakes import Canned
 from tests.studies.test_sensitivity import ishigami
@@ -137,6 +139,12 @@ def test_axes_of_any_name_go_all_the_way(
 def bar(number: str = "number", integer: str = "integer") -> FileScene:
     text = SCENE.replace("NUMBER", number).replace("WORD", "word").replace("INTEGER", integer)
     return file_scene(Description("bar.toml", tomllib.loads(text), {}))
+
+
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+def test_no_parameter_of_a_scene_of_the_package_has_a_name_of_data_sets(scene: Scene) -> None:
+    names = parameters_of(scene)
+    assert not [name for name in names if in_use(name, names)]
 
 
 def test_names_that_a_data_set_has_are_refused_before_a_run() -> None:

@@ -96,7 +96,7 @@ def test_a_run_is_the_same_bit_for_bit_whichever_others_share_its_path(
 
 def undeclared(record: Record) -> set[str]:
     """Return what a record gives and nobody has declared as it is given."""
-    declared = QUANTITIES | (IN_SPACE if "z" in record.coordinates else {})
+    declared = {**QUANTITIES, **(IN_SPACE if "z" in record.coordinates else {})}
     unknown = (record.scalars.keys() | record.fields.keys()) - declared.keys() - OWN
     unknown |= record.coordinates.keys() - declared.keys() - LABEL_ATTRIBUTES.keys()
     for name, (dims, _) in record.fields.items():

@@ -14,11 +14,11 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.sparse import eye_array
 
 from solver import Material, ModelError
+from solver.results.at_all_nodes import mesh_fields
 from solver.results.export import to_meshio
 from solver.results.extremes import residual_extremes
 from solver.results.fields import SystemFields
 from solver.results.maps import isochromatics, maps, profiles, surfaces
-from solver.results.mesh_fields import mesh_fields
 from solver.results.named_places import NamedPlaces, at_named_places
 from solver.results.record import Status
 from solver.results.requested import RequestedNumber
@@ -26,7 +26,7 @@ from solver.results.run import FinishedRun
 from solver.results.samples import Samples
 from solver.results.view import ACROSS_TRACK, NOWHERE, Places, View
 from solver.scenes import SCENES
-from solver.scenes.scene import _merged
+from solver.scenes.driver import _labelled, _merged
 from solver.tensors import to_mandel, von_mises
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.storage import ugrid
@@ -178,7 +178,7 @@ def records(parameters: RailParameters, values: Any, monitor: Any) -> Iterator[A
         run = finished(replace(parameters, load_ratio=load_ratio))
         outputs = (maps, isochromatics, profiles, surfaces, residual_extremes)
         found = {**_merged(run, outputs), **at_named_places(run, PLACES, ())}
-        record = RAIL._labelled(run, Status.OK, (), found)
+        record = _labelled(RAIL, run, Status.OK, (), found)
         fields = mesh_fields(run.samples.fields, run.outcome.points)
         yield replace(record, mesh=lambda fields=fields: fields)
 

@@ -31,15 +31,15 @@ import solver.results.shakedown
 import solver.results.singularity
 import solver.results.steady
 import solver.results.tractions
-import solver.scenes.rolling
+import solver.scenes.rolling_setup
 import solver.scenes.rolling_steady
 from solver.contact.candidates import Candidates
 from solver.contact.interface import Interface
 from solver.fem.fields import Sampler
 from solver.fem.loads import Superposed
 from solver.fem.softening import Softening
+from solver.model.contact_pair import ContactPair
 from solver.model.loads import InitialStress, Load, Temperature
-from solver.model.model import ContactPair
 from solver.results.contact_result import ContactResult
 from solver.results.fields import SystemFields
 from solver.results.requested import RequestedNumber
@@ -523,7 +523,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "residual stress of layers without zz": _passed(times(Layers, "stress", 0.9), "stored"),
     "the first pass told as the last": _passed(
-        instead(solver.scenes.rolling, "passes", first_pass_last), "stored"
+        instead(solver.scenes.rolling_setup, "passes", first_pass_last), "stored"
     ),
     "shear of a wheel against its way": _passed(
         instead(SteadyTractions, "along", part_times(1, -1.0)),

@@ -16,7 +16,8 @@ from solver.prism.profiled_wheel import ProfiledWheel
 from solver.prism.section import Section
 from solver.prism.state import PrismState
 from solver.prism.track import PrismTrack
-from solver.scenes.initial_stress import SectionStress, settled
+from solver.scenes.initial_stress import SectionStress
+from solver.scenes.wheel_rail_track import settled
 
 Array = NDArray[np.float64]
 RE = 502.0

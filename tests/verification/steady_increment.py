@@ -20,7 +20,7 @@ from solver.contact.state import ContactState, Converged, State
 from solver.loading.increment import Increment
 from solver.materials.material import Material
 from solver.model.amplitude import Amplitude
-from solver.model.model import ContactPair
+from solver.model.contact_pair import ContactPair
 from solver.model.motion import Axle
 from solver.scenes.rolling_model import wheel_body
 from solver.scenes.rolling_parameters import RollingParameters

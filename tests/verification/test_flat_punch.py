@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from solver import solve
-from solver.scenes.punch import PunchParameters, model
+from solver.scenes.punch import PunchParameters
+from solver.scenes.punch_setup import model
 from tests.verification.closed_forms import (
     corner_power,
     dundurs_lee_power,

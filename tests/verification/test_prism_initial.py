@@ -16,8 +16,9 @@ from solver.mesh.zone import Zone, rail_mesh
 from solver.prism import Section, SteppedPrism
 from solver.prism.straight import StraightPrism, straight_motions
 from solver.results.audit.prism import audit_prism
-from solver.scenes.initial_stress import NoStress, OverHeight, RollerStraightened, settled
+from solver.scenes.initial_stress import NoStress, OverHeight, RollerStraightened
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.scenes.wheel_rail_track import settled
 from solver.steady.passing import passing
 from tests.verification.prism_blocks import PERFECT, RE, block, ellipse, residual, stressed
 

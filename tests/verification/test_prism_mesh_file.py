@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from skfem import MeshQuad2
 
 from solver.errors import ModelError
+from solver.mesh.meshed_rail import MeshedRail, section_of
 from solver.mesh.rail import rail_60e1
-from solver.mesh.section_mesh import MeshedRail, SectionMesh
+from solver.mesh.section_mesh import SectionMesh
 from solver.mesh.zone import Zone, rail_mesh
 from solver.prism import PrismTrack, Section
 from solver.results.record import Status
@@ -96,7 +97,7 @@ WIDE = Zone(at=-1.0, half_width=24.0, depth=16.0, size=2.0)
 @pytest.fixture(scope="module")
 def own() -> SectionMesh:
     """60E1, upright, of 2 mm elements as wide as a wheel may need."""
-    return SectionMesh.of(rail_mesh(rail_60e1(), WIDE))
+    return section_of(rail_mesh(rail_60e1(), WIDE))
 
 
 def test_a_meshed_rail_has_the_outline_of_the_rail(own: SectionMesh) -> None:
@@ -161,7 +162,7 @@ HIDDEN = 40
 def changed(own: SectionMesh, change: str) -> SectionMesh:
     """The mesh with a mistake."""
     if change == "coarse":
-        return SectionMesh.of(rail_mesh(rail_60e1(), replace(WIDE, size=8.0)))
+        return section_of(rail_mesh(rail_60e1(), replace(WIDE, size=8.0)))
     at = own.points[own.cells[0][0]]
     return {
         "gap": own._replace(running=own.running[:8] + own.running[9:]),
@@ -205,7 +206,7 @@ def test_a_mesh_that_is_no_section_is_refused(own: SectionMesh, change: str, tol
 
 def test_edges_as_wide_as_the_zone_are_refused() -> None:
     """No edge has its middle in the zone."""
-    coarse = MeshedRail.of(SectionMesh.of(rail_mesh(rail_60e1(), replace(WIDE, size=8.0))))
+    coarse = MeshedRail.of(section_of(rail_mesh(rail_60e1(), replace(WIDE, size=8.0))))
     with pytest.raises(ModelError, match="at most 2 mm wide where the wheel may touch, not 8"):
         coarse.zoned(Zone(at=-1.0, half_width=2.0, depth=2.0, size=1.0), 2.0)
 

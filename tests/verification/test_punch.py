@@ -16,7 +16,8 @@ import pytest
 
 from solver import SCENES, PathControl, Status, solve
 from solver.fem.fields import Sampler
-from solver.scenes.punch import PunchParameters, model
+from solver.scenes.punch import PunchParameters
+from solver.scenes.punch_setup import model
 
 PLATEAU = 1 / 0.5714
 FRICTIONS = (0.0, 0.1, 0.2, 0.3, 0.4)

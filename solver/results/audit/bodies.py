@@ -4,21 +4,14 @@ from __future__ import annotations
 
 import itertools
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.system import LEAST
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged
-    from solver.contact.system import System
-    from solver.materials.law import Law
-    from solver.results.audit.plain import PlainBody
-
-    Array = NDArray[np.float64]
+from solver.contact.state import Converged
+from solver.contact.system import LEAST, System
+from solver.materials.law import Law
+from solver.results.audit.plain import PlainBody
+from solver.typing import Array, Bools
 
 
 class AuditedBody:
@@ -127,7 +120,7 @@ class AuditedBody:
         return np.asarray(moments[1:] / body.box.max())
 
     @cached_property
-    def held(self) -> NDArray[np.bool_]:
+    def held(self) -> Bools:
         """Whether supports hold, or loads prescribe, displacements (n_nodes, 2)."""
         body = self.plain.body
         held = np.zeros((self.plain.part.X.shape[1], 2), dtype=bool)
@@ -140,7 +133,7 @@ class AuditedBody:
         return held
 
     @property
-    def free(self) -> NDArray[np.bool_]:
+    def free(self) -> Bools:
         """Whether unknowns (n_nodes, 2) are free; False for the copies of a periodic body."""
         part = self.plain.part
         own = part.same == np.arange(len(part.same))

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Bools, Ints
 
 LIMIT = 1e-6
 """Limit of difference / scale, a multiple of rounding: both interpolate in the same elements."""
@@ -49,7 +46,7 @@ class Compared:
         off = np.abs(stored[known] - own[known]) / max(scale, 1e-300) * share
         self._worst(name, float(np.where(np.isnan(off), 1.0, off).max(initial=0.0)))
 
-    def absent(self, name: str, stored: Array, outside: NDArray[np.bool_]) -> None:
+    def absent(self, name: str, stored: Array, outside: Bools) -> None:
         """Check that values (..., n) are NaN at places outside the body."""
         if np.isfinite(stored[..., outside]).any():
             self._worst(name, 1.0)
@@ -59,7 +56,7 @@ class Compared:
             self.figure, self.name = figure, name
 
 
-def some(count: int, *fields: Array) -> NDArray[np.int64]:
+def some(count: int, *fields: Array) -> Ints:
     """Return the numbers of some places, evenly spread, and where fields (..., n) are largest."""
     spread = np.floor(np.arange(1, _COUNT + 1) * _GOLDEN % 1.0 * count).astype(np.int64)
     largest = [np.argmax(np.abs(np.nan_to_num(one)))

@@ -12,24 +12,17 @@ The square of the difference would be unbounded under refinement at a sharp corn
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from solver.contact.pressure import contact_pressure
+from solver.contact.state import Converged, State
+from solver.contact.system import System
 from solver.fem.error import ErrorPoints
+from solver.fem.surface import Surface
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.results.audit.surfaces import deformed
 from solver.tensors import to_tensor
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged, State
-    from solver.contact.system import System
-    from solver.fem.surface import Surface
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
 _ROUNDING = 1e-6

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from solver.fem.fields import Sampler, recovery
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.results.fields import Bodies
+from solver.results.fields import Bodies
+from solver.typing import Array
 
 
-def cut_force(
-    system: Bodies, body: str, stress: NDArray[np.float64], where: NDArray[np.float64]
-) -> float:
+def cut_force(system: Bodies, body: str, stress: Array, where: Array) -> float:
     """Return the normal force on a plane cut, over yield stress times area of the cut.
 
     ``where`` (2, n) are points along the straight cut [mm]; ``stress`` (4, n_points) is Mandel

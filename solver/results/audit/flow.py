@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from solver.materials.state import Response
+from solver.materials.law import Law
+from solver.materials.state import PlasticState, Response
 from solver.results.audit.large_strain import of_material
-from solver.results.audit.theory import equivalent
+from solver.results.audit.theory import Neglected, equivalent
+from solver.steady import Pass
 from solver.steady.flow import LEAST
+from solver.typing import Array, Ints
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.materials.state import PlasticState
-    from solver.results.audit.theory import Neglected
-    from solver.steady import Pass
-
-    Array = NDArray[np.float64]
-    Rows = NDArray[np.int64] | slice
+Rows = Ints | slice
 
 
 class AuditedFlow:

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
 from solver.contact.candidates import find_candidates
+from solver.contact.state import Converged
+from solver.contact.system import System
 from solver.fem.wheel import Wheel
+from solver.results.audit.bodies import AuditedBody
+from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.surfaces import deformed
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged
-    from solver.contact.system import System
-    from solver.results.audit.bodies import AuditedBody
-    from solver.results.audit.pairs import AuditedPair
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Bools
 
 _ROUNDED = 1e-5
 """Ratio to the force level up to which rounding is subtracted from nodal forces."""
@@ -71,7 +64,7 @@ def left_on(bodies: Sequence[AuditedBody]) -> float:
     return float(np.linalg.norm(left))
 
 
-def _of_pairs(body: AuditedBody, pairs: Sequence[AuditedPair]) -> tuple[Array, NDArray[np.bool_]]:
+def _of_pairs(body: AuditedBody, pairs: Sequence[AuditedPair]) -> tuple[Array, Bools]:
     """Return nodal forces (n_nodes, 2) of the pairs on a body, in space, and whether they act."""
     whole = body.plain.part
     force = np.zeros((whole.X.shape[1], 2))

@@ -31,31 +31,22 @@ in the space of logarithmic strain.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.contact.candidates import no_candidates
-from solver.contact.system import LEAST
+from solver.contact.state import Converged, State
+from solver.contact.system import LEAST, System
 from solver.fem.frame import turning
 from solver.fem.rigid import RigidPart
 from solver.loading.step import newton_step
-from solver.results.audit.plain import GHOST
+from solver.materials.elasticity import Elasticity
+from solver.results.audit.plain import GHOST, PlainBody
 from solver.results.audit.theory import Neglected
 from solver.tensors import SQRT2, to_tensor
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged, State
-    from solver.contact.system import System
-    from solver.materials.elasticity import Elasticity
-    from solver.results.audit.plain import PlainBody
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _FEW = 0.01
 """Least share of a body in the elastic energy of all; the stress of a body with less counts as that

@@ -7,24 +7,18 @@ nearest place of the master, and of the rigid body.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from solver.contact.system import LEAST, LEAST_ENERGY
+from solver.contact.state import Converged, State
+from solver.contact.system import LEAST, LEAST_ENERGY, System
+from solver.fem.frame import RigidMotion
 from solver.fem.rigid import RigidPart
 from solver.fem.surface import edges_of
 from solver.mesh.edges import shape_derivatives, shape_functions
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged, State
-    from solver.contact.system import System
-    from solver.fem.frame import RigidMotion
-    from solver.model.link import Link, Side
-
-    Array = NDArray[np.float64]
+from solver.model.link import Link, Side
+from solver.typing import Array
 
 _PIECES = 16
 """Number of pieces of an edge; more where edges of the other side are shorter."""

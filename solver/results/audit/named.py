@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,25 +12,16 @@ from solver.model.rigid import Moved, RigidBody
 from solver.results.audit.compared import AREA, LEAST_STRAIN, LIMIT, MEASURED, Compared, some
 from solver.results.audit.links import linked
 from solver.results.audit.plain import load_factor
-from solver.results.audit.sources import between
-from solver.results.audit.tractions import COVERED
+from solver.results.audit.sources import OfStates, between
+from solver.results.audit.tractions import COVERED, Tractions
 from solver.results.audit.values import Located, at_nodes
 from solver.results.body_fields import BODY_FIELDS, STORED
+from solver.results.named_places import NamedPlaces
+from solver.results.record import Record
+from solver.results.requested import RequestedNumber
+from solver.results.run import FinishedRun
 from solver.tensors import AXES, components
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.results.audit.sources import OfStates
-    from solver.results.audit.tractions import Tractions
-    from solver.results.named_places import NamedPlaces
-    from solver.results.record import Record
-    from solver.results.requested import RequestedNumber
-    from solver.results.run import FinishedRun
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _LEAST_LENGTH = 1e-9
 """Least scale of displacement, gap and slip, over the size of the bodies."""

@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from solver.contact.pressure import contact_pressure
-from solver.contact.system import LEAST
+from solver.contact.state import Converged, State
+from solver.contact.system import LEAST, System
+from solver.model.contact_pair import ContactPair
 from solver.model.friction import ContactPlaces, lines_of
-from solver.results.audit.surfaces import Surfaces
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged, State
-    from solver.contact.system import System
-    from solver.model.model import ContactPair
-    from solver.results.audit.surfaces import PairState
-
-    Array = NDArray[np.float64]
+from solver.results.audit.surfaces import PairState, Surfaces
+from solver.typing import Array, Bools
 
 PRESSED = 1e-6
 """Ratio of the normal force to the force level; below it a vertex counts as open."""
@@ -79,7 +71,7 @@ def untouched(system: System, states: Iterable[Converged]) -> tuple[str, ...]:
     )
 
 
-def _closed(state: State, number: int) -> NDArray[np.bool_]:
+def _closed(state: State, number: int) -> Bools:
     return np.asarray(state.contacts[number].normal > PRESSED * state.force_scale)
 
 

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.materials.law import Law
 from solver.prism import EllipticPatch, RollingPatch
 from solver.prism.friction_cone import NORMAL, TANGENTS
 from solver.prism.half_space import half_space
+from solver.prism.patch_contact import PatchContact, PatchLoad
 from solver.results.audit.flow import largest
 from solver.results.audit.pairs import COARSE, GAP, OVERLAP, PRESSED, STILL
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.prism.patch_contact import PatchContact, PatchLoad
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _FORCE = 1e-6
 """Largest tension and friction excess, over the force."""

@@ -9,29 +9,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from solver.fem.cells import smooth_cells
+from solver.fem.discretisation import Discretisation
 from solver.fem.surface import edges_of
 from solver.materials.heated import Heated
+from solver.materials.law import Law
+from solver.materials.state import PlasticState
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.mesh.elements import element_type
+from solver.model.amplitude import Amplitude
+from solver.model.body import Body
+from solver.model.loads import Load
 from solver.tensors import SQRT2, to_mandel, to_tensor
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.fem.discretisation import Discretisation
-    from solver.materials.law import Law
-    from solver.materials.state import PlasticState
-    from solver.model.amplitude import Amplitude
-    from solver.model.body import Body
-    from solver.model.loads import Load
-
-    Array = NDArray[np.float64]
-
+from solver.typing import Array, Ints
 
 _CHORDS, _HALVINGS, _BENT = 64, 40, 1e-7
 """Number of chords into which an edge is divided, and of times that chords are halved on which the
@@ -68,7 +62,7 @@ class PlainBody:
         return X
 
     @cached_property
-    def _nodes(self) -> NDArray[np.int64]:
+    def _nodes(self) -> Ints:
         return np.asarray(self.part.same[self.part.basis.element_dofs])
 
     @cached_property

@@ -10,25 +10,20 @@ field. What lies outside the zone is solved anew, with the whole section, for a 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from solver.fem.surface import edges_of
 from solver.linear import solvers as linear
+from solver.linear.solvers import LinearSolver
 from solver.mesh.edges import shape_derivatives, shape_functions
+from solver.prism import PrismTrack
+from solver.prism.section import Stiffness
 from solver.tensors import SQRT2
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.linear.solvers import LinearSolver
-    from solver.prism import PrismTrack
-    from solver.prism.section import Stiffness
-
-    Array = NDArray[np.float64]
-    Complex = NDArray[np.complex128]
+from solver.typing import Array, Complexes, Ints
 
 _SAMPLED = (0, 1, 5)
 """Waves of which the whole section is solved: the mean along x, where springs and supports carry
@@ -51,10 +46,10 @@ class Waves(NamedTuple):
     strain : (n_points, waves, 6) strain at the points of the zone, Mandel
     """
 
-    u: Complex
-    pulled: Complex
-    pushed: Complex
-    strain: Complex
+    u: Complexes
+    pulled: Complexes
+    pushed: Complexes
+    strain: Complexes
 
 
 class PlainPrism:
@@ -95,7 +90,7 @@ class PlainPrism:
         shape = (*self.area.shape, 6, -1)
         return still.reshape(shape), waving.reshape(shape)
 
-    def _rows(self, operator: Array, elements: NDArray[np.int64]) -> sparse.csr_array:
+    def _rows(self, operator: Array, elements: Ints) -> sparse.csr_array:
         """Return an operator at the points of elements as a matrix (6 n_points, n)."""
         values = operator[elements]
         columns = np.broadcast_to(self._dofs[elements][:, None, None], values.shape)
@@ -166,7 +161,7 @@ class PlainPrism:
         return found
 
     @cached_property
-    def _turn(self) -> Complex:
+    def _turn(self) -> Complexes:
         """(n,) i for displacements along x, 1 for others."""
         return np.tile([1j, 1.0, 1.0], self._n // 3)
 
@@ -203,12 +198,12 @@ class PlainPrism:
         tail = eigenstress[:, -1:] * fading[:, None]
         return np.concatenate([eigenstress, tail], axis=1)
 
-    def _force(self, stress: Complex) -> Complex:
+    def _force(self, stress: Complexes) -> Complexes:
         """Return the nodal forces (n, waves) of a stress (n_points, waves, 6), as amplitudes."""
         flat = stress.swapaxes(1, 2).reshape(-1, stress.shape[1]) * self._zone_area[:, None]
         return _times(self._still.T, flat) - 1j * self._k * _times(self._waving.T, flat)
 
-    def _strain(self, u: Complex) -> Complex:
+    def _strain(self, u: Complexes) -> Complexes:
         """Return the strain amplitudes (n_points, waves, 6) of displacements (n, waves)."""
         flat = _times(self._still, u) + 1j * self._k * _times(self._waving, u)
         return np.asarray(flat.reshape(-1, 6, u.shape[1]).swapaxes(1, 2))
@@ -258,14 +253,14 @@ class PlainPrism:
     @cached_property
     def _around(
         self,
-    ) -> tuple[sparse.csr_array, sparse.csr_array, NDArray[np.int64], Stiffness, LinearSolver]:
+    ) -> tuple[sparse.csr_array, sparse.csr_array, Ints, Stiffness, LinearSolver]:
         """Operators of elements outside the zone; unknowns there, their stiffness, and a solver."""
         still, waving = (self._rows(each, self._outside) for each in self._gradients)
         rest = np.setdiff1d(self.track.section.free, self.track.modes.unknowns)
         stiffness = self.track.section.stiffness(rest)
         return still, waving, rest, stiffness, linear.analyse(stiffness.pattern)
 
-    def resultants(self, pulled: Complex) -> Array:
+    def resultants(self, pulled: Complexes) -> Array:
         """Return forces along x, y, z [N] and the moment about x [N mm] of nodal forces."""
         force = self.spacing * pulled[:, 0].real.reshape(-1, 3)
         z, y = self.track.section.plane.X - self.track.section.plane.X.mean(axis=1, keepdims=True)
@@ -339,7 +334,7 @@ class PlainPrism:
         shares = np.linalg.solve(left[:, 1:], -left[:, 0])
         return free + relaxed(held) + np.tensordot(shares, np.stack(each), 1)
 
-    def _solved(self, wave: int, force: Complex) -> Complex:
+    def _solved(self, wave: int, force: Complexes) -> Complexes:
         """Return the displacement (n,) of the whole section for forces (n,) in a sampled wave."""
         free, u = self.track.section.free, np.zeros(self._n, dtype=complex)
         # motions of the whole section, against the springs alone, are found without its stiffness
@@ -355,7 +350,7 @@ class PlainPrism:
     # -- the surface ---------------------------------------------------------------------------
 
     @cached_property
-    def _chain(self) -> tuple[NDArray[np.int64], Array]:
+    def _chain(self) -> tuple[Ints, Array]:
         """Edges (m - 1, 3), from small to large z: first, last, middle; and their lengths."""
         X = self.track.section.plane.X
         edges = edges_of(self.track.section.plane, self.track.boundary)
@@ -413,7 +408,7 @@ class PlainPrism:
         return self.resultants(nodal)
 
 
-def _times(matrix: sparse.csr_array, values: Complex) -> Complex:
+def _times(matrix: sparse.csr_array, values: Complexes) -> Complexes:
     """Return the product of a real matrix with complex values (n, m), as real numbers."""
     real = np.ascontiguousarray(values).view(np.float64)
     return np.asarray(np.ascontiguousarray(matrix @ real).view(np.complex128))

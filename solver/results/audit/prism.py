@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from solver.materials.law import Law
+from solver.prism import PrismState, PrismTrack
 from solver.prism.patch_passing import AppliedPatch
 from solver.results.audit.flow import AuditedFlow, difference, largest
 from solver.results.audit.patch import AuditedPatch
 from solver.results.audit.plain_prism import PlainPrism
 from solver.results.audit.report import Audit, broken, limits_at, warnings
 from solver.results.audit.theory import largest_strain
+from solver.steady import Pass
 from solver.steady.flow import INFLOW, usual_parts
 from solver.steady.passing import TOLERANCE, deviation
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.prism import PrismState, PrismTrack
-    from solver.steady import Pass
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Ints
 
 _LENGTH = 0.01
 """Largest stress of the last level of the far field, over the yield stress."""
@@ -115,7 +108,7 @@ def audit_prism(
     )
 
 
-def _rows(found: Pass[PrismState]) -> NDArray[np.int64]:
+def _rows(found: Pass[PrismState]) -> Ints:
     """Return the rows along which the law is repeated: half yield most, half lie anywhere."""
     added = (found.accumulated - found.before.accumulated[:, None]).max(axis=1)
     count = min(_ROWS, len(added)) // 2

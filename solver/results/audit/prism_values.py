@@ -7,23 +7,17 @@ of the whole section comes from displacements, which do not change along x.
 from __future__ import annotations
 
 from functools import cache, cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.prism.state import PrismState
+from solver.prism.track import PrismTrack
 from solver.results.audit.plain import PlainBody
 from solver.results.audit.recomputed import Acting
+from solver.results.prism import PrismBody, PrismStage
+from solver.steady import Pass
 from solver.tensors import SQRT2
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.prism.state import PrismState
-    from solver.prism.track import PrismTrack
-    from solver.results.prism import PrismBody, PrismStage
-    from solver.steady import Pass
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 
 class PlainSection(PlainBody):

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from solver.results.audit.plain import PlainBody
-
-    Array = NDArray[np.float64]
+from solver.results.audit.plain import PlainBody
+from solver.typing import Array
 
 
 class BodyFields(Protocol):

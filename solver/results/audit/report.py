@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.contact.pressure import contact_pressure
-from solver.contact.system import LEAST
+from solver.contact.state import Converged
+from solver.contact.system import LEAST, System
+from solver.fem.discretisation import Discretisation
 from solver.fem.error import error_estimate
 from solver.loading.integration import missed
 from solver.results.audit.bodies import AuditedBody
@@ -20,15 +22,7 @@ from solver.results.audit.links import least_energy, links_error, turned
 from solver.results.audit.pairs import AuditedPair
 from solver.results.audit.plain import PlainBody
 from solver.results.audit.theory import accumulated_strain, plastic_strain
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged
-    from solver.contact.system import System
-    from solver.fem.discretisation import Discretisation
+from solver.typing import Array
 
 _TOLD = {
     "audit_surface_shear": (
@@ -191,9 +185,7 @@ def _discretisation(
     }
 
 
-def estimated_error(
-    bodies: Iterable[tuple[Discretisation, NDArray[np.float64]]], least: float = 0.0
-) -> float:
+def estimated_error(bodies: Iterable[tuple[Discretisation, Array]], least: float = 0.0) -> float:
     """Return the estimated relative error of the stress of bodies in the energy norm.
 
     A smaller energy than ``least`` [N mm] is replaced by it.

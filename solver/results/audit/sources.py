@@ -4,24 +4,18 @@ from __future__ import annotations
 
 import itertools
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from solver.model.motion import TravellingPressure
 from solver.results.audit.plain import PlainBody, load_factor
-from solver.results.audit.recomputed import Acting
+from solver.results.audit.recomputed import Acting, BodyFields
 from solver.results.audit.tractions import Tractions
 from solver.results.audit.values import StateFields
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.model.motion import TravellingPressure
-    from solver.results.audit.recomputed import BodyFields
-    from solver.results.run import FinishedRun
-    from solver.results.view import View
-
-    Array = NDArray[np.float64]
+from solver.results.run import FinishedRun
+from solver.results.view import View
+from solver.typing import Array
 
 
 def between(x: Array, at: Array, values: Array) -> Array:

@@ -3,33 +3,25 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.materials.law import Law
+from solver.model.motion import TravellingPressure
 from solver.results.audit.flow import AuditedFlow, difference, largest
+from solver.results.audit.pass_fields import PassFields
 from solver.results.audit.plain import PlainBody, load_factor
-from solver.results.audit.recomputed import Acting
+from solver.results.audit.recomputed import Acting, BodyFields
 from solver.results.audit.report import Audit, broken, estimated_error, limits_at, warnings
 from solver.results.audit.sources import between, hertz
 from solver.results.audit.theory import Neglected, equivalent, largest_strain
-from solver.results.audit.values import PassFields
-from solver.steady import RollingContact
+from solver.results.steady import TrackBody
+from solver.steady import Pass, RollingContact, Track
 from solver.steady.fields import of_layers, under_load
 from solver.steady.flow import INFLOW
+from solver.steady.layers import Layers
 from solver.steady.passing import TOLERANCE
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.materials.law import Law
-    from solver.model.motion import TravellingPressure
-    from solver.results.audit.recomputed import BodyFields
-    from solver.results.steady import TrackBody
-    from solver.steady import Pass, Track
-    from solver.steady.layers import Layers
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _LIMITS = {"audit_inflow": INFLOW, "audit_steadiness": TOLERANCE}
 

@@ -12,28 +12,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.results.audit.compared import LEAST_STRAIN, LIMIT, MEASURED, STEADY, Compared, some
 from solver.results.audit.figures import AUDIT
 from solver.results.audit.named import NamedPlacesCheck
+from solver.results.audit.recomputed import Recomputed
 from solver.results.audit.sources import OfStates, along, between
 from solver.results.audit.values import Located, at_nodes, flowed
 from solver.results.body_fields import BODY_FIELDS, STORED
+from solver.results.named_places import NamedPlaces
+from solver.results.record import Record
+from solver.results.run import FinishedRun
+from solver.results.view import View
 from solver.tensors import AXES, components
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.results.audit.recomputed import Recomputed
-    from solver.results.named_places import NamedPlaces
-    from solver.results.record import Record
-    from solver.results.run import FinishedRun
-    from solver.results.view import View
-
-    Array = NDArray[np.float64]
+from solver.typing import Array
 
 _FIGURE = AUDIT["audit_stored"].name
 _NEAR = 0.1

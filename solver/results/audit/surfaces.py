@@ -7,29 +7,22 @@ under the hats of the slave's vertices, to which contact forces belong.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.contact.normals import is_curved
 from solver.contact.overlap import largest_overlap
+from solver.contact.state import State
+from solver.contact.system import System
 from solver.fem.rigid import RigidPart
+from solver.fem.surface import Surface
 from solver.fem.wheel import Wheel
 from solver.mesh.edges import shape_derivatives, shape_functions
+from solver.model.contact_pair import ContactPair
 from solver.results.audit.plain import load_factor
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from solver.contact.state import State
-    from solver.contact.system import System
-    from solver.fem.surface import Surface
-    from solver.model.model import ContactPair
-
-    Array = NDArray[np.float64]
+from solver.typing import Array, Bools, Ints
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
 _NEWTON_STEPS = 5
@@ -161,7 +154,7 @@ class Surfaces:
             worst = max(worst, longest / width)
         return worst
 
-    def _halved(self) -> NDArray[np.bool_]:
+    def _halved(self) -> Bools:
         """Return whether the slave ends at the axis or a plane of symmetry, for both ends (2,).
 
         At a plane of symmetry a support holds it along its surface, and not across.
@@ -267,9 +260,7 @@ class Surfaces:
         )
 
 
-def _points(
-    slave: Surface, xs: Array, master: Surface, xm: Array
-) -> tuple[NDArray[np.int64], Array, Array]:
+def _points(slave: Surface, xs: Array, master: Surface, xm: Array) -> tuple[Ints, Array, Array]:
     """Return edge, coordinate on it and weight of the integration points (n,) on the slave.
 
     The edges are cut opposite the master's vertices, at the kinks of the integrand. The normals of
@@ -297,14 +288,14 @@ def _on(surface: Surface, x: Array) -> Array:
     return np.asarray(x[:, surface.nodes])
 
 
-def _spread(force: Array, nodes: NDArray[np.int64], shape: Array, count: int) -> Array:
+def _spread(force: Array, nodes: Ints, shape: Array, count: int) -> Array:
     """Return nodal forces (count, 2) of point forces (2, n) by shape functions (n, k)."""
     return np.stack(
         [np.bincount(nodes.ravel(), (f[:, None] * shape).ravel(), count) for f in force], axis=1
     )
 
 
-def _bent(surface: Surface, vertices: NDArray[np.int64]) -> bool:
+def _bent(surface: Surface, vertices: Ints) -> bool:
     """Whether the undeformed surface is curved next to vertices; a corner does not count."""
     first, last = _at_ends(surface.X, surface)
     within = np.pad(np.linalg.norm(last - first, axis=0), 1)
@@ -314,7 +305,7 @@ def _bent(surface: Surface, vertices: NDArray[np.int64]) -> bool:
     return bool((bend[vertices] > _STRAIGHT).any())
 
 
-def _normals(x: Array, surface: Surface, edges: NDArray[np.int64], xi: Array) -> Array:
+def _normals(x: Array, surface: Surface, edges: Ints, xi: Array) -> Array:
     """Return unit normals (2, n), interpolated between the ends of the edges.
 
     Neighbouring edges share their mean normal, except at corners of the undeformed surface.
@@ -374,9 +365,7 @@ def _cross(a: Array, b: Array) -> Array:
     return np.asarray(a[0] * b[1] - a[1] * b[0])
 
 
-def _met(
-    corners: Array, points: Array, way: Array, reach: float
-) -> tuple[NDArray[np.int64], Array, Array]:
+def _met(corners: Array, points: Array, way: Array, reach: float) -> tuple[Ints, Array, Array]:
     """Return the chord (n,) that lines intersect from outside, the coordinate on it, and 1 or 0."""
     side = _cross(way[:, :, None], corners[:, None, :] - points[:, :, None])
     chord = np.diff(corners)

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged, State
-    from solver.contact.system import System
-    from solver.materials.state import PlasticState
-    from solver.model.singular import SingularPoint
-
-    Array = NDArray[np.float64]
+from solver.contact.state import Converged, State
+from solver.contact.system import System
+from solver.materials.state import PlasticState
+from solver.model.singular import SingularPoint
+from solver.typing import Array
 
 LARGE = 0.05
 """Largest share that small-strain theory may leave out."""

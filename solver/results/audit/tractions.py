@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.contact.state import Converged
+from solver.contact.system import System
 from solver.mesh.edges import shape_derivatives, shape_functions
-from solver.results.audit.surfaces import Surfaces, deformed
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.contact.state import Converged
-    from solver.contact.system import System
-    from solver.results.audit.surfaces import PairState
-
-    Array = NDArray[np.float64]
+from solver.results.audit.surfaces import PairState, Surfaces, deformed
+from solver.typing import Array, Bools
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
 _WHOLE = 1e-6
@@ -66,7 +59,7 @@ class Tractions:
         return np.append(0.0, np.cumsum(np.hypot(*np.diff(self.X))))
 
     @property
-    def closed(self) -> NDArray[np.bool_]:
+    def closed(self) -> Bools:
         """Whether vertices (n,) carry pressure."""
         return np.asarray(self._contact.normal > 0)
 
@@ -81,7 +74,7 @@ class Tractions:
         return self._surfaces.finite or self._surfaces.curved
 
     @cached_property
-    def whole(self) -> NDArray[np.bool_]:
+    def whole(self) -> Bools:
         """Whether the hat of a vertex faces the master completely or not at all.
 
         The part of another hat that faces it depends on the projection.
@@ -94,7 +87,7 @@ class Tractions:
         return self.touching.area / self._area
 
     @cached_property
-    def known(self) -> NDArray[np.bool_]:
+    def known(self) -> Bools:
         """Whether the hats of a vertex and its neighbours face the master completely or not at all.
 
         Pressure and shear are means over the hats of neighbours.

@@ -18,7 +18,8 @@ from matplotlib.ticker import MaxNLocator
 from solver.model.rigid import RigidBody
 from solver.results.named_places import NamedPlaces
 from solver.results.view import View
-from solver.scenes.scene import Scene, Sketch
+from solver.scenes.scene import Scene
+from solver.scenes.sketch import Sketch
 from solver.tensors import AXES
 from studies.definition.parameters import build, defaults, parameters_of
 from studies.errors import StudyError

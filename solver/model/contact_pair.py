@@ -1,0 +1,102 @@
+"""Two boundaries that may touch."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.kinds import check_kinds
+from solver.model.amplitude import Amplitude
+from solver.model.friction import Coulomb, FrictionLaw
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactPair:
+    """Two boundaries that may touch.
+
+    Attributes
+    ----------
+    slave, master : ``(body name, boundary name)``. Gap, slip, pressure and shear are defined at the
+        vertices of the slave: the mean gap around each vertex must not be negative. Choose as slave
+        the surface that ends at a corner, else the finer one or the one that yields. They are
+        exchanged if the slave is unsuitable (`solver.contact.slave`)
+    friction : Coulomb coefficient; zero, or a value that counts as zero (`effective_friction`),
+        leaves out the tangential unknowns. Or a law of friction (`FrictionLaw`)
+    cohesion : shear that contact carries in addition to friction [MPa]: the shear is at most
+        ``friction * pressure + min(cohesion, pressure)``
+    shear_limit : ratio of the largest contact shear to the initial shear yield stress of the weaker
+        body, at any pressure; inf (default) sets no limit. If heat lowers the yield stress
+        (`Temperature`), that of the surfaces at the end of the increment counts. If friction
+        permits more shear than the material, the surface layer flows instead of slipping, and its
+        strain grows as the mesh is refined
+    sliding : which point of the master belongs to a point of the slave, and along which normal.
+        ``small``: always the point it faces before loading; consistent with small strains, and
+        exactly linear between changes of status. ``finite``: the point it faces in the current
+        positions, paired again in every iteration. ``auto`` (default): ``finite`` if either surface
+        is curved or bent before loading, else ``small`` until the surfaces have moved too far for
+        it (`solver.contact.drift`). Small sliding is wrong if surfaces move along each other by
+        more than an element, which the audit calls outside small-strain theory, or curved ones by
+        more than a hundredth of the contact's length, of which it warns
+    gap : gap added to the distance of the surfaces as meshed [mm]
+    interference : overlap at load factor 1, in addition to that of the mesh [mm]: a load, which
+        pushes the bodies apart with friction
+    amplitude : load factor of the interference; when absent, time is the load factor
+    presence : whether the pair is there over time: its surfaces may touch while it is above 0 and
+        does not decrease. While it decreases its forces decrease with it, wherever the surfaces
+        are; at 0 there is no pair, and bodies pass through each other. When absent, always 1
+    """
+
+    slave: tuple[str, str]
+    master: tuple[str, str]
+    friction: float | FrictionLaw = 0.0
+    shear_limit: float = math.inf
+    sliding: Literal["auto", "small", "finite"] = "auto"
+    cohesion: float = 0.0
+    gap: float = 0.0
+    interference: float = 0.0
+    amplitude: Amplitude | None = None
+    presence: Amplitude | None = None
+
+    def __post_init__(self) -> None:
+        check_kinds(ContactPair, self)
+        if self.presence is not None and (least := float(np.min(self.presence.value))) < 0:
+            raise ModelError("presence", least, "must not be negative")
+        if not self.shear_limit > 0:
+            raise ModelError("shear_limit", self.shear_limit, "must be positive")
+        if isinstance(self.friction, FrictionLaw):
+            for name, none in (("cohesion", 0.0), ("shear_limit", math.inf)):
+                if (value := getattr(self, name)) != none:
+                    raise ModelError(name, value, "must not stand beside a law of friction")
+        _ = self.law  # checks itself
+        if self.sliding not in ("auto", "small", "finite"):
+            raise ModelError("sliding", self.sliding, "must be auto, small or finite")
+        for name in ("gap", "interference"):
+            if not np.isfinite(getattr(self, name)):
+                raise ModelError(name, getattr(self, name), "must be finite [mm]")
+
+    @property
+    def law(self) -> FrictionLaw:
+        """The law of friction."""
+        if isinstance(self.friction, FrictionLaw):
+            return self.friction
+        return Coulomb(friction=self.friction, cohesion=self.cohesion, shear_limit=self.shear_limit)
+
+    def offset(self, time: float) -> float:
+        """Return the gap added at a time to the distance of the surfaces as meshed [mm]."""
+        factor = time if self.amplitude is None else self.amplitude.at(time)
+        return self.gap - factor * self.interference
+
+    def absent(self, time: float) -> bool:
+        """Return whether there is no pair at a time."""
+        return self.presence is not None and self.presence.at(time) == 0
+
+    def left(self, before: float, time: float) -> float | None:
+        """Return the ratio of its forces at a time to those before; None if contact finds them."""
+        if self.presence is None:
+            return None
+        was, now = self.presence.at(before), self.presence.at(time)
+        return None if now > 0 and now >= was else now / (was or 1.0)

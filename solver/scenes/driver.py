@@ -1,0 +1,161 @@
+"""Computes the runs of a scene, and their records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import tee
+from typing import Any
+
+from solver.contact.system import System
+from solver.errors import LimitLoad, TooLong
+from solver.loading.control import Control
+from solver.loading.outcome import Outcome
+from solver.loading.program import Program, walked
+from solver.loading.walker import Walker
+from solver.results.at_all_nodes import mesh_fields
+from solver.results.audit.figures import AUDIT
+from solver.results.audit.pairs import untouched
+from solver.results.audit.report import Audit, audit
+from solver.results.audit.stored import stored
+from solver.results.cycles import decided
+from solver.results.outlines import outlines
+from solver.results.quantities import Quantity
+from solver.results.record import Record, Status
+from solver.results.run import FinishedRun, Output, Values
+from solver.results.samples import Samples
+from solver.results.singular_points import singular_points
+from solver.results.tractions import tractions_of
+from solver.scenes.scene import Monitor, Scene
+
+
+def record(scene: Scene, run: FinishedRun) -> Record:
+    """Return the record of a run."""
+    cost = _merged(run, scene.costs)
+    if not run.complete:
+        limit = isinstance(run.outcome.error, LimitLoad)
+        status = Status.LIMIT_LOAD if limit else Status.NOT_CONVERGED
+        messages = (*run.notes, str(run.outcome.error))
+        return _labelled(scene, run, status, messages, cost)
+    check = run.check()
+    status = Status.OUTSIDE_THEORY if check.outside else Status.OK
+    states = {stage: run.outcome.points[stage] for stage in run.view.stages}
+    own = scene.warnings(run) if scene.warnings else ()
+    figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
+    values = {**cost, **figures, **_merged(run, (singular_points, outlines, *scene.outputs))}
+    written = _labelled(scene, run, Status.OK, (), values)
+    places = scene.places(run.parameters) if scene.places else None
+    comparison = stored(run, written, scene.view(run.parameters), places)
+    violations = check.violations + comparison.violations
+    if violations:
+        status = Status.AUDIT_FAILED
+    messages = violations + check.outside + run.notes + check.warnings + own
+    return replace(
+        written,
+        status=status,
+        message=_message(scene, run, status, messages),
+        scalars={**written.scalars, "audit_stored": comparison.figure},
+        mesh=partial(mesh_fields, run.samples.fields, states, run.beside),
+    )
+
+
+def _message(scene: Scene, run: FinishedRun, status: Status, messages: tuple[str, ...]) -> str:
+    """Return the message of a run; `TooLong` has its own advice, opposite to a finer mesh."""
+    table = scene.advice(run.parameters) if callable(scene.advice) else scene.advice
+    advice = None if isinstance(run.outcome.error, TooLong) else table.get(status)
+    return "; ".join((*messages, advice) if advice else messages)
+
+
+def _labelled(
+    scene: Scene, run: FinishedRun, status: Status, messages: tuple[str, ...], values: Values
+) -> Record:
+    own = {q.name: value for q, value in values.items() if q.coordinate}
+    return Record(
+        parameters=run.parameters,
+        status=status,
+        message=_message(scene, run, status, messages),
+        coordinates={**run.view.coordinates, **own},
+        fields={
+            q.name: (q.dims, value) for q, value in values.items() if q.dims and not q.coordinate
+        },
+        scalars={q.name: value for q, value in values.items() if not q.dims},
+        symmetric=run.view.symmetric,
+    )
+
+
+def _merged(run: FinishedRun, outputs: Sequence[Output]) -> Values:
+    values: dict[Quantity, Any] = {}
+    names: set[str] = set()
+    for output in outputs:
+        for quantity, value in output(run).items():
+            if quantity.name in names:
+                raise ValueError(f"two outputs of the scene give {quantity.name}")
+            names.add(quantity.name)
+            values[quantity] = value
+    return values
+
+
+def by_increments(
+    scene: Scene, runs: Iterable[Any], monitor: Monitor, largest: Any = None
+) -> Iterator[FinishedRun]:
+    """Solve the programs of runs that differ in the branch parameter; yield each when finished.
+
+    With `largest`, a bound on the runs, the next run is asked for when the one before is finished.
+    """
+    given = list(runs) if largest is None else None
+    last = given[-1] if given is not None else largest
+    system = System(scene.model(last))
+    samples = Samples(system, scene.view(last))
+    tractions = tractions_of(system, symmetric=samples.view.symmetric, axis=samples.view.axis)
+    programs: Iterable[Program]
+    if given is not None:
+        runs, bound = given, None
+        programs = listed = [scene.program(run) for run in given]
+        report = _counted(listed, monitor)
+    else:
+        runs, asked = tee(runs)
+        bound, programs = scene.program(largest), map(scene.program, asked)
+        report = partial(monitor, 0.0)  # how much is still to be asked for is not known
+    walker = Walker(
+        system,
+        Control(increment_error=scene.increment_error),
+        trace=partial(scene.trace, samples) if scene.trace else None,
+        refinement=scene.refinement(last) if scene.refinement else None,
+        until=partial(decided, laws=system.laws) if scene.until and scene.until(last) else None,
+        report=report,
+        watch=partial(scene.watch, last, samples) if scene.watch else None,
+    )
+    view = samples.view
+    for outcome, run in zip(walker.walk(programs, bound), runs, strict=True):
+
+        def check(outcome: Outcome = outcome) -> Audit:
+            loaded, unloaded = outcome.points[view.loaded], outcome.points.get(view.unloaded)
+            tally = outcome.tally
+            stages = outcome.points.values()
+            return audit(system, loaded, unloaded, tally.dissipation, tally.lost, stages)
+
+        # in the rest of a run that failed, any pair could have come into contact
+        notes = () if outcome.error else untouched(system, outcome.points.values())
+        yield FinishedRun(
+            parameters=run,
+            samples=samples,
+            tractions=tractions,
+            outcome=outcome,
+            check=check,
+            singular=system.model.singular,
+            notes=(*system.model.doubts, *notes),
+        )
+
+
+def _counted(programs: Sequence[Program], monitor: Monitor) -> Callable[[], None]:
+    """Return a function to call after each increment, which reports the share done."""
+    expected = walked(programs)
+    done = 0
+
+    def report() -> None:
+        nonlocal done
+        done += 1
+        monitor(min(done / expected, 0.99))
+
+    return report

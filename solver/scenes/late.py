@@ -1,0 +1,32 @@
+"""Functions by their names: a scene is listed without the modules that compute it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pkgutil import resolve_name
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Late:
+    """A function whose module is imported at the first call.
+
+    Attributes
+    ----------
+    name : ``module:function``
+    """
+
+    name: str
+
+    def __post_init__(self) -> None:
+        module, _, function = self.name.partition(":")
+        vars(self).update(__module__=module, __qualname__=function)  # as the function has them
+
+    def __call__(self, *given: Any, **named: Any) -> Any:
+        """Return what the function returns."""
+        return resolve_name(self.name)(*given, **named)
+
+
+def late(module: str, *functions: str) -> tuple[Late, ...]:
+    """Return functions of a module of the solver."""
+    return tuple(Late(f"solver.{module}:{function}") for function in functions)
