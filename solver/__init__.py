@@ -17,7 +17,7 @@ from solver.version import __version__ as __version__
 
 _HOMES = {
     "Amplitude": "model.amplitude",
-    "Audit": "results.audit.report",
+    "Audit": "audit.report",
     "Body": "model.body",
     "ContactPair": "model.contact_pair",
     "Displacement": "model.loads",

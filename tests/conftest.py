@@ -107,6 +107,15 @@ def no_settings_from_outside() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(autouse=True, scope="session")
+def records_are_compared() -> Iterator[None]:
+    """Compare every record that a test makes with own values of its declared quantities."""
+    from tests.recomputed import compared
+
+    with compared():
+        yield
+
+
 @pytest.fixture(scope="session")
 def programs() -> Iterator[Programs]:
     """What runs a file of Python in a process of its own, without loading libraries each time."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.pages.study import rank
-from solver.results.audit.figures import LIMITS
+from solver.audit.figures import LIMITS
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of

@@ -35,7 +35,7 @@ class _Swept:
     def __init__(
         self, law: Law, begin: PrismState, before: PrismState, strain: Array, parts: int
     ) -> None:
-        self._begin, self._strain = begin, strain
+        self._begin, self._strain, self._parts = begin, strain, parts
         self._stiff = 2 * law.elasticity.shear_modulus  # plastic strain changes no volume
         path = np.concatenate([begin.strain[:, None], strain], axis=1)
         self._sweep = sweep_of(law, path, begin.state, parts)
@@ -107,7 +107,8 @@ class PrismFlow(_Swept):
         end = self._last(self._before.displacement)
         had = self._stiff * self._before.plastic_strain[:, None]
         guess, nothing = body.strain(self.force[:, -1:] + had), body.at_rest
-        return self.states, passing(body, self._law, Given(nothing, nothing), end, guess).after
+        load, parts = Given(nothing, nothing), self._parts
+        return self.states, passing(body, self._law, load, end, guess, parts=parts).after
 
 
 class _Release:

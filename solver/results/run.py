@@ -6,10 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from solver.audit.report import Audit
 from solver.loading.outcome import Outcome
 from solver.model.singular import SingularPoint
-from solver.results.audit.recomputed import Recomputed
-from solver.results.audit.report import Audit
 from solver.results.fields import Bodies, Solved
 from solver.results.mesh_fields import MeshFields
 from solver.results.quantities import Quantity
@@ -31,7 +30,6 @@ class FinishedRun:
     check : function that returns the audit of a complete run
     notes : messages to the user about the computation
     singular : singular points, near which numbers depend on the mesh
-    source : source of the values with which the record is compared; None for states of a system
     beside : returns fields of further bodies at the same stages, for `mesh_fields`
     """
 
@@ -42,7 +40,6 @@ class FinishedRun:
     check: Callable[[], Audit]
     notes: tuple[str, ...] = ()
     singular: tuple[SingularPoint, ...] = ()
-    source: Recomputed | None = None
     beside: Callable[[], MeshFields] | None = None
 
     @property

@@ -12,6 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solver.audit.pairs import untouched
+from solver.audit.report import Audit, audit
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.errors import ModelError
@@ -28,8 +30,6 @@ from solver.model.model import Model
 from solver.model.rigid import RigidBody
 from solver.results import saved
 from solver.results.at_all_nodes import mesh_fields
-from solver.results.audit.pairs import untouched
-from solver.results.audit.report import Audit, audit
 from solver.results.body_fields import BodyValues
 from solver.results.contact_result import ContactResult, contact_result
 from solver.results.cycles import decided, shakedown_of

@@ -8,6 +8,9 @@ from functools import partial
 from itertools import tee
 from typing import Any
 
+from solver.audit.figures import AUDIT
+from solver.audit.pairs import untouched
+from solver.audit.report import Audit, audit
 from solver.contact.system import System
 from solver.errors import LimitLoad, TooLong
 from solver.loading.control import Control
@@ -15,10 +18,6 @@ from solver.loading.outcome import Outcome
 from solver.loading.program import Program, walked
 from solver.loading.walker import Walker
 from solver.results.at_all_nodes import mesh_fields
-from solver.results.audit.figures import AUDIT
-from solver.results.audit.pairs import untouched
-from solver.results.audit.report import Audit, audit
-from solver.results.audit.stored import stored
 from solver.results.cycles import decided
 from solver.results.outlines import outlines
 from solver.results.quantities import Quantity
@@ -44,18 +43,11 @@ def record(scene: Scene, run: FinishedRun) -> Record:
     own = scene.warnings(run) if scene.warnings else ()
     figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
     values = {**cost, **figures, **_merged(run, (singular_points, outlines, *scene.outputs))}
-    written = _labelled(scene, run, Status.OK, (), values)
-    places = scene.places(run.parameters) if scene.places else None
-    comparison = stored(run, written, scene.view(run.parameters), places)
-    violations = check.violations + comparison.violations
-    if violations:
+    if check.violations:
         status = Status.AUDIT_FAILED
-    messages = violations + check.outside + run.notes + check.warnings + own
+    messages = check.violations + check.outside + run.notes + check.warnings + own
     return replace(
-        written,
-        status=status,
-        message=_message(scene, run, status, messages),
-        scalars={**written.scalars, "audit_stored": comparison.figure},
+        _labelled(scene, run, status, messages, values),
         mesh=partial(mesh_fields, run.samples.fields, states, run.beside),
     )
 

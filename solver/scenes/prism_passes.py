@@ -10,6 +10,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from solver.audit.plain_prism import PlainPrism
+from solver.audit.prism import audit_prism
+from solver.audit.report import Audit
 from solver.errors import ModelError, NotConverged, WindowTooSmall
 from solver.linear.threads import one_thread
 from solver.loading.outcome import Outcome, Tally
@@ -19,10 +22,6 @@ from solver.prism.patch_contact import PatchContact, PatchLoad
 from solver.prism.patch_passing import AppliedPatch, PatchPassing
 from solver.prism.state import PrismState
 from solver.prism.track import PrismTrack
-from solver.results.audit.plain_prism import PlainPrism
-from solver.results.audit.prism import audit_prism
-from solver.results.audit.prism_values import OfPrismPass
-from solver.results.audit.report import Audit
 from solver.results.prism import PatchTractions, PrismBody
 from solver.results.prism_fields import zone_fields
 from solver.results.run import FinishedRun
@@ -189,11 +188,12 @@ class _Path:
     def finished(self, run: Any) -> FinishedRun:
         """Return a run with the results of the last pass found."""
         found, previous, view = self._found, self._previous, self._samples.view
-        points, source, beside = {}, None, None
+        points, beside = {}, None
         if found is not None and self.error is None:
-            left = self._body.left_by(found)
-            points = {view.loaded: self._body.under_load(found), view.unloaded: left}
-            source = OfPrismPass(self._body, found, left, view.unloaded)
+            points = {
+                view.loaded: self._body.under_load(found),
+                view.unloaded: self._body.left_by(found),
+            }
             beside = partial(zone_fields, self._body, found, view.loaded, view.unloaded)
         seconds = time.process_time() - self._started - self._elsewhere
 
@@ -214,7 +214,6 @@ class _Path:
             ),
             check=check,
             notes=doubts({view.profile_body: self._law}),
-            source=source,
             beside=beside,
         )
 

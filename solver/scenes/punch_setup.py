@@ -8,13 +8,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from solver.audit.cut import cut_force
 from solver.loading.program import Program, load_and_release, walked
 from solver.mesh.elements import element_type
 from solver.mesh.grids import grid
 from solver.mesh.lines import cells
 from solver.model.body import Body
 from solver.model.model import Model
-from solver.results.audit.cut import cut_force
 from solver.results.quantities import Quantity, declare
 from solver.results.run import FinishedRun, Values
 from solver.results.view import View
@@ -159,5 +159,5 @@ def figures(run: FinishedRun) -> Values:
     line = np.linspace(0.0, width * (1 - 1e-9), 8000)
     cut = np.stack([line, np.full_like(line, -0.5 * a)])
     stress = system.response("half_plane", unloaded).stress
-    out[SELF_EQUILIBRIUM] = abs(cut_force(system, "half_plane", stress, cut))
+    out[SELF_EQUILIBRIUM] = abs(cut_force(system.full("half_plane"), stress, cut))
     return out

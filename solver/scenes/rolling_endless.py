@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from solver.audit.report import Audit
+from solver.audit.steady import audit_pass
 from solver.errors import LimitLoad, ModelError, NotConverged, Spins, WindowTooSmall
 from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
 from solver.model.motion import TravellingPressure
-from solver.results.audit.report import Audit
-from solver.results.audit.steady import OfPass, audit_pass
 from solver.results.run import FinishedRun
 from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
@@ -168,7 +168,6 @@ class _SteadyPath:
             return audit_pass(body.track, run.material(), found, previous, way)
 
         own = run.of_pass(max(len(self._steps) - 1, 0))
-        moving = _moving(own, found.direction) if found and own.load != "contact" else None
         return FinishedRun(
             parameters=run,
             samples=samples,
@@ -176,7 +175,6 @@ class _SteadyPath:
             outcome=outcome,
             check=check,
             notes=doubts({view.profile_body: run.material()}),
-            source=OfPass(body, found, moving, view.unloaded) if found else None,
         )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.results.audit.figures import LIMITS
+from solver.audit.figures import LIMITS
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from solver.results.audit.figures import AUDIT
+from solver.audit.figures import AUDIT
 
 FIGURES: Mapping[str, str] = {
     "surface_residual_max": "largest residual {component} surface {body}",

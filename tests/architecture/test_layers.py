@@ -16,7 +16,7 @@ LAYERS = {
     "solver": (
         "version", "typing", "errors", "files", "parameters", "kinds", "parts", "memory", "tensors",
         "linear", "mesh", "materials", "model", "fem", "contact", "loading", "steady", "prism",
-        "results", "scenes",
+        "results.quantities", "audit", "results", "scenes",
     ),
     "studies": (
         "units", "errors", "toml", "scratch", "scenes", "definition", "storage",
@@ -35,8 +35,13 @@ def name_of(path: Path) -> str:
 
 
 def layer_of(module: str) -> str:
-    """First part of a module's name below its package; nothing for the package itself."""
-    return module.partition(".")[2].partition(".")[0]
+    """First part of a module's name below its package; nothing for the package itself.
+
+    The declarations of quantities are a layer of their own, below the audit, which reads them and
+    no other code of results.
+    """
+    below = module.partition(".")[2]
+    return below if below == "results.quantities" else below.partition(".")[0]
 
 
 def targets(source: str, known: set[str]) -> set[str]:
@@ -87,9 +92,26 @@ def test_no_imports_go_in_a_circle(package: str) -> None:
     graphlib.TopologicalSorter(graph(package)).prepare()
 
 
+ALPHABET = {"SQRT2", "NORMAL", "TANGENTS", "TYPE_CHECKING"}
+"""Constants that say no accuracy: a factor of Mandel vectors, and the numbers of directions."""
+
+
+def test_the_audit_takes_no_constant_of_what_it_audits() -> None:
+    """A limit that the solver converges to proves nothing of it: the audit has its own."""
+    for path in modules("solver/audit"):
+        for node in ast.walk(ast.parse((ROOT / path).read_text())):
+            if isinstance(node, ast.ImportFrom) and not str(node.module).startswith("solver.audit"):
+                constants = {alias.name for alias in node.names if alias.name.isupper()}
+                assert constants <= ALPHABET, f"{path}: {constants - ALPHABET}"
+
+
 def test_a_breach_is_found() -> None:
     known = {"solver.fem", "solver.fem.part", "solver.scenes"}
     text = "def later():\n    from solver import scenes\nfrom solver.fem import part"
     assert targets(text, known) == {"solver.scenes", "solver.fem.part"}
     assert list(against({"solver.fem.part": {"solver.scenes"}}, LAYERS["solver"]))
+    assert list(against({"solver.audit.report": {"solver.results.fields"}}, LAYERS["solver"]))
+    assert not list(
+        against({"solver.audit.report": {"solver.results.quantities"}}, LAYERS["solver"])
+    )
     assert not list(against({"solver.scenes": {"solver.fem.part"}}, LAYERS["solver"]))

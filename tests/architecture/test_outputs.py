@@ -10,8 +10,9 @@ from collections import Counter
 import pytest
 
 import solver.scenes  # noqa: F401  (declares all)
-from solver.results.quantities import QUANTITIES, declare
+from solver.results.quantities import IN_SPACE, QUANTITIES, declare
 from tests.architecture.sources import ROOT, modules
+from tests.recomputed.record import FORMULAS, RULES
 
 DECLARING = {"declare", "Quantity"}
 """What makes a variable of a data set."""
@@ -67,6 +68,14 @@ def test_every_output_is_declared_once_where_its_module_is_read() -> None:
     assert names.keys() <= declared_by_scenes(), "each one is declared when the scenes are imported"
     assert len(names) > 50
     assert not [name for source in sources for name in inside_functions(source)]
+
+
+def test_every_quantity_is_recomputed_or_known_as_a_formula() -> None:
+    """The figures of the audit are computed a second time by what they are."""
+    declared = {name for name in (*QUANTITIES, *IN_SPACE) if not name.startswith("audit_")}
+    assert not RULES.keys() & set(FORMULAS)
+    assert declared - set(FORMULAS) <= RULES.keys()
+    assert RULES.keys() | set(FORMULAS) <= declared
 
 
 def test_a_second_declaration_is_refused() -> None:

@@ -15,7 +15,7 @@ import pytest
 import xarray as xr
 
 from service.pages.form import as_python
-from solver.results.audit.figures import LIMITS
+from solver.audit.figures import LIMITS
 from studies import Client, Study, StudyError, open_study, summary
 from studies.client import NoAnswer, Refused, RemoteStudy, _Screen
 from studies.scenes.scene import read_scene

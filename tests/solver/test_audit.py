@@ -19,9 +19,9 @@ from solver import (
     Temperature,
     solve,
 )
+from solver.audit.pairs import AuditedPair
+from solver.audit.report import audit
 from solver.mesh import grid, mapped
-from solver.results.audit.pairs import AuditedPair
-from solver.results.audit.report import audit
 from solver.scenes.punch import PunchParameters
 from solver.scenes.punch_setup import model
 from tests.verification.bodies import block
@@ -70,6 +70,7 @@ def test_a_body_that_sinks_into_the_other_is_noticed(solution):
     u = tuple(ui + (0.01 if k == 1 else 0.0) for k, ui in enumerate(state.u))
     check = judged(solution, replace(solution.loaded, state=replace(state, u=u)))
     assert any("audit_closed_gap" in text for text in check.violations)
+    assert any("audit_prescribed" in text for text in check.violations), "its supports hold it"
 
 
 def test_bodies_that_are_not_released_are_noticed(solution):

@@ -20,6 +20,7 @@ from solver import (
     Stage,
     solve,
 )
+from solver.audit.report import audit
 from solver.contact.problem import STICK
 from solver.mesh import grid
 from solver.model.friction import (
@@ -31,7 +32,6 @@ from solver.model.friction import (
     through,
 )
 from solver.model.rigid import line
-from solver.results.audit.report import audit
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import rim_of
 from solver.steady import RollingWheel, rolling, track_of

@@ -26,8 +26,8 @@ from solver import (
     Traction,
     solve,
 )
+from solver.audit.theory import LARGE
 from solver.mesh import grid
-from solver.results.audit.theory import LARGE
 
 pytestmark = pytest.mark.solves
 

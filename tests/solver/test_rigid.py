@@ -96,6 +96,12 @@ def test_the_same_displacement_needs_the_same_force(material: Material) -> None:
         assert by_depth.plastic_strain("half_plane").max() > 1e-3
     for found in (by_force, by_depth):
         assert found.audit().passed, found.audit().violations
+    state = by_depth.loaded.state
+    for k in range(len(state.u[-1])):  # all three motions are prescribed
+        u = (*state.u[:-1], state.u[-1] + 1e-5 * abs(depth) * np.eye(3)[k])
+        check = replace(by_depth, stages={**by_depth.stages, "loaded": replace(
+            by_depth.loaded, state=replace(state, u=u))}).audit()  # fmt: skip
+        assert any("audit_prescribed" in text for text in check.violations), check.violations
 
 
 @pytest.mark.parametrize(

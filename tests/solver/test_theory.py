@@ -23,8 +23,8 @@ from solver import (
     Status,
     solve,
 )
+from solver.audit.theory import LARGE, largest_strain
 from solver.mesh import grid
-from solver.results.audit.theory import LARGE, largest_strain
 from solver.scenes import Scene
 
 pytestmark = pytest.mark.solves

@@ -23,6 +23,7 @@ from solver import (
     Walker,
     solve,
 )
+from solver.audit.report import audit
 from solver.fem.fields import Sampler
 from solver.linear import pardiso as mkl
 from solver.loading.increment import Increment
@@ -32,7 +33,6 @@ from solver.materials import TrescaMaterial
 from solver.mesh import grid
 from solver.model.amplitude import Amplitude
 from solver.model.loads import Temperature
-from solver.results.audit.report import audit
 from solver.scenes.punch import PunchParameters
 from solver.scenes.punch_setup import model
 from tests.solver.laws import CURVES, LAYERED, STEEL, StoredCentre, chaboche, steel

@@ -1,4 +1,7 @@
-"""Faults on the way from declared loads to stored results, which the audit must notice.
+"""Faults on the way from declared loads to stored results.
+
+The audit must notice those of loads, histories and passes; the comparison of every record that a
+test makes (`tests.recomputed`) those that break `STORED`.
 
 They are put into loads, histories, steady passes, looks and outputs, one at a time, as those of
 `mutations`.
@@ -58,7 +61,7 @@ from tests.solver import test_singularity
 from tests.verification import test_shakedown
 from tests.verification.mutations import Fault, Mutation, Patch
 
-STORED, HISTORY, LAW = ("stored",), ("history",), ("law",)
+HISTORY, STORED = ("history",), "stored"
 
 FILE = """
 name = "blocks"
@@ -487,7 +490,7 @@ MUTATIONS: dict[str, Mutation] = {
         "overlap",
     ),
     "prescribed motion halved": _file(
-        instead(solver.fem.discretisation, "prescribed", moved_half_way), "stored"
+        instead(solver.fem.discretisation, "prescribed", moved_half_way), "prescribed"
     ),
     # histories
     "friction kept through separation": _file(
@@ -519,75 +522,73 @@ MUTATIONS: dict[str, Mutation] = {
         instead(solver.scenes.rolling_steady, "rolling", always_ahead), "history"
     ),
     "a pass back shown as if it went forward": _passed(
-        instead(Track, "mirror", lambda old: property(not_turned)), "stored"
+        instead(Track, "mirror", lambda old: property(not_turned)), STORED
     ),
-    "residual stress of layers without zz": _passed(times(Layers, "stress", 0.9), "stored"),
+    "residual stress of layers without zz": _passed(times(Layers, "stress", 0.9), STORED),
     "the first pass told as the last": _passed(
-        instead(solver.scenes.rolling_setup, "passes", first_pass_last), "stored"
+        instead(solver.scenes.rolling_setup, "passes", first_pass_last), STORED
     ),
     "shear of a wheel against its way": _passed(
         instead(SteadyTractions, "along", part_times(1, -1.0)),
-        "stored",
+        STORED,
         load="contact",
     ),
     # places
     "sampler one element aside": _pressed(
-        instead(solver.fem.fields, "_locate", one_element_aside), "stored"
+        instead(solver.fem.fields, "_locate", one_element_aside), STORED
     ),
-    "depth scaled": _pressed(instead(Axis, "place", deeper), "stored"),
+    "depth scaled": _pressed(instead(Axis, "place", deeper), STORED),
     "shear of Mandel vectors": _pressed(
-        instead(solver.results.fields, "to_tensor", shear_of_mandel), "stored"
+        instead(solver.results.fields, "to_tensor", shear_of_mandel), STORED
     ),
     "von Mises stress without shear": _pressed(
-        instead(solver.results.fields, "von_mises", without_shear), "stored"
+        instead(solver.results.fields, "von_mises", without_shear), STORED
     ),
-    "stress in GPa": _pressed(at_nodes_times("stress", 1e-3), "stored"),
-    "plastic strain in percent": _pressed(at_nodes_times("plastic_strain", 100.0), "stored"),
-    "strain doubled": _file(at_nodes_times("strain", 2.0), "stored"),
-    "components of plastic strain doubled": _file(at_nodes_times("plastic_tensor", 2.0), "stored"),
+    "stress in GPa": _pressed(at_nodes_times("stress", 1e-3), STORED),
+    "plastic strain in percent": _pressed(at_nodes_times("plastic_strain", 100.0), STORED),
+    "strain doubled": _file(at_nodes_times("strain", 2.0), STORED),
+    "components of plastic strain doubled": _file(at_nodes_times("plastic_tensor", 2.0), STORED),
     "nodal values of the next node": _pressed(
-        instead(solver.contact.system, "recovery", next_node), "stored"
+        instead(solver.contact.system, "recovery", next_node), STORED
     ),
-    "maps seen from behind": _pressed(instead(Samples, "on_map", turned_round), "stored"),
-    "metal where there is none": _pressed(instead(Sampler, "__call__", zero_outside), "stored"),
-    "the state under load for the released one": _pressed(loaded_for_unloaded, "stored"),
-    "depth told in m": _pressed(other_coordinates("depth", 1e-3), "stored"),
-    "x told from the corner": _pressed(other_coordinates("x", -1.0), "stored"),
-    "lines beside their places": _file(instead(SystemFields, "at_places", aside), "stored"),
-    "stages in another order": _file(instead(SystemFields, "at_places", other_stages), "stored"),
-    "displacement against its way": _file(at_nodes_times("displacement", -1.0), "stored"),
+    "maps seen from behind": _pressed(instead(Samples, "on_map", turned_round), STORED),
+    "metal where there is none": _pressed(instead(Sampler, "__call__", zero_outside), STORED),
+    "the state under load for the released one": _pressed(loaded_for_unloaded, STORED),
+    "depth told in m": _pressed(other_coordinates("depth", 1e-3), STORED),
+    "x told from the corner": _pressed(other_coordinates("x", -1.0), STORED),
+    "lines beside their places": _file(instead(SystemFields, "at_places", aside), STORED),
+    "stages in another order": _file(instead(SystemFields, "at_places", other_stages), STORED),
+    "displacement against its way": _file(at_nodes_times("displacement", -1.0), STORED),
     # contact
-    "pressure on half the circumference": _fitted(pressure_times(2.0), "stored"),
-    "pressure of a unit of thickness": _file(pressure_times(2.0), "stored"),
+    "pressure on half the circumference": _fitted(pressure_times(2.0), STORED),
+    "pressure of a unit of thickness": _file(pressure_times(2.0), STORED),
     "shear on the other body": _fitted(
-        instead(PairTractions, "along", part_times(1, -1.0)), "stored"
+        instead(PairTractions, "along", part_times(1, -1.0)), STORED
     ),
     "gap opened": _fitted(
         instead(PairTractions, "along", lambda old: lambda *a: (*old(*a)[:2], old(*a)[2] + 1e-3)),
-        "stored",
+        STORED,
     ),
-    "width for half-width": _pressed(
-        instead(PairTractions, "extent", part_times(0, 2.0)), "stored"
-    ),
+    "width for half-width": _pressed(instead(PairTractions, "extent", part_times(0, 2.0)), STORED),
     "peak pressure too high": _pressed(
-        instead(PairTractions, "extent", part_times(1, 1.01)), "stored"
+        instead(PairTractions, "extent", part_times(1, 1.01)), STORED
     ),
     "forces told an increment later": _file(
-        instead(solver.results.increments, "_in_order", later), "stored"
+        instead(solver.results.increments, "_in_order", later), STORED
     ),
-    "reactions as actions": _file(instead(solver.results.history, "observe", other_way), "stored"),
+    "reactions as actions": _file(instead(solver.results.history, "observe", other_way), STORED),
     # numbers
     "integral times 1e-3": _file(
-        instead(RequestedNumber, "_found", number_times("integral", 1e-3)), "stored"
+        instead(RequestedNumber, "_found", number_times("integral", 1e-3)), STORED
     ),
-    "length of contact times 1.05": _file(instead(ContactResult, "length", longer), "stored"),
-    "another component sought": _file(other_component, "stored"),
-    "place of an extreme turned": _file(instead(RequestedNumber, "_found", place_turned), "stored"),
+    "length of contact times 1.05": _file(instead(ContactResult, "length", longer), STORED),
+    "another component sought": _file(other_component, STORED),
+    "place of an extreme turned": _file(instead(RequestedNumber, "_found", place_turned), STORED),
     "largest in size for largest": _pressed(
-        instead(solver.results.extremes, "_most", largest_of_all), "stored"
+        instead(solver.results.extremes, "_most", largest_of_all), STORED
     ),
     "extreme of another node": _pressed(
-        instead(solver.results.extremes, "_most", wrong_place), "stored"
+        instead(solver.results.extremes, "_most", wrong_place), STORED
     ),
 }
 

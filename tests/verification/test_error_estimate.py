@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from solver.audit import contact_error
+from solver.audit.report import estimated_error
 from solver.fem.error import ErrorPoints
 from solver.fem.fields import Sampler, recovery
-from solver.results.audit import contact_error
-from solver.results.audit.report import estimated_error
 from solver.tensors import SQRT2
 from studies.scenes.registry import scene_named
 from tests.verification import hertz_line

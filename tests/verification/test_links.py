@@ -30,10 +30,10 @@ from solver import (
     Traction,
     solve,
 )
+from solver.audit import links
 from solver.contact.parting import parted
 from solver.mesh import grid, mapped, merged, ring, within
 from solver.model.rigid import line
-from solver.results.audit import links
 from studies.scenes.scene import read_scene
 from tests.verification.bodies import E, bent, block, cells, sector, steel
 

@@ -19,10 +19,11 @@ from studies.errors import FileDiffers
 from studies.execution.task import PathTask, walk
 from studies.scenes.registry import scene_named
 from studies.storage import runfile
+from tests.recomputed import RecordDiffers
 from tests.verification import mutations, mutations_stored
 from tests.verification.mutations import PUNCH, ROLLING, Fault, Mutation
 from tests.verification.mutations_file import FILE_FAULTS, FileFault, every_run_is_ok
-from tests.verification.mutations_stored import FIT, PRESSED, TO_AND_FRO, UNSEEN, of_file
+from tests.verification.mutations_stored import FIT, PRESSED, STORED, TO_AND_FRO, UNSEEN, of_file
 
 BASE: dict[str, tuple[str, dict[str, Any], tuple[float, ...]]] = {
     "punch": ("punch", PUNCH, ()),
@@ -59,6 +60,10 @@ def test_without_a_fault_the_same_runs_pass(label: str, changes: dict[str, Any])
 @pytest.mark.parametrize("mutation", MUTATIONS.values(), ids=MUTATIONS)
 def test_a_fault_is_noticed(mutation: Mutation, monkeypatch: pytest.MonkeyPatch) -> None:
     mutation.fault(monkeypatch)
+    if STORED in mutation.breaks:
+        with pytest.raises(RecordDiffers):
+            run(mutation.scene, **(mutation.parameters or {}))
+        return
     record = run(mutation.scene, **(mutation.parameters or {}))
     assert record.status.name == "AUDIT_FAILED", record.message
     assert any(f"audit_{name} = " in record.message for name in mutation.breaks), record.message

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from solver.audit.prism import audit_prism
 from solver.errors import ModelError
 from solver.linear.threads import one_thread
 from solver.mesh import grid
@@ -15,7 +16,6 @@ from solver.mesh.rail import rail_60e1
 from solver.mesh.zone import Zone, rail_mesh
 from solver.prism import Section, SteppedPrism
 from solver.prism.straight import StraightPrism, straight_motions
-from solver.results.audit.prism import audit_prism
 from solver.scenes.initial_stress import NoStress, OverHeight, RollerStraightened
 from solver.scenes.wheel_rail_parameters import WheelRailParameters
 from solver.scenes.wheel_rail_track import settled

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from solver.audit.plain_prism import PlainPrism
+from solver.audit.prism import audit_prism
 from solver.linear.threads import one_thread
 from solver.materials import SmoothMaterial, Voce
 from solver.materials.hardening_rules import HARDENING
 from solver.materials.law import Law
 from solver.prism import EllipticPatch, PatchPassing, PrismTrack, SteppedPrism
-from solver.results.audit.plain_prism import PlainPrism
-from solver.results.audit.prism import audit_prism
 from solver.results.shakedown import ShakedownState, classify
 from solver.scenes.initial_stress import OverHeight
 from solver.scenes.wheel_rail_parameters import WheelRailParameters

@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from solver.audit.plain_prism import PlainPrism
+from solver.audit.prism import audit_prism
+from solver.audit.report import Audit
 from solver.linear.threads import one_thread
 from solver.materials import Material
 from solver.mesh import grid, within
@@ -18,9 +21,6 @@ from solver.prism import Modes, PatchPassing, PrismState, PrismTrack, RollingPat
 from solver.prism import far_field as far_fields
 from solver.prism import flow as flows
 from solver.prism import patch as patches
-from solver.results.audit.plain_prism import PlainPrism
-from solver.results.audit.prism import audit_prism
-from solver.results.audit.report import Audit
 from solver.steady import Pass
 from solver.steady.passing import passing
 from tests.verification.test_prism_passes import HARDENS, PERFECT, block, ellipse, lines, wheel

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from solver.audit import plain_prism
+from solver.audit.plain_prism import PlainPrism
+from solver.audit.prism import audit_prism
 from solver.linear.threads import one_thread
 from solver.mesh import grid, within
 from solver.prism import PrismTrack, Section
-from solver.results.audit import plain_prism
-from solver.results.audit.plain_prism import PlainPrism
-from solver.results.audit.prism import audit_prism
 from solver.steady.passing import passing
 from tests.verification.prism_blocks import HARDENS, PERFECT, block, ellipse
 

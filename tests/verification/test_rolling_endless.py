@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from solver import SCENES, ModelError, Status
+from solver.audit.steady import audit_pass
 from solver.errors import NotConverged, TooLong, WindowTooSmall
-from solver.results.audit.steady import audit_pass
 from solver.scenes import rolling_endless, rolling_steady
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import load_on, track_for

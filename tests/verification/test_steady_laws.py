@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from solver import Material
+from solver.audit.steady import audit_pass
 from solver.materials import (
     ArmstrongFrederick,
     Chaboche,
@@ -28,7 +29,6 @@ from solver.materials import (
     TrescaMaterial,
     Voce,
 )
-from solver.results.audit.steady import audit_pass
 from solver.scenes import SCENES
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import load_on, track_for

@@ -13,10 +13,10 @@ from math import sqrt
 import numpy as np
 import pytest
 
+from solver.audit.steady import audit_pass
 from solver.contact.problem import OPEN, STICK
 from solver.errors import LimitLoad
 from solver.model.friction import Coulomb
-from solver.results.audit.steady import audit_pass
 from solver.scenes.rolling_parameters import RollingParameters
 from solver.scenes.rolling_steady import rim_of
 from solver.steady import RollingWheel, rolling, track_of

@@ -1,4 +1,4 @@
-"""Sound runs whose outputs are hard to compute twice: the audit compares them, and passes them."""
+"""Sound runs whose records are hard to compute twice; each record is compared as it is made."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from solver import Record
+from solver.audit.plain import PlainBody
 from solver.fem.discretisation import Discretisation
 from solver.model.loads import Pressure
-from solver.results.audit.compared import LIMIT
-from solver.results.audit.plain import PlainBody
 from solver.scenes import SCENES
 from studies.scenes.description import Description
 from studies.scenes.scene import file_scene
@@ -84,7 +83,6 @@ def pressed(master: str, sliding: str) -> Record:
 @pytest.mark.parametrize("master", ["arc", "flat", "pad"])
 def test_numbers_of_a_contact_whose_master_ends_are_compared(master: str, sliding: str) -> None:
     record = pressed(master, sliding)
-    assert record.scalars["audit_stored"] <= LIMIT, record.message
     assert record.scalars["n12"] > 0.0  # the largest slip
 
 
@@ -113,6 +111,5 @@ def test_an_elastic_pass_is_as_exact_however_high_the_yield_stress() -> None:
             element_size=0.02, growth=1.3,
         )  # fmt: skip
         (record,) = scene.path(parameters, [parameters.passes], lambda share: None)
-        assert record.scalars["audit_stored"] <= LIMIT, record.message
         maps.append(record.fields["map_mises"][1])
     assert maps[0] == pytest.approx(maps[1], rel=1e-6, abs=1e-4, nan_ok=True)

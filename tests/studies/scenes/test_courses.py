@@ -65,7 +65,6 @@ def test_outputs_take_values_at_the_ends_of_stages() -> None:
     motion, shear = (record.fields[n][1] for n in ("motion_y", "contact_tangential_force"))
     assert found["moved"] == motion[2, 2] < -1e-4
     assert found["shear"] == shear[0, 2]
-    assert found["audit_stored"] < 1e-9
     units = {each.name: each.units for each in scene.quantities}
     assert [units[n] for n in ("pressed", "moved", "turned")] == ["N", "mm", "rad"]
     assert "pressed_x" not in units and "least_x" in units

@@ -68,7 +68,6 @@ def test_a_strip_has_the_strains_of_its_closed_form_at_all_places() -> None:
     assert numbers["on_line"] == pytest.approx(elastic[1] + plastic[1], rel=1e-6)
     assert numbers["shear"] == pytest.approx(abs((elastic + plastic)[[0, 1]] @ [1, -1]), rel=1e-6)
     assert numbers["least"] == pytest.approx(STRESS, rel=1e-6)
-    assert numbers["audit_stored"] < 1e-9
 
 
 def test_strain_is_that_of_the_displacements_with_heat_in_it() -> None:

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from solver.audit.bodies import AuditedBody
+from solver.audit.pairs import AuditedPair
+from solver.audit.surfaces import deformed
 from solver.contact.candidates import find_candidates
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.fem.wheel import Wheel
-from solver.results.audit.bodies import AuditedBody
-from solver.results.audit.pairs import AuditedPair
-from solver.results.audit.surfaces import deformed
 from solver.typing import Array, Bools
 
 _ROUNDED = 1e-5

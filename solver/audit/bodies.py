@@ -1,16 +1,18 @@
-"""Audit figures of single bodies: balance, material law, loads and reactions."""
+"""Audit figures of single bodies: motion, balance, material law, loads and reactions."""
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
 
+from solver.audit.plain import LEAST, PlainBody, load_factor
 from solver.contact.state import Converged
-from solver.contact.system import LEAST, System
+from solver.contact.system import System
+from solver.fem.rigid import RigidPart
 from solver.materials.law import Law
-from solver.results.audit.plain import PlainBody
+from solver.model.rigid import Moved
 from solver.typing import Array, Bools
 
 
@@ -122,15 +124,7 @@ class AuditedBody:
     @cached_property
     def held(self) -> Bools:
         """Whether supports hold, or loads prescribe, displacements (n_nodes, 2)."""
-        body = self.plain.body
-        held = np.zeros((self.plain.part.X.shape[1], 2), dtype=bool)
-        each = [(boundary, "xy".index(axis)) for boundary, axes in body.supports.items()
-                for axis in axes]  # fmt: skip
-        for load in body.every_load:
-            each += itertools.product(load.boundaries, load.components)
-        for boundary, axis in each:
-            held[self.plain.part.boundary_nodes(boundary), axis] = True
-        return held
+        return np.isfinite(self.plain.prescribed(self._converged.state.time))
 
     @property
     def free(self) -> Bools:
@@ -166,3 +160,28 @@ class AuditedBody:
         broken = law.misfit(self._reached, self.stress, self._before, after)
         beyond = law.yield_value(self.stress, after)
         return float(broken.max(initial=0.0)), float(beyond.max(initial=0.0))
+
+
+def misplaced(system: System, bodies: Sequence[PlainBody], states: Iterable[Converged]) -> float:
+    """Return the largest deviation from a prescribed displacement, over the largest displacement.
+
+    Supports and loads prescribe displacements of bodies, and motions those of rigid bodies.
+    """
+    off, most = [0.0], [0.0]
+    for state in (converged.state for converged in states):
+        for body in bodies:
+            u = system.displacement(body.body.name, state).reshape(-1, 2)
+            given = body.prescribed(state.time)
+            off += np.abs(u - given)[np.isfinite(given)].tolist()
+            most.append(float(np.abs(u).max()))
+        for rigid in system.model.rigid:
+            number = system.part(rigid.name)
+            part = system.parts[number]
+            assert isinstance(part, RigidPart)
+            sizes = 1.0, 1.0, part.frame.radius
+            for motion, own, size in zip(rigid.every_load, state.u[number], sizes, strict=True):
+                most.append(abs(float(own)))
+                if isinstance(motion, Moved):
+                    moved = size * load_factor(motion.amplitude, state.time) * motion.value
+                    off.append(abs(float(own) - moved))
+    return float(np.max(off)) / (float(np.max(most)) or 1.0)

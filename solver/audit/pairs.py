@@ -8,12 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solver.audit.plain import LEAST
+from solver.audit.surfaces import PairState, Surfaces
 from solver.contact.pressure import contact_pressure
 from solver.contact.state import Converged, State
-from solver.contact.system import LEAST, System
+from solver.contact.system import System
 from solver.model.contact_pair import ContactPair
 from solver.model.friction import ContactPlaces, lines_of
-from solver.results.audit.surfaces import PairState, Surfaces
 from solver.typing import Array, Bools
 
 PRESSED = 1e-6

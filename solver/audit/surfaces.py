@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.audit.plain import load_factor
 from solver.contact.normals import is_curved
 from solver.contact.overlap import largest_overlap
 from solver.contact.state import State
@@ -21,7 +22,6 @@ from solver.fem.surface import Surface
 from solver.fem.wheel import Wheel
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.model.contact_pair import ContactPair
-from solver.results.audit.plain import load_factor
 from solver.typing import Array, Bools, Ints
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)

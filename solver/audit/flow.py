@@ -7,15 +7,26 @@ from typing import Any
 
 import numpy as np
 
+from solver.audit.large_strain import of_material
+from solver.audit.theory import Neglected, equivalent
 from solver.materials.law import Law
 from solver.materials.state import PlasticState, Response
-from solver.results.audit.large_strain import of_material
-from solver.results.audit.theory import Neglected, equivalent
 from solver.steady import Pass
-from solver.steady.flow import LEAST
 from solver.typing import Array, Ints
 
 Rows = Ints | slice
+
+
+INFLOW = 0.1
+"""Limit of the ratio of the plastic strain added in the first column to that of the pass. Points
+that an earlier pass left at yield flow as soon as the load approaches, in a window of any size; 5 %
+change stress by 1 % of the yield stress."""
+_LEAST = 0.05
+"""Least plastic strain of a pass, in yield strains, to which added strain refers: a pass that adds
+less hardly yields, and the limit is then 1/200 of the yield strain."""
+STEADINESS = 1e-4
+"""Limit of the stress that the difference of two strains makes, over the yield stress: far below
+the error of any mesh, and far above rounding."""
 
 
 class AuditedFlow:
@@ -98,11 +109,11 @@ class AuditedFlow:
     def over_most(self, added: Array) -> float:
         """Return the largest added plastic strain over that of the pass.
 
-        The pass counts with at least `LEAST` of the yield strain.
+        The pass counts with at least `_LEAST` of the yield strain.
         """
         material = self._material
         yield_strain = material.yield_stress / material.elasticity.youngs_modulus
-        return largest(added) / max(LEAST * yield_strain, self._found.most_added)
+        return largest(added) / max(_LEAST * yield_strain, self._found.most_added)
 
 
 def difference(material: Law, one: PlasticState, other: PlasticState) -> float:
@@ -125,6 +136,13 @@ def difference(material: Law, one: PlasticState, other: PlasticState) -> float:
 def largest(values: Array) -> float:
     """Return the largest value, not below zero, or NaN where one is NaN."""
     return float(values.max(initial=0.0))
+
+
+def deviation(strain: Array) -> float:
+    """Return the largest norm of the deviators of Mandel strains (..., n_components)."""
+    mean = strain[..., :3].mean(axis=-1)
+    square = (strain**2).sum(axis=-1) - 3 * mean**2
+    return float(np.sqrt(np.maximum(square.max(), 0.0)))
 
 
 def _flat(values: Array) -> Array:

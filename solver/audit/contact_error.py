@@ -14,13 +14,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from solver.audit.surfaces import deformed
 from solver.contact.pressure import contact_pressure
 from solver.contact.state import Converged, State
 from solver.contact.system import System
 from solver.fem.error import ErrorPoints
 from solver.fem.surface import Surface
 from solver.mesh.edges import shape_derivatives, shape_functions
-from solver.results.audit.surfaces import deformed
 from solver.tensors import to_tensor
 from solver.typing import Array
 

@@ -36,15 +36,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.audit.plain import GHOST, LEAST, PlainBody
+from solver.audit.theory import Neglected
 from solver.contact.candidates import no_candidates
 from solver.contact.state import Converged, State
-from solver.contact.system import LEAST, System
+from solver.contact.system import System
 from solver.fem.frame import turning
 from solver.fem.rigid import RigidPart
 from solver.loading.step import newton_step
 from solver.materials.elasticity import Elasticity
-from solver.results.audit.plain import GHOST, PlainBody
-from solver.results.audit.theory import Neglected
 from solver.tensors import SQRT2, to_tensor
 from solver.typing import Array
 

@@ -6,13 +6,13 @@ from functools import cached_property
 
 import numpy as np
 
+from solver.audit.flow import largest
+from solver.audit.pairs import COARSE, GAP, OVERLAP, PRESSED, STILL
 from solver.materials.law import Law
 from solver.prism import EllipticPatch, RollingPatch
 from solver.prism.friction_cone import NORMAL, TANGENTS
 from solver.prism.half_space import half_space
 from solver.prism.patch_contact import PatchContact, PatchLoad
-from solver.results.audit.flow import largest
-from solver.results.audit.pairs import COARSE, GAP, OVERLAP, PRESSED, STILL
 from solver.typing import Array
 
 _FORCE = 1e-6

@@ -7,21 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.audit.bodies import AuditedBody, misplaced
+from solver.audit.contact_error import contact_error
+from solver.audit.figures import LIMITS
+from solver.audit.forces import action_reaction, imbalance, left_on, reactions
+from solver.audit.large_strain import large_strain
+from solver.audit.links import least_energy, links_error, turned
+from solver.audit.pairs import AuditedPair
+from solver.audit.plain import LEAST, PlainBody
+from solver.audit.theory import accumulated_strain, plastic_strain
 from solver.contact.pressure import contact_pressure
 from solver.contact.state import Converged
-from solver.contact.system import LEAST, System
+from solver.contact.system import System
 from solver.fem.discretisation import Discretisation
 from solver.fem.error import error_estimate
 from solver.loading.integration import missed
-from solver.results.audit.bodies import AuditedBody
-from solver.results.audit.contact_error import contact_error
-from solver.results.audit.figures import LIMITS
-from solver.results.audit.forces import action_reaction, imbalance, left_on, reactions
-from solver.results.audit.large_strain import large_strain
-from solver.results.audit.links import least_energy, links_error, turned
-from solver.results.audit.pairs import AuditedPair
-from solver.results.audit.plain import PlainBody
-from solver.results.audit.theory import accumulated_strain, plastic_strain
 from solver.typing import Array
 
 _TOLD = {
@@ -89,6 +89,7 @@ def audit(
     )
     pairs = [AuditedPair(system, k, loaded) for k in range(len(system.interfaces))]
     broken, beyond = _laws(bodies, released)
+    every = list({id(each): each for each in (*states, *stages)}.values())
     names = ("audit_overlap", "audit_closed_gap", "audit_tension", "audit_friction_excess",
              "audit_slip", "audit_contact_resolution")  # fmt: skip
     figures = {
@@ -97,6 +98,7 @@ def audit(
         ),
         "audit_reactions": reactions(bodies, pairs, loaded),
         "audit_action_reaction": action_reaction(system, bodies, pairs, loaded),
+        "audit_prescribed": misplaced(system, plain, every),
         "audit_law": broken,
         "audit_yield": beyond,
         "audit_increment_error": _largest(*(missed(system, converged) for converged in states)),
@@ -112,7 +114,6 @@ def audit(
     figures |= _strength(system, loaded)
     figures |= _discretisation(system, states, loaded.energy.scale)
     figures["audit_error_contact"] = contact_error(system, loaded)
-    every = list({id(each): each for each in (*states, *stages)}.values())
     neglected = plastic_strain(system, every).neglected, large_strain(system, plain, every)
     figures["audit_plastic_strain"] = accumulated_strain(system, states[1])
     figures["audit_large_strain"] = _largest(*(each.share for each in neglected))

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.contact.state import Converged, State
-from solver.contact.system import LEAST, LEAST_ENERGY, System
+from solver.audit.plain import LEAST, LEAST_ENERGY
+from solver.contact.state import Converged
+from solver.contact.system import System
 from solver.fem.frame import RigidMotion
 from solver.fem.rigid import RigidPart
 from solver.fem.surface import edges_of
@@ -117,11 +118,6 @@ def _motion(system: System, name: str, converged: Converged) -> RigidMotion:
     part = system.parts[number]
     assert isinstance(part, RigidPart)
     return part.motion_of(converged.state.u[number])
-
-
-def linked(system: System, state: State, name: str) -> Array:
-    """Return the resultant (2,) of the forces of all links on a body [N]."""
-    return _resultant(system, state.links, name)[0]
 
 
 def _forces(system: System, k: int, converged: Converged, name: str) -> tuple[Array, Array]:

@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from solver.audit.flow import INFLOW, STEADINESS, AuditedFlow, deviation, difference, largest
+from solver.audit.patch import AuditedPatch
+from solver.audit.plain_prism import PlainPrism
+from solver.audit.report import Audit, broken, limits_at, warnings
+from solver.audit.theory import largest_strain
 from solver.materials.law import Law
 from solver.prism import PrismState, PrismTrack
 from solver.prism.patch_passing import AppliedPatch
-from solver.results.audit.flow import AuditedFlow, difference, largest
-from solver.results.audit.patch import AuditedPatch
-from solver.results.audit.plain_prism import PlainPrism
-from solver.results.audit.report import Audit, broken, limits_at, warnings
-from solver.results.audit.theory import largest_strain
 from solver.steady import Pass
-from solver.steady.flow import INFLOW, usual_parts
-from solver.steady.passing import TOLERANCE, deviation
 from solver.typing import Array, Ints
 
 _LENGTH = 0.01
 """Largest stress of the last level of the far field, over the yield stress."""
 _ROWS = 16
 """Number of rows of points along which the law is repeated: those that yield most, and others."""
-_LIMITS = {"audit_inflow": INFLOW, "audit_steadiness": TOLERANCE, "audit_length": _LENGTH}
+_LIMITS = {"audit_inflow": INFLOW, "audit_steadiness": STEADINESS, "audit_length": _LENGTH}
 
 
 def audit_prism(
@@ -140,7 +138,7 @@ def _released(law: Law, found: Pass[PrismState]) -> float:
 
     It follows from the last station, on the way to the strain without load.
     """
-    before, after, parts = found.before, found.after, usual_parts(law)
+    before, after, parts = found.before, found.after, found.parts
     start = (before.strain + found.strain[:, -1]).T
     state = after.state.unpacked(found.states.packed[..., -1])
     for part in range(1, parts + 1):

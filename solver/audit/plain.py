@@ -7,6 +7,7 @@ boundary. Stress and strain are Mandel vectors, elements and points last.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -37,6 +38,9 @@ _INSIDE = (0.5, 1e-6, 1 - 1e-6)
 _PARTS = 7
 """Number of parts of an element along a side, if elements are few, on which a force per volume is
 first looked at."""
+LEAST, LEAST_ENERGY = 1e-7, 1e-8
+"""Ratios of what rounding leaves of forces, and of energies, to their values if each element were
+clamped: free expansion leaves 1e-13 of the energy. Ratios refer to nothing smaller."""
 GHOST = 1e-7
 """Share of stiffness that elements keep when they are removed."""
 
@@ -56,10 +60,6 @@ class PlainBody:
     def body(self) -> Body:
         """The declared body."""
         return self.part.body
-
-    def in_plane(self, X: Array) -> Array:
-        """Return the coordinates (2, n) in the plane of the mesh of positions (n_axes, n) [mm]."""
-        return X
 
     @cached_property
     def _nodes(self) -> Ints:
@@ -128,35 +128,6 @@ class PlainBody:
         """Positions of the points (2, n_points) [mm]."""
         return np.asarray(self.part.basis.global_coordinates()).reshape(2, -1)
 
-    def recovered(self, values: Array, time: float | None = None) -> Array:
-        """Return nodal values (..., n_nodes) of values at points (..., n_points).
-
-        In each element a (bi)linear field is fitted to the points by least squares; a node takes
-        the mean of its elements, weighted with their volume. Elements that are removed at ``time``
-        do not count; nodes of other elements with an unknown value are NaN.
-        """
-        basis = self.part.basis
-        terms = 4 if basis.mesh.t.shape[0] == 4 else 3
-        terms = next(k for k in (terms, 3, 1) if self.volume.shape[1] >= k)
-
-        def linear(x: Array) -> Array:
-            return np.stack([np.ones(x.shape[1]), x[0], x[1], x[0] * x[1]][:terms], axis=1)
-
-        fit, *_ = np.linalg.lstsq(linear(np.asarray(basis.X)), np.eye(self.volume.shape[1]))
-        to_nodes = linear(np.array(basis.elem.doflocs, dtype=float).T) @ fit
-        volume, nodes = self.volume.sum(axis=1), self._nodes
-        count = self.part.X.shape[1]
-        gone = np.zeros(len(volume), dtype=bool)
-        if time is not None:
-            gone = (self.left(time) <= GHOST).reshape(self.volume.shape)[:, 0]
-        weighted = values.reshape(*values.shape[:-1], *self.volume.shape) * volume[:, None]
-        weighted = np.where(gone[:, None], 0.0, weighted)
-        each = np.moveaxis(weighted @ to_nodes.T, -1, -2).reshape(-1, nodes.size)
-        total = np.bincount(nodes.ravel(), np.tile(np.where(gone, 0, volume), len(nodes)), count)
-        total[total == 0] = np.nan if gone.any() else 1.0  # 1: copies of a periodic body
-        sums = np.stack([np.bincount(nodes.ravel(), one, count) for one in each]) / total
-        return np.asarray(sums[:, self.part.same].reshape(*values.shape[:-1], count))
-
     def eigenstrain(self, time: float) -> Array:
         """Return the eigenstrain (4, n_points, Mandel) of heat and initial stress."""
         out, elasticity = np.zeros((4, self.points.shape[1])), self.body.material.elasticity
@@ -181,6 +152,23 @@ class PlainBody:
                 stiff -= factor * lost[0]
                 strong -= factor * lost[1]
         return self.left(time) * stiff, strong
+
+    def prescribed(self, time: float) -> Array:
+        """Return the displacements (n_nodes, 2) of supports and loads, NaN where free [mm]."""
+        moved: dict[tuple[str, int], float] = {
+            (boundary, "xy".index(axis)): 0.0
+            for boundary, axes in self.body.supports.items()
+            for axis in axes
+        }
+        for load in self.body.every_load:  # displacements of one boundary add up
+            factor = load_factor(load.amplitude, time)
+            for boundary, axis in itertools.product(load.boundaries, load.components):
+                value = factor * load.components[axis]
+                moved[boundary, axis] = moved.get((boundary, axis), 0.0) + value
+        given = np.full(self.part.X.T.shape, np.nan)
+        for (boundary, axis), value in moved.items():
+            given[self.part.boundary_nodes(boundary), axis] = value
+        return given
 
     def left(self, time: float) -> Array:
         """Return the shares of stiffness (n_points,) that removal leaves; 1 where none is."""

@@ -1,29 +1,19 @@
-"""The audit of a steady pass, in the frame of the load, and its recomputed results."""
+"""The audit of a steady pass over a track, in the frame of the load."""
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 
+from solver.audit.flow import INFLOW, STEADINESS, AuditedFlow, difference, largest
+from solver.audit.plain import PlainBody
+from solver.audit.report import Audit, broken, estimated_error, limits_at, warnings
+from solver.audit.theory import Neglected, equivalent, largest_strain
 from solver.materials.law import Law
-from solver.model.motion import TravellingPressure
-from solver.results.audit.flow import AuditedFlow, difference, largest
-from solver.results.audit.pass_fields import PassFields
-from solver.results.audit.plain import PlainBody, load_factor
-from solver.results.audit.recomputed import Acting, BodyFields
-from solver.results.audit.report import Audit, broken, estimated_error, limits_at, warnings
-from solver.results.audit.sources import between, hertz
-from solver.results.audit.theory import Neglected, equivalent, largest_strain
-from solver.results.steady import TrackBody
 from solver.steady import Pass, RollingContact, Track
 from solver.steady.fields import of_layers, under_load
-from solver.steady.flow import INFLOW
 from solver.steady.layers import Layers
-from solver.steady.passing import TOLERANCE
-from solver.typing import Array
 
-_LIMITS = {"audit_inflow": INFLOW, "audit_steadiness": TOLERANCE}
+_LIMITS = {"audit_inflow": INFLOW, "audit_steadiness": STEADINESS}
 
 
 def audit_pass(
@@ -128,72 +118,3 @@ def _of_contact(material: Law, found: Pass[Layers]) -> dict[str, float]:
         "audit_surface_shear": largest(np.abs(touching.shear)) / strength,
         "audit_friction_over_strength": largest(touching.most_shear) / strength,
     }
-
-
-class OfPass:
-    """Recomputed results of a steady pass (see `Recomputed`).
-
-    Parameters
-    ----------
-    moving : the travelling pressure, None if the load is a wheel
-    released : name of the state behind the pass
-    """
-
-    def __init__(
-        self,
-        half_plane: TrackBody,
-        found: Pass[Layers],
-        moving: TravellingPressure | None,
-        released: str,
-    ) -> None:
-        def fields(name: str, stage: str) -> BodyFields:
-            del name
-            return PassFields(half_plane, found, loaded=stage != released)
-
-        self._half_plane, self._found = half_plane, found
-        self._moving, self._released = moving, released
-        self.fields = cache(fields)  # a bound method would hold itself: a circle
-        self.plain = cache(lambda name: PlainBody(half_plane.full(name)))
-
-    def exact(self, stage: str) -> bool:
-        """See `Recomputed`; under the load two strains differ, by `audit_steadiness`."""
-        return stage == self._released
-
-    def centre(self, stage: str) -> float:
-        """See `Recomputed`."""
-        del stage
-        return 0.0
-
-    @property
-    def _vertices(self) -> tuple[Array, Array, Array]:
-        """Positions along x, pressure and shear there, in the coordinates of the track."""
-        touching, chain = self._found.loading, self._half_plane.track.surface
-        assert isinstance(touching, RollingContact)
-        x, way = chain.X[0, chain.vertices], self._found.direction
-        side = np.abs(np.diff(x)) / 2
-        area = np.append(side, 0.0) + np.append(0.0, side)
-        order = np.argsort(way * x)
-        pressure, shear = touching.normal / area, -way * touching.tangential / area
-        return (way * x)[order], pressure[order], shear[order]
-
-    def acting(self, stage: str, x: Array) -> Acting:
-        """See `Recomputed`."""
-        nowhere = np.full_like(x, np.nan)
-        if self._moving is not None:
-            time = float(stage == self._released)
-            return Acting(*hertz(self._moving, time, x, 0.0), nowhere)
-        if stage == self._released:
-            return Acting(np.zeros_like(x), np.zeros_like(x), nowhere)
-        at, pressure, shear = self._vertices
-        return Acting(between(x, at, pressure), between(x, at, shear), nowhere)
-
-    def extent(self, stage: str) -> tuple[float, float, float]:
-        """See `Recomputed`."""
-        if self._moving is not None:
-            share = load_factor(self._moving.amplitude, float(stage == self._released))
-            return self._moving.half_width, self._moving.half_width, share * self._moving.peak
-        if stage == self._released:
-            return np.nan, np.nan, 0.0
-        at, pressure, _ = self._vertices
-        width, side = np.ptp(at[pressure > 0]) / 2, np.diff(at).max()  # gaps are not available
-        return float(width - side), float(width + side), float(pressure.max())
