@@ -3,7 +3,7 @@ BIN := .venv/bin
 INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 STAMP := .venv/installed
 COMPILED := .venv/compiled
-KERNELS := solver/prism/influence.py solver/steady/sweep.py
+KERNELS := solver/rolling/rail/influence.py solver/rolling/sweep.py
 
 # Python keeps what it has compiled, whatever the caller says: tests and studies start many processes.
 export PYTHONDONTWRITEBYTECODE :=

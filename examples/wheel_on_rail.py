@@ -7,11 +7,15 @@ thesis, on elements of 2 mm; with ``size = spacing = 1.0`` its figures settle.
 import numpy as np
 
 from solver import Material
-from solver.mesh.rail import rail_60e1
-from solver.mesh.wheel_profile import s1002
-from solver.mesh.zone import Zone, rail_mesh
-from solver.prism import PatchPassing, PrismTrack, ProfiledWheel, RollingPatch, Section
-from solver.steady.passing import passing
+from solver.rolling.passing import passing
+from solver.rolling.rail.patch import RollingPatch
+from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.rail.profiled_wheel import ProfiledWheel
+from solver.rolling.rail.profiles.rail import rail_60e1
+from solver.rolling.rail.profiles.wheel_profile import s1002
+from solver.rolling.rail.profiles.zone import Zone, rail_mesh
+from solver.rolling.rail.section import Section
+from solver.rolling.rail.track import PrismTrack
 
 size = spacing = 2.0
 steel = Material(

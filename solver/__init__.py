@@ -37,7 +37,7 @@ _HOMES = {
     "Record": "results.record",
     "RigidBody": "model.rigid",
     "Scene": "scenes",
-    "SCENES": "scenes",
+    "SCENES": "shipped",
     "SingularPoint": "model.singular",
     "Solution": "results.solution",
     "solve": "results.solution",

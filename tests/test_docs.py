@@ -28,7 +28,7 @@ import pytest
 
 from residua.cli import main
 from solver.results.quantities import QUANTITIES
-from solver.scenes import SCENES
+from solver.shipped import SCENES
 from tests.architecture.sources import ROOT, tracked
 from tests.architecture.test_layers import LAYERS
 from tests.programs import Programs

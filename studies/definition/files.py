@@ -189,7 +189,7 @@ def _with_files(value: Any, field: str, folder: Path) -> Any:
         return value
     try:
         if value.endswith(_OF_POINTS):
-            from solver.mesh.points import read_points  # loads numpy
+            from solver.rolling.rail.profiles.points import read_points  # loads numpy
 
             return read_points(folder / value).T.tolist()
         from studies.scenes.meshfile import MeshFile  # loads scipy

@@ -8,8 +8,9 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
-from solver.scenes import SCENES, Scene
+from solver.scenes import Scene
 from solver.scenes.late import Late
+from solver.shipped import SCENES
 from studies.errors import StudyError, one_of
 from studies.scenes.file_scene import FileScene
 from studies.scenes.shipped import SHIPPED

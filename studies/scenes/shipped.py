@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from solver.scenes import SCENES
+from solver.shipped import SCENES
 
 SHIPPED: Mapping[str, Path] = {
     path.stem: path for path in sorted((Path(__file__).parent / "files").glob("*.toml"))

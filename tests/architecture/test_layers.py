@@ -15,8 +15,8 @@ LAYERS = {
     # from the ground up; a module may import from its own layer and from those before it
     "solver": (
         "version", "typing", "errors", "files", "parameters", "kinds", "parts", "memory", "tensors",
-        "linear", "mesh", "materials", "model", "fem", "contact", "loading", "steady", "prism",
-        "results.quantities", "audit", "results", "scenes",
+        "linear", "mesh", "materials", "model", "fem", "contact", "loading",
+        "results.quantities", "audit", "results", "scenes", "rolling", "shipped",
     ),
     "studies": (
         "units", "errors", "toml", "scratch", "scenes", "definition", "storage",

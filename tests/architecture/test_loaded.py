@@ -14,7 +14,11 @@ from tests.architecture.sources import ROOT
 
 NEVER = {"dask.array", "dask.dataframe", "matplotlib", "meshio", "numba", "pandas", "xarray"}
 """Each takes a tenth of a second to load, or much more, and memory of each worker."""
-ROLLING = ("solver.prism", "solver.steady", "solver.scenes.rolling_setup")
+ROLLING = (
+    "solver.rolling.passing",
+    "solver.rolling.rail.track",
+    "solver.rolling.scenes.rolling_setup",
+)
 
 PROGRAM = f"""
 import importlib, json, sys

@@ -9,7 +9,7 @@ from collections import Counter
 
 import pytest
 
-import solver.scenes  # noqa: F401  (declares all)
+import solver.shipped  # noqa: F401  (declares all)
 from solver.results.quantities import IN_SPACE, QUANTITIES, declare
 from tests.architecture.sources import ROOT, modules
 from tests.recomputed.record import FORMULAS, RULES
@@ -54,7 +54,7 @@ def test_nobody_outside_the_solver_declares(package: str) -> None:
 
 def declared_by_scenes() -> set[str]:
     """Names that are declared when the scenes have been imported, and nothing else."""
-    code = "import solver.scenes as s, solver.results.quantities as q; print(*q.QUANTITIES)"
+    code = "import solver.shipped as s, solver.results.quantities as q; print(*q.QUANTITIES)"
     command = [sys.executable, "-c", code]
     told = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
     return set(told.stdout.split())

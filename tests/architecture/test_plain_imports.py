@@ -11,9 +11,9 @@ import pytest
 
 from solver.results.outputs import MODULES
 from solver.results.quantities import DECLARING
-from solver.scenes import SCENES
+from solver.rolling.scenes.wheel_rail_parameters import _checked
 from solver.scenes.late import Late
-from solver.scenes.wheel_rail_parameters import _checked
+from solver.shipped import SCENES
 from tests.architecture.sources import ROOT, importing, modules
 
 DOORS = {

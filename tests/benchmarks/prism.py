@@ -18,18 +18,16 @@ from scipy.interpolate import LinearNDInterpolator
 
 from solver.linear.threads import one_thread
 from solver.materials import Material
-from solver.mesh.rail import rail_60e1
-from solver.mesh.wheel_profile import s1002
-from solver.mesh.zone import Zone, rail_mesh
-from solver.prism import (
-    PatchPassing,
-    PrismState,
-    PrismTrack,
-    ProfiledWheel,
-    RollingPatch,
-    Section,
-)
-from solver.steady.passing import Pass, passing
+from solver.rolling.passing import Pass, passing
+from solver.rolling.rail.patch import RollingPatch
+from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.rail.profiled_wheel import ProfiledWheel
+from solver.rolling.rail.profiles.rail import rail_60e1
+from solver.rolling.rail.profiles.wheel_profile import s1002
+from solver.rolling.rail.profiles.zone import Zone, rail_mesh
+from solver.rolling.rail.section import Section
+from solver.rolling.rail.state import PrismState
+from solver.rolling.rail.track import PrismTrack
 from tests.benchmarks.measure import Point, Timed, timed
 from tests.verification.prism_blocks import (
     HARDENS,

@@ -17,10 +17,10 @@ from solver import SCENES, Body, ContactPair, Material, Model, PathControl, solv
 from solver.contact import candidates
 from solver.memory import release
 from solver.mesh import grid
+from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling_steady import steady_passes
 from solver.scenes.punch import PunchParameters
 from solver.scenes.punch_setup import model
-from solver.scenes.rolling_parameters import RollingParameters
-from solver.scenes.rolling_steady import steady_passes
 from tests.benchmarks.measure import timed
 
 Array = NDArray[np.float64]

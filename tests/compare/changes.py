@@ -105,7 +105,7 @@ def change(name: str, before: Any, after: Any) -> float:
 
 def _rounding(name: str) -> float:
     """Return the change of a variable that rounding causes, in its unit."""
-    import solver.scenes  # noqa: F401  (declares all quantities)
+    import solver.shipped  # noqa: F401  (declares all quantities)
     from solver.results.quantities import QUANTITIES
 
     units = QUANTITIES[name].units if name in QUANTITIES else ""

@@ -17,9 +17,9 @@ from solver.results.named_places import NamedPlaces
 from solver.results.record import Record
 from solver.results.requested import RequestedNumber
 from solver.results.run import FinishedRun
-from solver.results.steady import TrackBody
 from solver.results.tractions import PrescribedTractions
 from solver.results.view import View
+from solver.rolling.results.plane import TrackBody
 from solver.tensors import AXES, components
 from tests.recomputed.bodies import Fields, Located, PlainSection, of_pass, of_state, of_zone
 from tests.recomputed.contact import (

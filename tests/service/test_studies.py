@@ -17,9 +17,9 @@ from fastapi.testclient import TestClient
 
 from service.app import create_app
 from service.settings import Settings
-from solver.mesh.meshed_rail import section_of
-from solver.mesh.rail import rail_60e1
-from solver.mesh.zone import Zone, rail_mesh
+from solver.rolling.rail.profiles.meshed_rail import section_of
+from solver.rolling.rail.profiles.rail import rail_60e1
+from solver.rolling.rail.profiles.zone import Zone, rail_mesh
 from studies import Study, StudyError, open_study
 from studies.definition.files import read_study
 from tests.architecture.sources import ROOT

@@ -12,7 +12,7 @@ import pytest
 from solver import Body, ContactPair, Displacement, Material, Model, Record, solve
 from solver.materials.doubts import doubts
 from solver.mesh import grid
-from solver.scenes import SCENES
+from solver.shipped import SCENES
 
 pytestmark = pytest.mark.solves
 

@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from solver.contact.system import System
-from solver.scenes import SCENES, Scene
-from solver.scenes.rolling_steady import rim_of, track_for
+from solver.rolling.scenes.rolling_steady import rim_of, track_for
+from solver.scenes import Scene
+from solver.shipped import SCENES
 from tests.counted import counted
 
 COARSE = {"smallest_element": 0.02, "growth": 2.0}

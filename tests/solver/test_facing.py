@@ -26,7 +26,7 @@ from solver.fem.discretisation import Discretisation
 from solver.fem.surface import extract
 from solver.mesh import grid, mapped
 from solver.model.rigid import arc
-from solver.scenes.rolling import ROLLING
+from solver.rolling.scenes.rolling import ROLLING
 from tests.verification.bodies import block
 
 pytestmark = pytest.mark.solves

@@ -32,9 +32,11 @@ from solver.model.friction import (
     through,
 )
 from solver.model.rigid import line
-from solver.scenes.rolling_parameters import RollingParameters
-from solver.scenes.rolling_steady import rim_of
-from solver.steady import RollingWheel, rolling, track_of
+from solver.rolling.plane.rolling import rolling
+from solver.rolling.plane.track import track_of
+from solver.rolling.plane.wheel import RollingWheel
+from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling_steady import rim_of
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 WEAK = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)

@@ -26,7 +26,7 @@ from solver import (
 from solver.loading.freed import check_freed
 from solver.mesh import grid
 from solver.model.rigid import arc
-from solver.scenes.rolling import ROLLING
+from solver.rolling.scenes.rolling import ROLLING
 
 pytestmark = pytest.mark.solves
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from solver import ModelError
-from solver.mesh.outline import Outline, RoundedCorner
-from solver.mesh.points import read_points
-from solver.mesh.rail import rail_60e1
+from solver.rolling.rail.profiles.outline import Outline, RoundedCorner
+from solver.rolling.rail.profiles.points import read_points
+from solver.rolling.rail.profiles.rail import rail_60e1
 
 RAIL = rail_60e1()
 OUTLINE = RAIL.outline

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.errors import ModelError
-from solver.scenes.schedule import Schedule
+from solver.rolling.scenes.schedule import Schedule
 
 
 def schedule(**fields):

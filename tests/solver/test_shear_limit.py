@@ -25,11 +25,11 @@ from solver.contact.problem import STICK
 from solver.fem.discretisation import Discretisation
 from solver.mesh import grid, mapped
 from solver.model.friction import Coulomb
+from solver.rolling.scenes.rolling import ROLLING
+from solver.rolling.scenes.rolling_model import model as rolling_model
+from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.scenes.punch import PunchParameters
 from solver.scenes.punch_setup import model as punch_model
-from solver.scenes.rolling import ROLLING
-from solver.scenes.rolling_model import model as rolling_model
-from solver.scenes.rolling_parameters import RollingParameters
 
 YIELD_STRESS, SHARE, PRESSURE = 300.0, 0.1, 100.0
 STRENGTH = SHARE * YIELD_STRESS / np.sqrt(3)

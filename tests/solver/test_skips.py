@@ -27,7 +27,7 @@ def test_a_run_by_increments_does_not_wait_for_the_compiler_of_steady_passes() -
     """Importing it takes as long as a small run."""
     program = (
         "import sys\n"
-        "from solver.scenes import SCENES\n"
+        "from solver.shipped import SCENES\n"
         "punch = SCENES['punch']\n"
         "(run,) = punch.path(punch.parameters(accuracy='draft'), [0.3], lambda share: None)\n"
         "print(run.status.name, 'numba' in sys.modules)\n"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from solver import ModelError
-from solver.mesh.points import read_points
-from solver.mesh.rail import rail_60e1
-from solver.mesh.wheel_profile import conical, crowned, measured, s1002
+from solver.rolling.rail.profiles.points import read_points
+from solver.rolling.rail.profiles.rail import rail_60e1
+from solver.rolling.rail.profiles.wheel_profile import conical, crowned, measured, s1002
 
 PROFILE = s1002()
 PROFILES = {

@@ -16,9 +16,9 @@ from solver.loading.control import Control
 from solver.loading.increment import Increment
 from solver.loading.outcome import IncrementFailed
 from solver.loading.walker import Walker
+from solver.rolling.scenes.rolling import ROLLING
+from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.scenes.punch import PUNCH, PunchParameters
-from solver.scenes.rolling import ROLLING
-from solver.scenes.rolling_parameters import RollingParameters
 
 PRESSED = PunchParameters(accuracy="draft", friction=0.3, load_ratio=0.6)
 ROLLED = RollingParameters(

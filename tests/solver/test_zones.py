@@ -12,8 +12,8 @@ from skfem.quadrature import get_quadrature
 from solver import ModelError
 from solver.mesh.check import check_mesh
 from solver.mesh.elements import ELEMENTS
-from solver.mesh.rail import rail_60e1
-from solver.mesh.zone import Zone, raceway_mesh, rail_mesh
+from solver.rolling.rail.profiles.rail import rail_60e1
+from solver.rolling.rail.profiles.zone import Zone, raceway_mesh, rail_mesh
 
 RAIL = rail_60e1()
 QUAD8 = ElementQuadS2()

@@ -15,7 +15,8 @@ from annotated_types import Gt, Interval, Unit
 
 from solver.errors import ModelError
 from solver.results.record import Record, Status
-from solver.scenes import SCENES, Monitor, Scene
+from solver.scenes import Monitor, Scene
+from solver.shipped import SCENES
 
 INCREMENTS = 10
 COMPONENTS = ["xx", "yy", "zz", "xy"]

@@ -16,7 +16,7 @@ import xarray as xr
 
 from solver.linear import solvers
 from solver.results.record import Record, Status
-from solver.scenes import SCENES
+from solver.shipped import SCENES
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.storage import dataset as layout
 from studies.storage import frame, provenance

@@ -11,7 +11,8 @@ import pytest
 
 from residua.cli import main
 from solver.results.quantities import IN_SPACE, QUANTITIES
-from solver.scenes import SCENES, Scene
+from solver.scenes import Scene
+from solver.shipped import SCENES
 from studies import Study, StudyError, open_study
 from studies.definition.parameters import parameters_of
 from studies.errors import SceneError

@@ -12,7 +12,7 @@ from types import ModuleType
 
 import pytest
 
-from solver.scenes import SCENES
+from solver.shipped import SCENES
 from studies import Store, Study
 from studies.definition.identity import solver_hash, written
 from studies.execution.proof import Unfit

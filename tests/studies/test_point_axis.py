@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from residua.cli import main
-from solver.scenes import SCENES
+from solver.shipped import SCENES
 from studies import Store, Study, StudyError, estimate, open_study, to_grid
 from studies.definition.parameters import parameters_of
 from studies.toml import CASE

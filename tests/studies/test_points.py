@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from solver.scenes import SCENES
+from solver.shipped import SCENES
 from studies import Study
 from studies.definition.parameters import parameters_of
 from studies.errors import StudyError

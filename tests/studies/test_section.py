@@ -25,8 +25,8 @@ from solver.results.requested import RequestedNumber
 from solver.results.run import FinishedRun
 from solver.results.samples import Samples
 from solver.results.view import ACROSS_TRACK, NOWHERE, Places, View
-from solver.scenes import SCENES
 from solver.scenes.driver import _labelled, _merged
+from solver.shipped import SCENES
 from solver.tensors import to_mandel, von_mises
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.storage import ugrid

@@ -17,9 +17,9 @@ from residua.cli import main
 from service.keys import Keys, KeysError
 from solver.errors import ModelError
 from solver.files import NoFile, read_file
-from solver.mesh.points import read_points
 from solver.model.tabulated import Tabulated
 from solver.results import saved
+from solver.rolling.rail.profiles.points import read_points
 from studies import CatalogueDamaged, Store, Study, StudyError, run_study
 from studies.execution.cluster import Access, connect
 from studies.storage.claims import Claims

@@ -16,7 +16,7 @@ import pytest
 
 import studies.definition.expansion
 import studies.definition.identity
-from solver.scenes import SCENES
+from solver.shipped import SCENES
 from studies import Study, StudyError, scene_schema
 from studies.definition.identity import content_id, written
 from studies.definition.sweep import MAXIMUM_RUNS

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.scenes import SCENES
+from solver.shipped import SCENES
 from studies import Store, Study, open_study
 from studies.definition.parameters import scene_schema
 from studies.errors import StudyError

@@ -1,9 +1,9 @@
 """A small model of 20-node bricks: material stands still, and a load moves over it.
 
-It shares with `solver.prism` the material law alone. Along x the model repeats itself. Bricks have
-their usual 2 x 2 x 2 Gauss points. Material is at other points, which are equispaced along x: two
-in each brick, half a brick apart. Strain, and the stress that plastic strain takes away, are linear
-along a brick from one to the other.
+It shares with `solver.rolling.rail` the material law alone. Along x the model repeats itself.
+Bricks have their usual 2 x 2 x 2 Gauss points. Material is at other points, which are equispaced
+along x: two in each brick, half a brick apart. Strain, and the stress that plastic strain takes
+away, are linear along a brick from one to the other.
 
 Strain and stress are Mandel vectors (xx, yy, zz, sqrt(2) xy, sqrt(2) yz, sqrt(2) zx).
 """

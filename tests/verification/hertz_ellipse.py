@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from solver.materials import Elasticity
-from solver.prism.half_space import half_space
-from solver.prism.patch import RollingPatch
-from solver.prism.patch_grid import PatchGrid
-from solver.prism.profiled_wheel import ProfiledWheel
+from solver.rolling.rail.half_space import half_space
+from solver.rolling.rail.patch import RollingPatch
+from solver.rolling.rail.patch_grid import PatchGrid
+from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from tests.verification.closed_forms import HertzEllipse
 
 Array = NDArray[np.float64]

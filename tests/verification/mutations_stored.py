@@ -32,10 +32,10 @@ import solver.results.places
 import solver.results.samples
 import solver.results.shakedown
 import solver.results.singularity
-import solver.results.steady
 import solver.results.tractions
-import solver.scenes.rolling_setup
-import solver.scenes.rolling_steady
+import solver.rolling.results.plane
+import solver.rolling.scenes.rolling_setup
+import solver.rolling.scenes.rolling_steady
 from solver.contact.candidates import Candidates
 from solver.contact.interface import Interface
 from solver.fem.fields import Sampler
@@ -49,12 +49,12 @@ from solver.results.requested import RequestedNumber
 from solver.results.run import FinishedRun
 from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
-from solver.results.steady import SteadyTractions
 from solver.results.tractions import PairTractions
 from solver.results.view import Axis, Places, View
+from solver.rolling.layers import Layers
+from solver.rolling.plane.track import Track
+from solver.rolling.results.plane import SteadyTractions
 from solver.scenes.scene import Scene
-from solver.steady.layers import Layers
-from solver.steady.track import Track
 from studies.scenes.description import Description
 from studies.scenes.scene import file_scene
 from tests.solver import test_singularity
@@ -513,20 +513,20 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     # steady passes
     "inflow of a second pass lost": _passed(
-        instead(import_module("solver.steady.rolling"), "search", no_inflow), "history"
+        instead(import_module("solver.rolling.plane.rolling"), "search", no_inflow), "history"
     ),
     "a pass back not mirrored": _passed(
         instead(Layers, "mirrored", lambda old: property(lambda self: self)), "history"
     ),
     "a pass back taken forward": _passed(
-        instead(solver.scenes.rolling_steady, "rolling", always_ahead), "history"
+        instead(solver.rolling.scenes.rolling_steady, "rolling", always_ahead), "history"
     ),
     "a pass back shown as if it went forward": _passed(
         instead(Track, "mirror", lambda old: property(not_turned)), STORED
     ),
     "residual stress of layers without zz": _passed(times(Layers, "stress", 0.9), STORED),
     "the first pass told as the last": _passed(
-        instead(solver.scenes.rolling_setup, "passes", first_pass_last), STORED
+        instead(solver.rolling.scenes.rolling_setup, "passes", first_pass_last), STORED
     ),
     "shear of a wheel against its way": _passed(
         instead(SteadyTractions, "along", part_times(1, -1.0)),

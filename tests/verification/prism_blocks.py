@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from solver.materials import Material
 from solver.materials.law import Law
 from solver.mesh import grid, within
-from solver.prism.given_patch import EllipticPatch
-from solver.prism.patch_passing import PatchPassing
-from solver.prism.profiled_wheel import ProfiledWheel
-from solver.prism.section import Section
-from solver.prism.state import PrismState
-from solver.prism.track import PrismTrack
-from solver.scenes.initial_stress import SectionStress
-from solver.scenes.wheel_rail_track import settled
+from solver.rolling.rail.given_patch import EllipticPatch
+from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.rail.profiled_wheel import ProfiledWheel
+from solver.rolling.rail.section import Section
+from solver.rolling.rail.state import PrismState
+from solver.rolling.rail.track import PrismTrack
+from solver.rolling.scenes.initial_stress import SectionStress
+from solver.rolling.scenes.wheel_rail_track import settled
 
 Array = NDArray[np.float64]
 RE = 502.0

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.materials import Elasticity
-from solver.prism.half_space import half_space
-from solver.prism.patch import RollingPatch
-from solver.prism.patch_contact import PatchContact
-from solver.prism.patch_grid import PatchGrid
-from solver.prism.profiled_wheel import ProfiledWheel
+from solver.rolling.rail.half_space import half_space
+from solver.rolling.rail.patch import RollingPatch
+from solver.rolling.rail.patch_contact import PatchContact
+from solver.rolling.rail.patch_grid import PatchGrid
+from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from tests.verification.closed_forms import HertzEllipse
 from tests.verification.hertz_ellipse import surface_of
 

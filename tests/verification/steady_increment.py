@@ -22,13 +22,13 @@ from solver.materials.material import Material
 from solver.model.amplitude import Amplitude
 from solver.model.contact_pair import ContactPair
 from solver.model.motion import Axle
-from solver.scenes.rolling_model import wheel_body
-from solver.scenes.rolling_parameters import RollingParameters
-from solver.scenes.rolling_steady import load_on, rim_of
-from solver.steady import Track
-from solver.steady.fields import under_load
-from solver.steady.passing import passing
-from solver.steady.rim import flowed
+from solver.rolling.passing import passing
+from solver.rolling.plane.fields import under_load
+from solver.rolling.plane.rim import flowed
+from solver.rolling.plane.track import Track
+from solver.rolling.scenes.rolling_model import wheel_body
+from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling_steady import load_on, rim_of
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from solver import Model, PathControl, solve
 from solver.fem.discretisation import Discretisation
 from solver.fem.fields import recovery
 from solver.mesh import grid
-from solver.results.free_surface import FreeSurface
+from solver.rolling.results.free_surface import FreeSurface
 from solver.tensors import to_tensor
 from tests.verification.bodies import NU, E, block, cells, sector, steel
 from tests.verification.closed_forms import ThickCylinder, ThickSphere

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from solver.materials import Elasticity
-from solver.prism.half_space import half_space
-from solver.prism.hats import SHARES, Hats
+from solver.rolling.rail.half_space import half_space
+from solver.rolling.rail.hats import SHARES, Hats
 
 NU = 0.3
 STEEL = Elasticity(youngs_modulus=2e5, poisson_ratio=NU)

@@ -10,14 +10,14 @@ import pytest
 
 from solver.errors import WindowTooSmall
 from solver.materials import Elasticity
-from solver.prism.friction_cone import OPEN, SLIP, STICK
-from solver.prism.given_patch import EllipticPatch
-from solver.prism.patch import RollingPatch
-from solver.prism.patch_contact import PatchContact
-from solver.prism.patch_grid import PatchGrid
-from solver.prism.profiled_wheel import ProfiledWheel
-from solver.prism.stepped import Bare
-from solver.prism.stepped_patch import SteppedPatch
+from solver.rolling.rail.friction_cone import OPEN, SLIP, STICK
+from solver.rolling.rail.given_patch import EllipticPatch
+from solver.rolling.rail.patch import RollingPatch
+from solver.rolling.rail.patch_contact import PatchContact
+from solver.rolling.rail.patch_grid import PatchGrid
+from solver.rolling.rail.profiled_wheel import ProfiledWheel
+from solver.rolling.rail.stepped import Bare
+from solver.rolling.rail.stepped_patch import SteppedPatch
 from tests.verification.hertz_ellipse import STEEL, ellipse, flat, pressed, surface_of
 
 FRICTION = 0.3

@@ -7,12 +7,12 @@ import pytest
 from numpy.typing import NDArray
 
 from solver.errors import ModelError
-from solver.mesh.wheel_profile import s1002
-from solver.prism.friction_cone import OPEN
-from solver.prism.patch import RollingPatch
-from solver.prism.patch_contact import PatchContact
-from solver.prism.patch_grid import PatchGrid
-from solver.prism.profiled_wheel import ProfiledWheel
+from solver.rolling.rail.friction_cone import OPEN
+from solver.rolling.rail.patch import RollingPatch
+from solver.rolling.rail.patch_contact import PatchContact
+from solver.rolling.rail.patch_grid import PatchGrid
+from solver.rolling.rail.profiled_wheel import ProfiledWheel
+from solver.rolling.rail.profiles.wheel_profile import s1002
 from tests.verification.hertz_ellipse import STEEL, ellipse, flat, pressed, surface_of
 
 Array = NDArray[np.float64]

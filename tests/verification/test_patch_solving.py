@@ -12,8 +12,8 @@ import pytest
 
 from solver.errors import LimitLoad, ModelError, Spins, WindowTooSmall
 from solver.materials import Elasticity
-from solver.prism.patch import RollingPatch
-from solver.prism.profiled_wheel import ProfiledWheel
+from solver.rolling.rail.patch import RollingPatch
+from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from tests.verification.hertz_ellipse import STEEL, ellipse, flat, pressed, surface_of
 from tests.verification.rolling_cases import moved, random_case, worst
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.prism.given_patch import EllipticPatch
-from solver.prism.track import PrismField, PrismTrack
+from solver.rolling.rail.given_patch import EllipticPatch
+from solver.rolling.rail.track import PrismField, PrismTrack
 from solver.tensors import to_tensor, von_mises
 from tests.verification.closed_forms import HertzEllipse
 from tests.verification.prism_blocks import PERFECT, A, B, block

@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 
 from solver.errors import ModelError, NotConverged, WindowTooSmall
 from solver.linear.threads import one_thread
-from solver.prism import stepped
-from solver.prism.given_patch import EllipticPatch
-from solver.prism.patch import RollingPatch
-from solver.prism.patch_contact import PatchContact
-from solver.prism.patch_passing import PatchPassing
-from solver.prism.stepped import Bare, LoadAt, SteppedIncrement, SteppedPrism
-from solver.prism.stepped_patch import SteppedPatch
-from solver.prism.track import PrismTrack
-from solver.steady.passing import passing
+from solver.rolling.passing import passing
+from solver.rolling.rail import stepped
+from solver.rolling.rail.given_patch import EllipticPatch
+from solver.rolling.rail.patch import RollingPatch
+from solver.rolling.rail.patch_contact import PatchContact
+from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.rail.stepped import Bare, LoadAt, SteppedIncrement, SteppedPrism
+from solver.rolling.rail.stepped_patch import SteppedPatch
+from solver.rolling.rail.track import PrismTrack
 from tests.verification.prism_blocks import AHEAD, HARDENS, PERFECT, A, B, block, crowned, residual
 
 Array = NDArray[np.float64]

@@ -8,18 +8,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver.audit.prism import audit_prism
 from solver.errors import ModelError
 from solver.linear.threads import one_thread
 from solver.mesh import grid
-from solver.mesh.rail import rail_60e1
-from solver.mesh.zone import Zone, rail_mesh
-from solver.prism import Section, SteppedPrism
-from solver.prism.straight import StraightPrism, straight_motions
-from solver.scenes.initial_stress import NoStress, OverHeight, RollerStraightened
-from solver.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.wheel_rail_track import settled
-from solver.steady.passing import passing
+from solver.rolling.audit.rail import audit_prism
+from solver.rolling.passing import passing
+from solver.rolling.rail.profiles.rail import rail_60e1
+from solver.rolling.rail.profiles.zone import Zone, rail_mesh
+from solver.rolling.rail.section import Section
+from solver.rolling.rail.stepped import SteppedPrism
+from solver.rolling.rail.straight import StraightPrism, straight_motions
+from solver.rolling.scenes.initial_stress import NoStress, OverHeight, RollerStraightened
+from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.rolling.scenes.wheel_rail_track import settled
 from tests.verification.prism_blocks import PERFECT, RE, block, ellipse, residual, stressed
 
 Array = NDArray[np.float64]

@@ -8,17 +8,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.audit.plain_prism import PlainPrism
-from solver.audit.prism import audit_prism
 from solver.linear.threads import one_thread
 from solver.materials import SmoothMaterial, Voce
 from solver.materials.hardening_rules import HARDENING
 from solver.materials.law import Law
-from solver.prism import EllipticPatch, PatchPassing, PrismTrack, SteppedPrism
 from solver.results.shakedown import ShakedownState, classify
-from solver.scenes.initial_stress import OverHeight
-from solver.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.steady.passing import Pass, passing
+from solver.rolling.audit.plain_rail import PlainPrism
+from solver.rolling.audit.rail import audit_prism
+from solver.rolling.passing import Pass, passing
+from solver.rolling.rail.given_patch import EllipticPatch
+from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.rail.stepped import SteppedPrism
+from solver.rolling.rail.track import PrismTrack
+from solver.rolling.scenes.initial_stress import OverHeight
+from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
 from tests.solver.yield_surfaces import Hosford
 from tests.verification.prism_blocks import AHEAD, PERFECT, RE, A, block, residual, stressed
 

@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 from skfem import MeshQuad2
 
 from solver.errors import ModelError
-from solver.mesh.meshed_rail import MeshedRail, section_of
-from solver.mesh.rail import rail_60e1
-from solver.mesh.section_mesh import SectionMesh
-from solver.mesh.zone import Zone, rail_mesh
-from solver.prism import PrismTrack, Section
 from solver.results.record import Status
-from solver.scenes import SCENES
-from solver.scenes.wheel_rail_contact import canted
-from solver.scenes.wheel_rail_track import geometry, mesh_of, meshed
+from solver.rolling.rail.profiles.meshed_rail import MeshedRail, section_of
+from solver.rolling.rail.profiles.rail import rail_60e1
+from solver.rolling.rail.profiles.section_mesh import SectionMesh
+from solver.rolling.rail.profiles.zone import Zone, rail_mesh
+from solver.rolling.rail.section import Section
+from solver.rolling.rail.track import PrismTrack
+from solver.rolling.scenes.wheel_rail_contact import canted
+from solver.rolling.scenes.wheel_rail_track import geometry, mesh_of, meshed
+from solver.shipped import SCENES
 from studies import Study, StudyError
 from studies.scenes.meshfile import MeshFile
 from studies.views.columns import value_text

@@ -11,18 +11,22 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver.audit.plain_prism import PlainPrism
-from solver.audit.prism import audit_prism
 from solver.audit.report import Audit
 from solver.linear.threads import one_thread
 from solver.materials import Material
 from solver.mesh import grid, within
-from solver.prism import Modes, PatchPassing, PrismState, PrismTrack, RollingPatch, Section
-from solver.prism import far_field as far_fields
-from solver.prism import flow as flows
-from solver.prism import patch as patches
-from solver.steady import Pass
-from solver.steady.passing import passing
+from solver.rolling.audit.plain_rail import PlainPrism
+from solver.rolling.audit.rail import audit_prism
+from solver.rolling.passing import Pass, passing
+from solver.rolling.rail import far_field as far_fields
+from solver.rolling.rail import flow as flows
+from solver.rolling.rail import patch as patches
+from solver.rolling.rail.modes import Modes
+from solver.rolling.rail.patch import RollingPatch
+from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.rail.section import Section
+from solver.rolling.rail.state import PrismState
+from solver.rolling.rail.track import PrismTrack
 from tests.verification.test_prism_passes import HARDENS, PERFECT, block, ellipse, lines, wheel
 
 Array = NDArray[np.float64]

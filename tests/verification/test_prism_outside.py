@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.audit import plain_prism
-from solver.audit.plain_prism import PlainPrism
-from solver.audit.prism import audit_prism
 from solver.linear.threads import one_thread
 from solver.mesh import grid, within
-from solver.prism import PrismTrack, Section
-from solver.steady.passing import passing
+from solver.rolling.audit import plain_rail as plain_prism
+from solver.rolling.audit.plain_rail import PlainPrism
+from solver.rolling.audit.rail import audit_prism
+from solver.rolling.passing import passing
+from solver.rolling.rail.section import Section
+from solver.rolling.rail.track import PrismTrack
 from tests.verification.prism_blocks import HARDENS, PERFECT, block, ellipse
 
 PEAK = 1360.0

@@ -19,14 +19,14 @@ from solver.materials import (
 )  # fmt: skip
 from solver.materials.law import Law
 from solver.mesh import grid
-from solver.prism.patch import RollingPatch
-from solver.prism.patch_contact import PatchContact
-from solver.prism.patch_passing import PatchPassing
-from solver.prism.section import Section
-from solver.prism.state import PrismState
-from solver.prism.track import PrismTrack
-from solver.steady import track_of
-from solver.steady.passing import Pass, passing
+from solver.rolling.passing import Pass, passing
+from solver.rolling.plane.track import track_of
+from solver.rolling.rail.patch import RollingPatch
+from solver.rolling.rail.patch_contact import PatchContact
+from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.rail.section import Section
+from solver.rolling.rail.state import PrismState
+from solver.rolling.rail.track import PrismTrack
 from solver.tensors import SQRT2, von_mises
 from tests.verification.prism_blocks import (
     HARDENS,

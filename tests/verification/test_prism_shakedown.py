@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.linear.threads import one_thread
-from solver.prism.given_patch import EllipticPatch
-from solver.prism.patch_passing import PatchPassing
-from solver.prism.track import PrismTrack
-from solver.steady.passing import passing
+from solver.rolling.passing import passing
+from solver.rolling.rail.given_patch import EllipticPatch
+from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.rail.track import PrismTrack
 from tests.verification.prism_blocks import PERFECT, RE, block
 
 RADIUS, PASSES = 7.0, 6

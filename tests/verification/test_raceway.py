@@ -12,15 +12,15 @@ import pytest
 
 from solver import ModelError, Record
 from solver.linear.threads import one_thread
-from solver.prism.given_patch import EllipticPatch
-from solver.prism.patch_passing import PatchPassing
 from solver.results.record import Status
 from solver.results.shakedown import QUIET, ShakedownState
-from solver.scenes import SCENES
-from solver.scenes.hertz_ellipse import HertzEllipse
-from solver.scenes.raceway_parameters import MOST_LONG, RacewayParameters
-from solver.scenes.raceway_track import RolledRaceway, geometry, track_of
-from solver.steady.passing import passing
+from solver.rolling.passing import passing
+from solver.rolling.rail.given_patch import EllipticPatch
+from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.scenes.hertz_ellipse import HertzEllipse
+from solver.rolling.scenes.raceway_parameters import MOST_LONG, RacewayParameters
+from solver.rolling.scenes.raceway_track import RolledRaceway, geometry, track_of
+from solver.shipped import SCENES
 from tests.records import kept
 from tests.verification import closed_forms
 

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from solver import SCENES, ModelError, Status
-from solver.audit.steady import audit_pass
 from solver.errors import NotConverged, TooLong, WindowTooSmall
-from solver.scenes import rolling_endless, rolling_steady
-from solver.scenes.rolling_parameters import RollingParameters
-from solver.scenes.rolling_steady import load_on, track_for
-from solver.steady import rolling, search
-from solver.steady.passing import SolveBudget
+from solver.rolling.audit.plane import audit_pass
+from solver.rolling.passing import SolveBudget
+from solver.rolling.plane import search
+from solver.rolling.plane.rolling import rolling
+from solver.rolling.scenes import rolling_endless, rolling_steady
+from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling_steady import load_on, track_for
 from tests.records import kept
 
 COARSE = {"element_size": 3.0, "growth": 1.3}

@@ -10,15 +10,15 @@ import pytest
 from solver import LimitLoad, Material
 from solver.errors import NotConverged, WindowTooSmall
 from solver.fem.fields import recovery
-from solver.results.steady import TrackBody
-from solver.scenes.rolling_grids import wheel_nodes
-from solver.scenes.rolling_parameters import RollingParameters
-from solver.scenes.rolling_steady import load_on, track_for
-from solver.steady import search as steady_search
-from solver.steady import track_of
-from solver.steady.passing import passing, searched
-from solver.steady.rolling import Expected
-from solver.steady.search import _HARDEST, _LIGHTER, _SOFTEST, _approached, _fading, search
+from solver.rolling.passing import passing, searched
+from solver.rolling.plane import search as steady_search
+from solver.rolling.plane.rolling import Expected
+from solver.rolling.plane.search import _HARDEST, _LIGHTER, _SOFTEST, _approached, _fading, search
+from solver.rolling.plane.track import track_of
+from solver.rolling.results.plane import TrackBody
+from solver.rolling.scenes.rolling_grids import wheel_nodes
+from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling_steady import load_on, track_for
 
 
 class Weight:

@@ -19,7 +19,6 @@ import numpy as np
 import pytest
 
 from solver import Material
-from solver.audit.steady import audit_pass
 from solver.materials import (
     ArmstrongFrederick,
     Chaboche,
@@ -29,14 +28,17 @@ from solver.materials import (
     TrescaMaterial,
     Voce,
 )
-from solver.scenes import SCENES
-from solver.scenes.rolling_parameters import RollingParameters
-from solver.scenes.rolling_steady import load_on, track_for
-from solver.steady import Track, flow, rolling, track_of
-from solver.steady.fields import under_load
-from solver.steady.flow import RowFlow
-from solver.steady.stepped import SteppedFlow
-from solver.steady.sweep import CompiledFlow
+from solver.rolling.audit.plane import audit_pass
+from solver.rolling.flow import RowFlow
+from solver.rolling.plane import flow
+from solver.rolling.plane.fields import under_load
+from solver.rolling.plane.rolling import rolling
+from solver.rolling.plane.track import Track, track_of
+from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling_steady import load_on, track_for
+from solver.rolling.stepped import SteppedFlow
+from solver.rolling.sweep import CompiledFlow
+from solver.shipped import SCENES
 from tests.solver.yield_surfaces import Hosford
 from tests.verification.steady_increment import SteadyIncrement
 
@@ -81,7 +83,7 @@ LAWS = {
 @pytest.fixture
 def exactly(monkeypatch):
     """Passes are found to rounding, so that both ways of finding them can be compared."""
-    module = sys.modules["solver.steady.rolling"]
+    module = sys.modules["solver.rolling.plane.rolling"]
     monkeypatch.setattr(module, "TOLERANCE", 1e-11)
 
 
@@ -322,8 +324,8 @@ def test_the_audit_finds_what_is_wrong_with_internal_variables(broken, figure):
 
 
 OWN = """
-from solver.scenes import SCENES
-from solver.scenes.rolling_parameters import RollingParameters
+from solver.shipped import SCENES
+from solver.rolling.scenes.rolling_parameters import RollingParameters
 
 p = RollingParameters(
     element_size=4.0, growth=1.5, load="hertz", passes=2, hardening="threshold", threshold=30.0,

@@ -13,13 +13,15 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from solver.audit.steady import audit_pass
 from solver.contact.problem import OPEN, STICK
 from solver.errors import LimitLoad
 from solver.model.friction import Coulomb
-from solver.scenes.rolling_parameters import RollingParameters
-from solver.scenes.rolling_steady import rim_of
-from solver.steady import RollingWheel, rolling, track_of
+from solver.rolling.audit.plane import audit_pass
+from solver.rolling.plane.rolling import rolling
+from solver.rolling.plane.track import track_of
+from solver.rolling.plane.wheel import RollingWheel
+from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling_steady import rim_of
 from tests.verification.closed_forms import carter_creepage
 
 A, YIELD, FRICTION = 8.0, 502.0, 0.3

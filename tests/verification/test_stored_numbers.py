@@ -13,7 +13,7 @@ from solver import Record
 from solver.audit.plain import PlainBody
 from solver.fem.discretisation import Discretisation
 from solver.model.loads import Pressure
-from solver.scenes import SCENES
+from solver.shipped import SCENES
 from studies.scenes.description import Description
 from studies.scenes.scene import file_scene
 from tests.verification.bodies import sector, steel

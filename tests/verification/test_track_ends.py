@@ -14,10 +14,11 @@ import pytest
 
 from solver import System, Walker
 from solver.loading.control import Control, Tolerances
-from solver.scenes.rolling_model import model
-from solver.scenes.rolling_parameters import RollingParameters
-from solver.scenes.rolling_steady import load_on
-from solver.steady import Track, rolling
+from solver.rolling.plane.rolling import rolling
+from solver.rolling.plane.track import Track
+from solver.rolling.scenes.rolling_model import model
+from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling_steady import load_on
 
 SIDE = 4.0
 FREE = {

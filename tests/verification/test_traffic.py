@@ -11,11 +11,11 @@ import pytest
 from solver import ModelError, Record
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
-from solver.scenes import SCENES
-from solver.scenes.traffic import CUT, deviations
-from solver.scenes.wheel_rail_contact import expected_contact
-from solver.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.wheel_rail_track import RolledRail, geometry
+from solver.rolling.scenes.traffic import CUT, deviations
+from solver.rolling.scenes.wheel_rail_contact import expected_contact
+from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.rolling.scenes.wheel_rail_track import RolledRail, geometry
+from solver.shipped import SCENES
 from tests.records import kept
 
 SCENE = SCENES["wheel_rail"]

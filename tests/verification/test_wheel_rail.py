@@ -11,15 +11,15 @@ from scipy.optimize import fsolve
 from scipy.spatial import cKDTree
 
 from solver import ModelError, Record
-from solver.prism.track import PrismField
 from solver.results.export import to_meshio
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
-from solver.scenes import SCENES
-from solver.scenes.initial_stress import RollerStraightened
-from solver.scenes.wheel_rail_contact import expected_contact
-from solver.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.wheel_rail_track import RolledRail, geometry, section_of, track_of
+from solver.rolling.rail.track import PrismField
+from solver.rolling.scenes.initial_stress import RollerStraightened
+from solver.rolling.scenes.wheel_rail_contact import expected_contact
+from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.rolling.scenes.wheel_rail_track import RolledRail, geometry, section_of, track_of
+from solver.shipped import SCENES
 from tests.records import kept
 from tests.verification.hertz_ellipse import HertzEllipse
 
@@ -201,7 +201,7 @@ def test_the_zone_is_at_the_contact() -> None:
 
 
 def test_a_zone_that_is_too_small_is_begun_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("solver.scenes.prism_passes._REACHES", (0.6, 1.0))
+    monkeypatch.setattr("solver.rolling.scenes.rail_passes._REACHES", (0.6, 1.0))
     again = SCENE.path(SCENE.parameters(**PUBLISHED), [1], lambda share: None)
     (record,) = again
     assert record.status is Status.OK

@@ -10,10 +10,11 @@ import pytest
 from solver import ModelError, Record
 from solver.errors import WindowTooSmall
 from solver.results.record import Status
-from solver.scenes import SCENES, prism_passes
-from solver.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
-from solver.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.wheel_rail_track import geometry
+from solver.rolling.scenes import rail_passes as prism_passes
+from solver.rolling.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
+from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.rolling.scenes.wheel_rail_track import geometry
+from solver.shipped import SCENES
 
 SCENE = SCENES["wheel_rail"]
 DRAFT = {"accuracy": "draft", "hardening": "kinematic", "hardening_ratio": 0.0196}

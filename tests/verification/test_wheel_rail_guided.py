@@ -10,8 +10,8 @@ import pytest
 
 from solver import ModelError, Record
 from solver.results.record import Status
-from solver.scenes import SCENES
-from solver.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.shipped import SCENES
 from tests.records import kept
 
 SCENE = SCENES["wheel_rail"]

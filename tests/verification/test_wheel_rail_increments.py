@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 
 from solver.linear.threads import one_thread
-from solver.prism.patch_passing import PatchPassing
-from solver.prism.state import PrismState
-from solver.prism.stepped import SteppedIncrement, SteppedPrism
-from solver.prism.stepped_patch import SteppedPatch
-from solver.prism.track import PrismTrack
-from solver.scenes.prism_passes import contact_of
-from solver.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.wheel_rail_track import RolledRail, geometry, track_of
-from solver.steady.passing import Pass, passing
+from solver.rolling.passing import Pass, passing
+from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.rail.state import PrismState
+from solver.rolling.rail.stepped import SteppedIncrement, SteppedPrism
+from solver.rolling.rail.stepped_patch import SteppedPatch
+from solver.rolling.rail.track import PrismTrack
+from solver.rolling.scenes.rail_passes import contact_of
+from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.rolling.scenes.wheel_rail_track import RolledRail, geometry, track_of
 
 STEPS = 37
 ACCELERATING = WheelRailParameters(

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from solver import ModelError, Record
-from solver.mesh.rail import rail_60e1
-from solver.mesh.wheel_profile import s1002
 from solver.results.record import Status
-from solver.scenes import SCENES
-from solver.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.wheel_rail_track import geometry
+from solver.rolling.rail.profiles.rail import rail_60e1
+from solver.rolling.rail.profiles.wheel_profile import s1002
+from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.rolling.scenes.wheel_rail_track import geometry
+from solver.shipped import SCENES
 
 SCENE = SCENES["wheel_rail"]
 DRAFT = {"accuracy": "draft", "hardening": "kinematic", "hardening_ratio": 0.0196}

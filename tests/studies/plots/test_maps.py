@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 from matplotlib.text import Text
 
-from solver.scenes import SCENES
+from solver.shipped import SCENES
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.views.plots.captions import setting
 from studies.views.plots.mapped import whole

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from solver.contact.system import System
-from solver.scenes import SCENES
+from solver.shipped import SCENES
 from studies import Store, Study, StudyError
 from studies.errors import SceneError
 from studies.scenes.description import Description

@@ -1,0 +1,182 @@
+"""Rows of integration points along which material flows through a fixed mesh.
+
+The load moves along +x, so material flows along -x. In a window around the load the mesh is uniform
+along x and may yield; columns of points are numbered downstream. Behind the window, up to the left
+end of the mesh, plastic strain is that of the last column after unloading to the residual state.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+from scipy.interpolate import RegularGridInterpolator
+
+from solver.errors import ModelError
+from solver.fem.discretisation import Discretisation
+from solver.materials.law import Law
+from solver.rolling.layers import Layers
+from solver.rolling.plane.condensed import CondensedTrack
+from solver.typing import Array, Bools, Ints
+
+_LEVEL = 1e-6
+"""Ratio of a difference of depth to the depth of the rows; up to it points lie on one row."""
+
+
+class FlowRows:
+    """The points of the window, their strains, and the forces equivalent to plastic strain.
+
+    Parameters
+    ----------
+    part : the half-plane, made of quadrilaterals in rows; its top is y = 0
+    operator : the inverse of its elastic stiffness, which keeps the m unknowns of the window
+    ahead, behind : the window extends from x = -behind to x = ahead [mm]
+    deep : depth of the window [mm]
+    interleaved : make two rows of each, of every other column
+
+    Attributes
+    ----------
+    points : (n_rows, n_columns) numbers of the points in the window
+    ahead, behind : (n_rows, n) numbers of the points before and behind the window, on these rows
+    shape : n_rows, n_columns
+    depth : (n_rows,) depths of the rows, increasing [mm]
+    uppermost : number of rows at the smallest depth
+    weights : (n_rows, n_columns) volume of the points [mm3]
+    """
+
+    def __init__(
+        self,
+        part: Discretisation,
+        operator: CondensedTrack,
+        ahead: float,
+        behind: float,
+        deep: float,
+        *,
+        interleaved: bool = False,
+    ) -> None:
+        self.part = part
+        middle = part.points.mean(axis=2)
+        shallow = middle[1] > -deep
+        inside = shallow & (middle[0] > -behind) & (middle[0] < ahead)
+        points = _in_rows(part, inside, deep, interleaved)
+        self.shape = points.shape
+        self.points = points
+        self.weights = part.volumes[points]
+        n_rows = len(points)
+        length = self._length(points)
+        self.uppermost = 2 if interleaved else 1
+        self.depth = -part.points[1].ravel()[points[:, 0]]
+        self._thickness = self.weights.sum(axis=1) / length
+        self.ahead = _in_rows(part, shallow & (middle[0] > ahead), deep, interleaved)
+        self.behind = downstream = _in_rows(
+            part, shallow & (middle[0] < -behind), deep, interleaved
+        )
+        if len(downstream) != n_rows:
+            raise ModelError("mesh", len(downstream), f"must have {n_rows} rows behind the window")
+        self._strain = sparse.csr_array(self._strain_at(points)[:, operator.kept])
+        self._force = self._force_of(points, self._strain)
+        # all points behind the window have the plastic strain of their row
+        same = sparse.kron(
+            sparse.eye_array(n_rows), np.ones((downstream.shape[1], 1)), format="csr"
+        )
+        each = self._force_of(downstream, self._strain_at(downstream))
+        self._behind = each @ sparse.kron(same, sparse.eye_array(4), format="csr")
+        # condensed, this force acts only on the boundary of the window
+        self._force_behind = sparse.csr_array(operator.condense(self._behind.toarray()))
+
+    def virgin(self, law: Law) -> Layers:
+        """Return the state before any load."""
+        k = self.uppermost
+        surface = Layers(np.zeros(k), np.zeros(k), law.initial(k, 4))
+        return Layers(self.depth, self._thickness, law.initial(len(self.depth), 4), surface)
+
+    @property
+    def every(self) -> Ints:
+        """The points of each row along the whole body (n_rows, n), in and outside the window."""
+        return np.hstack([self.points, self.ahead, self.behind])
+
+    @cached_property
+    def highest(self) -> Ints:
+        """The points of the uppermost rows (n,), increasing."""
+        return np.sort(self.every[: self.uppermost].ravel())
+
+    @cached_property
+    def above(self) -> Ints:
+        """Positions of the points of the uppermost rows (n_uppermost, n) in `highest`."""
+        return np.searchsorted(self.highest, self.every[: self.uppermost])
+
+    def onto_surface(self, values: Array) -> Array:
+        """Return values (n, ...) at the surface, extrapolated linearly from rows (2 n, ...).
+
+        ``n`` is the number of uppermost rows.
+        """
+        k = self.uppermost
+        near, far = self.depth[0], self.depth[k]
+        return np.asarray((far * values[:k] - near * values[k : 2 * k]) / (far - near))
+
+    def _length(self, points: Ints) -> float:
+        """Return the length of the window [mm]."""
+        elements = np.unique(points // self.part.weights.shape[1])
+        corners = self.part.body.mesh.p[0, self.part.body.mesh.t[:, elements]]
+        return float(np.ptp(corners))
+
+    def _force_of(self, points: Ints, strain: sparse.csr_array) -> sparse.csr_array:
+        """Return the matrix from plastic strains at points to equivalent nodal forces."""
+        stiff = 2 * self.part.body.law.elasticity.shear_modulus
+        weights = stiff * np.repeat(self.part.volumes[points].ravel(), 4)
+        return sparse.csr_array(strain.T @ sparse.diags_array(weights))
+
+    def _strain_at(self, points: Ints) -> sparse.csr_array:
+        """Return the matrix from displacements to strains at points, row by row."""
+        part = self.part
+        n_points = part.weights.shape[1]
+        element, point = np.divmod(points.ravel(), n_points)
+        B = part.B[element, point]
+        columns = np.broadcast_to(part.dofs[element][:, None, :], B.shape)
+        indptr = np.arange(0, B.size + 1, B.shape[2])
+        return sparse.csr_array(
+            (B.ravel(), columns.ravel(), indptr), shape=(4 * points.size, part.n)
+        )
+
+    def strain(self, u: Array) -> Array:
+        """Return the strains (n_rows, n_columns, 4) of displacements (m,)."""
+        return np.asarray((self._strain @ u).reshape(*self.shape, 4))
+
+    def interpolated(self, strain: Array, rows: FlowRows) -> Array:
+        """Return strains (n_rows, n_columns, 4) here, interpolated from those of other rows."""
+        x, depth = (rows.part.points.reshape(2, -1)[k, rows.points] for k in (0, 1))
+        here = self.part.points.reshape(2, -1)[:, self.points]
+        along = RegularGridInterpolator(
+            (depth[::-1, 0], x[0, ::-1]), strain[::-1, ::-1], bounds_error=False, fill_value=None
+        )
+        return np.asarray(along((here[1], here[0])))
+
+    def force(self, flow: Array, behind: Array) -> Array:
+        """Return the condensed nodal forces (m,) equivalent to plastic strain [N].
+
+        Parameters
+        ----------
+        flow : (n_rows, n_columns, 4) plastic strain in the window
+        behind : (n_rows, 4) plastic strain everywhere behind it
+        """
+        return np.asarray(self._force @ flow.ravel() + self._force_behind @ behind.ravel())
+
+    def force_behind(self, behind: Array) -> Array:
+        """Return the forces on all nodes (n,) equivalent to plastic strain behind the window."""
+        return np.asarray(self._behind @ behind.ravel())
+
+
+def _in_rows(part: Discretisation, elements: Bools, deep: float, interleaved: bool) -> Ints:
+    """Return the points of elements (n_rows, n_columns), downwards and downstream."""
+    n_points = part.weights.shape[1]
+    points = (np.flatnonzero(elements)[:, None] * n_points + np.arange(n_points)).ravel()
+    x, y = part.points.reshape(2, -1)[:, points]
+    level = np.round(y / (_LEVEL * deep)).astype(np.int64)
+    depths, counts = np.unique(level, return_counts=True)
+    if len(points) == 0 or len(set(counts)) != 1:
+        raise ModelError("mesh", len(depths), "must have its points in rows of equal length")
+    rows = points[np.lexsort((-x, -level))].reshape(len(depths), -1)
+    if interleaved:
+        rows = rows.reshape(len(depths), -1, 2).swapaxes(1, 2).reshape(2 * len(depths), -1)
+    return rows

@@ -1,0 +1,219 @@
+"""The half-plane over which a steady load passes: meshed and factorised once for many passes."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solver.errors import ModelError
+from solver.fem.discretisation import Discretisation
+from solver.fem.loads import travelling_forces
+from solver.fem.surface import Surface, extract
+from solver.materials.elasticity import Elasticity
+from solver.materials.law import Law
+from solver.materials.material import Material
+from solver.memory import kept
+from solver.mesh.grids import grid, within
+from solver.model.amplitude import Amplitude
+from solver.model.body import Body
+from solver.model.motion import TravellingPressure
+from solver.rolling.flow import RowFlow
+from solver.rolling.layers import Layers
+from solver.rolling.load import Given
+from solver.rolling.plane.condensed import CondensedTrack
+from solver.rolling.plane.endless import MOST_COLUMNS, track_lines, window_depth, window_elements
+from solver.rolling.plane.rows import FlowRows
+from solver.typing import Array, Ints
+
+CONTACT = 2.0
+"""Ratio of half the length of the surface that may come into contact to the half-width."""
+_BLOCKS = 8
+"""Number of parts in which the compliance of the surface is solved for: all displacements at once
+would take as much memory as all else of a track."""
+
+
+class Track:
+    """An elastic half-plane y < 0 with rows of points around a load at x = 0.
+
+    It does not depend on the load or on the yield stress: passes of any load with the same
+    half-width share it, for any friction and hardening.
+
+    Parameters
+    ----------
+    half_width : half-width a of the contact [mm]
+    element_size : side of the elements in the window [mm]
+    growth : ratio of neighbouring element sides in depth
+    elasticity : elastic constants of the half-plane
+    reach : factor of the usual length and depth of the window
+    interleaved : make two rows of each, of every other column: their points are one element
+        apart, as in increments by which the load advances one element
+
+    Raises
+    ------
+    ModelError
+        if the elements are larger than half the half-width, or too many
+    """
+
+    def __init__(
+        self,
+        half_width: float,
+        element_size: float,
+        growth: float,
+        elasticity: Elasticity,
+        *,
+        reach: float = 1.0,
+        interleaved: bool = False,
+    ) -> None:
+        a, h = half_width, element_size
+        if not 0 < h <= a / 2:
+            raise ModelError("element_size", h, f"must be in (0, {a / 2:.3g}], half the half-width")
+        ahead, behind = window_elements(a, h, reach)
+        if (columns := ahead + behind) > MOST_COLUMNS:
+            allowed = f"makes {columns} elements along the track; at most {MOST_COLUMNS}"
+            raise ModelError("element_size", h, allowed)
+        self.half_width = a
+        self._lines = track_lines(a, h, growth, reach)
+        self._contact = CONTACT * reach * a
+        self.part = Discretisation(half_space_body(*self._lines, self._contact, elasticity))
+        self._window = h * ahead, h * behind, window_depth(a, reach)
+        self.rows = FlowRows(self.part, self.operator, *self._window, interleaved=interleaved)
+
+    @cached_property
+    def mirrored(self) -> Discretisation:
+        """The half-plane seen along -x."""
+        x, y = self._lines
+        return Discretisation(half_space_body(-x[::-1], y, self._contact, self.elasticity))
+
+    @cached_property
+    def mirror(self) -> tuple[Ints, Ints]:
+        """Numbers of the points, and of the nodes, at the mirrored places."""
+        own, seen = self.part, self.mirrored
+        both = ((own.points.reshape(2, -1), seen.points.reshape(2, -1)), (own.X, seen.X))
+        points, nodes = (
+            cKDTree(of.T).query((at * [[-1.0], [1.0]]).T)[1].astype(np.int64) for of, at in both
+        )
+        return points, nodes
+
+    @property
+    def elasticity(self) -> Elasticity:
+        """Elastic constants."""
+        return self.part.body.law.elasticity
+
+    @cached_property
+    def operator(self) -> CondensedTrack:
+        """The inverse of the elastic stiffness, condensed to the m unknowns of the window."""
+        x, y = self.part.X
+        ahead, behind, deep = self._window
+        edge = 1e-6 * deep
+        inside = (x < ahead + edge) & (x > -behind - edge) & (y > -deep - edge)
+        return CondensedTrack(self.part, np.flatnonzero(inside))
+
+    @property
+    def at_rest(self) -> Array:
+        """Displacements (m,) of the window without plastic strain and load: zero [mm]."""
+        return np.zeros(len(self.operator.kept))
+
+    @property
+    def weights(self) -> Array:
+        """Volume of the points (n_rows, n_columns) of the window [mm3]."""
+        return self.rows.weights
+
+    @property
+    def rough(self) -> Self:
+        """The track itself: see `PassedBody`."""
+        return self
+
+    def solve(self, force: Array) -> Array:
+        """Return displacements (m,) for the condensed forces of plastic strain (m,) [mm]."""
+        return self.operator.solve(force)
+
+    def strain(self, u: Array) -> Array:
+        """Return the strains (n_rows, n_columns, 4) of displacements (m,)."""
+        return self.rows.strain(u)
+
+    def flow(self, law: Law, before: Layers, added: Array, parts: int) -> RowFlow:
+        """Return the flow of a material along the rows, see `RowFlow`."""
+        return RowFlow(self.rows, law, before, added, parts)
+
+    @cached_property
+    def at_surface(self) -> Ints:
+        """Positions of the surface's unknowns among those of the window."""
+        return self.operator.place(self.surface.dofs)
+
+    def under(self, forces: Array) -> Array:
+        """Return displacements (m,) or (m, k) for forces (n,) or (n, k) on the surface [mm]."""
+        every = np.zeros((len(self.operator.kept), *forces.shape[1:]))
+        every[self.at_surface] = forces
+        return self.operator.solve(every)
+
+    @cached_property
+    def compliance(self) -> Array:
+        """Displacements (n, n) of the surface's unknowns for forces on them [mm/N]."""
+        each = np.array_split(np.eye(len(self.at_surface)), _BLOCKS, axis=1)
+        return np.hstack([self.under(forces)[self.at_surface] for forces in each])
+
+    @cached_property
+    def surface(self) -> Surface:
+        """The part of the top that may come into contact, as a chain of edges downstream."""
+        return extract(self.part, "contact")
+
+    def hertz(
+        self, peak: float, shear_ratio: float = 0.0, half_width: float | None = None
+    ) -> Given:
+        """Return a Hertz pressure with proportional shear.
+
+        Parameters
+        ----------
+        peak : p0 [MPa]
+        shear_ratio : ratio of the shear along +x, the motion of the load, to the pressure; positive
+            when braking
+        half_width : half-width of the pressure [mm]; that of the track by default
+        """
+        pressure = standing_pressure(half_width or self.half_width, peak, shear_ratio)
+        force = travelling_forces(self.part, pressure, 0.0)
+        return Given(force, self.operator.solve(self.operator.condense(force)))
+
+
+def standing_pressure(half_width: float, peak: float, shear_ratio: float) -> TravellingPressure:
+    """Return a Hertz pressure at x = 0, with factor 1 at time 0 and factor 0 at time 1.
+
+    Parameters
+    ----------
+    half_width, peak : a [mm] and p0 [MPa]
+    shear_ratio : ratio of the shear along +x to the pressure
+    """
+    return TravellingPressure(
+        boundary="top",
+        half_width=half_width,
+        peak=peak,
+        amplitude=Amplitude(np.array([0.0, 1.0]), np.array([1.0, 0.0])),
+        position=Amplitude.constant(0.0),
+        shear_ratio=Amplitude.constant(shear_ratio),
+    )
+
+
+def half_space_body(x: Array, y: Array, contact: float, elasticity: Elasticity) -> Body:
+    """Return the half-plane with grid lines x, y, which may touch within ``contact`` of x = 0."""
+    return Body(
+        name="half_space",
+        mesh=within(grid(x, y), "contact", ["top"], x=(-contact, contact)),
+        material=Material(
+            youngs_modulus=elasticity.youngs_modulus, poisson_ratio=elasticity.poisson_ratio
+        ),
+        supports={"left": "x", "right": "x", "bottom": "xy"},
+    )
+
+
+@kept
+def track_of(
+    half_width: float,
+    element_size: float,
+    growth: float,
+    elasticity: Elasticity,
+    reach: float = 1.0,
+) -> Track:
+    """Return the track with these dimensions, made once in a process: see `Track`."""
+    return Track(half_width, element_size, growth, elasticity, reach=reach)

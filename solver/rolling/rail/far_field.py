@@ -1,0 +1,254 @@
+"""What a load on an endless prism makes beyond the same load repeated every length L.
+
+The field of a load is an integral over wavenumbers k, that of the repeated load a trapezoidal sum
+with step 2 pi / L. They differ by loads at the distances +-L, +-2 L, ...; from there only the
+resultants count, and only small k, since these fields are smooth. So the resultants, spread along
+x over a width of L / 8, are solved on the length 8 L by a few waves, and the solution on L, every
+eighth of these waves, is subtracted. Then 64 L less 8 L with the width L, and so on.
+
+The spread has the transform ``exp(-t) (1 + t + t^2 / 2)``, t = (k width)^2 / 2: what is missing is
+of the sixth order in k.
+
+A prism *clamped* at both ends of a span has more: forces and moments on its section beyond the
+ends, with which the section does not move at the ends, in the mean. Within the span the field of an
+end is that of loads beyond it: both are made of the waves that fade away from the end. Bending in
+both planes, torsion, shear and foundation are those of the section, not of a theory of beams.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.rolling.rail.modes import Modes, superposed
+from solver.rolling.rail.sampled import sampled_answers
+from solver.rolling.rail.section import I_AXIS, I_COMPONENTS
+from solver.typing import Array, Bools
+
+_RATIO = 8
+"""Ratio of the lengths of two levels, and of a length to the width of the spread load on it."""
+_CUT = 6.0
+"""Product of k and width beyond which waves are left out: the transform is below 3e-6 there."""
+_LOOSE = 1e-9
+"""Singular value of the motions of the surface rows, of 1 at the farthest node; below it the rows
+do not carry a resultant."""
+_ALONG = np.array([True, False, False, False, True, True])
+"""Whether motions of a section, as `Section.mean_motions`, are along x; resultants are the first
+four of them."""
+_ROOM = 1.5
+"""Least ratio of the length of the first level with loads beyond the ends to the span."""
+_BEYOND = 4.0
+"""Distance of these loads from the ends over the width over which they are spread."""
+
+
+class FarField:
+    """What an endless or clamped prism adds to one loaded every L, for loads near one station.
+
+    Resultants (4,) are the forces along x, y and z [N] and the moment about x, at the middle of the
+    nodes of the section [N mm].
+
+    Parameters
+    ----------
+    modes : the prism of length L, with surface rows
+    x : position at which the resultants act [mm]
+    levels : number of lengths 8 L, 64 L, ...; the last one stands for endless. It must be long
+        against the reach of a load: a rail on soft springs rolls, and moves along x, over 10 m
+    span : length of a prism clamped at both ends, the resultants in the middle [mm]; None if it
+        is endless
+
+    Attributes
+    ----------
+    displacement : (n_rows, window, 4) of the surface rows for unit resultants [mm/N, 1/N]
+    strain : (n_points, window, 6, 4) Mandel strain at the points of the zone [1/N, 1/(N mm)]
+    beneath : (m, 4) displacement of the zone's unknowns at the resultants [mm/N, 1/N]
+    last : (n_points, 1, 6, 4) strain of the last level alone, where the resultants act
+
+    Raises
+    ------
+    ModelError
+        if the surface rows cannot carry all four resultants, or the levels are shorter than a span
+    """
+
+    def __init__(self, modes: Modes, x: float, levels: int = 4, span: float | None = None) -> None:
+        self._modes, self._spacing = modes, modes.length / modes.stations
+        self._motions = modes.rows @ modes.section.rigid[modes.unknowns]
+        size = np.abs(modes.section.rigid).max(axis=0)
+        if np.linalg.matrix_rank(self._motions / size, tol=_LOOSE) < len(size):
+            allowed = "must carry forces along x, y and z and a moment about x"
+            raise ModelError("surface", f"{len(self._motions)} rows", allowed)
+        section = modes.section
+        forces = np.zeros((section.n, len(size)))
+        # the least forces on the rows with these resultants
+        forces[modes.unknowns] = modes.rows.T @ np.linalg.pinv(self._motions).T
+        shares = _shares(modes.length, levels)
+        waves = sorted(shares)
+        self._k = 2 * np.pi / (modes.length * _RATIO**levels) * np.array(waves)
+        every = forces if span is None else np.hstack([forces, section.mean_motions.T])
+        basis, found = sampled_answers(section, every, self._k)
+        self._basis = basis
+        n = len(size)
+
+        def own(shares: dict[int, float]) -> _SectionLoad:
+            return _SectionLoad(found[..., :n], self._k, _listed(shares, waves), _ALONG[:n])
+
+        self._sources = [_FarLoad(own(shares), 0.0, np.eye(n))]
+        if span is not None:
+            first, beyond = _level_of(modes.length, levels, span)
+            shares = _shares(modes.length, levels, first)
+            ends = _SectionLoad(found[..., n:], self._k, _listed(shares, waves), _ALONG)
+            moved = section.mean_motions @ basis
+            self._sources += _clamped(own(shares), ends, moved, span / 2, beyond)
+        apart = np.asarray(modes.x - x, dtype=float)
+        self.displacement = self._summed(modes.rows @ self._own, modes.along, apart)
+        self.strain = self.strain_at(apart)
+        axis = modes.unknowns % 3 == I_AXIS
+        self.beneath = self._summed(self._own, axis, np.zeros(1))[:, 0]
+        only = _shares(modes.length * _RATIO ** (levels - 1), 1)
+        self.last = self.strain_at(np.zeros(1), [_FarLoad(own(only), 0.0, np.eye(n))])
+
+    def resultants(self, forces: Array) -> Array:
+        """Return the resultants (4,) of forces (n_rows, window) on the surface rows [N/mm]."""
+        return self._spacing * (self._motions.T @ forces.sum(axis=1))
+
+    def strain_at(self, apart: Array, sources: list[_FarLoad] | None = None) -> Array:
+        """Return ``strain`` (n_points, n, 6, 4) at distances (n,) from the resultants along x."""
+        modes = self._modes
+        still = self._summed(modes.B0 @ self._own, modes.carrying, apart, sources)
+        waving = self._summed(modes.B1 @ self._own, modes.carrying, apart, sources, power=1)
+        return modes.by_point(still + waving)
+
+    @cached_property
+    def around(self) -> Array:
+        """Strain (n, 6, 4) at all points of the section where the resultants act, Mandel."""
+        section = self._modes.section
+        B0, B1 = section.strain_matrices(np.arange(len(section.dofs)), np.arange(section.n))
+        carrying = np.isin(np.arange(6), I_COMPONENTS).repeat(section.weights.size)
+        here = np.zeros(1)
+        still = self._summed(B0 @ self._basis, carrying, here)
+        waving = self._summed(B1 @ self._basis, carrying, here, power=1)
+        return np.asarray((still + waving)[:, 0].reshape(6, -1, 4).swapaxes(0, 1))
+
+    @property
+    def _own(self) -> Array:
+        """The directions (m, r) of the zone's unknowns."""
+        return self._basis[self._modes.unknowns]
+
+    def _summed(
+        self, directions: Array, carrying: Bools, apart: Array,
+        sources: list[_FarLoad] | None = None, power: int = 0,
+    ) -> Array:  # fmt: skip
+        """Return results (n_results, n, 4) at distances (n,), times k^power.
+
+        ``directions`` (n_results, r) are those of the section's directions, ``carrying``
+        (n_results,) is whether a result carries i.
+        """
+        each = [
+            source.load.summed(apart - source.x, power) @ source.factors
+            for source in (self._sources if sources is None else sources)
+        ]
+        return _combined(directions, np.sum(each, axis=0), carrying)
+
+
+def _combined(directions: Array, sums: Array, carrying: Bools) -> Array:
+    """Return results (n_results, n, q) from directions (n_results, r) and `_SectionLoad.summed`."""
+    out = np.empty((len(carrying), *sums.shape[2:]))
+    for flag in (False, True):
+        some = carrying == flag
+        out[some] = np.tensordot(directions[some], sums[int(flag)], 1)
+    return out
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _SectionLoad:
+    """Unit loads (q,) at one place, and what they make.
+
+    ``made`` (r, waves, q) shares of directions of the section in the answers, ``k`` (waves,) and
+    ``share`` (waves,) of the waves, ``along`` (q,) whether a load carries i.
+    """
+
+    made: Array
+    k: Array
+    share: Array
+    along: Bools
+
+    def summed(self, apart: Array, power: int = 0) -> Array:
+        """Return the directions' shares (2, r, n, q) at distances (n,), times k^power.
+
+        They are those for results that do not carry i, and for results that do.
+        """
+        made, phase = self.made * self.k[:, None] ** power, np.outer(self.k, apart)
+        sums = [
+            superposed(made, phase, self.share, np.full(len(made), carrying), self.along)
+            for carrying in (False, True)
+        ]
+        return np.stack(sums).swapaxes(2, 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _FarLoad:
+    """Loads at a distance ``x`` from the resultants, and their ``factors`` (q, 4) by these."""
+
+    load: _SectionLoad
+    x: float
+    factors: Array
+
+
+def _clamped(
+    own: _SectionLoad, ends: _SectionLoad, mean: Array, half: float, beyond: float
+) -> list[_FarLoad]:
+    """Return the loads beyond both ends +-half with which the section does not move there.
+
+    ``mean`` (6, r) are the mean motions of the section by its directions.
+    """
+    places, at = half * np.array([-1.0, 1.0]), (half + beyond) * np.array([-1.0, 1.0])
+
+    def moved(load: _SectionLoad, apart: Array) -> Array:
+        """Return mean motions (n, 6, q) at distances (n,) from the load."""
+        return _combined(mean, load.summed(apart), ends.along).swapaxes(0, 1)
+
+    by_load = moved(own, places).reshape(-1, len(own.along))
+    apart = (places[:, None] - at).ravel()
+    n = len(ends.along)
+    by_ends = moved(ends, apart).reshape(2, 2, n, n).swapaxes(1, 2).reshape(2 * n, -1)
+    factors = np.asarray(np.linalg.solve(by_ends, -by_load), dtype=float).reshape(2, n, -1)
+    return [_FarLoad(ends, x, each) for x, each in zip(at, factors, strict=True)]
+
+
+def _level_of(length: float, levels: int, span: float) -> tuple[int, float]:
+    """Return the first level that is long against a span, and how far beyond its ends loads are."""
+    if not span > 0:
+        raise ModelError("span", span, "must be positive [mm]")
+    for level in range(1, levels + 1):
+        period = length * _RATIO**level
+        if period >= _ROOM * span:
+            return level, _BEYOND * period / _RATIO**2
+    most = length * _RATIO**levels / _ROOM
+    raise ModelError("span", span, f"must be at most {most:g} mm with {levels} levels of far field")
+
+
+def _shares(length: float, levels: int, first: int | None = None) -> dict[int, float]:
+    """Return the shares of waves in what all levels add, by their numbers on the longest length.
+
+    They are what the levels add to the load repeated every ``length``. With ``first`` they are all
+    that a single load makes far from it, by the levels from that one on.
+    """
+    shares: dict[int, float] = {}
+    for level in range(first or 1, levels + 1):
+        period = length * _RATIO**level
+        width = period / _RATIO**2
+        for j in range(int(_CUT * period / (2 * np.pi * width)) + 1):
+            t = (2 * np.pi * j / period * width) ** 2 / 2
+            spread = np.exp(-t) * (1 + t + t**2 / 2)
+            both_signs = 2.0 if j else 1.0
+            less = 1.0 if j % _RATIO or level == first else 1.0 - _RATIO
+            at = j * _RATIO ** (levels - level)
+            shares[at] = shares.get(at, 0.0) + spread * both_signs * less / period
+    return shares
+
+
+def _listed(shares: dict[int, float], waves: list[int]) -> Array:
+    """Return the shares (n,) of waves by number, 0 where there is none."""
+    return np.array([shares.get(j, 0.0) for j in waves])

@@ -1,0 +1,248 @@
+"""The frictional contact problem of a surface that rolls, with friction in two directions.
+
+Unknowns are pressure p and shear q = (q_x, q_s) at the points of a surface, stations times
+vertices, and rigid motions. Gap g and slip w depend linearly on them::
+
+    (w_x, g, w_s) = offset + influence (q_x, p, q_s) + motions r
+    weights (q_x, p, q_s) = resultants
+    p >= 0, g >= 0, p g = 0
+    |q| <= mu p,  w = 0 where |q| < mu p,  q = -mu p w / |w| where w is not 0
+
+The conditions are p = max(0, p - c g) and q = the vector nearest to q - d w with |q| <= mu p, for
+any c, d > 0. Newton's method solves them: influences of all points come from a Fourier transform,
+and only closed points are unknowns, with pressure and two shears where they stick, pressure and the
+shear across the slip where they slip.
+
+P. Alart, A. Curnier, Comput. Methods Appl. Mech. Engrg. 92 (1991) 353-375, section 3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.errors import NoContact
+from solver.linear.dense import RefinedLU
+from solver.model.friction import PatchStatus
+from solver.rolling.passing import searched
+from solver.rolling.rail.influence import Influence
+from solver.typing import Array
+
+OPEN, STICK, SLIP = map(int, PatchStatus)
+"""Status of a point."""
+NORMAL, TANGENTS = 1, (0, 2)
+"""Places of the normal and of the tangents among local axes (x, normal, tangent across)."""
+
+_TOLERANCE = 1e-9
+"""Largest error of a condition over the largest pressure, or over friction times it for shear."""
+_STEPS = 60
+_SHORTEST = 1 / 256
+"""Smallest share of a Newton step in the line search. Where all points slip, a creepage that is
+found by its moment may overshoot a hundredfold."""
+_LOST = 1e6
+"""Ratio of the largest |q - d w| to the first resultant on one point, a pressure that no contact
+reaches; above it motions grow without bound."""
+_LOOSE = "the contact forces are not determined: nothing holds the wheel"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConeProblem:
+    """One problem, of n stations, m vertices and k rigid motions.
+
+    Values and effects have local axes: (q_x, p, q_s) and (w_x, g, w_s).
+
+    Attributes
+    ----------
+    influence : effects (n, m, 3) of values (n, m, 3) [mm/MPa]
+    offset : (n, m, 3) effects without tractions and motions [mm]
+    friction : coefficient mu
+    motions : (k, n, m, 3) effects of the rigid motions
+    weights : (k, n, m, 3) sums of values that are given, such as areas [mm2]
+    resultants : (k,) what they are [N]; the first is the load
+    """
+
+    influence: Influence
+    offset: Array
+    friction: float
+    motions: Array
+    weights: Array
+    resultants: Array
+
+
+class ConeSolution:
+    """The solution of a problem.
+
+    Attributes
+    ----------
+    values : (n, m, 3) pressure and shear [MPa]
+    effects : (n, m, 3) gap and slip [mm]
+    rigid : (k,) rigid motions
+    status : (n, m) OPEN, STICK or SLIP
+    steps : number of Newton steps
+    """
+
+    def __init__(self, found: _Iterate, tangent: _Tangent | None, steps: int) -> None:
+        self.values, self.effects, self.rigid = found.values, found.effects, found.rigid
+        self.status, self.steps = found.status, steps
+        self._found, self._tangent = found, tangent
+
+    def along(self, change: Array) -> tuple[Array, Array]:
+        """Return the change of values and rigid motions with that of the offset (n, m, 3).
+
+        The equations are those of the last Newton step, if no point has changed its status since.
+        """
+        if self._tangent is None or not self._tangent.holds(self._found):
+            self._tangent = _Tangent(self._found)
+        return self._tangent.along(change)
+
+
+def solve_cone(problem: ConeProblem, values: Array, rigid: Array) -> ConeSolution:
+    """Return the solution, by Newton's method from these values (n, m, 3) and motions (k,).
+
+    Raises
+    ------
+    NoContact
+        if none was found
+    """
+    here, tangent = _Iterate(problem, values, rigid), None
+    most = _LOST * abs(problem.resultants[0]) / np.abs(problem.weights[0]).max()
+    for step in range(_STEPS):
+        if here.error <= _TOLERANCE * here.values[..., NORMAL].max():
+            return ConeSolution(here, tangent, step)
+        tangent = _Tangent(here)
+
+        def moved(
+            share: float, here: _Iterate = here, step: tuple[Array, Array] = tangent.step()
+        ) -> _Iterate:
+            change, motion = step
+            return _Iterate(problem, here.values + share * change, here.rigid + share * motion)
+
+        here = searched(moved, here.size, _SHORTEST)
+        if not here.pull.max() < most:
+            break
+    raise NoContact(f"no contact forces were found in {step + 1} steps of Newton's method")
+
+
+class _Iterate:
+    """Values and rigid motions, and by how much they miss the conditions."""
+
+    def __init__(self, problem: ConeProblem, values: Array, rigid: Array) -> None:
+        self.problem, self.values, self.rigid = problem, values, rigid
+        moved = np.tensordot(rigid, problem.motions, 1)
+        self.effects = problem.offset + problem.influence.of(values) + moved
+        own = problem.influence.own()
+        self.stiffness = 1 / own[:, NORMAL, NORMAL].mean()
+        self.grip = 2 / sum(own[:, a, a].mean() for a in TANGENTS)
+        p, q = values[..., NORMAL], values[..., TANGENTS]
+        pushed = p - self.stiffness * self.effects[..., NORMAL]
+        self.closed = pushed > 0
+        self.bound = problem.friction * np.maximum(p, 0)
+        pulled = q - self.grip * self.effects[..., TANGENTS]
+        self.pull = np.hypot(pulled[..., 0], pulled[..., 1])
+        slips = self.closed & (self.pull > self.bound)
+        self.status = np.where(slips, SLIP, np.where(self.closed, STICK, OPEN))
+        self.along = np.zeros_like(q)
+        np.divide(pulled, self.pull[..., None], out=self.along, where=slips[..., None])
+        nearest = np.where(slips[..., None], self.bound[..., None] * self.along, pulled)
+        self.missed = q - np.where(self.closed[..., None], nearest, 0)
+        self.unbalanced = problem.resultants - np.tensordot(problem.weights, values, values.ndim)
+        largest = np.abs(problem.weights).max(axis=(1, 2, 3))
+        balance = self.unbalanced / largest / np.sqrt(max(self.closed.sum(), 1))
+        normal = np.append(p - np.maximum(pushed, 0), balance[0])
+        tangential = np.append(self.missed, balance[1:])
+        self.error = float(max(
+            np.abs(normal).max(), np.abs(tangential).max() / (problem.friction or 1.0)
+        ))  # fmt: skip
+        self.size = float(np.hypot(np.linalg.norm(normal), np.linalg.norm(tangential)))
+
+
+class _Tangent:
+    """Newton's equations at an iterate, factorised: one for each unknown of its closed points."""
+
+    def __init__(self, here: _Iterate) -> None:
+        problem = here.problem
+        self._here, self._influence = here, problem.influence
+        status, pull, bound = (a.ravel() for a in (here.status, here.pull, here.bound))
+        along = here.along.reshape(-1, 2)
+        closed = np.flatnonzero(status != OPEN)
+        rough = problem.friction > 0
+        stick = np.flatnonzero(status == STICK) if rough else closed[:0]
+        slip = np.flatnonzero(status == SLIP) if rough else closed[:0]
+        self._at = np.concatenate([closed, stick, stick, slip])
+        self._slipping = slice(len(closed) + 2 * len(stick), None)
+        columns = np.zeros((len(self._at), 3))
+        columns[: len(closed), NORMAL] = 1
+        rows = columns.copy()
+        columns[: len(closed), TANGENTS] = problem.friction * along[closed]
+        for axis, first in zip(TANGENTS, (len(closed), len(closed) + len(stick)), strict=True):
+            rows[first : first + len(stick), axis] = 1
+        # the direction across the slip
+        rows[self._slipping, 0], rows[self._slipping, 2] = -along[slip, 1], along[slip, 0]
+        columns[len(closed) :] = rows[len(closed) :]
+        held = bound[slip] / pull[slip]
+        rows[self._slipping] *= held[:, None]
+        self._rows, self._columns = rows, columns
+        size, k = len(self._at), len(problem.resultants)
+        motions, weights = (
+            a.reshape(k, -1, 3)[:, self._at] for a in (problem.motions, problem.weights)
+        )
+        unit = 1 / here.stiffness
+        self._unit = unit / np.abs(problem.motions).max(axis=(1, 2, 3))
+        self._scale = unit / np.abs(problem.weights).max(axis=(1, 2, 3))
+        S = np.zeros((size + k, size + k))
+        S[:size, :size] = problem.influence.between(self._at, rows, self._at, columns)
+        slipping = np.arange(size)[self._slipping]
+        S[slipping, slipping] += (1 - held) / here.grip
+        S[:size, size:] = np.einsum("knb,nb->nk", motions, rows) * self._unit
+        S[size:, :size] = np.einsum("knb,nb->kn", weights, columns) * self._scale[:, None]
+        try:
+            self._factors = RefinedLU(S)
+        except ZeroDivisionError:
+            raise NoContact(_LOOSE) from None
+
+    def holds(self, other: _Iterate) -> bool:
+        """Whether points have the same status at another iterate."""
+        return bool((self._here.status == other.status).all())
+
+    def step(self) -> tuple[Array, Array]:
+        """Return Newton's change of values (n, m, 3) and rigid motions (k,)."""
+        here = self._here
+        known = np.where(here.closed[..., None], 0, -here.values)
+        slips = here.status == SLIP
+        p, q = here.values[..., NORMAL], here.values[..., TANGENTS]
+        short = here.problem.friction * p - (q * here.along).sum(axis=-1)
+        known[..., TANGENTS] += np.where(slips, short, 0)[..., None] * here.along
+        if not here.problem.friction:
+            known[..., TANGENTS] = -q
+        follows = self._influence.of(known)
+        wanted = -self._of(here.effects + follows)
+        across = self._of(follows)[self._slipping]
+        aside = (q.reshape(-1, 2)[self._at[self._slipping]]
+                 * self._columns[self._slipping][:, TANGENTS]).sum(axis=1)  # fmt: skip
+        wanted[self._slipping] = -aside / here.grip - across
+        weights = here.problem.weights
+        missing = here.unbalanced - np.tensordot(weights, known, known.ndim)
+        change, rigid = self._solve(wanted, missing)
+        return known + change, rigid
+
+    def along(self, change: Array) -> tuple[Array, Array]:
+        """Return the change of values and rigid motions with that of the offset (n, m, 3)."""
+        return self._solve(-self._of(change), np.zeros(len(self._unit)))
+
+    def _of(self, effects: Array) -> Array:
+        """Return the combinations of effects that the equations contain."""
+        return np.asarray((effects.reshape(-1, 3)[self._at] * self._rows).sum(axis=1))
+
+    def _solve(self, wanted: Array, missing: Array) -> tuple[Array, Array]:
+        size = len(self._at)
+        rhs = np.concatenate([wanted, self._scale * missing])
+        try:
+            found = self._factors.solve(rhs)
+        except ZeroDivisionError:
+            raise NoContact(_LOOSE) from None
+        if not np.isfinite(found).all():
+            raise NoContact(_LOOSE)
+        values = np.zeros((self._here.status.size, 3))
+        np.add.at(values, self._at, found[:size, None] * self._columns)
+        return values.reshape(self._here.values.shape), found[size:] * self._unit

@@ -1,0 +1,409 @@
+"""An elastic wheel that rolls over the surface of a prism, in the frame of its axle.
+
+Material of both bodies flows upstream to downstream through the contact, in which nothing changes.
+The *slip* at station c is the motion of the surface over the wheel while the axle advances by the
+distance of two stations: with the displacements u of surface minus wheel, in local axes,
+
+    slip[c] = (3 u_t[c] - 4 u_t[c - 1] + u_t[c - 2]) / 2 + rigid slip
+    gap[c] = gap of the bodies - u_n[c]
+
+The difference is of second order at the station, and looks upstream, where material comes from: a
+difference across the station would not couple it to itself. The displacements are those without
+tractions, and linear in the tractions: the influence between two stations depends on their distance
+alone. The rest is the problem of `friction_cone`. The wheel is a half-space; its tractions are
+those of the surface, mirrored.
+
+J.J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), sections 1.6 and 4.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+from dataclasses import replace
+from typing import Required, Self, TypedDict, Unpack
+
+import numpy as np
+
+from solver.errors import LimitLoad, ModelError, NoContact, Spins, WindowTooSmall
+from solver.linear.threads import one_thread
+from solver.model.friction import LEAST_FRICTION
+from solver.rolling.rail.friction_cone import (
+    NORMAL,
+    OPEN,
+    TANGENTS,
+    ConeProblem,
+    ConeSolution,
+    solve_cone,
+)
+from solver.rolling.rail.half_space import half_space
+from solver.rolling.rail.influence import Influence
+from solver.rolling.rail.patch_contact import PatchContact
+from solver.rolling.rail.patch_grid import PatchGrid
+from solver.rolling.rail.profiled_wheel import ProfiledWheel
+from solver.typing import Array, Ints
+
+_MIRROR = np.array([1.0, -1.0, 1.0])
+"""Local axes of the wheel's surface, in those of the prism's; (shear, pressure, shear) likewise."""
+_PRESSED = 0.5
+"""Ratio of the interpenetration of undeformed bodies to their approach, over the expected contact.
+For a ball in contact over a radius a it is 0.5 at the edge (K.L. Johnson, 1985, section 4.2)."""
+UPSTREAM = (1.5, -2.0, 0.5)
+"""Weights of the slip at a station, at the one before and at the second before."""
+_SLIDES = 1.0
+"""Creepage at which all of a contact slips."""
+
+
+class RollingLoad(TypedDict, total=False):
+    """Friction and load of a `RollingPatch`, with its units; creepages that are not given are 0."""
+
+    friction: Required[float]
+    force: Required[float]
+    drive: float | None
+    lateral_force: float | None
+    creepage: float
+    lateral_creepage: float
+    spin: float
+
+
+class RollingPatch:
+    """A wheel pressed on the surface of a prism; see `PatchLoad`.
+
+    Friction and load, the parameters after ``wheel``, are given by name.
+
+    Parameters
+    ----------
+    grid : stations and vertices of the surface
+    compliance : (N, m, 3, m, 3) [mm/MPa], N >= n: entry ``[d, i, a, j, b]`` is the displacement of
+        the surface along axis a, the mean under hat i, d stations downstream of a unit traction
+        along axis b at vertex j, in x, y, z. Negative d are at the end, as in an FFT; a prism of N
+        stations that repeats itself has every d once
+    wheel : the wheel
+    friction : coefficient of friction; without it moment and lateral force are left out
+    force : vertical force on the axle [N]
+    drive : moment on the axle over radius, positive when braking, over friction times force; None
+        if ``creepage`` is given
+    lateral_force : force on the surface along z [N]; None if ``lateral_creepage`` is given
+    creepage, lateral_creepage, spin : as in `ProfiledWheel.rolling` [1, 1, 1/mm]
+
+    Attributes
+    ----------
+    grid, wheel, friction, force, drive, lateral_force : as above; what is left out is None
+    """
+
+    def __init__(
+        self,
+        grid: PatchGrid,
+        compliance: Array,
+        wheel: ProfiledWheel,
+        **load: Unpack[RollingLoad],
+    ) -> None:
+        n, m = grid.stations, len(grid.z)
+        if compliance.shape[1:] != (m, 3, m, 3) or len(compliance) < n:
+            allowed = f"must be ({n} or more, {m}, 3, {m}, 3) on this grid"
+            raise ModelError("compliance", compliance.shape, allowed)
+        self.grid, self._axes, self._area = grid, grid.axes, grid.area
+        self._set_wheel(wheel)
+        self._set_load(**load)
+        with one_thread():
+            self._influence = Influence(self._kernel(_apart(grid, compliance, wheel)))
+        if not self._influence.own()[:, NORMAL, NORMAL].min() > 0:
+            raise ModelError("compliance", 0.0, "surface and wheel must not both be rigid")
+
+    def _set_wheel(self, wheel: ProfiledWheel) -> None:
+        """Set what depends on the shape of the wheel."""
+        self.wheel = wheel
+        self._rest, self._motions = wheel.rolling(self.grid)
+        self._sums = self._resultants()
+
+    def _set_load(
+        self,
+        *,
+        friction: float,
+        force: float,
+        drive: float | None = None,
+        lateral_force: float | None = None,
+        creepage: float = 0.0,
+        lateral_creepage: float = 0.0,
+        spin: float = 0.0,
+    ) -> None:
+        """Set friction and load; parameters are those of the class."""
+        if not 0 <= friction <= 1:
+            raise ModelError("friction", friction, "must lie between 0 and 1")
+        if not force > 0:
+            raise ModelError("force", force, "must be positive")
+        self.force = force
+        self.friction = friction if friction > LEAST_FRICTION else 0.0
+        self.drive = drive if self.friction else None
+        self.lateral_force = lateral_force if self.friction else None
+        self._given = np.array([0.0, creepage, lateral_creepage, spin])
+
+    def with_wheel(self, wheel: ProfiledWheel) -> Self:
+        """Return the same load with a wheel of another shape, or beside the place of this one.
+
+        Influences of tractions are shared.
+
+        Raises
+        ------
+        ModelError
+            if its elastic constants are others
+        """
+        if wheel.elasticity != self.wheel.elasticity:
+            raise ModelError("elasticity", wheel.elasticity, f"must be {self.wheel.elasticity}")
+        other = copy(self)
+        other._set_wheel(wheel)
+        return other
+
+    def with_load(self, **load: Unpack[RollingLoad]) -> Self:
+        """Return the same wheel with another load and friction, parameters as of the class."""
+        other = copy(self)
+        other._set_load(**load)
+        return other
+
+    def scaled(self, share: float) -> Self:
+        """See `PatchLoad`."""
+        other = copy(self)
+        other.force *= share
+        if other.lateral_force is not None:
+            other.lateral_force *= share
+        return other
+
+    def driven(self, share: float) -> Self:
+        """See `PatchLoad`."""
+        other = copy(self)
+        if other.drive is not None:
+            other.drive *= share
+        return other
+
+    @property
+    def moment(self) -> float:
+        """See `PatchLoad`."""
+        return (self.drive or 0.0) * self.friction * self.force
+
+    @property
+    def slipping(self) -> Self:
+        """See `PatchLoad`."""
+        other = copy(self)
+        if self.moment:
+            other.drive = None
+            other._given = self._given.copy()
+            other._given[1] += np.sign(self.moment) * _SLIDES
+        return other
+
+    def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
+        """See `PatchLoad`.
+
+        Raises
+        ------
+        Spins, LimitLoad
+            if moment or lateral force exceed the friction of the whole contact
+        WindowTooSmall
+            if the contact reaches the outermost stations or vertices
+        NoContact
+            if no tractions are found
+        """
+        with one_thread():
+            found = self._solve(u, start)
+        status = found.status
+        _check_rim(status)
+
+        def of(
+            values: Array, free: Array, near: Callable[[Array], PatchContact] | None
+        ) -> PatchContact:
+            height, creepage, lateral, spin = self._moved(free)
+            return PatchContact(
+                grid=self.grid,
+                traction=self._global(values),
+                gap=found.effects[..., NORMAL],
+                slip=found.effects[..., TANGENTS],
+                status=status,
+                along=lambda change: self._global(found.along(self._offset(change))[0]),
+                near=near,
+                height=height,
+                creepage=creepage,
+                lateral_creepage=lateral,
+                spin=spin,
+                steps=found.steps,
+            )
+
+        def near(other: Array) -> PatchContact:
+            values, free = found.along(self._offset(other - u))
+            return of(found.values + values, found.rigid + free, None)
+
+        return of(found.values, found.rigid, near)
+
+    def _moved(self, free: Array) -> list[float]:
+        """Return height, creepages and spin, from the rigid motions (k,) that are free."""
+        rigid = self._given.copy()
+        rigid[self._free] = free
+        return rigid.tolist()
+
+    def _solve(self, u: Array, start: PatchContact | None) -> ConeSolution:
+        """Solve the frictional problem of a surface with these displacements (n, m, 3)."""
+        problem = self._problem(u)
+        if start is not None:
+            try:
+                return solve_cone(problem, *self._known(start))
+            except NoContact:  # the contact may be elsewhere
+                pass
+        smooth = self._smooth(problem)
+        try:
+            found = solve_cone(problem, smooth.values, self._rolling_freely(problem, smooth))
+        except NoContact:
+            _check_rim(smooth.status)
+            self._check_sliding(u)
+            raise
+        found.steps += smooth.steps
+        return found
+
+    @staticmethod
+    def _kernel(apart: Array) -> Array:
+        """Return slip and gap (w_x, g, w_s) by tractions, from the motions and gap they make."""
+        kernel = apart.copy()
+        for axis in TANGENTS:
+            motion = apart[:, :, axis]
+            kernel[:, :, axis] = sum(
+                weight * np.roll(motion, back, axis=0) for back, weight in enumerate(UPSTREAM)
+            )
+        return kernel
+
+    @property
+    def _free(self) -> list[int]:
+        """Numbers of the rigid motions whose resultant is given: height and creepages."""
+        given = (self.force, self.drive, self.lateral_force)
+        return [number for number, value in enumerate(given) if value is not None]
+
+    def _resultants(self) -> Array:
+        """Return the sums (3, n, m, 3) of (q_x, p, q_s) that height and creepages work with."""
+        sin, cos = np.sin(self.grid.angle), np.cos(self.grid.angle)
+        sums = np.zeros((3, *self._rest.shape))
+        sums[0, ..., 1], sums[0, ..., 2] = cos, -sin
+        sums[1] = -self._motions[1] / self.grid.spacing
+        sums[2, ..., 1], sums[2, ..., 2] = sin, cos
+        return sums * self._area[:, None]
+
+    def _offset(self, u: Array) -> Array:
+        """Return slip and gap (n, m, 3) from displacements (n, m, 3) of the surface."""
+        local = np.einsum("jab,cjb->cja", self._axes, u)
+        moved = np.zeros_like(local)
+        tangential = local[..., TANGENTS]
+        before = 2 * tangential[:1] - tangential[1:2]  # one station upstream of the grid
+        path = np.concatenate([before, tangential])
+        moved[1:, :, TANGENTS] = sum(
+            weight * path[2 - back : len(path) - back] for back, weight in enumerate(UPSTREAM)
+        )
+        moved[..., NORMAL] = -local[..., NORMAL]
+        return moved
+
+    def _global(self, values: Array) -> Array:
+        """Return tractions (n, m, 3) in x, y, z from (q_x, p, q_s)."""
+        return np.asarray(np.einsum("jab,cja->cjb", self._axes, values * _MIRROR))
+
+    def _problem(self, u: Array) -> ConeProblem:
+        """Return the frictional problem of a surface with these displacements (n, m, 3)."""
+        free = self._free
+        drive = 0.0 if self.drive is None else self.drive * self.friction * self.force
+        resultants = np.array([self.force, drive, self.lateral_force or 0.0])
+        given = self._given.copy()
+        given[free] = 0.0
+        return ConeProblem(
+            influence=self._influence,
+            offset=self._rest + self._offset(u) + np.tensordot(given, self._motions, 1),
+            friction=self.friction,
+            motions=self._motions[free],
+            weights=self._sums[free],
+            resultants=resultants[free],
+        )
+
+    def _known(self, start: PatchContact) -> tuple[Array, Array]:
+        """Return values (n, m, 3) and free rigid motions of a contact."""
+        values = np.einsum("jab,cjb->cja", self._axes, start.traction) * _MIRROR
+        motions = (start.height, start.creepage, start.lateral_creepage)
+        return values, np.array(motions)[self._free]
+
+    def _smooth(self, problem: ConeProblem) -> ConeSolution:
+        """Return the contact without friction; the undeformed bodies give the first points."""
+        smooth = replace(
+            problem, friction=0.0, motions=problem.motions[:1], weights=problem.weights[:1],
+            resultants=problem.resultants[:1],
+        )  # fmt: skip
+        height = np.array([-self._expected_edge(problem)])
+        return solve_cone(smooth, np.zeros_like(problem.offset), height)
+
+    @staticmethod
+    def _rolling_freely(problem: ConeProblem, smooth: ConeSolution) -> Array:
+        """Return rigid motions (k,): free creepages make slip least, weighted with the pressure."""
+        share = np.sqrt(np.maximum(smooth.values[..., NORMAL, None], 0.0))
+        slip = (share * smooth.effects[..., TANGENTS]).ravel()
+        motions = (share * problem.motions[1:][..., TANGENTS]).reshape(-1, slip.size)
+        return np.append(smooth.rigid, np.linalg.lstsq(motions.T, -slip)[0])
+
+    def _expected_edge(self, problem: ConeProblem) -> float:
+        """Return the gap of undeformed bodies at the edge of the contact, roughly [mm].
+
+        It is a share of the approach, which is that of a uniform pressure on the same area.
+        """
+        gap = (problem.offset[..., NORMAL] / problem.motions[0, ..., NORMAL]).ravel()
+        nearest = np.argsort(gap)
+        area = np.cumsum(np.broadcast_to(self._area, problem.offset.shape[:2]).ravel()[nearest])
+        own = problem.influence.own()[:, NORMAL, NORMAL].mean()
+        approach = own * self.force / np.sqrt(area * self._area.mean())
+        inside = gap[nearest] - gap[nearest[0]] <= _PRESSED * approach
+        return float(gap[nearest[np.flatnonzero(inside)[-1]]])
+
+    def _check_sliding(self, u: Array) -> None:
+        """Raise `Spins` or `LimitLoad` if full slip carries less than moment and lateral force.
+
+        Full slip may carry less than friction times load: spin turns shear, and shear on a slope
+        carries a part of the load.
+        """
+        if self.drive is None and self.lateral_force is None:
+            return
+        smooth = np.tensordot(self._sums[1:], self._smooth(self._problem(u)).values, 3)
+        given = np.array([value is not None for value in (self.drive, self.lateral_force)])
+        wanted = np.where(given, [self.moment, self.lateral_force or 0.0] - smooth, 0.0)
+        size = float(np.hypot(*wanted))
+        if not size:
+            return
+        other = copy(self)
+        other.drive = other.lateral_force = None
+        other._given = self._given.copy()
+        other._given[1:3] += _SLIDES * wanted / size
+        try:
+            found = other._solve(u, None)
+        except NoContact:
+            return
+        forces = np.tensordot(self._sums[1:], found.values, 3) - smooth
+        carried = float(forces @ wanted) / size**2
+        if carried >= 1:
+            return
+        if self.lateral_force is not None:
+            lateral = float(np.tensordot(self._sums[2], found.values, 3))
+            wanted_force = self.lateral_force
+            told = f"{wanted_force:.0f}" if abs(wanted_force) >= 1 else f"{wanted_force:.2g}"
+            much = f"with all of its contact slipping the lateral force is {lateral:.0f} N"
+            much += f", not {told}: give one that a wheel at this position can have"
+            raise LimitLoad(f"the wheel slides off: {much}", carried, 1.0)
+        much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"
+        raise Spins(much, carried, 1.0)
+
+
+def _check_rim(status: Ints) -> None:
+    """Raise `WindowTooSmall` if an outermost station or vertex (n, m) is closed."""
+    rim = [status[0], status[-1], status[:, 0], status[:, -1]]
+    if any((part != OPEN).any() for part in rim):
+        raise WindowTooSmall("the contact reaches the outermost stations or vertices")
+
+
+def _apart(grid: PatchGrid, compliance: Array, wheel: ProfiledWheel) -> Array:
+    """Return the motion of the surface over the wheel, and the gap, by (q_x, p, q_s) of each point.
+
+    That of the wheel is equal; axes are those of `Influence`.
+    """
+    n, m = grid.stations, len(grid.z)
+    distances = np.fft.ifftshift(np.arange(-n, n)) % len(compliance)
+    turned = grid.axes @ compliance[distances].reshape(2 * n, m, 3, 3 * m)
+    surface = turned.reshape(-1, m, 3).swapaxes(0, 1) @ grid.axes.transpose(0, 2, 1)
+    mirrored = half_space(grid.hats.s, grid.spacing, n, wheel.elasticity)
+    local = surface.swapaxes(0, 1).reshape(mirrored.shape)
+    return np.asarray(local * _MIRROR[:, None, None] * _MIRROR + mirrored)

@@ -1,0 +1,1 @@
+"""Cross-sections of rails and wheels, and meshes of them."""

@@ -1,0 +1,204 @@
+"""Adapter of a steady pass to samples and outputs: states of one body in the frame of the load."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array, hstack
+from scipy.spatial import cKDTree
+
+from solver.contact.state import State
+from solver.fem.discretisation import Discretisation
+from solver.fem.fields import Sampler, recovery
+from solver.fem.frame import RigidMotion
+from solver.materials.state import Response
+from solver.results.contact_result import contact_patches
+from solver.rolling.layers import Layers
+from solver.rolling.passing import Pass
+from solver.rolling.plane.fields import TrackFields, of_layers, under_load
+from solver.rolling.plane.touching import RollingContact
+from solver.rolling.plane.track import Track
+from solver.typing import Array, Ints
+
+_LOADED, _RELEASED = 0.0, 1.0
+_LEVEL = 1e-6
+"""Ratio of a difference of depth to the depth of the first row; up to it points and nodes are on
+one line."""
+_MIRRORED = np.array([[1.0], [1.0], [1.0], [-1.0]])
+
+
+@dataclass(frozen=True, slots=True)
+class TrackState:
+    """A state of the half-plane.
+
+    Attributes
+    ----------
+    state : displacements and internal variables; its time is 0 under the load and 1 after it
+    response : stress at the points
+    touching : the contact with a wheel in the frame of the load, or None
+    """
+
+    state: State
+    response: Response
+    touching: RollingContact | None
+
+
+class TrackBody:
+    """The body of a track in a fixed frame; the track itself is computed for a load along +x.
+
+    Parameters
+    ----------
+    track : the track, with the load along +x
+    way : 1 if the load moves along +x, -1 if it moves along -x and all is mirrored
+    """
+
+    def __init__(self, track: Track, way: int) -> None:
+        self.track, self.way = track, way
+        self._part = track.part if way == 1 else track.mirrored
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of the only body."""
+        return (self._part.body.name,)
+
+    @property
+    def n_unknowns(self) -> int:
+        """Number of displacement unknowns."""
+        return len(self._part.free)
+
+    def full(self, name: str) -> Discretisation:
+        """Return the body."""
+        del name
+        return self._part
+
+    def sampler(self, name: str, X: Array) -> Sampler:
+        """Return the interpolation of nodal fields at positions (2, n) [mm]."""
+        return Sampler(self.full(name), X)
+
+    def recovery(self, name: str) -> csr_array:
+        """Return the matrix (n_nodes, n) from values at points and at the surface to nodes.
+
+        Nodes of the surface take the values at the surface: plastic strain, and thus stress, may
+        change too much between the first two rows of points for extrapolation.
+        """
+        del name
+        part, first = self._part, self._first
+        points, y = part.points.reshape(2, -1), part.X[1]
+        top = np.flatnonzero(y > y.max() - _LEVEL * abs(points[1].max()))
+        nearest = cKDTree(points[0, first, None]).query(part.X[0, top, None], k=2)[1]
+        below = np.ones(len(y))
+        below[top] = 0.0
+        halves = np.full(nearest.size, 0.5), (np.repeat(top, 2), nearest.ravel())
+        at_surface = csr_array(halves, shape=(len(y), len(first)))
+        return csr_array(hstack([diags_array(below) @ recovery(part), at_surface]))
+
+    @cached_property
+    def _first(self) -> Ints:
+        """Indices of the points nearest to the surface."""
+        y = self._part.points[1].ravel()
+        return np.flatnonzero(y > y.max() * (1 + _LEVEL))
+
+    def positions(self, name: str) -> Array:
+        """Return positions (2, n) of the points, then at the surface above the first row [mm]."""
+        points = self.full(name).points.reshape(2, -1)
+        return np.concatenate([points, points[:, self._first] * [[1.0], [0.0]]], axis=1)
+
+    def response(self, name: str, converged: TrackState) -> Response:
+        """Return stress and internal variables at the points, then at the surface above them."""
+        del name
+        return converged.response
+
+    def strain(self, name: str, converged: TrackState) -> Array:
+        """Return the strain (4, n, Mandel) at the points, then at the surface above them."""
+        found = converged.response
+        return self.full(name).body.law.elastic_strain(found.stress) + found.state.plastic_strain
+
+    def displacement(self, name: str, state: State) -> Array:
+        """Return the displacements (n,) [mm]."""
+        del name
+        return state.u[0]
+
+    def axle(self, converged: TrackState) -> RigidMotion | None:
+        """Return the displacement of the axle, which stays at x = 0, or None without a wheel."""
+        touching = converged.touching
+        return None if touching is None else RigidMotion(x=0.0, y=touching.height, rotation=0.0)
+
+    def under_load(self, found: Pass[Layers]) -> TrackState:
+        """Return the state under the load of a pass."""
+        touching = found.loading if isinstance(found.loading, RollingContact) else None
+        return self._state(_LOADED, under_load(self.track, found), touching)
+
+    def left_by(self, found: Pass[Layers]) -> TrackState:
+        """Return the state after a pass."""
+        return self._state(_RELEASED, of_layers(self.track, found.law, found.after), None)
+
+    def _state(
+        self, time: float, fields: TrackFields, touching: RollingContact | None
+    ) -> TrackState:
+        u, strain, inside, (above, at_surface) = fields
+        strain = np.concatenate([strain, above], axis=1)
+        plastic = inside.unpacked(np.concatenate([inside.packed, at_surface.packed], axis=1))
+        stress = self.track.part.body.law.stiffness(4) @ (strain - plastic.plastic_strain)
+        if self.way == -1:
+            points, nodes = self.track.mirror
+            uppermost = np.searchsorted(self.track.rows.highest, points[self._first])
+            points = np.concatenate([points, len(points) + uppermost])
+            u = (u.reshape(-1, 2)[nodes] * [-1.0, 1.0]).ravel()
+            stress = stress[:, points] * _MIRRORED
+            plastic = plastic.at(points).mirrored
+        response = Response(stress, np.zeros((4, 4, 0)), plastic, np.zeros(0, dtype=bool))
+        return TrackState(State(time, (u,), (plastic,), ()), response, touching)
+
+
+class SteadyTractions:
+    """Pressure and shear of a wheel; see `solver.results.tractions.SurfaceTractions`.
+
+    Parameters
+    ----------
+    way : 1 if the wheel moves along +x, -1 if it moves back
+    """
+
+    def __init__(self, way: int) -> None:
+        self._way = way
+
+    def along(self, converged: TrackState, x: Array) -> tuple[Array, Array, Array]:
+        """See `SurfaceTractions`."""
+        touching = converged.touching
+        if touching is None:
+            return np.zeros_like(x), np.zeros_like(x), np.full_like(x, np.nan)
+        at = self._way * touching.x
+        order = np.argsort(at)
+
+        def sampled(values: Array, beyond: float) -> Array:
+            return np.asarray(np.interp(x, at[order], values[order], left=beyond, right=beyond))
+
+        return (
+            sampled(touching.pressure, 0.0),
+            sampled(-self._way * touching.shear, 0.0),
+            sampled(touching.gap, np.nan),
+        )
+
+    def extent(self, converged: TrackState) -> tuple[float, float]:
+        """See `SurfaceTractions`."""
+        touching = converged.touching
+        assert touching is not None
+        order = np.argsort(touching.x)
+        closed = touching.normal[order] > 0
+        patches = contact_patches(touching.x[order], touching.gap[order], closed)
+        return (patches[-1][1] - patches[0][0]) / 2, float(touching.pressure.max())
+
+    def force(self, converged: TrackState) -> float:
+        """See `SurfaceTractions`."""
+        assert converged.touching is not None
+        return -self._way * float(converged.touching.tangential.sum())
+
+    def centre(self, converged: TrackState) -> float:
+        """See `SurfaceTractions`."""
+        del converged
+        return 0.0
+
+    def points(self, converged: TrackState) -> None:
+        """See `SurfaceTractions`."""
+        del converged

@@ -1,0 +1,46 @@
+"""Ball or roller rolling along a raceway, in three dimensions.
+
+The raceway is a block, flat or with a groove, elastic-plastic in a zone under the contact, without
+ends and straight along x, held at its foot. The ball or roller is an elastic half-space with the
+shape of its two radii; or with ``load = "hertz"`` there is none, but the pressure of its elastic
+Hertz contact with shear in proportion, which does not change while the raceway yields. Passes are
+steady: in the frame of the load nothing changes. Coordinates are x along the raceway, y up from the
+lowest line of the groove, z across; x = 0 is at the load. A positive ``traction`` brakes.
+
+A.R.S. Ponter, A.D. Hearle, K.L. Johnson, J. Mech. Phys. Solids 33 (1985) 339-362.
+"""
+
+from __future__ import annotations
+
+from solver.results.record import Status
+from solver.rolling.scenes.raceway_parameters import RacewayParameters
+from solver.scenes.late import late
+from solver.scenes.scene import Scene
+
+_method, _view, _sketch, _effort, _setup = late(
+    "rolling.scenes.raceway_setup", "method", "view", "sketch", "effort", "setup"
+)
+
+RACEWAY = Scene(
+    name="raceway",
+    summary="ball or roller rolling along an elastic-plastic raceway, in three dimensions",
+    parameters=RacewayParameters,
+    branch="passes",
+    method=_method,
+    view=_view,
+    sketch=_sketch,
+    outputs=(
+        *late("results.maps", "maps", "profiles"),
+        *late("results.extremes", "residual_extremes"),
+        *late("results.figures", "extremes"),
+        *late("rolling.scenes.rail_outputs", "patch", "section", "cycles"),
+        *late("rolling.scenes.raceway_setup", "elastic"),
+    ),
+    costs=late("results.figures", "cost"),
+    effort=_effort,
+    setup=_setup,
+    advice={
+        Status.LIMIT_LOAD: "lower load or traction, or let the material harden",
+        Status.NOT_CONVERGED: "lower load or traction, or choose another accuracy",
+    },
+)

@@ -1,0 +1,234 @@
+"""Results of rolling over a prism: the contact, the section of the prism, and its passes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy
+
+from solver.materials.law import Law
+from solver.model.friction import PatchStatus
+from solver.results.cycles import (
+    SHAKEDOWN_STATE,
+    STEADY_NET_INCREMENT,
+    STEADY_PLASTIC_INCREMENT,
+)
+from solver.results.quantities import declare
+from solver.results.run import FinishedRun, Values
+from solver.results.shakedown import Shakedown, ShakedownState, classify
+from solver.rolling.rail.section import Section
+from solver.rolling.scenes.passes import (
+    PASS,
+    PASS_CREEPAGE,
+    PASS_MAX_PLASTIC_STRAIN,
+    PASS_NET_INCREMENT,
+    PASS_PLASTIC_INCREMENT,
+    PASS_SURFACE_ADVANCE,
+)
+from solver.rolling.scenes.rail_passes import PassTrace
+from solver.rolling.scenes.rolling_setup import CREEPAGE, LONGITUDINAL_FORCE
+from solver.scenes.sketch import Sketch
+from solver.typing import Array
+
+_PATCH = ("x", "z")
+PATCH_PRESSURE = declare(
+    "patch_pressure", "contact pressure on the running surface", "MPa", dims=_PATCH
+)
+PATCH_SHEAR = {
+    "x": declare(
+        "patch_shear_x", "contact shear on the running surface along x", "MPa", dims=_PATCH
+    ),
+    "z": declare(
+        "patch_shear_z", "contact shear on the running surface across it", "MPa", dims=_PATCH
+    ),
+}
+PATCH_SLIP = {
+    "x": declare(
+        "patch_slip_x", "slip of the running surface over the wheel along x, per advance",
+        dims=_PATCH,
+    ),
+    "z": declare(
+        "patch_slip_z", "slip of the running surface over the wheel across it, per advance",
+        dims=_PATCH,
+    ),
+}  # fmt: skip
+PATCH_STATUS = declare(
+    "patch_status", "whether the surfaces are open, stick or slip", dims=_PATCH, flags=PatchStatus
+)
+PEAK_PATCH_PRESSURE = declare(
+    "peak_patch_pressure", "largest contact pressure on the running surface", "MPa"
+)
+PEAK_PATCH_PRESSURE_Z = declare(
+    "peak_patch_pressure_z", "position z of the largest contact pressure", "mm"
+)
+PATCH_AREA = declare("patch_area", "area of the contact", "mm2")
+PATCH_LEFT = declare("patch_left", "smallest z of the contact", "mm")
+PATCH_RIGHT = declare("patch_right", "largest z of the contact", "mm")
+LATERAL_FORCE = declare("lateral_force", "contact force along z", "N")
+RUNNING_SURFACE_RESIDUAL = declare(
+    "running_surface_residual", "residual stress at the running surface, at its nodes, over z",
+    "MPa", dims=("component", "z"),
+)  # fmt: skip
+LOWEST_LOADED = declare(
+    "lowest_loaded", "smallest stress around the load, at integration points", "MPa",
+    dims=("component",),
+)  # fmt: skip
+HIGHEST_MISES = declare("highest_mises", "largest von Mises stress at x = 0 under the load", "MPa")
+HIGHEST_MISES_DEPTH = declare(
+    "highest_mises_depth", "depth below the top of the largest von Mises stress", "mm"
+)
+MOST_STRAINED_Z = declare("most_strained_z", "position z of the largest plastic strain", "mm")
+LEAST_YIELDED_DEPTH = declare(
+    "least_yielded_depth", "depth below the top of the highest point that has yielded", "mm"
+)
+MOST_YIELDED_DEPTH = declare(
+    "most_yielded_depth", "depth below the top of the deepest point that has yielded", "mm"
+)
+PASS_RESIDUAL_MIN = declare(
+    "pass_residual_min", "smallest residual stress after a pass, at points of the zone", "MPa",
+    dims=("component", "pass"),
+)  # fmt: skip
+MEAN_PLASTIC_INCREMENT = declare(
+    "mean_plastic_increment",
+    "largest equivalent plastic strain accumulated in a pass, its mean over the last passes",
+)
+MEAN_NET_INCREMENT = declare(
+    "mean_net_increment",
+    "largest equivalent of the signed plastic strain left by a pass, mean over the last passes",
+)
+_AVERAGED = 100
+"""Largest number of passes in a mean over the last ones, which are at most half of all."""
+_YIELDED = 1e-6
+"""Plastic strain above which a point counts as yielded."""
+
+
+def sketched(name: str, section: Section, law: Law, curves: Mapping[str, Array]) -> Sketch:
+    """Return the section of a prism of a law, and curves (2, n) of what rolls on it, in z and y."""
+    body = replace(section.plane.body, name=name, material=law)
+    return Sketch((body,), springs={body.name: [*section.springs]}, curves=curves)
+
+
+def patch(run: FinishedRun) -> Values:
+    """Return pressure, shear and slip on the contact, its forces, its size, and the creepage.
+
+    Slip and status are those of the nearest station and vertex; slip is NaN where it is open.
+    """
+    contact: Any = run.outcome.points[run.view.loaded].touching
+    grid, pressure = contact.grid, contact.pressure
+    X, Z = np.meshgrid(run.view.x, run.view.z, indexing="ij")
+    places = _widened(grid.x[::-1]), _widened(grid.z)
+
+    def sampled(values: Array, method: str = "linear", outside: float = 0.0) -> Array:
+        at = scipy.interpolate.RegularGridInterpolator(
+            places, values[::-1], method, bounds_error=False, fill_value=outside
+        )
+        return np.asarray(at((X, Z)))
+
+    closed = contact.status != PatchStatus.OPEN
+    slip = np.where(closed[..., None], contact.slip / grid.spacing, np.nan)
+    touched = grid.z[closed.any(axis=0)]
+    force = contact.force
+    return {
+        PATCH_PRESSURE: sampled(pressure),
+        PATCH_SHEAR["x"]: sampled(contact.shear[..., 0]),
+        PATCH_SHEAR["z"]: sampled(contact.shear[..., 1]),
+        PATCH_SLIP["x"]: sampled(slip[..., 0], "nearest", np.nan),
+        PATCH_SLIP["z"]: sampled(slip[..., 1], "nearest", np.nan),
+        PATCH_STATUS: sampled(contact.status.astype(float), "nearest").astype(np.int32),
+        PEAK_PATCH_PRESSURE: float(pressure.max()),
+        PEAK_PATCH_PRESSURE_Z: float(grid.z[pressure.max(axis=0).argmax()]),
+        PATCH_AREA: float((closed * grid.area).sum()),
+        PATCH_LEFT: float(touched[0]),
+        PATCH_RIGHT: float(touched[-1]),
+        CREEPAGE: contact.creepage,
+        LONGITUDINAL_FORCE: float(force[0]),
+        LATERAL_FORCE: float(force[2]),
+    }
+
+
+def _widened(places: Array) -> Array:
+    """Return rising places, the outermost moved out by rounding: a place on them is inside."""
+    ends = 1e-9 * (places[-1] - places[0]) * np.array([-1.0, 1.0])
+    return np.concatenate([places[:1] + ends[0], places[1:-1], places[-1:] + ends[1]])
+
+
+def section(run: FinishedRun) -> Values:
+    """Return stress under the load, residual stress at the surface, and where the rail yielded."""
+    name = run.view.profile_body
+    body = run.system.full(name)
+    nodes = body.boundary_nodes(run.view.surfaces[name])
+    nodes = nodes[np.argsort(body.X[2, nodes])]
+    stress = run.samples.fields.at_nodes(run.unloaded, name).stress[:, nodes]
+    at_surface = [
+        np.interp(run.view.z, body.X[2, nodes], each, left=np.nan, right=np.nan) for each in stress
+    ]
+    X, mises, _ = run.samples.fields.at_points(run.loaded, name)
+    accumulated = run.samples.fields.at_points(run.unloaded, name)[2]
+    loaded: Any = run.loaded
+    yielded = -X[1, accumulated > _YIELDED]
+    most = int(np.nanargmax(mises))
+    return {
+        RUNNING_SURFACE_RESIDUAL: np.stack(at_surface),
+        LOWEST_LOADED: loaded.lowest,
+        HIGHEST_MISES: float(mises[most]),
+        HIGHEST_MISES_DEPTH: float(-X[1, most]),
+        MOST_STRAINED_Z: float(X[2, accumulated.argmax()]) if len(yielded) else np.nan,
+        LEAST_YIELDED_DEPTH: float(yielded.min()) if len(yielded) else np.nan,
+        MOST_YIELDED_DEPTH: float(yielded.max()) if len(yielded) else np.nan,
+    }
+
+
+def cycles(run: FinishedRun, cycle: int | None = 1) -> Values:
+    """Return the figures of every pass, and the shakedown state that the passes tend to.
+
+    Parameters
+    ----------
+    cycle : passes after which the loading repeats itself; increments are those of the cycle that
+        ends with a pass. With None it never does: increments are those of a pass, and if anything
+        yields no state is decided
+    """
+    p, traces = run.parameters, run.outcome.traces
+    numbers = range(len(traces))
+    accumulated, net = map(
+        np.stack, zip(*(_added(traces, number, cycle or 1) for number in numbers), strict=True)
+    )
+    last = slice((len(traces) - 1) % (cycle or 1), None, cycle)
+    yield_strain = p.yield_stress / p.youngs_modulus
+    hardens = p.material().hardens
+    found = classify(accumulated[last], net[last], yield_strain, hardens=hardens)
+    if cycle is None and found.state is not ShakedownState.ELASTIC:
+        found = Shakedown(ShakedownState.UNDECIDED, np.nan, np.nan)
+    average = max(min(len(traces) // 2, _AVERAGED), 1)
+    mean, mean_net = (each.max() / average for each in _added(traces, numbers[-1], average))
+    surface = np.array([t.surface for t in traces])
+    before = np.concatenate([np.zeros(cycle or 1), surface])[: len(surface)]
+    return {
+        PASS: np.arange(1, len(traces) + 1),
+        PASS_CREEPAGE: np.array([t.creepage for t in traces]),
+        PASS_MAX_PLASTIC_STRAIN: np.array([t.accumulated.max() for t in traces]),
+        PASS_RESIDUAL_MIN: np.stack([t.lowest for t in traces], axis=1),
+        PASS_PLASTIC_INCREMENT: accumulated.max(axis=1),
+        PASS_NET_INCREMENT: net.max(axis=1),
+        PASS_SURFACE_ADVANCE: surface - before,
+        SHAKEDOWN_STATE: found.state,
+        STEADY_PLASTIC_INCREMENT: found.accumulated,
+        STEADY_NET_INCREMENT: found.net,
+        MEAN_PLASTIC_INCREMENT: float(mean),
+        MEAN_NET_INCREMENT: float(mean_net),
+    }
+
+
+def _added(traces: Sequence[PassTrace], number: int, cycle: int) -> tuple[Array, Array]:
+    """Return the plastic strain (n,) that the cycle which ends with a pass adds at each point.
+
+    It is that accumulated, and the equivalent of the signed one that is left.
+    """
+    after = traces[number]
+    accumulated, flow = after.accumulated, after.plastic_strain
+    if number >= cycle:
+        accumulated = accumulated - traces[number - cycle].accumulated
+        flow = flow - traces[number - cycle].plastic_strain
+    return accumulated, np.sqrt(2 / 3 * (flow**2).sum(axis=1))

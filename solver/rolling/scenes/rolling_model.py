@@ -1,0 +1,135 @@
+"""The model of the rolling scene: half-space and wheel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from skfem import Mesh
+
+from solver.materials.material import Material
+from solver.mesh.grids import grid, mapped, merged, within
+from solver.model.amplitude import Amplitude
+from solver.model.body import Body
+from solver.model.model import Model
+from solver.model.motion import Axle, TravellingPressure
+from solver.rolling.plane.endless import track_lines
+from solver.rolling.plane.track import CONTACT, half_space_body, standing_pressure
+from solver.rolling.scenes.rolling_grids import half_space_nodes, wheel_nodes
+from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.scenes.sketch import Sketch
+
+
+def track_grid(parameters: RollingParameters) -> tuple[float, float, float, float, float, bool]:
+    """Return the arguments of `half_space_nodes`."""
+    p, a = parameters, parameters.half_width
+    far = p.length if p.periodic else p.half_space_size * a
+    return p.fine, far, a, p.element_size, p.growth, p.periodic
+
+
+def _half_space(parameters: RollingParameters) -> Body:
+    x, y = half_space_nodes(*track_grid(parameters))
+    periodic = parameters.periodic
+    travelling = None
+    if parameters.load == "hertz":
+        schedule = parameters.schedule
+        ratio = parameters.friction * parameters.traction
+        travelling = TravellingPressure(
+            boundary="top",
+            half_width=parameters.half_width,
+            peak=parameters.peak_pressure,
+            amplitude=schedule.load,
+            position=schedule.position,
+            shear_ratio=schedule.way.times(ratio),
+        )
+    return Body(
+        name="half_space",
+        mesh=within(grid(x, y), "track", ["top"], x=(-parameters.fine, parameters.fine)),
+        material=parameters.material(),
+        element=parameters.element,
+        supports={"bottom": "xy"} if periodic else {"left": "x", "right": "x", "bottom": "xy"},
+        travelling=travelling,
+        periodic=("left", "right") if periodic else None,
+    )
+
+
+def _ring(R: float, reach: float, h: float, turned: float) -> Mesh:
+    """Return the mesh of a wheel above (0, 0), turned by an angle [rad]; see `wheel_nodes`."""
+    angle, radius = wheel_nodes(R, reach, h)
+    ring = within(grid(angle, radius), "rim", ["top"], x=(-reach / R, reach / R))
+
+    def around(p: np.ndarray) -> np.ndarray:
+        angle = p[0] - turned
+        return np.stack([-p[1] * np.sin(angle), R - p[1] * np.cos(angle)])
+
+    return merged(mapped(ring, around))
+
+
+def wheel_body(
+    axle: Axle, reach: float, h: float, material: Material, element: str = "quad8"
+) -> Body:
+    """Return a wheel on its axle; see `wheel_nodes`."""
+    return Body(
+        name="wheel",
+        mesh=_ring(axle.radius, reach, h, -axle.turned),
+        material=material,
+        element=element,
+        supports={"bottom": "xy"},
+        axle=axle,
+    )
+
+
+def _wheel(parameters: RollingParameters) -> Body:
+    R, turned = parameters.radius, parameters.wheel_turned
+    schedule = parameters.schedule
+    position = schedule.position
+    full_slip = parameters.friction * parameters.force
+    rotation: Amplitude | None = None
+    if parameters.traction == 1.0:  # locked
+        rotation = Amplitude(position.time, np.full_like(position.value, -turned))
+    elif parameters.guided:
+        # without friction no moment turns the wheel: its rotation is prescribed as rolling
+        turning = (1 - parameters.given_creepage) * position.value / R
+        rotation = Amplitude(position.time, -turned - turning)
+    axle = Axle(
+        centre=(0.0, R),
+        radius=R,
+        force=schedule.load.times(parameters.force),
+        moment=schedule.drive.times(R * parameters.traction * full_slip),
+        position=position,
+        rotation=rotation,
+        turned=-turned,
+    )
+    p = parameters
+    return wheel_body(axle, p.reach, p.element_size, p.wheel_material, p.element)
+
+
+def sketch(parameters: RollingParameters) -> Sketch | None:
+    """Return the bodies of steady passes, the load at x = 0; None of passes by increments."""
+    p = parameters
+    if not p.endless:
+        return None
+    lines, a = track_lines(p.mesh_width, p.element_size, p.growth), p.mesh_width
+    body = half_space_body(*lines, CONTACT * a, p.material().elasticity)
+    half_space = replace(body, material=p.material())
+    if p.load == "hertz":
+        pressure = standing_pressure(p.peak_pressure, p.friction * p.traction, p.half_width)
+        return Sketch((replace(half_space, travelling=pressure),))
+    still = Amplitude.constant(0.0)
+    axle = Axle(
+        centre=(0.0, p.radius), radius=p.radius, force=Amplitude.constant(p.force), moment=still,
+        position=still,
+    )  # fmt: skip
+    wheel = wheel_body(axle, p.widest.reach, p.element_size, p.wheel_material)
+    return Sketch((wheel, half_space), ((("half_space", "contact"), ("wheel", "rim")),))
+
+
+def model(parameters: RollingParameters) -> Model:
+    """Return the half-space, and the wheel unless ``load`` is ``hertz``."""
+    half_space = _half_space(parameters)
+    if parameters.load == "hertz":
+        return Model(bodies=(half_space,))
+    contact = parameters.contact(
+        slave=("half_space", "track"), master=("wheel", "rim"), sliding="finite"
+    )
+    return Model(bodies=(_wheel(parameters), half_space), contacts=(contact,))

@@ -1,0 +1,212 @@
+"""The passes and the results of the rolling cylinder."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.loading.program import Program
+from solver.loading.refinement import StepRefinement
+from solver.results.cycles import (
+    SHAKEDOWN_STATE,
+    STEADY_NET_INCREMENT,
+    STEADY_PLASTIC_INCREMENT,
+)
+from solver.results.quantities import Quantity, declare
+from solver.results.record import Status
+from solver.results.run import FinishedRun, Values
+from solver.rolling.results.free_surface import FreeSurface
+from solver.rolling.scenes.passes import Trace, passes, shakedown_of
+from solver.rolling.scenes.rolling_endless import by_steady_passes
+from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.scenes.driver import by_increments
+from solver.scenes.scene import Method
+from solver.typing import Array
+
+CREEPAGE = declare("creepage", "creepage of the last pass")
+TRAVEL = declare("travel", "length rolled in the last pass", "mm")
+ADVANCE = declare("advance", "advance of an increment, as used", "mm")
+ADVANCE_ERROR = declare(
+    "advance_error",
+    "estimated error of residual stress under mid-track by the advance of increments", "MPa",
+)  # fmt: skip
+SURFACE = {
+    "x": declare(
+        "surface_residual_x",
+        "residual stress xx at the surface, mid-track, recovered at its nodes", "MPa",
+    ),
+    "z": declare(
+        "surface_residual_z",
+        "residual stress zz at the surface, mid-track, recovered at its nodes", "MPa",
+    ),
+}  # fmt: skip
+FIRST_ROW = {
+    "x": declare(
+        "first_row_residual_x",
+        "residual stress xx at the first row of integration points, mid-track", "MPa",
+    ),
+    "z": declare(
+        "first_row_residual_z",
+        "residual stress zz at the first row of integration points, mid-track", "MPa",
+    ),
+}  # fmt: skip
+FREE_SURFACE = {
+    "x": declare(
+        "free_surface_residual_x",
+        "residual stress xx at the surface, mid-track, by the conditions of a free surface", "MPa",
+    ),
+    "z": declare(
+        "free_surface_residual_z",
+        "residual stress zz at the surface, mid-track, by the conditions of a free surface", "MPa",
+    ),
+}  # fmt: skip
+LOWEST = {
+    "x": declare("lowest_residual_x", "smallest residual stress xx under mid-track", "MPa"),
+    "z": declare("lowest_residual_z", "smallest residual stress zz under mid-track", "MPa"),
+}
+DEPTH_OF_LOWEST = {
+    "x": declare("depth_of_lowest_residual_x", "depth of the smallest residual stress xx", "mm"),
+    "z": declare("depth_of_lowest_residual_z", "depth of the smallest residual stress zz", "mm"),
+}
+FIRST_ROW_DEPTH = declare(
+    "first_row_depth", "depth of the first row of integration points, mid-track", "mm"
+)
+SURFACE_PLASTIC_STRAIN = declare(
+    "surface_plastic_strain", "equivalent plastic strain at the surface, mid-track"
+)
+HIGHEST_PLASTIC_STRAIN = declare(
+    "highest_plastic_strain", "largest equivalent plastic strain under mid-track"
+)
+DEPTH_OF_HIGHEST_PLASTIC_STRAIN = declare(
+    "depth_of_highest_plastic_strain",
+    "depth of the largest plastic strain under mid-track", "mm",
+)  # fmt: skip
+UNSTEADINESS = declare(
+    "unsteadiness",
+    "ratio of the largest difference of residual stress between stations to the largest residual "
+    "stress",
+)
+LONGITUDINAL_FORCE = declare(
+    "longitudinal_force", "longitudinal force on the track along x, mid-track", "N"
+)
+AXLE_HEIGHT = declare("axle_height", "displacement of the axle at mid-track", "mm")
+AXLE_ROTATION = declare(
+    "axle_rotation",
+    "rotation of the wheel at mid-track, counter-clockwise, from its mesh", "rad",
+)  # fmt: skip
+
+
+def method(parameters: RollingParameters) -> Method:
+    """Return the method of the passes: steady on an endless track, else by increments."""
+    if not parameters.endless:
+        return by_increments
+
+    return by_steady_passes
+
+
+def program(parameters: RollingParameters) -> Program:
+    """Return the loading history of the passes."""
+    return parameters.schedule.program
+
+
+def refinement(parameters: RollingParameters) -> StepRefinement | None:
+    """Return how the advance is halved until residual stress converges, or None."""
+    tolerance = parameters.advance_tolerance * parameters.yield_stress
+    return StepRefinement(measure=_under_mid_track, tolerance=tolerance) if tolerance else None
+
+
+def _under_mid_track(trace: Trace) -> Array:
+    """Return the residual stress xx and zz under mid-track (2, depth) [MPa]."""
+    return trace.stress[len(trace.stress) // 2, [0, 2]]
+
+
+def progress(run: FinishedRun) -> Values:
+    """Return the length rolled in the last pass, the advance of its increments and its error."""
+    if run.parameters.endless:
+        return {}
+    schedule, settled = run.parameters.schedule, run.outcome.settled
+    return {
+        TRAVEL: schedule.travel(run.outcome.last.state.time),
+        ADVANCE: schedule.increment / settled.times,
+        ADVANCE_ERROR: settled.error,
+    }
+
+
+def profile_figures(run: FinishedRun) -> Values:
+    """Return the figures of the last pass under mid-track."""
+    trace: Trace = run.outcome.traces[-1]
+    stress, strain = trace.stress, trace.strain
+    depth = run.view.depth
+    middle = len(stress) // 2
+    out: dict[Quantity, float] = {CREEPAGE: trace.creepage}
+    for axis, component in (("x", 0), ("z", 2)):
+        profile = stress[middle, component]
+        out[SURFACE[axis]] = float(profile[0])
+        out[LOWEST[axis]] = float(profile.min())
+        out[DEPTH_OF_LOWEST[axis]] = float(depth[profile.argmin()])
+    out[SURFACE_PLASTIC_STRAIN] = float(strain[middle, 0])
+    out[HIGHEST_PLASTIC_STRAIN] = float(strain[middle].max())
+    out[DEPTH_OF_HIGHEST_PLASTIC_STRAIN] = float(depth[strain[middle].argmax()])
+    spread = np.ptp(stress[:, [0, 2]], axis=0).max()
+    out[UNSTEADINESS] = float(spread / max(np.abs(stress[:, [0, 2]]).max(), 1e-30))
+    return out
+
+
+def wheel(run: FinishedRun) -> Values:
+    """Return the longitudinal force at mid-track, and height and rotation of a wheel."""
+    out: dict[Quantity, float] = {LONGITUDINAL_FORCE: run.tractions.force(run.loaded)}
+    if (hub := run.system.axle(run.loaded)) is not None:
+        out |= {AXLE_HEIGHT: hub.y, AXLE_ROTATION: hub.rotation}
+    return out
+
+
+def surface(run: FinishedRun) -> Values:
+    """Return residual stress at and near the surface at mid-track, without extrapolation."""
+    found = FreeSurface.of(run.system.full("half_space"), "top")
+    response = run.system.response("half_space", run.unloaded)
+    u = run.system.displacement("half_space", run.unloaded.state)
+    free = found.at(0.0, found.stress(u, response.state.plastic_strain))
+    row = found.at(0.0, found.first_row(response.stress))
+    return {
+        **{FIRST_ROW[axis]: float(value) for axis, value in zip("xz", row, strict=True)},
+        FIRST_ROW_DEPTH: float(found.at(0.0, found.depth)),
+        **{FREE_SURFACE[axis]: float(value) for axis, value in zip("xz", free, strict=True)},
+    }
+
+
+def cycles(run: FinishedRun) -> Values:
+    """Return the results of every pass, and the shakedown state that the passes tend to."""
+    parameters = run.parameters
+    found = shakedown_of(parameters, run.outcome.traces)
+    return {
+        **passes(run.outcome.traces, parameters.cycle),
+        SHAKEDOWN_STATE: found.state,
+        STEADY_PLASTIC_INCREMENT: found.accumulated,
+        STEADY_NET_INCREMENT: found.net,
+    }
+
+
+def warnings(run: FinishedRun) -> tuple[str, ...]:
+    """Return a warning if the error by the advance is above its tolerance or unknown."""
+    settled, tolerance = run.outcome.settled, refinement(run.parameters)
+    if run.parameters.endless or tolerance is None or settled.error <= tolerance.tolerance:
+        return ()
+    advance = run.parameters.schedule.increment
+    known = not np.isnan(settled.error)
+    error = f"an error of {settled.error:.3g} MPa" if known else "an unknown error"
+    failed = f"; one of {advance / settled.failed:.3g} mm failed" if settled.failed else ""
+    return (
+        f"an advance of {advance / settled.times:.3g} mm still leaves {error}, "
+        f"above the tolerance of {tolerance.tolerance:.3g} MPa{failed}: "
+        "reduce advance_step or raise advance_tolerance",
+    )
+
+
+def advice(parameters: RollingParameters) -> dict[Status, str]:
+    """Return what the user can do by status; on an endless track nothing advances by steps."""
+    refined = "refine the mesh by element_size or growth"
+    return {
+        Status.LIMIT_LOAD: "lower load_ratio or traction, or let the material harden",
+        Status.NOT_CONVERGED: f"{refined}, or lower load_ratio or traction"
+        if parameters.endless
+        else f"reduce advance_step, or {refined}",
+    }
