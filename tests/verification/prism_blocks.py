@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from solver.materials import Material
 from solver.materials.law import Law
 from solver.mesh import grid, within
-from solver.rolling.rail.given_patch import EllipticPatch
 from solver.rolling.rail.patch_passing import PatchPassing
 from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from solver.rolling.rail.section import Section
@@ -18,6 +17,7 @@ from solver.rolling.rail.state import PrismState
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.initial_stress import SectionStress
 from solver.rolling.scenes.wheel_rail_track import settled
+from tests.verification.stepped_prism import SteppedEllipse
 
 Array = NDArray[np.float64]
 RE = 502.0
@@ -95,7 +95,7 @@ def residual(law: Law, state: PrismState) -> Array:
 def ellipse(track: PrismTrack, peak: float, **shear: tuple[float, float]) -> PatchPassing:
     """The pressure of the wheel on the rail of the thesis, of another peak [MPa]."""
     return PatchPassing(
-        EllipticPatch(grid=track.grid, force=2 * np.pi * A * B * peak / 3, a=A, b=B, **shear)
+        SteppedEllipse(grid=track.grid, force=2 * np.pi * A * B * peak / 3, a=A, b=B, **shear)
     )
 
 

@@ -16,9 +16,9 @@ from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.rolling.rail.profiled_wheel import ProfiledWheel
-from solver.rolling.rail.stepped import Bare
-from solver.rolling.rail.stepped_patch import SteppedPatch
 from tests.verification.hertz_ellipse import STEEL, ellipse, flat, pressed, surface_of
+from tests.verification.stepped_patch import SteppedPatch
+from tests.verification.stepped_prism import Bare
 
 FRICTION = 0.3
 

@@ -16,15 +16,20 @@ from numpy.typing import NDArray
 from solver.errors import ModelError, NotConverged, WindowTooSmall
 from solver.linear.threads import one_thread
 from solver.rolling.passing import passing
-from solver.rolling.rail import stepped
-from solver.rolling.rail.given_patch import EllipticPatch
 from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.patch_passing import PatchPassing
-from solver.rolling.rail.stepped import Bare, LoadAt, SteppedIncrement, SteppedPrism
-from solver.rolling.rail.stepped_patch import SteppedPatch
 from solver.rolling.rail.track import PrismTrack
+from tests.verification import stepped_prism
 from tests.verification.prism_blocks import AHEAD, HARDENS, PERFECT, A, B, block, crowned, residual
+from tests.verification.stepped_patch import SteppedPatch
+from tests.verification.stepped_prism import (
+    Bare,
+    LoadAt,
+    SteppedEllipse,
+    SteppedIncrement,
+    SteppedPrism,
+)
 
 Array = NDArray[np.float64]
 SPACING = 2.0
@@ -36,10 +41,10 @@ def track() -> PrismTrack:
     return block(SPACING, 104.0)
 
 
-def ellipse(**given: Any) -> EllipticPatch:
+def ellipse(**given: Any) -> SteppedEllipse:
     """The pressure of the wheel on the rail of the thesis."""
     force = 2 * np.pi * A * B * 1360.0 / 3
-    return EllipticPatch(grid=track().grid, a=A, b=B, **{"force": force} | given)
+    return SteppedEllipse(grid=track().grid, a=A, b=B, **{"force": force} | given)
 
 
 def wheel(**given: Any) -> SteppedPatch:
@@ -211,7 +216,7 @@ def test_a_load_cannot_roll_round_the_length_into_its_start() -> None:
 def test_a_zone_that_is_too_small_is_told() -> None:
     small = block(SPACING, zone_depth=4.0)
     body = SteppedPrism(small, HARDENS)
-    load = EllipticPatch(grid=small.grid, force=150e3, a=A, b=B)
+    load = SteppedEllipse(grid=small.grid, force=150e3, a=A, b=B)
     with pytest.raises(WindowTooSmall, match="rim"), one_thread():
         body.rolled(body.virgin, load, 2)
 
@@ -219,7 +224,7 @@ def test_a_zone_that_is_too_small_is_told() -> None:
 def test_an_increment_without_equilibrium_tells_where_the_load_is(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(stepped, "_STEPS", 1)
+    monkeypatch.setattr(stepped_prism, "_STEPS", 1)
     body = SteppedPrism(track(), PERFECT)
     with one_thread(), pytest.raises(NotConverged, match="with the load 3 stations"):
         next(body.along(body.virgin, [LoadAt(ellipse(), 3)]))

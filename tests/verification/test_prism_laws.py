@@ -18,12 +18,12 @@ from solver.rolling.audit.rail import audit_prism
 from solver.rolling.passing import Pass, passing
 from solver.rolling.rail.given_patch import EllipticPatch
 from solver.rolling.rail.patch_passing import PatchPassing
-from solver.rolling.rail.stepped import SteppedPrism
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.initial_stress import OverHeight
 from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
 from tests.solver.yield_surfaces import Hosford
 from tests.verification.prism_blocks import AHEAD, PERFECT, RE, A, block, residual, stressed
+from tests.verification.stepped_prism import SteppedPrism
 
 CURVE = ((0.0, RE), (0.002, 560.0), (0.02, 640.0))
 WORDS: dict[str, dict[str, Any]] = {

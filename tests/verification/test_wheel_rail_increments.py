@@ -16,12 +16,12 @@ from solver.linear.threads import one_thread
 from solver.rolling.passing import Pass, passing
 from solver.rolling.rail.patch_passing import PatchPassing
 from solver.rolling.rail.state import PrismState
-from solver.rolling.rail.stepped import SteppedIncrement, SteppedPrism
-from solver.rolling.rail.stepped_patch import SteppedPatch
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.rail_passes import contact_of
 from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_track import RolledRail, geometry, track_of
+from tests.verification.stepped_patch import SteppedPatch
+from tests.verification.stepped_prism import SteppedIncrement, SteppedPrism
 
 STEPS = 37
 ACCELERATING = WheelRailParameters(

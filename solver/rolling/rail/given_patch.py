@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +10,6 @@ from solver.errors import ModelError, WindowTooSmall
 from solver.rolling.rail.friction_cone import OPEN, SLIP
 from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.patch_grid import PatchGrid
-from solver.rolling.rail.stepped import SteppedContact
 from solver.typing import Array
 
 _POINTS = 8
@@ -79,10 +77,6 @@ class EllipticPatch:
             status=np.where(pressure > 0, SLIP, OPEN),
             along=np.zeros_like,
         )
-
-    def following(self, before: Sequence[SteppedContact], stations: int) -> EllipticPatch:
-        """See `SteppedLoad`; the tractions do not change."""
-        return self
 
     def scaled(self, share: float) -> EllipticPatch:
         """See `PatchLoad`."""

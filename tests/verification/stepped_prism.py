@@ -36,6 +36,7 @@ from solver.materials.state import PlasticState
 from solver.rolling.flow import allowed_inflow, sweep_of, usual_parts
 from solver.rolling.passing import TOLERANCE, deviation, searched
 from solver.rolling.rail.friction_cone import OPEN
+from solver.rolling.rail.given_patch import EllipticPatch
 from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.rolling.rail.track import PrismTrack
@@ -97,7 +98,7 @@ class Bare(NamedTuple):
 
 
 class SteppedLoad(Protocol):
-    """A load of an increment, as `EllipticPatch` and `SteppedPatch`."""
+    """A load of an increment, as `SteppedEllipse` and `SteppedPatch`."""
 
     def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
         """Return the contact on a surface with displacements (n, m, 3); see `PatchLoad`."""
@@ -110,6 +111,14 @@ class SteppedLoad(Protocol):
         before : the last increment; and the one before it, if the load advanced by as many
             stations in between. For a load that is set down the surface as it is
         """
+
+
+class SteppedEllipse(EllipticPatch):
+    """A given load."""
+
+    def following(self, before: Sequence[SteppedContact], stations: int) -> Self:
+        """See `SteppedLoad`; the tractions do not change."""
+        return self
 
 
 class LoadAt(NamedTuple):

@@ -24,8 +24,8 @@ import numpy as np
 from solver.rolling.rail.friction_cone import NORMAL, TANGENTS
 from solver.rolling.rail.patch import UPSTREAM, RollingPatch
 from solver.rolling.rail.patch_contact import PatchContact
-from solver.rolling.rail.stepped import SteppedContact
 from solver.typing import Array
+from tests.verification.stepped_prism import SteppedContact
 
 
 class SteppedPatch(RollingPatch):
