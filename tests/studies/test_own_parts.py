@@ -220,7 +220,7 @@ def test_a_word_is_listed_with_its_parameters_and_a_bad_file_is_one_line(
     listed = called(BOTH, SCENES)
     assert f"one of {WORDS}, swift, threshold" in listed.stdout
     assert "n of swift hardening" in listed.stdout
-    (tmp_path / "bad.py").write_text("import solver.scenes\n")
+    (tmp_path / "bad.py").write_text("from solver import SCENES\n")
     refused = called("bad.py", SCENES)
     assert refused.returncode == 2
     (line,) = refused.stderr.splitlines()

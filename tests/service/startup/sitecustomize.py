@@ -13,12 +13,12 @@ from types import ModuleType
 
 
 class AfterScenes:
-    """Import hook that adds the fake scene when ``solver.scenes`` has been loaded."""
+    """Import hook that adds the fake scene when ``solver.shipped`` has been loaded."""
 
     @classmethod
     def find_spec(cls, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
-        """Find ``solver.scenes`` in the usual way, and wrap its loader."""
-        if name != "solver.scenes":
+        """Find ``solver.shipped`` in the usual way, and wrap its loader."""
+        if name != "solver.shipped":
             return None
         sys.meta_path.remove(cls)
         spec = importlib.util.find_spec(name)
