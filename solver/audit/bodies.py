@@ -10,6 +10,7 @@ import numpy as np
 from solver.audit.plain import LEAST, PlainBody, load_factor
 from solver.contact.state import Converged
 from solver.contact.system import System
+from solver.fem.dofs import vectors
 from solver.fem.rigid import RigidPart
 from solver.materials.law import Law
 from solver.model.rigid import Moved
@@ -85,7 +86,7 @@ class AuditedBody:
         """Nodal forces (n_nodes, 2) of links on the whole body [N]."""
         number, state = self._system.part(self.name), self._converged.state
         force = self._system.links.on_part(number, state.links, self.part.n)
-        return np.asarray(self.part.on_whole(force).reshape(-1, 2))
+        return vectors(self.part.on_whole(force), self.plain.part.dim).T
 
     @cached_property
     def lacking(self) -> Array:
@@ -93,7 +94,7 @@ class AuditedBody:
         whole = self.plain.part
         wheel = self.plain.body.axle is not None  # its load acts on the hub
         external = np.zeros(whole.n) if wheel else whole.external(self._converged.state.time)
-        return self.balancing - external.reshape(-1, 2) - self.linked
+        return self.balancing - vectors(external, whole.dim).T - self.linked
 
     def applied(self) -> Array:
         """Return the resultant of the loads (2,) [N]."""
@@ -117,8 +118,8 @@ class AuditedBody:
         body, whole = self.plain.body, self.plain.part
         if body.axle or body.travelling or body.periodic:
             return np.zeros((2, 2))
-        force = whole.external(self._converged.state.time).reshape(-1, 2)
-        moments = self.plain.moments(force.T, whole.X) - self._declared
+        force = vectors(whole.external(self._converged.state.time), whole.dim)
+        moments = self.plain.moments(force, whole.X) - self._declared
         return np.asarray(moments[1:] / body.box.max())
 
     @cached_property

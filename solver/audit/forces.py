@@ -12,6 +12,7 @@ from solver.audit.surfaces import deformed
 from solver.contact.candidates import find_candidates
 from solver.contact.state import Converged
 from solver.contact.system import System
+from solver.fem.dofs import vectors
 from solver.fem.wheel import Wheel
 from solver.typing import Array, Bools
 
@@ -32,7 +33,7 @@ def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
         i = system.part(body.name)
         part = system.parts[i]
         force = candidates.on_part(i, candidates.forces, part.n)
-        out[body.name] = part.on_whole(force).reshape(-1, 2)
+        out[body.name] = vectors(part.on_whole(force), system.full(body.name).dim).T
     return out
 
 

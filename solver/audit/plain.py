@@ -16,6 +16,7 @@ import numpy as np
 
 from solver.fem.cells import smooth_cells
 from solver.fem.discretisation import Discretisation
+from solver.fem.dofs import vectors
 from solver.fem.surface import edges_of
 from solver.materials.heated import Heated
 from solver.materials.law import Law
@@ -112,7 +113,7 @@ class PlainBody:
         They are (2, 2, n_elements, n_points), direction of displacement first, and (n_elements,
         n_points).
         """
-        at = u.reshape(-1, 2)[self._nodes]  # (n_element_nodes, n_elements, 2)
+        at = vectors(u, self.part.dim).T[self._nodes]  # (n_element_nodes, n_elements, 2)
         gradient = np.einsum("ijep,iek->kjep", self._gradients, at)
         if self.body.kinematics == "axisymmetric":
             return gradient, np.einsum("iep,ie->ep", self._round, at[..., 0])

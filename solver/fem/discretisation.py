@@ -9,6 +9,7 @@ from scipy import linalg, sparse
 
 from solver.fem import kinematics
 from solver.fem.assembly import Assembly, whole_matrix
+from solver.fem.dofs import Dofs
 from solver.fem.loads import (
     Superposed,
     check_removed,
@@ -43,8 +44,8 @@ class Discretisation(Nodes, Part):
 
     Attributes
     ----------
-    dofs : (n_elements, 2 n_element_nodes) unknowns of the elements
-    B : (n_elements, n_points, 4, 2 n_element_nodes) Mandel strain operator [1/mm]
+    dofs : (n_elements, dim n_element_nodes) unknowns of the elements
+    B : (n_elements, n_points, n_components, dim n_element_nodes) Mandel strain operator [1/mm]
     weights : (n_elements, n_points) volume of the points, with thickness or 2 pi r [mm3]
     loads : nodal forces (n,) of pressures and tractions [N]
     condensable : ``loads`` plus the nodal forces of the eigenstrain in an elastic body [N]
@@ -60,9 +61,7 @@ class Discretisation(Nodes, Part):
         super().__init__(body)
         self.nodes = self.X
         kind = element_type(body.element)
-        nodes = self.same[self.basis.element_dofs]
-        self.dofs = np.stack([2 * nodes, 2 * nodes + 1], axis=1).transpose(2, 0, 1)
-        self.dofs = self.dofs.reshape(nodes.shape[1], -1)
+        self.dofs = Dofs(self.same[self.basis.element_dofs].T, self.dim).every
         values = np.array([np.broadcast_to(np.asarray(b[0]), self.basis.dx.shape)
                            for b in self.basis.basis])  # fmt: skip
         gradients = np.array([b[0].grad for b in self.basis.basis]).swapaxes(0, 1)

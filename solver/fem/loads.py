@@ -9,6 +9,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.fem.cells import LOBATTO, smooth_cells
+from solver.fem.dofs import Dofs, vectors
 from solver.fem.nodes import Nodes
 from solver.fem.surface import edges_of
 from solver.mesh.edges import shape_derivatives, shape_functions
@@ -131,7 +132,10 @@ def _prescriptions(part: Nodes, loads: Sequence[Load], axis: int) -> list[_Presc
     both += [("displacement", b, own) for b, own in moved.items()]
     return [
         _Prescription(
-            f"{kind}.{boundary}", 2 * part.boundary_nodes(boundary) + axis, tuple(own), axis
+            f"{kind}.{boundary}",
+            Dofs(part.boundary_nodes(boundary), part.dim).along(axis),
+            tuple(own),
+            axis,
         )
         for kind, boundary, own in both
     ]
@@ -166,7 +170,7 @@ class _Prescription:
         worst = int(apart.argmax())
         if apart[worst] <= _SAME * max(np.abs(mine).max(), np.abs(others).max()):
             return
-        x, y = part.X[:, shared[0] // 2]
+        x, y = part.X[:, shared[0] // part.dim]
         raise ModelError(
             f"{self.name}.{'xy'[self.axis]}", float(f"{mine[worst]:g}"),
             f"must be {others[worst]:g} mm at time {times[worst]:g}, as {other.name} of body "
@@ -223,7 +227,7 @@ def check_removed(part: Nodes, loads: Superposed) -> None:
         alone = np.ones(part.X.shape[1], dtype=bool)
         alone[part.basis.element_dofs[:, ~gone]] = False
         for load, field in zip(loads.cases, loads.fields.T, strict=True):
-            if not field.reshape(-1, 2)[alone].any():
+            if not vectors(field, part.dim)[:, alone].any():
                 continue
             after = [t for t in comparing([load, removal]) if removal.factor(t) >= 1]
             if any(load.factor(t) for t in after):

@@ -15,6 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from solver.fem.discretisation import Discretisation, choose_pins
+from solver.fem.dofs import Dofs
 from solver.fem.loads import Superposed
 from solver.fem.operators import Dense, Fixed
 from solver.fem.part import Part
@@ -75,7 +76,7 @@ class Substructure(Part):
         self.body = whole.body
         self._linear_solver = linear_solver
         self._nodes = nodes = np.unique(np.concatenate([surface.nodes for surface in surfaces]))
-        self._kept = kept = np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()
+        self._kept = kept = Dofs(nodes, whole.dim).every
         self.elastic = slice(len(kept))
         self.n = len(kept)
         self.nodes = whole.X[:, nodes]

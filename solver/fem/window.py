@@ -20,6 +20,7 @@ import numpy as np
 
 from solver.fem.assembly import Assembly
 from solver.fem.discretisation import Discretisation, choose_pins
+from solver.fem.dofs import Dofs, vectors
 from solver.fem.loads import Superposed
 from solver.fem.operators import Operator, Operators, Restricted
 from solver.fem.softening import Softening
@@ -51,7 +52,7 @@ class Region:
 
         Where nothing yields it has the elements that touch.
         """
-        touched = inner.contact[whole.dofs].any(axis=1)
+        touched = np.asarray(inner.contact[whole.dofs].any(axis=1))
         near = np.zeros(whole.n, dtype=bool)
         near[whole.dofs[_layered(whole, touched, layers)]] = True
         contact = np.zeros(whole.n, dtype=bool)
@@ -76,7 +77,7 @@ def _layered(whole: Discretisation, elements: Bools, layers: int) -> Bools:
     for _ in range(layers):
         within = np.zeros(whole.n, dtype=bool)
         within[whole.dofs[elements]] = True
-        elements = within[whole.dofs].any(axis=1)
+        elements = np.asarray(within[whole.dofs].any(axis=1))
     return elements
 
 
@@ -99,14 +100,15 @@ class Windowed(Discretisation):
 
     def __init__(self, whole: Discretisation, region: Region, linear_solver: str) -> None:
         nodes = np.zeros(whole.X.shape[1], dtype=bool)
-        nodes[whole.dofs[region.elements] // 2] = True
-        nodes[np.flatnonzero(region.contact) // 2] = True
+        nodes[whole.dofs[region.elements] // whole.dim] = True
+        nodes[np.flatnonzero(region.contact) // whole.dim] = True
         nodes[whole.same[nodes]] = True
         nodes |= nodes[whole.same]
         self.whole, self.body = whole, whole.body
-        self.elements = nodes[whole.dofs // 2].all(axis=1)
+        self.elements = nodes[whole.dofs // whole.dim].all(axis=1)
         at = np.flatnonzero(nodes)
-        self.kept = kept = np.stack([2 * at, 2 * at + 1], axis=1).ravel()
+        self.dim, self.kept = whole.dim, Dofs(at, whole.dim).every
+        kept = self.kept
         self._number = number = np.full(whole.n, -1)
         number[kept] = np.arange(len(kept))
         self.n = len(kept)
@@ -127,7 +129,7 @@ class Windowed(Discretisation):
         self.points = whole.points[:, self.elements]
         per_element = whole.weights.shape[1]
         elements = np.repeat(np.flatnonzero(self.elements), per_element)
-        self.softening = Softening.of(self, self.points.reshape(2, -1), elements)
+        self.softening = Softening.of(self, self.points.reshape(self.dim, -1), elements)
         self._at = np.flatnonzero(np.repeat(self.elements, per_element))
         strains = whole.eigenstrains
         components, cases = self.B.shape[2], len(strains.cases)
@@ -173,7 +175,7 @@ class Windowed(Discretisation):
     def motion(self, surface: Surface, u: Array) -> Array:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
         at = self._number[surface.dofs]
-        return np.where(at < 0, self._begin[surface.dofs], u[at]).reshape(-1, 2).T
+        return vectors(np.where(at < 0, self._begin[surface.dofs], u[at]), self.dim)
 
     def pull_back(self, surface: Surface, u: Array, block: Array, gaps: int) -> tuple[Ints, Array]:
         """See `Part.pull_back`; raises `Singular` if contact has left the region."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from solver.contact.state import Converged
 from solver.contact.system import System
+from solver.fem.dofs import vectors
 from solver.fem.frame import RigidMotion
 from solver.fem.rigid import RigidPart
 from solver.results.quantities import Quantity
@@ -51,8 +52,8 @@ def observe(system: System, converged: Converged) -> Observed:
             reactions[name] = (float(x), float(y), float(turning) * part.frame.radius)
         elif part.body.axle is None:  # type: ignore[union-attr]
             # by equilibrium, also for a condensed body, whose supported nodes are eliminated
-            loads = system.full(name).external(state.time).reshape(-1, 2).sum(axis=0)
-            x, y = -loads - touch.reshape(-1, 2).sum(axis=0)
+            loads = vectors(system.full(name).external(state.time), 2).sum(axis=1)
+            x, y = -loads - vectors(touch, 2).sum(axis=1)
             reactions[name] = (float(x), float(y), np.nan)
     pairs = [(float(c.normal.sum()), float(c.tangential.sum())) for c in state.contacts]
     return Observed(state.time, motions, reactions, pairs)

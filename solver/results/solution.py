@@ -17,6 +17,7 @@ from solver.audit.report import Audit, audit
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.errors import ModelError
+from solver.fem.dofs import vectors
 from solver.fem.frame import RigidMotion
 from solver.kinds import require
 from solver.loading.control import Control, PathControl
@@ -98,7 +99,8 @@ class Solution:
 
     def displacement(self, body: str, stage: str = "unloaded") -> Array:
         """Return nodal displacements (2, n_nodes) [mm]."""
-        return self.system.displacement(self._known(body), self._at(stage).state).reshape(-1, 2).T
+        u = self.system.displacement(self._known(body), self._at(stage).state)
+        return vectors(u, self.system.full(body).dim)
 
     def stress(self, body: str, stage: str = "unloaded") -> Array:
         """Return recovered nodal stress (4, n_nodes), components xx, yy, zz, xy [MPa].
