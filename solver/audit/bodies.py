@@ -11,6 +11,7 @@ from solver.audit.plain import LEAST, PlainBody, load_factor
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.fem.dofs import vectors
+from solver.fem.fields import elastic_energy
 from solver.fem.rigid import RigidPart
 from solver.materials.law import Law
 from solver.model.rigid import Moved
@@ -138,7 +139,7 @@ class AuditedBody:
         """Return the elastic energy [N mm]; of a condensed body from its kept unknowns."""
         if self.meshed:
             return self.plain.elastic_energy(self.stress, self._converged.state.time)
-        return self.part.stiffness_along(self._u, self._response)[1] / 2
+        return elastic_energy(self.part, self._u, self._response, self._converged.state.time)
 
     @property
     def strength(self) -> float:

@@ -399,7 +399,7 @@ class System:
         if not self.parts[number].meshed:
             whole = self.full(name)
             state = converged.state
-            return whole.respond(self.displacement(name, state), whole.virgin(), state.time)
+            return whole.respond(self.displacement(name, state), whole.virgin(), state.time).law
         found, gone = converged.responses[number], self.full(name).gone(converged.state.time)
         if gone is None or not gone.any():
             return found

@@ -146,4 +146,4 @@ def elastic_energy(part: Part, u: Array, response: Response, time: float) -> flo
     """Return the elastic energy of a part [N mm]; without points, from its condensed stiffness."""
     if part.meshed:
         return float(part.law(time).energy_density(response.stress) @ part.volumes)
-    return part.stiffness_along(u, response)[1] / 2
+    return part.stiffness_along(u, part.respond(u, part.virgin(), time))[1] / 2

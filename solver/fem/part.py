@@ -9,6 +9,7 @@ import numpy as np
 import scipy  # loads spatial when it is used: few models look for places
 from scipy import sparse
 
+from solver.fem.deformation import PartResponse
 from solver.fem.dofs import Dofs, vectors
 from solver.fem.loads import Superposed
 from solver.fem.operators import PartOperators
@@ -75,11 +76,11 @@ class Part(ABC):
         """Return the internal variables before any load."""
 
     @abstractmethod
-    def respond(self, u: Array, state: PlasticState, time: float) -> Response:
+    def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
         """Return stress, tangent and new internal variables at all points."""
 
     @abstractmethod
-    def residual(self, time: float, u: Array, response: Response) -> Array:
+    def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,), without contact forces [N]."""
 
     @abstractmethod
@@ -87,7 +88,7 @@ class Part(ABC):
         """Return the elastic stiffness on all unknowns (n, n), supports not applied."""
 
     @abstractmethod
-    def stiffness_along(self, step: Array, response: Response) -> tuple[float, float]:
+    def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
 
     @abstractmethod

@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from solver.fem.assembly import Assembly
+from solver.fem.deformation import PartResponse
 from solver.fem.discretisation import Discretisation, choose_pins
 from solver.fem.dofs import Dofs, vectors
 from solver.fem.loads import Superposed
@@ -27,7 +28,7 @@ from solver.fem.softening import Softening
 from solver.fem.surface import Surface
 from solver.linear.schur import Eliminated, SchurComplement
 from solver.linear.solvers import Singular
-from solver.materials import PlasticState, Response
+from solver.materials import PlasticState
 from solver.typing import Array, Bools, Ints
 
 
@@ -124,15 +125,15 @@ class Windowed(Discretisation):
     def _mesh(self, whole: Discretisation, number: Ints) -> None:
         """Take the elements of the window, and what belongs to their points."""
         self.dofs = number[whole.dofs[self.elements]]
-        self.B, self.weights = whole.B[self.elements], whole.weights[self.elements]
-        self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
+        self.weights = whole.weights[self.elements]
+        self._strain_by(whole.undeformed.B[self.elements])
         self.points = whole.points[:, self.elements]
         per_element = whole.weights.shape[1]
         elements = np.repeat(np.flatnonzero(self.elements), per_element)
         self.softening = Softening.of(self, self.points.reshape(self.dim, -1), elements)
         self._at = np.flatnonzero(np.repeat(self.elements, per_element))
         strains = whole.eigenstrains
-        components, cases = self.B.shape[2], len(strains.cases)
+        components, cases = self.components, len(strains.cases)
         fields = strains.fields.reshape(components, whole.weights.size, cases)[:, self._at]
         self.eigenstrains = Superposed(
             strains.cases, fields.reshape(components * len(self._at), cases)
@@ -156,7 +157,7 @@ class Windowed(Discretisation):
         here = copy(self)
         response = self.whole.respond(u, plastic, time)
         out = self.whole.residual(time, u, response)
-        out[self.kept] += self.internal_force(response.stress[:, self._at])
+        out[self.kept] += self.undeformed.internal_force(response.law.stress[:, self._at])
         here._outer, here._begin = self._schur.begin(out), u
         here._plastic = plastic.at(self._at)
         return here
@@ -188,15 +189,16 @@ class Windowed(Discretisation):
 
     # -- the window as a body ------------------------------------------------------------------
 
-    def respond(self, u: Array, state: PlasticState, time: float) -> Response:
+    def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
         """Return the response from the beginning of the increment, whose state is known."""
         del state
         return super().respond(u, self._plastic, time)
 
-    def residual(self, time: float, u: Array, response: Response) -> Array:
+    def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,), those of the rest condensed [N]."""
         del time
-        force = self._outer.condensed - self.internal_force(response.stress)
+        inner = response.deformation.internal_force(response.law.stress)
+        force = self._outer.condensed - inner
         force[self._edge] -= self._rest @ (u - self._begin[self.kept])[self._edge]
         return force
 
@@ -223,7 +225,7 @@ class Windowed(Discretisation):
         moved[self.kept] = u
         return self.whole.rounding(moved)
 
-    def stiffness_along(self, step: Array, response: Response) -> tuple[float, float]:
+    def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
         edge = step[self._edge]
         rest = float(edge @ self._rest @ edge)
