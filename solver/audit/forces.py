@@ -66,9 +66,9 @@ def left_on(bodies: Sequence[AuditedBody]) -> float:
 
 
 def _of_pairs(body: AuditedBody, pairs: Sequence[AuditedPair]) -> tuple[Array, Bools]:
-    """Return nodal forces (n_nodes, 2) of the pairs on a body, in space, and whether they act."""
+    """Return nodal forces (n_nodes, dim) of the pairs on a body, in space, and whether they act."""
     whole = body.plain.part
-    force = np.zeros((whole.X.shape[1], 2))
+    force = np.zeros(whole.X.T.shape)
     for pair in pairs:
         surfaces, touching = pair.surfaces, pair.touching
         for (name, _), chain, nodal in (

@@ -78,12 +78,12 @@ class Discretisation(Nodes, Part):
         self.eigenstrains = eigenstrains(self)
         per_element = self.weights.shape[1]
         elements = np.repeat(np.arange(len(self.weights)), per_element)
-        self.softening = Softening.of(self, self.points.reshape(2, -1), elements)
+        self.softening = Softening.of(self, self.positions, elements)
         self._hold()
 
     def _strain_by(self, B: Array) -> None:
         """Take strain linear in displacements, by the operator B of the elements."""
-        at_rest = np.zeros((B.shape[2], self.weights.size))
+        at_rest = np.zeros((self.components, self.weights.size))
         self.kinematics: Kinematics = SmallStrain(
             Deformation(n=self.n, dofs=self.dofs, strain=at_rest, B=B, weights=self.weights)
         )
@@ -92,11 +92,6 @@ class Discretisation(Nodes, Part):
     def undeformed(self) -> Deformation:
         """The body before loading."""
         return self.kinematics.undeformed
-
-    @property
-    def components(self) -> int:
-        """Number of components of stress and strain."""
-        return len(self.undeformed.strain)
 
     def _hold(self) -> None:
         """Find the supported unknowns, the remaining rigid motions, and one pin for each motion."""
@@ -286,10 +281,9 @@ class Discretisation(Nodes, Part):
             tangent += float(np.einsum("ei,eij,ej", each, bent, each))
         return float(elastic[linear].sum() + tangent), float(elastic.sum())
 
-    def place(self, point: int) -> tuple[float, float]:
-        """Return the position (x, y) of a point [mm]."""
-        x, y = self.points.reshape(2, -1)[:, point]
-        return float(x), float(y)
+    def place(self, point: int) -> tuple[float, ...]:
+        """Return the position of a point [mm]."""
+        return tuple(self.positions[:, point].tolist())
 
     def plastic_work(
         self, before: PlasticState, response: Response, time: float

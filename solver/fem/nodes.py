@@ -45,6 +45,16 @@ class Nodes:
         self.copied = Dofs(self.same, self.dim).every
         self.points = np.asarray(self.basis.global_coordinates())
 
+    @property
+    def components(self) -> int:
+        """Number of components of stress and strain: 4 in the plane, 6 in space."""
+        return 2 * self.dim
+
+    @property
+    def positions(self) -> Array:
+        """Positions of the points (dim, n_points) [mm]."""
+        return self.points.reshape(self.dim, -1)
+
     def measure(self, x: Array) -> Array | float:
         """Return the depth across the plane at positions x [mm]: thickness or 2 pi r."""
         if self.body.kinematics == "axisymmetric":

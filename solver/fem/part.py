@@ -218,8 +218,8 @@ class Part(ABC):
         """Return for each unknown (n,) the one a distance ``way`` [mm] behind along x, or -1."""
         return same_unknowns(self.nodes, self.nodes - np.array([[way], [0.0]]))
 
-    def place(self, point: int) -> tuple[float, float]:
-        """Return the position (x, y) of a point [mm]; NaN without points."""
+    def place(self, point: int) -> tuple[float, ...]:
+        """Return the position of a point [mm]; NaN without points."""
         del point
         return np.nan, np.nan
 

@@ -130,7 +130,7 @@ class Windowed(Discretisation):
         self.points = whole.points[:, self.elements]
         per_element = whole.weights.shape[1]
         elements = np.repeat(np.flatnonzero(self.elements), per_element)
-        self.softening = Softening.of(self, self.points.reshape(self.dim, -1), elements)
+        self.softening = Softening.of(self, self.positions, elements)
         self._at = np.flatnonzero(np.repeat(self.elements, per_element))
         strains = whole.eigenstrains
         components, cases = self.components, len(strains.cases)
