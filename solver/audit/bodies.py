@@ -10,6 +10,8 @@ import numpy as np
 from solver.audit.plain import LEAST, PlainBody, load_factor
 from solver.contact.state import Converged
 from solver.contact.system import System
+from solver.fem.dofs import vectors
+from solver.fem.fields import elastic_energy
 from solver.fem.rigid import RigidPart
 from solver.materials.law import Law
 from solver.model.rigid import Moved
@@ -44,14 +46,14 @@ class AuditedBody:
 
     @cached_property
     def _reached(self) -> Array:
-        """Mandel strain (4, n_points) from the displacements, without the eigenstrain."""
+        """Mandel strain (n_components, n_points) from displacements, without eigenstrain."""
         state = self._converged.state
         strain = self.plain.strain(self._system.displacement(self.name, state))
         return strain.reshape(len(strain), -1) - self.plain.eigenstrain(state.time)
 
     @cached_property
     def stress(self) -> Array:
-        """Mandel stress (4, n_points) [MPa]; of a condensed body by Hooke's law."""
+        """Mandel stress (n_components, n_points) [MPa]; of a condensed body by Hooke's law."""
         if self.meshed:
             return self._response.stress
         return self.plain.body.law.stiffness(len(self._reached)) @ self._reached
@@ -69,7 +71,7 @@ class AuditedBody:
 
     @cached_property
     def balancing(self) -> Array:
-        """Nodal forces (n_nodes, 2) that balance the stress of the body [N]."""
+        """Nodal forces (n_nodes, dim) that balance the stress of the body [N]."""
         return self.plain.forces(self.stress)
 
     @property
@@ -82,21 +84,21 @@ class AuditedBody:
 
     @cached_property
     def linked(self) -> Array:
-        """Nodal forces (n_nodes, 2) of links on the whole body [N]."""
+        """Nodal forces (n_nodes, dim) of links on the whole body [N]."""
         number, state = self._system.part(self.name), self._converged.state
         force = self._system.links.on_part(number, state.links, self.part.n)
-        return np.asarray(self.part.on_whole(force).reshape(-1, 2))
+        return vectors(self.part.on_whole(force), self.plain.part.dim).T
 
     @cached_property
     def lacking(self) -> Array:
-        """Nodal forces (n_nodes, 2) that contact and supports must add to loads and links [N]."""
+        """Nodal forces (n_nodes, dim) that contact and supports must add to loads and links [N]."""
         whole = self.plain.part
         wheel = self.plain.body.axle is not None  # its load acts on the hub
         external = np.zeros(whole.n) if wheel else whole.external(self._converged.state.time)
-        return self.balancing - external.reshape(-1, 2) - self.linked
+        return self.balancing - vectors(external, whole.dim).T - self.linked
 
     def applied(self) -> Array:
-        """Return the resultant of the loads (2,) [N]."""
+        """Return the resultant of the loads (dim,) [N]."""
         time, travelling = self._converged.state.time, self.plain.body.travelling
         if travelling is None:
             return np.asarray(self._declared[0])
@@ -109,26 +111,26 @@ class AuditedBody:
         return self.plain.applied(self._converged.state.time)
 
     def misapplied(self) -> Array:
-        """Return the error (2, 2) of the first moments of nodal forces, over the body's size [N].
+        """Return the error (dim, dim) of first moments of nodal forces, over the body's size [N].
 
-        First moments, force times x and y, also show loads without a resultant, such as centrifugal
-        forces. Moving loads and periodic bodies are left out.
+        First moments, force times position, also show loads without a resultant, such as
+        centrifugal forces. Moving loads and periodic bodies are left out.
         """
         body, whole = self.plain.body, self.plain.part
         if body.axle or body.travelling or body.periodic:
             return np.zeros((2, 2))
-        force = whole.external(self._converged.state.time).reshape(-1, 2)
-        moments = self.plain.moments(force.T, whole.X) - self._declared
+        force = vectors(whole.external(self._converged.state.time), whole.dim)
+        moments = self.plain.moments(force, whole.X) - self._declared
         return np.asarray(moments[1:] / body.box.max())
 
     @cached_property
     def held(self) -> Bools:
-        """Whether supports hold, or loads prescribe, displacements (n_nodes, 2)."""
+        """Whether supports hold, or loads prescribe, displacements (n_nodes, dim)."""
         return np.isfinite(self.plain.prescribed(self._converged.state.time))
 
     @property
     def free(self) -> Bools:
-        """Whether unknowns (n_nodes, 2) are free; False for the copies of a periodic body."""
+        """Whether unknowns (n_nodes, dim) are free; False for the copies of a periodic body."""
         part = self.plain.part
         own = part.same == np.arange(len(part.same))
         return np.asarray(~self.held & own[:, None])
@@ -137,7 +139,7 @@ class AuditedBody:
         """Return the elastic energy [N mm]; of a condensed body from its kept unknowns."""
         if self.meshed:
             return self.plain.elastic_energy(self.stress, self._converged.state.time)
-        return self.part.stiffness_along(self._u, self._response)[1] / 2
+        return elastic_energy(self.part, self._u, self._response, self._converged.state.time)
 
     @property
     def strength(self) -> float:
@@ -170,7 +172,7 @@ def misplaced(system: System, bodies: Sequence[PlainBody], states: Iterable[Conv
     off, most = [0.0], [0.0]
     for state in (converged.state for converged in states):
         for body in bodies:
-            u = system.displacement(body.body.name, state).reshape(-1, 2)
+            u = vectors(system.displacement(body.body.name, state), body.part.dim).T
             given = body.prescribed(state.time)
             off += np.abs(u - given)[np.isfinite(given)].tolist()
             most.append(float(np.abs(u).max()))

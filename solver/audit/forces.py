@@ -12,6 +12,7 @@ from solver.audit.surfaces import deformed
 from solver.contact.candidates import find_candidates
 from solver.contact.state import Converged
 from solver.contact.system import System
+from solver.fem.dofs import vectors
 from solver.fem.wheel import Wheel
 from solver.typing import Array, Bools
 
@@ -32,7 +33,7 @@ def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
         i = system.part(body.name)
         part = system.parts[i]
         force = candidates.on_part(i, candidates.forces, part.n)
-        out[body.name] = part.on_whole(force).reshape(-1, 2)
+        out[body.name] = vectors(part.on_whole(force), system.full(body.name).dim).T
     return out
 
 
@@ -65,9 +66,9 @@ def left_on(bodies: Sequence[AuditedBody]) -> float:
 
 
 def _of_pairs(body: AuditedBody, pairs: Sequence[AuditedPair]) -> tuple[Array, Bools]:
-    """Return nodal forces (n_nodes, 2) of the pairs on a body, in space, and whether they act."""
+    """Return nodal forces (n_nodes, dim) of the pairs on a body, in space, and whether they act."""
     whole = body.plain.part
-    force = np.zeros((whole.X.shape[1], 2))
+    force = np.zeros(whole.X.T.shape)
     for pair in pairs:
         surfaces, touching = pair.surfaces, pair.touching
         for (name, _), chain, nodal in (

@@ -204,7 +204,7 @@ class _Joined:
         parts, strains = self._system.parts, self.each(strain)
         own, begun = [np.zeros(part.n) for part in parts], []
         for k, (body, each) in enumerate(zip(self._bodies, strains, strict=True)):
-            force = -body.part.internal_force(body.stiffness @ each)
+            force = -body.part.undeformed.internal_force(body.stiffness @ each)
             begun.append(parts[body.number].begin(force if forces is None else force - forces[k]))
             own[body.number] = begun[-1].condensed
         operators = [each.elastic for each in self._system.operators]

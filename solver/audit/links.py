@@ -14,6 +14,7 @@ import numpy as np
 from solver.audit.plain import LEAST, LEAST_ENERGY
 from solver.contact.state import Converged
 from solver.contact.system import System
+from solver.fem.dofs import vectors
 from solver.fem.frame import RigidMotion
 from solver.fem.rigid import RigidPart
 from solver.fem.surface import edges_of
@@ -75,7 +76,7 @@ def _places(
         short = np.linalg.norm(opposite.ends[1] - opposite.ends[0], axis=0)
         count *= math.ceil(max(float(long.mean() / short.mean()), 1.0))
     ends = np.linspace(-1.0, 1.0, count + 1)
-    moved = system.displacement(name, converged.state).reshape(-1, 2).T
+    moved = vectors(system.displacement(name, converged.state), 2)
 
     def at(xi: Array, field: Array) -> Array:
         return np.asarray(field[:, edges] @ shape_functions(xi, edges.shape[1]).T)
@@ -135,7 +136,7 @@ def _resultant(system: System, own: Array, name: str) -> tuple[Array, Array]:
         x, y = part.frame.centre
         turning = force[2] * part.frame.radius + x * force[1] - y * force[0]
         return force[:2], np.asarray(turning)
-    nodal, X = part.on_whole(force).reshape(-1, 2).T, system.full(name).X
+    nodal, X = vectors(part.on_whole(force), 2), system.full(name).X
     return nodal.sum(axis=1), np.asarray((X[0] * nodal[1] - X[1] * nodal[0]).sum())
 
 
@@ -206,7 +207,7 @@ def _misfit_at_nodes(system: System, k: int, converged: Converged, size: float) 
     whole, edges = system.full(name), edges_of(system.full(name), boundary)
     nodes, local = np.unique(edges, return_inverse=True)
     local = local.reshape(edges.shape)
-    X, u = whole.X[:, nodes], system.displacement(name, converged.state).reshape(-1, 2).T[:, nodes]
+    X, u = whole.X[:, nodes], vectors(system.displacement(name, converged.state), 2)[:, nodes]
     xi, weights = np.polynomial.legendre.leggauss(_GAUSS)
     shapes = shape_functions(xi, edges.shape[1])
     along = X[:, local] @ shape_derivatives(xi, edges.shape[1]).T * weights
@@ -228,7 +229,7 @@ def _misfit_at_nodes(system: System, k: int, converged: Converged, size: float) 
         own = np.where(system.links.whose == k, converged.state.links, 0.0)
         part = system.parts[system.part(name)]
         force = part.on_whole(system.links.on_part(system.part(name), own, part.n))
-        force = force.reshape(-1, 2).T[:, nodes] / link.stiffness
+        force = vectors(force, 2)[:, nodes] / link.stiffness
         off = area * (jump[:, None] * ways).sum(axis=0) + force
         return float(np.hypot(*off).sum()) / area.sum() / size
     return float(np.abs(jump if link.rigid else jump - jump[:, :1]).max()) / size

@@ -16,6 +16,7 @@ import numpy as np
 
 from solver.fem.cells import smooth_cells
 from solver.fem.discretisation import Discretisation
+from solver.fem.dofs import vectors
 from solver.fem.surface import edges_of
 from solver.materials.heated import Heated
 from solver.materials.law import Law
@@ -35,6 +36,9 @@ the whole force: loads may bend and jump."""
 _GAUSS = (0.5 - 0.75**0.5 / 3, 0.5 + 0.75**0.5 / 3)
 _INSIDE = (0.5, 1e-6, 1 - 1e-6)
 """Gauss points of a chord; its middle, and its ends, where neighbours may have other loads."""
+_SHEARS = ((0, 1), (1, 2), (2, 0))
+_COMPONENT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
+"""Axes of the shear components xy, yz, zx; and the number of the component of two axes."""
 _PARTS = 7
 """Number of parts of an element along a side, if elements are few, on which a force per volume is
 first looked at."""
@@ -67,7 +71,7 @@ class PlainBody:
 
     @cached_property
     def _gradients(self) -> Array:
-        """(n_element_nodes, 2, n_elements, n_points) [1/mm]."""
+        """(n_element_nodes, dim, n_elements, n_points) [1/mm]."""
         return np.array([np.asarray(b[0].grad) for b in self.part.basis.basis])
 
     @property
@@ -109,28 +113,31 @@ class PlainBody:
     def gradient(self, u: Array) -> tuple[Array, Array]:
         """Return the gradient of displacements (n,) [mm] at the points, and their hoop strain.
 
-        They are (2, 2, n_elements, n_points), direction of displacement first, and (n_elements,
+        They are (dim, dim, n_elements, n_points), direction of displacement first, and (n_elements,
         n_points).
         """
-        at = u.reshape(-1, 2)[self._nodes]  # (n_element_nodes, n_elements, 2)
+        at = vectors(u, self.part.dim).T[self._nodes]  # (n_element_nodes, n_elements, dim)
         gradient = np.einsum("ijep,iek->kjep", self._gradients, at)
         if self.body.kinematics == "axisymmetric":
             return gradient, np.einsum("iep,ie->ep", self._round, at[..., 0])
         return gradient, np.zeros(gradient.shape[2:])
 
     def strain(self, u: Array) -> Array:
-        """Return Mandel strain (4, n_elements, n_points) for displacements (n,) [mm]."""
-        ((xx, xy), (yx, yy)), hoop = self.gradient(u)
-        return self.level(np.array([xx, yy, hoop, (xy + yx) / SQRT2]))
+        """Return Mandel strain (n_components, n_elements, n_points) for displacements (n,) [mm]."""
+        H, hoop = self.gradient(u)
+        normal = [*(H[axis, axis] for axis in range(len(H))), hoop][:3]
+        shears = [(H[a, b] + H[b, a]) / SQRT2 for a, b in _SHEARS[: 2 * len(H) - 3]]
+        return self.level(np.array([*normal, *shears]))
 
     @cached_property
     def points(self) -> Array:
-        """Positions of the points (2, n_points) [mm]."""
-        return np.asarray(self.part.basis.global_coordinates()).reshape(2, -1)
+        """Positions of the points (dim, n_points) [mm]."""
+        return np.asarray(self.part.basis.global_coordinates()).reshape(self.part.dim, -1)
 
     def eigenstrain(self, time: float) -> Array:
-        """Return the eigenstrain (4, n_points, Mandel) of heat and initial stress."""
-        out, elasticity = np.zeros((4, self.points.shape[1])), self.body.material.elasticity
+        """Return the eigenstrain (n_components, n_points, Mandel) of heat and initial stress."""
+        components = 2 * len(self.points)
+        out, elasticity = np.zeros((components, self.volume.size)), self.body.material.elasticity
         for load in self.body.every_load:
             factor = load_factor(load.amplitude, time)
             strain, stress = load.eigenstrain(self.points), load.initial_stress(self.points)
@@ -154,9 +161,9 @@ class PlainBody:
         return self.left(time) * stiff, strong
 
     def prescribed(self, time: float) -> Array:
-        """Return the displacements (n_nodes, 2) of supports and loads, NaN where free [mm]."""
+        """Return the displacements (n_nodes, dim) of supports and loads, NaN where free [mm]."""
         moved: dict[tuple[str, int], float] = {
-            (boundary, "xy".index(axis)): 0.0
+            (boundary, "xyz".index(axis)): 0.0
             for boundary, axes in self.body.supports.items()
             for axis in axes
         }
@@ -219,17 +226,18 @@ class PlainBody:
         return np.asarray(self._left(time)[0] * out)
 
     def forces(self, stress: Array) -> Array:
-        """Return the nodal forces (n_nodes, 2) that balance a Mandel stress (4, n_points) [N]."""
-        xx, yy, zz, xy = self.level(to_tensor(stress).reshape(4, *self.volume.shape))
-        return self.nominal_forces(np.array([[xx, xy], [xy, yy]]), zz)
+        """Return the nodal forces (n_nodes, dim) that balance a Mandel stress of the points [N]."""
+        each = self.level(to_tensor(stress).reshape(len(stress), *self.volume.shape))
+        dim = len(each) // 2
+        return self.nominal_forces(each[_COMPONENT[:dim, :dim]], each[2])
 
     def nominal_forces(self, stress: Array, hoop: Array) -> Array:
-        """Return the nodal forces (n_nodes, 2) that balance a nominal stress [N].
+        """Return the nodal forces (n_nodes, dim) that balance a nominal stress [N].
 
         Parameters
         ----------
-        stress : (2, 2, n_elements, n_points) force on planes before loading, direction of the force
-            first [MPa]
+        stress : (dim, dim, n_elements, n_points) force on planes before loading, direction of the
+            force first [MPa]
         hoop : (n_elements, n_points) [MPa]
         """
         each = np.einsum("ijep,kjep->kie", self._gradients, stress * self.volume)
@@ -240,27 +248,29 @@ class PlainBody:
         return np.stack([np.bincount(nodes, f.ravel(), count) for f in each], axis=1)
 
     def applied(self, time: float) -> Array:
-        """Return the resultant [N] of the loads at a time and its first moments [N mm] (3, 2).
+        """Return the resultant [N] of the loads at a time, first moments [N mm] (1 + dim, dim).
 
-        First moments are force times x and force times y, from the centre of the body. A pressure p
+        First moments are force times x, y and z, from the centre of the body. A pressure p
         gives the force p times depth times length, against the outward normal, at the Gauss points
         of many pieces of each edge.
         """
-        total = np.zeros((3, 2))
+        total = np.zeros((1 + self.part.dim, self.part.dim))
         for load, own in zip(self.body.every_load, self._on_body, strict=True):
             total += load_factor(load.amplitude, time) * own
         return total
 
     @cached_property
     def _on_body(self) -> list[Array]:
-        """The moments (3, 2) of the forces of each load."""
+        """The moments (1 + dim, dim) of the forces of each load."""
+        if self.part.dim == 3:
+            return [np.zeros((4, 3)) for _ in self.body.every_load]  # none has a force
         return [
             sum((self._on_boundary(load, b) for b in load.boundaries), self._on_volume(load))
             for load in self.body.every_load
         ]
 
     def moments(self, force: Array, x: Array) -> Array:
-        """Return the sums (3, 2) of forces (2, n) times 1, x and y, at places (2, n)."""
+        """Return the sums (1 + dim, dim) of forces (dim, n) times 1, x, y (, z), at places."""
         arm = x - self.part.X.mean(axis=1, keepdims=True)
         return np.asarray(np.vstack([np.ones_like(arm[:1]), arm]) @ force.T)
 

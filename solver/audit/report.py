@@ -80,7 +80,8 @@ def audit(
     """Check one run: its state under load and, if there is one, that after unloading.
 
     ``least_dissipation`` [MPa] and ``lost`` are the extremes over all its increments, see `Tally`.
-    Strain is judged at the end of all ``stages``.
+    Strain is judged at the end of all ``stages``. Bodies in space have no estimate of the error of
+    the mesh, and of large strain only that of plastic strain.
     """
     states = (loaded, unloaded or loaded)
     plain = [PlainBody(system.full(body.name)) for body in system.model.bodies]
@@ -112,9 +113,12 @@ def audit(
         "audit_contact_after_unloading": left_on(released) if unloaded else 0.0,
     }  # fmt: skip
     figures |= _strength(system, loaded)
-    figures |= _discretisation(system, states, loaded.energy.scale)
+    plane = all(body.dim == 2 for body in system.model.bodies)
+    if plane:
+        figures |= _discretisation(system, states, loaded.energy.scale)
     figures["audit_error_contact"] = contact_error(system, loaded)
-    neglected = plastic_strain(system, every).neglected, large_strain(system, plain, every)
+    neglected = [plastic_strain(system, every).neglected]
+    neglected += [large_strain(system, plain, every)] if plane else []
     figures["audit_plastic_strain"] = accumulated_strain(system, states[1])
     figures["audit_large_strain"] = _largest(*(each.share for each in neglected))
     figures["audit_small_sliding"] = max(

@@ -17,6 +17,7 @@ from solver.contact.normals import is_curved
 from solver.contact.overlap import largest_overlap
 from solver.contact.state import State
 from solver.contact.system import System
+from solver.fem.dofs import vectors
 from solver.fem.rigid import RigidPart
 from solver.fem.surface import Surface
 from solver.fem.wheel import Wheel
@@ -46,7 +47,7 @@ def deformed(system: System, name: str, state: State) -> tuple[Array, Array]:
         x, y, angle = part.motion_of(u)
         return _turned(part.nodes, part.frame.centre, angle, (x, y)), np.eye(2)
     whole = system.full(name)
-    d = system.displacement(name, state).reshape(-1, 2).T
+    d = vectors(system.displacement(name, state), whole.dim)
     if not isinstance(part, Wheel):
         return whole.X + d, np.eye(2)
     at = part.motion_of(u)
@@ -165,7 +166,7 @@ class Surfaces:
         whole = self._system.full(name)
         held = np.ones(whole.n, dtype=bool)
         held[whole.free] = False
-        ends = held.reshape(-1, 2)[self.slave.nodes[self.slave.vertices[[0, -1]]]]
+        ends = vectors(held, 2).T[self.slave.nodes[self.slave.vertices[[0, -1]]]]
         first, last = _at_ends(self.slave.X, self.slave)
         along = np.abs(np.stack([first[:, 0], last[:, -1]])).argmin(axis=1)
         return np.asarray(ends[[0, 1], along] & ~ends[[0, 1], 1 - along])

@@ -21,6 +21,7 @@ from solver.contact.problem import ContactProblem, ContactSolution
 from solver.contact.rows import ContactRows, OnParts, joined
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
+from solver.fem.dofs import Dofs
 from solver.fem.loads import comparing
 from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
@@ -228,7 +229,7 @@ def _conditions(
         areas, X = slave.areas[nodes], slave.X[:, nodes]
         block = np.zeros((len(nodes), 2 * len(slave.nodes)))
         for axis, along in enumerate(np.concatenate(along_each, axis=1)):
-            block[np.arange(len(nodes)), 2 * nodes + axis] = along
+            block[np.arange(len(nodes)), Dofs(nodes, 2).along(axis)] = along
     else:
         bodies = [parts[names.index(of)].body for of, _ in link.sides]
         at_rest = [np.zeros_like(surfaces[side].X) for side in link.sides]

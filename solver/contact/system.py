@@ -387,8 +387,8 @@ class System:
         return recovery(self.full(name))
 
     def positions(self, name: str) -> Array:
-        """Return the positions of the integration points of a body (2, n_points) [mm]."""
-        return self.full(name).points.reshape(2, -1)
+        """Return the positions of the integration points of a body (dim, n_points) [mm]."""
+        return self.full(name).positions
 
     def response(self, name: str, converged: Converged) -> Response:
         """Return stress and internal variables at the points of a whole body.
@@ -399,7 +399,7 @@ class System:
         if not self.parts[number].meshed:
             whole = self.full(name)
             state = converged.state
-            return whole.respond(self.displacement(name, state), whole.virgin(), state.time)
+            return whole.respond(self.displacement(name, state), whole.virgin(), state.time).law
         found, gone = converged.responses[number], self.full(name).gone(converged.state.time)
         if gone is None or not gone.any():
             return found

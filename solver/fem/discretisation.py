@@ -9,6 +9,8 @@ from scipy import linalg, sparse
 
 from solver.fem import kinematics
 from solver.fem.assembly import Assembly, whole_matrix
+from solver.fem.deformation import Deformation, Kinematics, PartResponse, SmallStrain
+from solver.fem.dofs import Dofs
 from solver.fem.loads import (
     Superposed,
     check_removed,
@@ -43,9 +45,9 @@ class Discretisation(Nodes, Part):
 
     Attributes
     ----------
-    dofs : (n_elements, 2 n_element_nodes) unknowns of the elements
-    B : (n_elements, n_points, 4, 2 n_element_nodes) Mandel strain operator [1/mm]
+    dofs : (n_elements, dim n_element_nodes) unknowns of the elements
     weights : (n_elements, n_points) volume of the points, with thickness or 2 pi r [mm3]
+    kinematics : how strain follows from displacements
     loads : nodal forces (n,) of pressures and tractions [N]
     condensable : ``loads`` plus the nodal forces of the eigenstrain in an elastic body [N]
     free : unknowns that no support holds, without periodic copies
@@ -60,17 +62,15 @@ class Discretisation(Nodes, Part):
         super().__init__(body)
         self.nodes = self.X
         kind = element_type(body.element)
-        nodes = self.same[self.basis.element_dofs]
-        self.dofs = np.stack([2 * nodes, 2 * nodes + 1], axis=1).transpose(2, 0, 1)
-        self.dofs = self.dofs.reshape(nodes.shape[1], -1)
+        self.dofs = Dofs(self.same[self.basis.element_dofs].T, self.dim).every
         values = np.array([np.broadcast_to(np.asarray(b[0]), self.basis.dx.shape)
                            for b in self.basis.basis])  # fmt: skip
         gradients = np.array([b[0].grad for b in self.basis.basis]).swapaxes(0, 1)
         self.weights = self.basis.dx * self.measure(self.points)
-        self.B = kinematics.strain_operator(values, gradients, self.points[0], body.kinematics)
+        B = kinematics.strain_operator(values, gradients, self.points[0], body.kinematics)
         if kind.mean_dilatation and body.kinematics != "plane_stress":
-            self.B = kinematics.mean_dilatation(self.B, self.weights)
-        self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
+            B = kinematics.mean_dilatation(B, self.weights)
+        self._strain_by(B)
         self.moves = body.travelling is not None
         self._travelling: tuple[float, Array] = (np.nan, np.zeros(0))
         self.loads = nodal_forces(self)
@@ -78,8 +78,20 @@ class Discretisation(Nodes, Part):
         self.eigenstrains = eigenstrains(self)
         per_element = self.weights.shape[1]
         elements = np.repeat(np.arange(len(self.weights)), per_element)
-        self.softening = Softening.of(self, self.points.reshape(2, -1), elements)
+        self.softening = Softening.of(self, self.positions, elements)
         self._hold()
+
+    def _strain_by(self, B: Array) -> None:
+        """Take strain linear in displacements, by the operator B of the elements."""
+        at_rest = np.zeros((self.components, self.weights.size))
+        self.kinematics: Kinematics = SmallStrain(
+            Deformation(n=self.n, dofs=self.dofs, strain=at_rest, B=B, weights=self.weights)
+        )
+
+    @property
+    def undeformed(self) -> Deformation:
+        """The body before loading."""
+        return self.kinematics.undeformed
 
     def _hold(self) -> None:
         """Find the supported unknowns, the remaining rigid motions, and one pin for each motion."""
@@ -154,12 +166,11 @@ class Discretisation(Nodes, Part):
 
     def virgin(self) -> PlasticState:
         """Return the internal variables of the body before any load."""
-        return self.body.law.initial(self.weights.size, self.B.shape[2])
+        return self.body.law.initial(self.weights.size, self.components)
 
-    def strain(self, u: Array, elements: Bools | slice = slice(None)) -> Array:
-        """Return Mandel strain (4, n_points) for displacements (n,), of all or some elements."""
-        flat = np.matmul(self._flat_B[elements], u[self.dofs[elements]][:, :, None])
-        return np.asarray(flat.reshape(-1, self.B.shape[2]).T)
+    def strain(self, u: Array) -> Array:
+        """Return Mandel strain (n_components, n_points) for displacements (n,)."""
+        return self.kinematics.at(u).strain
 
     def law(self, time: float) -> Law:
         """Return the material law of its points at a time; temperature may change it."""
@@ -176,26 +187,29 @@ class Discretisation(Nodes, Part):
         return heat if heat and heat.strength.fields.any() else None
 
     def eigenstrain(self, time: float) -> Array:
-        """Return the eigenstrain (4, n_points, Mandel): thermal, or that of an initial stress."""
-        return self.eigenstrains.at(time).reshape(4, -1)
+        """Return the eigenstrain (n_components, n_points, Mandel) of heat or initial stress."""
+        return self.eigenstrains.at(time).reshape(self.components, -1)
 
-    def respond(self, u: Array, state: PlasticState, time: float) -> Response:
+    def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
         """Return stress, tangent and new state at all points; the tangent is symmetric."""
-        strain = self.strain(u)
+        deformation = self.kinematics.at(u)
+        strain = deformation.strain
         if self.eigenstrains.cases:
-            strain -= self.eigenstrain(time)
+            strain = strain - self.eigenstrain(time)
         response = self.law(time).respond(strain, state)
-        if self.body.law.symmetric:
-            return response
-        tangent = response.tangent
-        return response._replace(tangent=0.5 * (tangent + tangent.swapaxes(0, 1)))
+        if not self.body.law.symmetric:
+            tangent = response.tangent
+            response = response._replace(tangent=0.5 * (tangent + tangent.swapaxes(0, 1)))
+        return PartResponse(response, deformation)
 
     @cached_property
     def condensable(self) -> Superposed:
         """Nodal forces (n,) of all loads and of the eigenstrain on an elastic body [N]."""
-        C = self.body.law.stiffness(self.B.shape[2])
-        strains = self.eigenstrains
-        pushed = [self.internal_force(C @ strain.reshape(4, -1)) for strain in strains.fields.T]
+        C, strains = self.body.law.stiffness(self.components), self.eigenstrains
+        pushed = [
+            self.undeformed.internal_force(C @ strain.reshape(len(C), -1))
+            for strain in strains.fields.T
+        ]
         both = (*self.loads.cases, *strains.cases), (*self.loads.fields.T, *pushed)
         return Superposed.of(self.n, zip(*both, strict=True))
 
@@ -217,7 +231,10 @@ class Discretisation(Nodes, Part):
             stress = self.body.law.stiffness(len(strain)) @ strain
             energy += float((stress * strain).sum(axis=0) @ self.volumes) / 2
             size = np.linalg.norm(stress, axis=0) * self.volumes
-            each = np.linalg.norm(self.B, axis=2) * size.reshape(self.weights.shape)[..., None]
+            each = (
+                np.linalg.norm(self.undeformed.B, axis=2)
+                * size.reshape(self.weights.shape)[..., None]
+            )
             nodal += np.bincount(self.dofs.ravel(), each.sum(axis=1).ravel(), self.n)
         if self.driven.cases:
             moved = self.driven.at(time)
@@ -245,31 +262,28 @@ class Discretisation(Nodes, Part):
         solver.factorise(self.elastic_data)
         return solver
 
-    def internal_force(self, stress: Array) -> Array:
-        """Return nodal forces (n,) that balance ``stress`` (4, n_points) [N]."""
-        weighted = (stress * self.weights.ravel()).T.reshape(len(self._flat_B), 1, -1)
-        forces = np.matmul(weighted, self._flat_B)[:, 0]
-        nodal = np.bincount(self.dofs.ravel(), weights=forces.ravel(), minlength=self.n)
-        return np.asarray(nodal, dtype=float)
-
-    def residual(self, time: float, u: Array, response: Response) -> Array:
+    def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,), without contact forces [N]."""
         del u
-        return self.external(time) - self.internal_force(response.stress)
+        return self.external(time) - response.deformation.internal_force(response.law.stress)
 
-    def stiffness_along(self, step: Array, response: Response) -> tuple[float, float]:
+    def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
-        strain, yields = self.strain(step), response.yielding
+        (law, deformation), linear = response, response.linear
+        strain = deformation.change(step)
         C = self.body.law.stiffness(len(strain))
         elastic = (strain * (C @ strain)).sum(axis=0) * self.volumes
-        some, D = strain[:, yields], response.tangent[:, :, yields]
-        tangent = np.einsum("ap,abp,bp->p", some, D, some) @ self.volumes[yields]
-        return float(elastic[~yields].sum() + tangent), float(elastic.sum())
+        some, D = strain[:, ~linear], law.tangent[:, :, ~linear]
+        tangent = float(np.einsum("ap,abp,bp->p", some, D, some) @ self.volumes[~linear])
+        if deformation.geometric is not None:
+            each = step[self.dofs]
+            bent = deformation.geometric(law.stress, slice(None))
+            tangent += float(np.einsum("ei,eij,ej", each, bent, each))
+        return float(elastic[linear].sum() + tangent), float(elastic.sum())
 
-    def place(self, point: int) -> tuple[float, float]:
-        """Return the position (x, y) of a point [mm]."""
-        x, y = self.points.reshape(2, -1)[:, point]
-        return float(x), float(y)
+    def place(self, point: int) -> tuple[float, ...]:
+        """Return the position of a point [mm]."""
+        return tuple(self.positions[:, point].tolist())
 
     def plastic_work(
         self, before: PlasticState, response: Response, time: float
@@ -280,12 +294,6 @@ class Discretisation(Nodes, Part):
         return float(work), float(self.law(time).dissipation(before, response).min())
 
     # -- stiffness ---------------------------------------------------------------------------
-
-    def _element_stiffness(self, elements: Ints | slice, tangent: Array) -> Array:
-        B = self.B[elements]
-        DB = np.matmul(tangent, B) * self.weights[elements][:, :, None, None]
-        flat = B.reshape(len(B), -1, B.shape[-1])
-        return np.matmul(flat.swapaxes(1, 2), DB.reshape(flat.shape))
 
     @cached_property
     def _assembly(self) -> Assembly:
@@ -299,8 +307,8 @@ class Discretisation(Nodes, Part):
     @cached_property
     def elastic_elements(self) -> Array:
         """Elastic stiffness of each element (n_elements, m, m)."""
-        C = self.body.law.stiffness(self.B.shape[2])
-        return self._element_stiffness(slice(None), C[None, None])
+        C = self.body.law.stiffness(self.components)
+        return self.undeformed.stiffness(slice(None), C[None, None])
 
     @cached_property
     def elastic_data(self) -> Array:
@@ -315,16 +323,17 @@ class Discretisation(Nodes, Part):
         """Return the elastic stiffness on all unknowns (n, n), supports not applied."""
         return self._elastic_matrix
 
-    def tangent_data(self, response: Response) -> Array:
+    def tangent_data(self, response: PartResponse) -> Array:
         """Return the values of the consistent tangent on `pattern`.
 
-        Only elements with a yielding point are integrated; the rest keep their elastic matrix.
+        Elements whose points are all linear keep their elastic matrix.
         """
-        shape = self.weights.shape
-        elements = np.flatnonzero(response.yielding.reshape(shape).any(axis=1))
+        (law, deformation), shape = response, self.weights.shape
+        elements = np.flatnonzero(~response.linear.reshape(shape).all(axis=1))
         if len(elements) == 0:
             return self.elastic_data
-        tangent = response.tangent.reshape(*response.tangent.shape[:2], *shape)
+        tangent = law.tangent.reshape(*law.tangent.shape[:2], *shape)
         tangent = tangent[:, :, elements].transpose(2, 3, 0, 1)
-        change = self._element_stiffness(elements, tangent) - self.elastic_elements[elements]
+        now = deformation.stiffness(elements, tangent, law.stress)
+        change = now - self.elastic_elements[elements]
         return self.elastic_data + self._assembly.values(elements, change)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.part import Part
 from solver.materials.state import Response
@@ -23,12 +24,20 @@ def _monomials(x: Array, count: int) -> Array:
     return np.stack([np.ones_like(x[0]), x[0], x[1], x[0] * x[1]][:count], axis=-1)
 
 
+def _check_plane(part: Discretisation) -> None:
+    """Refuse a body in space: it has values at its points alone."""
+    if part.basis.mesh.dim() == 3:
+        allowed = "has no fields at nodes and places yet, and so no maps and files: take those at "
+        raise ModelError("element", part.body.element, allowed + "points, System.response")
+
+
 def recovery(part: Discretisation) -> sparse.csr_array:
     """Return the operator (n_nodes, n_points) that recovers nodal values from point values.
 
     In each element a (bi)linear field is fitted to the points by least squares and evaluated
     at the nodes; at a node the elements around it are averaged by volume.
     """
+    _check_plane(part)
     cells = part.basis.mesh.t.shape[0]
     n_elements, n_points = part.weights.shape
     count = 4 if cells == 4 and n_points >= 4 else 3 if n_points >= 3 else 1
@@ -72,6 +81,7 @@ class Sampler:
     """
 
     def __init__(self, part: Discretisation, x: Array) -> None:
+        _check_plane(part)
         element, point, local = _locate(part, np.asarray(x, dtype=float))
         shape = part.basis.elem.lbasis
         nodes = part.basis.element_dofs[:, element]
@@ -146,4 +156,4 @@ def elastic_energy(part: Part, u: Array, response: Response, time: float) -> flo
     """Return the elastic energy of a part [N mm]; without points, from its condensed stiffness."""
     if part.meshed:
         return float(part.law(time).energy_density(response.stress) @ part.volumes)
-    return part.stiffness_along(u, response)[1] / 2
+    return part.stiffness_along(u, part.respond(u, part.virgin(), time))[1] / 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -9,12 +10,13 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.fem.cells import LOBATTO, smooth_cells
+from solver.fem.dofs import Dofs, vectors
 from solver.fem.nodes import Nodes
 from solver.fem.surface import edges_of
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.model.loads import Load, checked
 from solver.model.motion import TravellingPressure
-from solver.tensors import to_mandel
+from solver.tensors import AXES, to_mandel
 from solver.typing import Array, Bools, Ints
 
 Push = Callable[[Array, Array], Array | None]
@@ -67,7 +69,8 @@ def nodal_forces(part: Nodes) -> Superposed:
     """Return the nodal forces (n,) of the loads on a body [N]."""
     each: list[tuple[Load, Array]] = []
     for load in part.body.every_load:
-        own = [_tractions(part, b, load.push) for b in load.boundaries]
+        edges = load.boundaries if part.dim == 2 else ()  # no load acts on faces yet
+        own = [_tractions(part, b, load.push) for b in edges]
         own.append(_body_forces(part, load))
         given = [force for force in own if force is not None]
         if given:
@@ -106,7 +109,7 @@ def prescribed(part: Nodes) -> tuple[Superposed, Bools]:
     """
     loads = [load for load in part.body.every_load if load.components]
     each, held = [(load, np.zeros(part.n)) for load in loads], np.zeros(part.n, dtype=bool)
-    for axis in (0, 1):
+    for axis in range(part.dim):
         prescriptions = _prescriptions(part, loads, axis)
         for k, prescription in enumerate(prescriptions):
             for other in prescriptions[:k]:
@@ -121,7 +124,7 @@ def prescribed(part: Nodes) -> tuple[Superposed, Bools]:
 
 def _prescriptions(part: Nodes, loads: Sequence[Load], axis: int) -> list[_Prescription]:
     """Return the displacements that supports and loads prescribe along an axis, by boundary."""
-    still = [b for b, axes in part.body.supports.items() if "xy"[axis] in axes]
+    still = [b for b, axes in part.body.supports.items() if AXES[axis] in axes]
     moved: dict[str, list[Load]] = {}
     for load in loads:
         if axis in load.components:
@@ -131,7 +134,10 @@ def _prescriptions(part: Nodes, loads: Sequence[Load], axis: int) -> list[_Presc
     both += [("displacement", b, own) for b, own in moved.items()]
     return [
         _Prescription(
-            f"{kind}.{boundary}", 2 * part.boundary_nodes(boundary) + axis, tuple(own), axis
+            f"{kind}.{boundary}",
+            Dofs(part.boundary_nodes(boundary), part.dim).along(axis),
+            tuple(own),
+            axis,
         )
         for kind, boundary, own in both
     ]
@@ -166,12 +172,12 @@ class _Prescription:
         worst = int(apart.argmax())
         if apart[worst] <= _SAME * max(np.abs(mine).max(), np.abs(others).max()):
             return
-        x, y = part.X[:, shared[0] // 2]
+        at = ", ".join(f"{x:g}" for x in part.X[:, shared[0] // part.dim])
         raise ModelError(
-            f"{self.name}.{'xy'[self.axis]}", float(f"{mine[worst]:g}"),
+            f"{self.name}.{AXES[self.axis]}", float(f"{mine[worst]:g}"),
             f"must be {others[worst]:g} mm at time {times[worst]:g}, as {other.name} of body "
             f"{part.body.name!r} has it, because both boundaries have the node at "
-            f"({x:g}, {y:g}) mm; or shorten one of the boundaries by an element",
+            f"({at}) mm; or shorten one of the boundaries by an element",
         )  # fmt: skip
 
 
@@ -191,8 +197,8 @@ def eigenstrains(part: Nodes) -> Superposed:
 
     An initial stress s has the eigenstrain ``-C^-1 s``, which gives s in the undeformed body.
     """
-    x = part.points.reshape(2, -1)
-    shape = (4, x.shape[1])
+    x = part.positions
+    shape = (part.components, x.shape[1])
     each: list[tuple[Load, Array]] = []
     for load in part.body.every_load:
         strain, stress = load.eigenstrain(x), load.initial_stress(x)
@@ -204,7 +210,7 @@ def eigenstrains(part: Nodes) -> Superposed:
                 _check_plane(stress)
             strain = part.body.material.elasticity.strain(to_mandel(stress))
             each.append((load, -strain))
-    return Superposed.of(4 * x.shape[1], each)
+    return Superposed.of(math.prod(shape), each)
 
 
 def _check_plane(stress: Array) -> None:
@@ -223,7 +229,7 @@ def check_removed(part: Nodes, loads: Superposed) -> None:
         alone = np.ones(part.X.shape[1], dtype=bool)
         alone[part.basis.element_dofs[:, ~gone]] = False
         for load, field in zip(loads.cases, loads.fields.T, strict=True):
-            if not field.reshape(-1, 2)[alone].any():
+            if not vectors(field, part.dim)[:, alone].any():
                 continue
             after = [t for t in comparing([load, removal]) if removal.factor(t) >= 1]
             if any(load.factor(t) for t in after):

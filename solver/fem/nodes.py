@@ -6,6 +6,7 @@ import numpy as np
 from skfem import CellBasis
 
 from solver.errors import ModelError
+from solver.fem.dofs import Dofs
 from solver.mesh.elements import element_type
 from solver.mesh.rounding import ROUNDED
 from solver.model.body import Body
@@ -15,19 +16,19 @@ from solver.typing import Array, Ints
 class Nodes:
     """The unknowns and the integration points of one body, and their positions.
 
-    Unknowns are numbered node by node: ``2 * node`` is x, ``2 * node + 1`` is y. Points are
-    numbered element by element. Nodes on the far side of a periodic body repeat those on the near
-    side: their unknowns are copies.
+    Unknowns are numbered node by node (`Dofs`), points element by element. Nodes on the far side of
+    a periodic body repeat those on the near side: their unknowns are copies.
 
     Attributes
     ----------
     basis : elements and quadrature, of scikit-fem
-    X : (2, n_nodes) node positions [mm]
+    X : (dim, n_nodes) node positions [mm]
+    dim : number of axes
     n : number of unknowns
     same : (n_nodes,) for each node, the node whose unknowns it uses: itself, unless it is a copy
     copied : (n,) for each unknown, the unknown whose value it takes
     period : period of a periodic body, else 0 [mm]
-    points : (2, n_elements, n_points) positions of the points [mm]
+    points : (dim, n_elements, n_points) positions of the points [mm]
     """
 
     def __init__(self, body: Body) -> None:
@@ -39,10 +40,20 @@ class Nodes:
             intorder=kind.full_order if body.full_integration else kind.order,
         )
         self.X = self.basis.doflocs
-        self.n = 2 * self.X.shape[1]
+        self.dim, self.n = len(self.X), self.X.size
         self.same, self.period = self._copies()
-        self.copied = np.stack([2 * self.same, 2 * self.same + 1], axis=1).ravel()
+        self.copied = Dofs(self.same, self.dim).every
         self.points = np.asarray(self.basis.global_coordinates())
+
+    @property
+    def components(self) -> int:
+        """Number of components of stress and strain: 4 in the plane, 6 in space."""
+        return 2 * self.dim
+
+    @property
+    def positions(self) -> Array:
+        """Positions of the points (dim, n_points) [mm]."""
+        return self.points.reshape(self.dim, -1)
 
     def measure(self, x: Array) -> Array | float:
         """Return the depth across the plane at positions x [mm]: thickness or 2 pi r."""

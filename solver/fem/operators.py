@@ -9,9 +9,9 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
 
+from solver.fem.deformation import PartResponse
 from solver.linear import solvers as linear
 from solver.linear.solvers import Begun
-from solver.materials.state import Response
 from solver.typing import Array, Ints
 
 
@@ -47,7 +47,7 @@ class Stiff(Protocol):
     def elastic_data(self) -> Array:
         """Values of the elastic stiffness on ``pattern``."""
 
-    def tangent_data(self, response: Response) -> Array:
+    def tangent_data(self, response: PartResponse) -> Array:
         """Return the values of the tangent on ``pattern``."""
 
 
@@ -109,7 +109,7 @@ class PartOperators(Protocol):
     def elastic(self) -> Operator:
         """The operator of the elastic stiffness."""
 
-    def tangent(self, response: Response, blend: float) -> Operator:
+    def tangent(self, response: PartResponse, blend: float) -> Operator:
         """Return the operator of ``(1 - blend) tangent + blend elastic stiffness``."""
 
 
@@ -144,9 +144,9 @@ class Operators:
     def _analysed(self) -> Analysed:
         return Analysed(self._part, self._contact, self._name)
 
-    def tangent(self, response: Response, blend: float) -> Operator:
+    def tangent(self, response: PartResponse, blend: float) -> Operator:
         """Return the operator of ``(1 - blend) tangent + blend elastic stiffness``."""
-        if blend >= 1 or not response.yielding.any():
+        if blend >= 1 or response.linear.all():
             return self.elastic
         data = self._part.tangent_data(response)
         if blend:
@@ -206,7 +206,7 @@ class Fixed:
     def __init__(self, operator: Operator) -> None:
         self.elastic = operator
 
-    def tangent(self, response: Response, blend: float) -> Operator:
+    def tangent(self, response: PartResponse, blend: float) -> Operator:
         """Return the elastic operator."""
         del response, blend
         return self.elastic

@@ -9,6 +9,8 @@ import numpy as np
 import scipy  # loads spatial when it is used: few models look for places
 from scipy import sparse
 
+from solver.fem.deformation import PartResponse
+from solver.fem.dofs import Dofs, vectors
 from solver.fem.loads import Superposed
 from solver.fem.operators import PartOperators
 from solver.fem.softening import Softening
@@ -26,12 +28,11 @@ _SAME = 1e-6
 
 
 def same_unknowns(nodes: Array, places: Array) -> Ints:
-    """Return the unknowns (2 n,) of nodes (2, m) at given places (2, n), -1 if no node is there."""
+    """Return the unknowns (dim n,) of nodes (dim, m) at places (dim, n), -1 if no node is there."""
     near = _SAME * float(np.ptp(nodes, axis=1).max())
     _, at = scipy.spatial.cKDTree(nodes.T).query(places.T, distance_upper_bound=near)
-    found = at < nodes.shape[1]
-    unknowns = np.stack([2 * at, 2 * at + 1], axis=1)
-    return np.asarray(np.where(found[:, None], unknowns, -1).ravel(), dtype=np.int64)
+    found = np.repeat(at < nodes.shape[1], len(nodes))
+    return np.asarray(np.where(found, Dofs(at, len(nodes)).every, -1), dtype=np.int64)
 
 
 class Part(ABC):
@@ -75,11 +76,11 @@ class Part(ABC):
         """Return the internal variables before any load."""
 
     @abstractmethod
-    def respond(self, u: Array, state: PlasticState, time: float) -> Response:
+    def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
         """Return stress, tangent and new internal variables at all points."""
 
     @abstractmethod
-    def residual(self, time: float, u: Array, response: Response) -> Array:
+    def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,), without contact forces [N]."""
 
     @abstractmethod
@@ -87,7 +88,7 @@ class Part(ABC):
         """Return the elastic stiffness on all unknowns (n, n), supports not applied."""
 
     @abstractmethod
-    def stiffness_along(self, step: Array, response: Response) -> tuple[float, float]:
+    def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
 
     @abstractmethod
@@ -217,14 +218,14 @@ class Part(ABC):
         """Return for each unknown (n,) the one a distance ``way`` [mm] behind along x, or -1."""
         return same_unknowns(self.nodes, self.nodes - np.array([[way], [0.0]]))
 
-    def place(self, point: int) -> tuple[float, float]:
-        """Return the position (x, y) of a point [mm]; NaN without points."""
+    def place(self, point: int) -> tuple[float, ...]:
+        """Return the position of a point [mm]; NaN without points."""
         del point
         return np.nan, np.nan
 
     def motion(self, surface: Surface, u: Array) -> Array:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
-        return u[surface.dofs].reshape(-1, 2).T
+        return vectors(u[surface.dofs], len(surface.X))
 
     def pull_back(self, surface: Surface, u: Array, block: Array, gaps: int) -> tuple[Ints, Array]:
         """Return unknowns (m,) of this part and derivative rows (n_rows, m) on these.

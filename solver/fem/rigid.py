@@ -11,6 +11,7 @@ from copy import copy
 import numpy as np
 from scipy import sparse
 
+from solver.fem.deformation import PartResponse, without_points
 from solver.fem.frame import MovingFrame, RigidMotion
 from solver.fem.loads import Superposed
 from solver.fem.operators import Fixed
@@ -170,12 +171,12 @@ class RigidPart(Part):
         """Return the internal variables of no points."""
         return self.body.law.initial(0, 4)
 
-    def respond(self, u: Array, state: PlasticState, time: float) -> Response:
+    def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
         """Return the response of no points."""
         del u, time
-        return self.body.law.respond(np.zeros((4, 0)), state)
+        return without_points(self.n, self.body.law.respond(np.zeros((4, 0)), state))
 
-    def residual(self, time: float, u: Array, response: Response) -> Array:
+    def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return the external forces (3,) [N]."""
         del u, response
         return self.external(time)
@@ -184,7 +185,7 @@ class RigidPart(Part):
         """Return the stiffness (3, 3), which is zero."""
         return sparse.csr_array((3, 3))
 
-    def stiffness_along(self, step: Array, response: Response) -> tuple[float, float]:
+    def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
         """Return zero: it stores no energy."""
         del step, response
         return 0.0, 0.0

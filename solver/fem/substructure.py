@@ -14,7 +14,9 @@ from hashlib import sha256
 import numpy as np
 from scipy import sparse
 
+from solver.fem.deformation import PartResponse, without_points
 from solver.fem.discretisation import Discretisation, choose_pins
+from solver.fem.dofs import Dofs
 from solver.fem.loads import Superposed
 from solver.fem.operators import Dense, Fixed
 from solver.fem.part import Part
@@ -75,7 +77,7 @@ class Substructure(Part):
         self.body = whole.body
         self._linear_solver = linear_solver
         self._nodes = nodes = np.unique(np.concatenate([surface.nodes for surface in surfaces]))
-        self._kept = kept = np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()
+        self._kept = kept = Dofs(nodes, whole.dim).every
         self.elastic = slice(len(kept))
         self.n = len(kept)
         self.nodes = whole.X[:, nodes]
@@ -111,14 +113,15 @@ class Substructure(Part):
 
     def virgin(self) -> PlasticState:
         """Return the law's state for zero points: nothing here can yield."""
-        return self.body.law.initial(0, self.whole.B.shape[2])
+        return self.body.law.initial(0, self.whole.components)
 
-    def respond(self, u: Array, state: PlasticState, time: float) -> Response:
+    def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
         """Return the law's response for zero points."""
         del u, time
-        return self.body.law.respond(np.zeros_like(state.plastic_strain), state)
+        none = np.zeros_like(state.plastic_strain)
+        return without_points(self.n, self.body.law.respond(none, state))
 
-    def residual(self, time: float, u: Array, response: Response) -> Array:
+    def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,) [N]."""
         del response
         force = self.external(time)
@@ -130,7 +133,7 @@ class Substructure(Part):
         rest = np.zeros((self.n - len(self._kept),) * 2)
         return sparse.csr_array(sparse.block_diag([self._condensed.stiffness, rest]))
 
-    def stiffness_along(self, step: Array, response: Response) -> tuple[float, float]:
+    def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
         del response
         energy = float(step[self.elastic] @ self._condensed.stiffness @ step[self.elastic])
@@ -164,7 +167,7 @@ class Substructure(Part):
 def _key(part: Discretisation, kept: Ints, linear_solver: str) -> str:
     """Return a key made from the content: equal bodies share their condensation."""
     digest, body = sha256(), part.body
-    elastic = body.law.stiffness(part.B.shape[2])
+    elastic = body.law.stiffness(part.components)
     for array in (body.mesh.doflocs, body.mesh.t, kept, elastic, part.condensable.fields):
         digest.update(np.ascontiguousarray(array).tobytes())
     digest.update(

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from solver.errors import ModelError
+from solver.fem.dofs import Dofs
 from solver.fem.nodes import Nodes
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.typing import Array, Ints
@@ -99,8 +100,8 @@ class Surface:
 
     @cached_property
     def dofs(self) -> Ints:
-        """(2 n_nodes,) unknowns of the body, node by node."""
-        return np.stack([2 * self.nodes, 2 * self.nodes + 1], axis=1).ravel()
+        """(dim n_nodes,) unknowns of the body, node by node."""
+        return Dofs(self.nodes, len(self.X)).every
 
 
 def at_vertices(of_edges: Array) -> Array:

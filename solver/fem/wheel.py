@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.fem.discretisation import Discretisation
+from solver.fem.dofs import vectors
 from solver.fem.frame import MovingFrame, RigidMotion, turning
 from solver.fem.loads import Superposed
 from solver.fem.part import same_unknowns
@@ -75,7 +76,7 @@ class Wheel(Substructure):
 
     def motion(self, surface: Surface, u: Array) -> Array:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
-        d = u[surface.dofs].reshape(-1, 2).T
+        d = vectors(u[surface.dofs], 2)
         return self.frame.displacements(u[self._hub :], surface.X, d)
 
     def pull_back(self, surface: Surface, u: Array, block: Array, gaps: int) -> tuple[Ints, Array]:
@@ -88,7 +89,7 @@ class Wheel(Substructure):
         compensates the difference of the lever arms; on a mesh with ten points in contact its error
         is 1e-4 of force times radius, enough to turn a wheel that is held by less friction.
         """
-        d, q = u[surface.dofs].reshape(-1, 2).T, u[self._hub :]
+        d, q = vectors(u[surface.dofs], 2), u[self._hub :]
         hub = self.frame.rows(q, block, self.passing(surface, d))
         hub[:gaps, _TURN] = 0.0
         rim = block.reshape(-1, 2) @ self.frame.turned(q)

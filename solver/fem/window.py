@@ -19,14 +19,16 @@ from functools import cached_property
 import numpy as np
 
 from solver.fem.assembly import Assembly
+from solver.fem.deformation import PartResponse
 from solver.fem.discretisation import Discretisation, choose_pins
+from solver.fem.dofs import Dofs, vectors
 from solver.fem.loads import Superposed
 from solver.fem.operators import Operator, Operators, Restricted
 from solver.fem.softening import Softening
 from solver.fem.surface import Surface
 from solver.linear.schur import Eliminated, SchurComplement
 from solver.linear.solvers import Singular
-from solver.materials import PlasticState, Response
+from solver.materials import PlasticState
 from solver.typing import Array, Bools, Ints
 
 
@@ -51,7 +53,7 @@ class Region:
 
         Where nothing yields it has the elements that touch.
         """
-        touched = inner.contact[whole.dofs].any(axis=1)
+        touched = np.asarray(inner.contact[whole.dofs].any(axis=1))
         near = np.zeros(whole.n, dtype=bool)
         near[whole.dofs[_layered(whole, touched, layers)]] = True
         contact = np.zeros(whole.n, dtype=bool)
@@ -76,7 +78,7 @@ def _layered(whole: Discretisation, elements: Bools, layers: int) -> Bools:
     for _ in range(layers):
         within = np.zeros(whole.n, dtype=bool)
         within[whole.dofs[elements]] = True
-        elements = within[whole.dofs].any(axis=1)
+        elements = np.asarray(within[whole.dofs].any(axis=1))
     return elements
 
 
@@ -99,14 +101,15 @@ class Windowed(Discretisation):
 
     def __init__(self, whole: Discretisation, region: Region, linear_solver: str) -> None:
         nodes = np.zeros(whole.X.shape[1], dtype=bool)
-        nodes[whole.dofs[region.elements] // 2] = True
-        nodes[np.flatnonzero(region.contact) // 2] = True
+        nodes[whole.dofs[region.elements] // whole.dim] = True
+        nodes[np.flatnonzero(region.contact) // whole.dim] = True
         nodes[whole.same[nodes]] = True
         nodes |= nodes[whole.same]
         self.whole, self.body = whole, whole.body
-        self.elements = nodes[whole.dofs // 2].all(axis=1)
+        self.elements = nodes[whole.dofs // whole.dim].all(axis=1)
         at = np.flatnonzero(nodes)
-        self.kept = kept = np.stack([2 * at, 2 * at + 1], axis=1).ravel()
+        self.dim, self.kept = whole.dim, Dofs(at, whole.dim).every
+        kept = self.kept
         self._number = number = np.full(whole.n, -1)
         number[kept] = np.arange(len(kept))
         self.n = len(kept)
@@ -122,15 +125,15 @@ class Windowed(Discretisation):
     def _mesh(self, whole: Discretisation, number: Ints) -> None:
         """Take the elements of the window, and what belongs to their points."""
         self.dofs = number[whole.dofs[self.elements]]
-        self.B, self.weights = whole.B[self.elements], whole.weights[self.elements]
-        self._flat_B = np.ascontiguousarray(self.B.reshape(len(self.B), -1, self.B.shape[-1]))
+        self.weights = whole.weights[self.elements]
+        self._strain_by(whole.undeformed.B[self.elements])
         self.points = whole.points[:, self.elements]
         per_element = whole.weights.shape[1]
         elements = np.repeat(np.flatnonzero(self.elements), per_element)
-        self.softening = Softening.of(self, self.points.reshape(2, -1), elements)
+        self.softening = Softening.of(self, self.positions, elements)
         self._at = np.flatnonzero(np.repeat(self.elements, per_element))
         strains = whole.eigenstrains
-        components, cases = self.B.shape[2], len(strains.cases)
+        components, cases = self.components, len(strains.cases)
         fields = strains.fields.reshape(components, whole.weights.size, cases)[:, self._at]
         self.eigenstrains = Superposed(
             strains.cases, fields.reshape(components * len(self._at), cases)
@@ -154,7 +157,7 @@ class Windowed(Discretisation):
         here = copy(self)
         response = self.whole.respond(u, plastic, time)
         out = self.whole.residual(time, u, response)
-        out[self.kept] += self.internal_force(response.stress[:, self._at])
+        out[self.kept] += self.undeformed.internal_force(response.law.stress[:, self._at])
         here._outer, here._begin = self._schur.begin(out), u
         here._plastic = plastic.at(self._at)
         return here
@@ -173,7 +176,7 @@ class Windowed(Discretisation):
     def motion(self, surface: Surface, u: Array) -> Array:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
         at = self._number[surface.dofs]
-        return np.where(at < 0, self._begin[surface.dofs], u[at]).reshape(-1, 2).T
+        return vectors(np.where(at < 0, self._begin[surface.dofs], u[at]), self.dim)
 
     def pull_back(self, surface: Surface, u: Array, block: Array, gaps: int) -> tuple[Ints, Array]:
         """See `Part.pull_back`; raises `Singular` if contact has left the region."""
@@ -186,15 +189,16 @@ class Windowed(Discretisation):
 
     # -- the window as a body ------------------------------------------------------------------
 
-    def respond(self, u: Array, state: PlasticState, time: float) -> Response:
+    def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
         """Return the response from the beginning of the increment, whose state is known."""
         del state
         return super().respond(u, self._plastic, time)
 
-    def residual(self, time: float, u: Array, response: Response) -> Array:
+    def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,), those of the rest condensed [N]."""
         del time
-        force = self._outer.condensed - self.internal_force(response.stress)
+        inner = response.deformation.internal_force(response.law.stress)
+        force = self._outer.condensed - inner
         force[self._edge] -= self._rest @ (u - self._begin[self.kept])[self._edge]
         return force
 
@@ -221,7 +225,7 @@ class Windowed(Discretisation):
         moved[self.kept] = u
         return self.whole.rounding(moved)
 
-    def stiffness_along(self, step: Array, response: Response) -> tuple[float, float]:
+    def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
         edge = step[self._edge]
         rest = float(edge @ self._rest @ edge)

@@ -9,11 +9,11 @@ import numpy as np
 
 from solver.contact.candidates import Candidates
 from solver.contact.system import System
-from solver.fem.discretisation import Discretisation
+from solver.fem.deformation import PartResponse
 from solver.fem.part import Part
 from solver.loading.outcome import Mechanism
 from solver.loading.step import moving
-from solver.materials import Response
+from solver.model.body import Body
 from solver.tensors import deviator
 from solver.typing import Array
 
@@ -35,7 +35,7 @@ def mechanism(
     system: System,
     time: float,
     step: Vectors,
-    responses: Sequence[Response],
+    responses: Sequence[PartResponse],
     residuals: Vectors,
     candidates: Candidates,
     level: float,
@@ -74,15 +74,15 @@ def mechanism(
         most.append(0)
         if not flows:
             continue
-        body, surface = cast("Discretisation", part), part.law(time).surface
-        strain = body.strain(u)
-        if body.body.kinematics == "plane_stress":
+        body, surface = cast("Body", part.body), part.law(time).surface
+        strain = response.deformation.change(u)
+        if body.kinematics == "plane_stress":
             strain[2] = -strain[0] - strain[1]
         tension = strength / surface.shear(1.0)
         flow[-1] = float(tension * surface.power(strain) @ part.volumes)
         most[-1] = int((strain**2).sum(axis=0).argmax())
         swelling += float(tension * np.abs(strain[:3].sum(axis=0)) @ part.volumes)
-        load += float((response.stress * deviator(strain)).sum(axis=0) @ part.volumes)
+        load += float((response.law.stress * deviator(strain)).sum(axis=0) @ part.volumes)
     rates = np.sum([candidates.of_part(k, u) for k, u in enumerate(v)], axis=0)
     apart, normal = rates[: candidates.n], candidates.forces[: candidates.n]
     held = np.abs(np.minimum(apart, 0.0)).sum() + np.abs(rates[candidates.linked]).sum()
@@ -102,7 +102,7 @@ def mechanism(
 
 
 def is_singular(
-    parts: Sequence[Part], time: float, step: Vectors, responses: Sequence[Response]
+    parts: Sequence[Part], time: float, step: Vectors, responses: Sequence[PartResponse]
 ) -> bool:
     """Whether a part has so little stiffness along a step that rounding determines the step.
 

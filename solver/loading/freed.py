@@ -10,6 +10,7 @@ import numpy as np
 
 from solver.contact.system import System
 from solver.errors import ModelError
+from solver.fem.dofs import vectors
 from solver.fem.part import Part
 from solver.fem.wheel import Wheel
 from solver.loading.program import Program
@@ -61,7 +62,7 @@ def _ways(part: Part, pushed: Array) -> str:
     """Return the directions in which a body would move, in words."""
     sizes = np.abs(pushed[-3:])  # of a rigid body or a hub
     if part.meshed:
-        each = pushed.reshape(-1, 2).T
+        each = vectors(pushed, len(part.nodes))
         sizes = np.append(np.abs(each.mean(axis=1)), np.ptp(each, axis=1).max() / 2)
     ways = zip(("along x", "along y", "in rotation"), sizes, strict=True)
     return " and ".join(way for way, size in ways if size > _ALONG * sizes.max())

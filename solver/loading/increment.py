@@ -30,6 +30,7 @@ from solver.contact.candidates import Candidates, find_candidates, no_candidates
 from solver.contact.ends import beyond_end
 from solver.contact.state import ContactState, Converged, State, Timing
 from solver.contact.system import System
+from solver.fem.deformation import PartResponse
 from solver.fem.window import Windowed
 from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
@@ -49,7 +50,6 @@ from solver.loading.step import (
     unheld,
 )
 from solver.loading.timing import timing
-from solver.materials import Response
 from solver.typing import Array
 
 Vectors = tuple[Array, ...]
@@ -81,7 +81,7 @@ class Balanced:
     u: Vectors
     contacts: tuple[ContactState, ...]
     links: Array
-    responses: tuple[Response, ...]
+    responses: tuple[PartResponse, ...]
     residuals: Vectors
     candidates: Candidates
     scale: float
@@ -213,7 +213,7 @@ class Increment:
                 residuals = self._residuals(u, responses)
             contacts = candidates.states(contacts, forces, step.status)
             links = forces[candidates.linked]
-            if self.elastic_only and any(r.yielding.any() for r in responses):
+            if self.elastic_only and any(r.law.yielding.any() for r in responses):
                 raise Yielded
         self._path.append(u)
         raise IncrementFailed(
@@ -244,7 +244,7 @@ class Increment:
 
     def _flow(
         self,
-        responses: Sequence[Response],
+        responses: Sequence[PartResponse],
         residuals: Vectors,
         candidates: Candidates,
         level: float,
@@ -268,11 +268,11 @@ class Increment:
 
     # -- 1, 2: stress, residual, contact geometry ----------------------------------------------
 
-    def _respond(self, u: Vectors) -> tuple[Response, ...]:
+    def _respond(self, u: Vectors) -> tuple[PartResponse, ...]:
         each = zip(self.system.parts, u, self.start.plastic, strict=True)
         return tuple(part.respond(ui, plastic, self.time) for part, ui, plastic in each)
 
-    def _residuals(self, u: Vectors, responses: Sequence[Response]) -> Vectors:
+    def _residuals(self, u: Vectors, responses: Sequence[PartResponse]) -> Vectors:
         """Return external minus internal forces of each part, without contact forces [N]."""
         each = zip(self.system.parts, u, responses, strict=True)
         return tuple(part.residual(self.time, ui, response) for part, ui, response in each)
@@ -342,7 +342,7 @@ class Increment:
     def _step(
         self,
         residuals: Vectors,
-        responses: Sequence[Response],
+        responses: Sequence[PartResponse],
         candidates: Candidates,
         blends: Sequence[float],
     ) -> NewtonStep:
@@ -373,13 +373,13 @@ class Increment:
 
     def _search(
         self, u: Vectors, residuals: Vectors, candidates: Candidates, step: NewtonStep, out: float
-    ) -> tuple[float, Vectors, tuple[Response, ...], Vectors]:
+    ) -> tuple[float, Vectors, tuple[PartResponse, ...], Vectors]:
         """Return a share of the step, and displacements, responses and residuals after it.
 
         ``out`` is the norm of the out-of-balance forces before the step, or what is allowed over
         `_LESS` if that is more [N]: a step to what is allowed needs no line search.
         """
-        trial: tuple[Vectors, tuple[Response, ...], Vectors]
+        trial: tuple[Vectors, tuple[PartResponse, ...], Vectors]
 
         def left(share: float) -> Vectors:
             """Return the residuals after a share of the step."""
@@ -412,12 +412,13 @@ class Increment:
         span = self.time - self.start.time
         contacts = candidates.kept(self.start.contacts, span, grows=not self.system.moves)
         spent = [
-            part.plastic_work(before, response, self.time)
+            part.plastic_work(before, response.law, self.time)
             for part, before, response in zip(
                 self.system.parts, self.start.plastic, responses, strict=True
             )
         ]
         inner = on_parts(self.system, candidates, candidates.forces)
+        plastic = tuple(response.law.state for response in responses)
         held = zip(self.system.parts, found.residuals, inner, strict=True)
         return Converged(
             start=self.start,
@@ -426,10 +427,8 @@ class Increment:
             contact_work=candidates.work(self.start.contacts),
             plastic_work=sum(work for work, _ in spent),
             dissipation=float(np.min([0.0, *(least for _, least in spent)])),
-            state=State(
-                self.time, u, tuple(r.state for r in responses), contacts, found.scale, found.links
-            ),
-            responses=responses,
+            state=State(self.time, u, plastic, contacts, found.scale, found.links),
+            responses=tuple(r.law for r in responses),
             iterations=found.iterations,
             pivoted=found.pivoted,
             blended=found.blended,

@@ -52,7 +52,7 @@ def _missed(part: Discretisation, now: Converged, number: int, flows: Bools) -> 
     within = np.asarray(flows.reshape(part.weights.shape).any(axis=1))
     points = np.flatnonzero(np.repeat(within, part.weights.shape[1]))
     ends = (now.start.time, now.start.u[number]), (now.state.time, now.state.u[number])
-    start, end = (part.strain(u, within) - part.eigenstrain(time)[:, points] for time, u in ends)
+    start, end = ((part.strain(u) - part.eigenstrain(time))[:, points] for time, u in ends)
     law, state = part.law(now.state.time).at(points), now.start.plastic[number].at(points)
     for share in np.arange(1, _PARTS + 1) / _PARTS:
         stress, _, state, _ = law.respond(start + share * (end - start), state)

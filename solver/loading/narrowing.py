@@ -69,7 +69,8 @@ def narrowed(
     at, elastic_first = system.moved(guess or start, time), guess is None
     each = zip(system.parts, at.u, start.plastic, strict=True)
     responses = tuple(part.respond(u, plastic, time) for part, u, plastic in each)
-    both = zip(_yields(system, responses), _yields(system, before.responses), strict=True)
+    own, had = [response.law for response in responses], before.responses
+    both = zip(_yields(system, own), _yields(system, had), strict=True)
     yields: Yields = [now if now is None or was is None else now | was for now, was in both]
     if not before.windows and not any(own is not None and own.any() for own in yields):
         return None
@@ -112,7 +113,7 @@ def narrowed(
         count += (found.iterations, found.pivoted, found.blended)
         found = _expanded(system, start, time, parts, found)
         at, elastic_first = replace(at, u=found.u, contacts=found.contacts), False
-        yields = _yields(system, found.responses)
+        yields = _yields(system, [response.law for response in found.responses])
         inside = zip(windows, yields, strict=True)
         if all(w is None or y is None or not (y & ~w.elements).any() for w, y in inside):
             iterations, pivoted, blended = count.tolist()
@@ -151,7 +152,7 @@ def _expanded(
     )
 
 
-def _yields(system: System, responses: tuple[Response, ...]) -> Yields:
+def _yields(system: System, responses: Sequence[Response]) -> Yields:
     """Return the elements (n_elements,) of each meshed part that yield, None of the others."""
     each = zip(system.parts, responses, strict=True)
     return [

@@ -12,6 +12,7 @@ from solver.contact.state import Converged, State
 from solver.errors import NotConverged, SolverError
 from solver.loading.cycle import Cycle
 from solver.loading.slide import Slide
+from solver.tensors import AXES
 
 _CLOSE = 1e-3
 """Relative distance of a load below one that is excluded; up to it the load is at the limit."""
@@ -23,14 +24,14 @@ class Yielded(SolverError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mechanism:
-    """A motion in which bodies flow, strained most in ``body`` at ``place`` (x, y) [mm].
+    """A motion in which bodies flow, strained most in ``body`` at ``place`` [mm].
 
     ``ratio`` is the power of the load over the largest power that can resist it.
     """
 
     ratio: float = 0.0
     body: str = ""
-    place: tuple[float, float] = (0.0, 0.0)
+    place: tuple[float, ...] = (0.0, 0.0)
 
     def __lt__(self, other: Mechanism) -> bool:
         """Whether the other proves more."""
@@ -47,9 +48,9 @@ class Mechanism:
         return self.limit
 
     def __str__(self) -> str:
-        x, y = self.place
+        at = ", ".join(f"{axis} = {x:.4g}" for axis, x in zip(AXES, self.place, strict=False))
         return (
-            f"body {self.body!r} flows around x = {x:.4g}, y = {y:.4g} mm, where the load does "
+            f"body {self.body!r} flows around {at} mm, where the load does "
             f"{self.ratio:.4g} times the largest work of plastic flow and friction"
         )
 

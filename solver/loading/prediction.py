@@ -17,6 +17,7 @@ from solver.contact.interface import Interface
 from solver.contact.problem import OPEN
 from solver.contact.state import ContactState, State
 from solver.contact.system import System
+from solver.fem.dofs import Dofs
 from solver.fem.following import Following
 from solver.typing import Ints
 
@@ -95,9 +96,10 @@ def _on_vertices(interface: Interface, sources: Ints) -> Ints:
     """
     surface = interface.slave_surface
     nodes = surface.nodes[surface.vertices]
-    vertex = np.full(len(sources) // 2 + 1, -1)
+    dim = len(surface.X)
+    vertex = np.full(len(sources) // dim + 1, -1)
     vertex[nodes] = np.arange(len(nodes))
-    return np.asarray(vertex[sources[2 * nodes] // 2])
+    return np.asarray(vertex[sources[Dofs(nodes, dim).along(0)] // dim])
 
 
 def _follow(

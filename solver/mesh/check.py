@@ -1,5 +1,7 @@
 """Checks of a mesh: elements must not be folded or overlap, and the mesh must be one piece.
 
+A mesh in space must have no folded element and be one piece; cracks are not looked for there.
+
 The Jacobian of an element keeps one sign, and neighbours lie on opposite sides of their common
 edge. The mesh is connected through edges, without cracks and hinges. Lengths are compared with
 nearby edges and with the rounding of coordinates, so that unit, grading and origin do not matter.
@@ -36,10 +38,15 @@ def check_mesh(mesh: Mesh, name: str, kind: ElementType) -> None:
     Errors give the numbers of elements and nodes in the mesh.
     """
     where = f'of body "{name}"'
-    _check_nodes(mesh, where)
-    _check_neighbours(mesh, where, _check_elements(mesh, where, kind))
+    _check_nodes(mesh, where, kind)
+    sense = _check_elements(mesh, where, kind)
+    if kind.dim == 3:
+        _check_connected(mesh, where)
+        return
+    _check_neighbours(mesh, where, sense)
     _check_cracks(mesh, where)
     _check_connected(mesh, where)
+    _check_hinges(mesh, where)
 
 
 def _refuse(what: str, where: str, allowed: str) -> NoReturn:
@@ -47,13 +54,13 @@ def _refuse(what: str, where: str, allowed: str) -> NoReturn:
 
 
 def _at(mesh: Mesh, node: int) -> str:
-    x, y = mesh.p[:, node]
-    return f"({x:.6g}, {y:.6g})"
+    return f"({', '.join(f'{x:.6g}' for x in mesh.p[:, node])})"
 
 
-def _check_nodes(mesh: Mesh, where: str) -> None:
-    if len(mesh.p) != 2:
-        _refuse("node 0", where, f"has {len(mesh.p)} coordinates; nodes must have two, x and y")
+def _check_nodes(mesh: Mesh, where: str, kind: ElementType) -> None:
+    if len(mesh.p) != kind.dim:
+        words = "two, x and y" if kind.dim == 2 else "three, x, y and z"
+        _refuse("node 0", where, f"has {len(mesh.p)} coordinates; nodes must have {words}")
     used, n = mesh.dofs.element_dofs, mesh.p.shape[1]
     for element in np.flatnonzero(((used < 0) | (used >= n)).any(axis=0))[:1]:
         nodes = ", ".join(map(str, used[:, element]))
@@ -67,15 +74,17 @@ def _check_nodes(mesh: Mesh, where: str) -> None:
 def _jacobians(mesh: Mesh, kind: ElementType) -> Array:
     """Return signed Jacobians (n_elements, n_points), at nodes and integration points.
 
-    The Jacobian of a straight element is linear: its extremes are at the corners.
+    The Jacobian of a straight element in the plane is linear: its extremes are at the corners.
     """
     element, nodes = mesh.elem(), mesh.dofs.element_dofs
     points = [element.doflocs.T]
-    if len(nodes) > len(mesh.t):
+    if len(nodes) > len(mesh.t) or kind.dim == 3:
         points += [get_quadrature(element, order)[0] for order in {kind.order, kind.full_order}]
     slopes = [element.lbasis(np.hstack(points), i)[1] for i in range(len(nodes))]
     X = mesh.p[:, nodes] - mesh.p[:, None, nodes[0]]  # exact, also far from the origin
     J = np.einsum("ine,njq->ijeq", X, np.array(slopes), optimize=True)
+    if len(J) == 3:
+        return np.asarray(np.linalg.det(np.moveaxis(J, (0, 1), (-2, -1))))
     return np.asarray(J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0])
 
 
@@ -86,10 +95,11 @@ def _check_elements(mesh: Mesh, where: str, kind: ElementType) -> Array:
     sense = np.where(high >= -low, 1.0, -1.0)
     greatest = np.maximum(high, -low)
     corners = mesh.p[:, mesh.t]
-    sides = np.hypot(*(np.roll(corners, -1, axis=1) - corners))
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=0)
     height = _FOLDED * sides.min(axis=0) + _ROUNDING * np.abs(corners).max(axis=(0, 1))
-    for element in np.flatnonzero(greatest <= height * sides.max(axis=0))[:1]:
-        _refuse(f"element {element}", where, "is flat: its corners must not lie on one line")
+    for element in np.flatnonzero(greatest <= height * sides.max(axis=0) ** (kind.dim - 1))[:1]:
+        within = "on one line" if kind.dim == 2 else "in one plane"
+        _refuse(f"element {element}", where, f"is flat: its corners must not lie {within}")
     for element in np.flatnonzero(np.minimum(sense * low, sense * high) <= _FOLDED * greatest)[:1]:
         allowed = (
             f"is folded: its Jacobian goes from {low[element]:.3g} to {high[element]:.3g} and must "
@@ -184,7 +194,7 @@ def _hanging(mesh: Mesh, nodes: Ints, shortest: Array) -> Ints:
 
 
 def _check_connected(mesh: Mesh, where: str) -> None:
-    """Refuse a mesh of several parts, and parts that share only a node."""
+    """Refuse a mesh of several parts."""
     pairs, n = mesh.f2t[:, mesh.f2t[1] >= 0], mesh.nelements
     joined = coo_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(n, n))
     parts, part = connected_components(joined, directed=False)
@@ -196,6 +206,10 @@ def _check_connected(mesh: Mesh, where: str) -> None:
             "a body must be one piece: merge the nodes of its parts, or make them several bodies"
         )
         _refuse(f"element {np.argmax(part == sizes.argmin())}", where, allowed)
+
+
+def _check_hinges(mesh: Mesh, where: str) -> None:
+    """Refuse parts that share only a node."""
     edges = np.bincount(mesh.facets[:, mesh.boundary_facets()].ravel())
     for node in np.flatnonzero(edges > 2)[:1]:
         allowed = (

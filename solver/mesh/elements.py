@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from skfem import Element, ElementQuad1, ElementQuad2, ElementQuadS2, ElementTriP1, ElementTriP2
-from skfem.refdom import RefQuad, RefTri
+import skfem
+from skfem.refdom import RefHex, RefQuad, RefTet, RefTri
 
 from solver.errors import ModelError
 from solver.parts import load_own_parts
 
-_NODES = {"tri": (3, 6), "quad": (4, 8, 9)}
+_CELLS = {RefTri: "tri", RefQuad: "quad", RefTet: "tet", RefHex: "hex"}
+_NODES = {"tri": (3, 6), "quad": (4, 8, 9), "tet": (4, 10), "hex": (8, 20)}
 """Permitted numbers of nodes of an element: at corners, on sides, in the middle."""
 
 
@@ -23,13 +24,13 @@ class ElementType:
     Attributes
     ----------
     element : scalar scikit-fem element whose unknowns are values at its nodes: 3 or 6 of a
-        triangle, 4, 8 or 9 of a quadrilateral
+        triangle, 4, 8 or 9 of a quadrilateral, 4 or 10 of a tetrahedron, 8 or 20 of a hexahedron
     order : polynomial degree that the default integration integrates exactly
     full_order : the same of full integration
     mean_dilatation : whether the volumetric strain is averaged over the element (B-bar)
     """
 
-    element: Element
+    element: skfem.Element
     order: int
     full_order: int
     mean_dilatation: bool = False
@@ -37,8 +38,9 @@ class ElementType:
     def __post_init__(self) -> None:
         shape = self.element
         name = type(shape).__name__
-        if shape.refdom not in (RefQuad, RefTri):
-            raise ModelError("element", name, "must be of quadrilaterals or triangles")
+        if shape.refdom not in _CELLS:
+            allowed = "must be of triangles, quadrilaterals, tetrahedra or hexahedra"
+            raise ModelError("element", name, allowed)
         nodes = np.array(shape.doflocs, dtype=float).T
         counts = _NODES[self.cells]
         if nodes.shape[1] not in counts or shape.nodal_dofs != 1 or shape.facet_dofs > 1:
@@ -54,21 +56,28 @@ class ElementType:
 
     @property
     def cells(self) -> str:
-        """``quad`` or ``tri``."""
-        return "quad" if self.element.refdom is RefQuad else "tri"
+        """``tri``, ``quad``, ``tet`` or ``hex``."""
+        return _CELLS[self.element.refdom]
+
+    @property
+    def dim(self) -> int:
+        """Number of axes: 2 in the plane, 3 in space."""
+        return int(self.element.refdom.dim())
 
     @property
     def quadratic(self) -> bool:
         """Whether edges carry a midside node."""
-        return bool(self.element.facet_dofs)
+        return bool(self.element.edge_dofs if self.dim == 3 else self.element.facet_dofs)
 
 
 ELEMENTS: dict[str, ElementType] = {
-    "quad8": ElementType(element=ElementQuadS2(), order=3, full_order=5),
-    "quad9": ElementType(element=ElementQuad2(), order=5, full_order=5),
-    "quad4": ElementType(element=ElementQuad1(), order=3, full_order=3, mean_dilatation=True),
-    "tri6": ElementType(element=ElementTriP2(), order=2, full_order=4),
-    "tri3": ElementType(element=ElementTriP1(), order=1, full_order=1),
+    "quad8": ElementType(element=skfem.ElementQuadS2(), order=3, full_order=5),
+    "quad9": ElementType(element=skfem.ElementQuad2(), order=5, full_order=5),
+    "quad4": ElementType(element=skfem.ElementQuad1(), order=3, full_order=3, mean_dilatation=True),
+    "tri6": ElementType(element=skfem.ElementTriP2(), order=2, full_order=4),
+    "tri3": ElementType(element=skfem.ElementTriP1(), order=1, full_order=1),
+    "hex8": ElementType(element=skfem.ElementHex1(), order=3, full_order=3, mean_dilatation=True),
+    "tet10": ElementType(element=skfem.ElementTetP2(), order=2, full_order=4),
 }
 """The elements by name."""
 
@@ -87,10 +96,10 @@ def add_element(name: str, kind: ElementType) -> None:
         raise ModelError("element", name, "is the name of another element already")
 
 
-def known_elements() -> Mapping[str, ElementType]:
-    """Return the elements by name, including those of the user's own files."""
+def known_elements(dim: int | None = None) -> Mapping[str, ElementType]:
+    """Return the elements by name, also those of the user's own files; of ``dim`` axes, or all."""
     load_own_parts()
-    return ELEMENTS
+    return {name: kind for name, kind in ELEMENTS.items() if dim in (None, kind.dim)}
 
 
 def element_type(name: str) -> ElementType:

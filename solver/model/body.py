@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
@@ -17,8 +17,12 @@ from solver.mesh.elements import element_type
 from solver.mesh.rounding import with_zeros
 from solver.model.amplitude import Amplitude
 from solver.model.kinematics import KINEMATICS, Kinematics
-from solver.model.loads import Load, Pressure
+from solver.model.loads import Displacement, Load, Pressure
 from solver.model.motion import Axle, TravellingPressure
+from solver.tensors import AXES
+
+_HELD = {2: ("x", "y", "xy"), 3: ("x", "y", "z", "xy", "xz", "yz", "xyz")}
+"""Components that a support may hold, by number of axes."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,13 +32,17 @@ class Body:
     Attributes
     ----------
     name : unique in its model
-    mesh : scikit-fem mesh of quadrilaterals or triangles with named boundaries [mm]
+    mesh : scikit-fem mesh of quadrilaterals or triangles, or of bodies in space of hexahedra or
+        tetrahedra, with named boundaries [mm]
     material : material law, a `Material` or a law of your own (`solver.materials.Law`)
-    kinematics : ``plane_strain``, ``plane_stress`` or ``axisymmetric`` (x is the radius)
-    element : ``quad8`` (default), ``quad9``, ``quad4``, ``tri6``, ``tri3`` or one of your own
+    kinematics : ``plane_strain``, ``plane_stress`` or ``axisymmetric`` (x is the radius); left out
+        for bodies in space
+    element : ``quad8`` (default), ``quad9``, ``quad4``, ``tri6``, ``tri3``, in space ``hex8`` or
+        ``tet10``, or one of your own
     full_integration : integrate by the element's ``full_order``: ``quad8`` with 3x3 points, not 2x2
     thickness : thickness of plane bodies [mm]
-    supports : boundary name -> supported displacement components, ``x``, ``y`` or ``xy``
+    supports : boundary name -> supported displacement components, ``x``, ``y`` or ``xy``; in space
+        also with ``z``
     pressure : boundary name -> pressure at load factor one, positive when it pushes [MPa]
     amplitude : load factor of the pressures over time; when absent, time is the load factor
     loads : further loads, each with an amplitude of its own (`solver.model.loads`)
@@ -70,14 +78,16 @@ class Body:
         if not (np.isfinite(self.thickness) and self.thickness > 0):
             raise ModelError("thickness", self.thickness, "must be positive [mm]")
         element = element_type(self.element)
-        corners = 4 if element.cells == "quad" else 3
-        if self.mesh.t.shape[0] != corners:
+        shapes = element.element.refdom, self.mesh.elem.refdom
+        if shapes[0] is not shapes[1]:
+            needed, has = (f"{s.nnodes} corners" + " in space" * (s.dim() == 3) for s in shapes)
             raise ModelError(
-                "element", self.element, f"needs cells of {corners} corners; the mesh of body "
-                f"{self.name!r} has {self.mesh.t.shape[0]}; a mesh file with "
-                "triangles gives no others",
+                "element", self.element, f"needs cells with {needed}; the mesh of body "
+                f"{self.name!r} has {has}; a mesh file with triangles gives no others",
             )  # fmt: skip
         check_mesh(self.mesh, self.name, element)
+        if self.dim == 3:
+            self._check_solid()
         if self.kinematics == "axisymmetric" and self.mesh.p[0].min() < 0:
             object.__setattr__(self, "mesh", with_zeros(self.mesh))
             if self.mesh.p[0].min() < 0:
@@ -86,13 +96,18 @@ class Body:
             self.facets(boundary, "supports")
         for load in self.every_load:
             load.check(self.kinematics)
+            for axis in load.components.keys() - set(range(self.dim)):
+                name = ".".join((load.name, *load.boundaries, AXES[axis]))
+                raise ModelError(name, load.components[axis], "must be left out in a plane body")
             for boundary in load.boundaries:
                 self.facets(boundary, load.name, outer=load.outside)
             if load.removes:
                 self.region(load.removes, f"{load.name}.region")
         for boundary, held in self.supports.items():
-            if held not in ("x", "y", "xy"):
-                raise ModelError(f"supports.{boundary}", held, "must be x, y or xy")
+            if held not in _HELD[self.dim]:
+                *others, last = _HELD[self.dim]
+                allowed = f"must be {', '.join(others)} or {last}"
+                raise ModelError(f"supports.{boundary}", held, allowed)
         if self.axle is not None and not self.material.elastic:
             raise ModelError("axle", self.name, "a wheel must be elastic: leave out yield_stress")
         if self.travelling is not None:
@@ -105,6 +120,24 @@ class Body:
         for load in self.every_load if moved else ():
             allowed = "must not be given on a body with an axle or a travelling pressure"
             raise ModelError(load.name, load.boundaries, allowed)
+
+    @property
+    def dim(self) -> int:
+        """Number of axes: 2 of a plane or axisymmetric body, 3 of one in space."""
+        return element_type(self.element).dim
+
+    def _check_solid(self) -> None:
+        """Refuse what bodies in space have not yet: all but supports and displacements."""
+        plane = ("kinematics", "thickness", "pressure", "axle", "travelling", "periodic")
+        defaults = {each.name: each.default for each in fields(self)} | {"pressure": {}}
+        given = {name: getattr(self, name) for name in plane}
+        given |= {
+            load.name: load.boundaries for load in self.loads if not isinstance(load, Displacement)
+        }
+        for name, value in given.items():
+            if value != defaults.get(name):
+                allowed = f"must be left out: bodies of {self.element} do not have it yet"
+                raise ModelError(name, value, allowed)
 
     @cached_property
     def law(self) -> Law:

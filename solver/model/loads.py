@@ -24,6 +24,7 @@ from solver.model.amplitude import Amplitude
 from solver.model.kinematics import Kinematics
 from solver.parameters import Coordinate
 from solver.parts import Parts
+from solver.tensors import AXES
 from solver.typing import Array
 
 Field = Callable[[Array], Array]
@@ -105,7 +106,7 @@ class Load:
 
     @property
     def components(self) -> dict[int, float]:
-        """Prescribed displacements of its boundaries: component 0 (x) or 1 (y) -> [mm]."""
+        """Prescribed displacements of its boundaries: component 0 (x), 1 (y), 2 (z) -> [mm]."""
         return {}
 
     @property
@@ -264,16 +265,20 @@ class Centrifugal(Load):
 @LOADS.word("displacement")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Displacement(BoundaryLoad):
-    """A prescribed displacement of a boundary: ``x`` and ``y`` [mm]; None leaves it free."""
+    """A prescribed displacement of a boundary: ``x``, ``y`` and, of a body in space, ``z`` [mm].
+
+    None leaves it free.
+    """
 
     x: Coordinate | None = None
     y: Coordinate | None = None
+    z: Coordinate | None = None
     outside: ClassVar[bool] = False
 
     @property
     def components(self) -> dict[int, float]:
-        """The prescribed components: 0 (x) or 1 (y) -> displacement [mm]."""
-        given = enumerate((self.x, self.y))
+        """The prescribed components: 0 (x), 1 (y) or 2 (z) -> displacement [mm]."""
+        given = enumerate((self.x, self.y, self.z))
         return {axis: value for axis, value in given if value is not None}
 
     def check(self, kinematics: Kinematics) -> None:
@@ -282,7 +287,7 @@ class Displacement(BoundaryLoad):
         if not self.components:
             raise ModelError(f"displacement.{self.boundary}", None, "must give x, y or both [mm]")
         for axis, value in self.components.items():
-            _finite(f"displacement.{self.boundary}.{'xy'[axis]}", value, "mm")
+            _finite(f"displacement.{self.boundary}.{AXES[axis]}", value, "mm")
 
 
 @LOADS.word("temperature")

@@ -40,6 +40,7 @@ class Model:
         names = [body.name for body in self.bodies] + [body.name for body in self.rigid]
         if not self.bodies or len(set(names)) < len(names):
             raise ModelError("bodies", names, "must be at least one, with different names")
+        self._check_solids()
         kinds = {body.kinematics for body in self.bodies}
         if len(kinds) > 1:
             raise ModelError("bodies.kinematics", sorted(kinds), "must be the same for all bodies")
@@ -63,6 +64,17 @@ class Model:
             if not body.surfaces and all(link.rigid != body.name for link in self.links):
                 allowed = "must be 1 or more, unless a link moves a boundary with the body"
                 raise ModelError(f"rigid.{body.name}.surfaces", {}, allowed)
+
+    def _check_solids(self) -> None:
+        """Refuse what models of bodies in space have not yet: contact, links, rigid bodies."""
+        kinds = {body.element for body in self.bodies if body.dim == 3}
+        for name in ("rigid", "contacts", "links", "singular") if kinds else ():
+            if len(getattr(self, name)):
+                allowed = f"must be left out: bodies of {min(kinds)} do not have it yet"
+                raise ModelError(name, len(getattr(self, name)), allowed)
+        if kinds and any(body.dim == 2 for body in self.bodies):
+            every = [body.element for body in self.bodies]
+            raise ModelError("bodies.element", every, "must be all in the plane or all in space")
 
     def _check_link(self, name: str, link: Link) -> None:
         """Refuse bodies that a link cannot join, and surfaces that something else holds too."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from solver.contact.state import Converged
 from solver.contact.system import System
+from solver.fem.dofs import vectors
 from solver.fem.frame import RigidMotion
 from solver.fem.rigid import RigidPart
 from solver.results.quantities import Quantity
@@ -24,15 +25,16 @@ class Observed:
     time : time of the program; the load factor if loads have no amplitude
     motions : motion of each rigid body
     reactions : forces x, y [N] and moment [N mm] by body. On a body with a mesh: the forces of
-        supports and prescribed displacements, moment NaN. On a rigid body: all forces except
-        contact, both given ones and those that its motion needs, and their moment about its centre
+        supports and prescribed displacements, in space also z, moment NaN. On a rigid body: all
+        forces except contact, both given ones and those that its motion needs, and their moment
+        about its centre
     contact : sums of normal and of tangential forces on the slave of each pair [N]
     watched : numbers that outputs watch, over the dimension ``increment``
     """
 
     time: float
     motions: Mapping[str, RigidMotion]
-    reactions: Mapping[str, tuple[float, float, float]]
+    reactions: Mapping[str, tuple[float, ...]]
     contact: Sequence[tuple[float, float]]
     watched: Mapping[Quantity, float] = field(default_factory=dict)
 
@@ -51,9 +53,10 @@ def observe(system: System, converged: Converged) -> Observed:
             reactions[name] = (float(x), float(y), float(turning) * part.frame.radius)
         elif part.body.axle is None:  # type: ignore[union-attr]
             # by equilibrium, also for a condensed body, whose supported nodes are eliminated
-            loads = system.full(name).external(state.time).reshape(-1, 2).sum(axis=0)
-            x, y = -loads - touch.reshape(-1, 2).sum(axis=0)
-            reactions[name] = (float(x), float(y), np.nan)
+            whole = system.full(name)
+            loads = vectors(whole.external(state.time), whole.dim).sum(axis=1)
+            held = -loads - vectors(touch, whole.dim).sum(axis=1)
+            reactions[name] = (*held.tolist(), np.nan)
     pairs = [(float(c.normal.sum()), float(c.tangential.sum())) for c in state.contacts]
     return Observed(state.time, motions, reactions, pairs)
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from solver.fem.dofs import Dofs, vectors
 from solver.mesh.rounding import ROUNDED
 from solver.parameters import Length, check, described
 from solver.results.contact_result import contact_patches
@@ -89,21 +90,21 @@ class Indentation:
         body = run.system.full(name)
         nodes = body.boundary_nodes(run.view.surfaces[name])
         nodes = nodes[np.argsort(body.X[0, nodes])]
-        u = run.system.displacement(name, converged.state)[2 * nodes + 1]
+        u = run.system.displacement(name, converged.state)[Dofs(nodes, 2).along(1)]
         centre = self._approach(run.system, converged) if name == self.body else 0.0
         return np.asarray(np.interp(run.view.s, body.X[0, nodes], u) - centre)
 
     def _force(self, system: Any, converged: Any) -> float:
         """Return the force of the contact on the ball along its axis [N]."""
         forces = converged.contact_forces[system.all_names.index(self.body)]
-        return abs(float(forces.reshape(-1, 2)[:, 1].sum()))
+        return abs(float(vectors(forces, 2)[1].sum()))
 
     def _approach(self, system: Bodies, converged: Solved) -> float:
         """Return the displacement of the ball's centre towards the other body [mm]."""
         X = system.full(self.body).X
         axis = np.flatnonzero(np.abs(X[0]) <= ROUNDED * self.radius)
         axis = axis[np.argsort(X[1, axis])]
-        moved = system.displacement(self.body, converged.state)[2 * axis + 1]
+        moved = system.displacement(self.body, converged.state)[Dofs(axis, 2).along(1)]
         y = X[1, axis]
         centre = self.radius if y.max() > 0 else -self.radius
         return float(-np.sign(centre) * np.interp(centre, y, moved))

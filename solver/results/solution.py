@@ -17,6 +17,7 @@ from solver.audit.report import Audit, audit
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.errors import ModelError
+from solver.fem.dofs import vectors
 from solver.fem.frame import RigidMotion
 from solver.kinds import require
 from solver.loading.control import Control, PathControl
@@ -93,12 +94,13 @@ class Solution:
         return self._fields.at_nodes(self._at(stage), self._known(body))
 
     def nodes(self, body: str) -> Array:
-        """Return node positions (2, n_nodes) of a body [mm]."""
+        """Return node positions (dim, n_nodes) of a body [mm]."""
         return self.system.full(self._known(body)).X
 
     def displacement(self, body: str, stage: str = "unloaded") -> Array:
-        """Return nodal displacements (2, n_nodes) [mm]."""
-        return self.system.displacement(self._known(body), self._at(stage).state).reshape(-1, 2).T
+        """Return nodal displacements (dim, n_nodes) [mm]."""
+        u = self.system.displacement(self._known(body), self._at(stage).state)
+        return vectors(u, self.system.full(body).dim)
 
     def stress(self, body: str, stage: str = "unloaded") -> Array:
         """Return recovered nodal stress (4, n_nodes), components xx, yy, zz, xy [MPa].
@@ -119,7 +121,8 @@ class Solution:
         x = system.positions(body)
         loads = system.model.body(body).every_load
         fields = (load.initial_stress(x) for load in loads)
-        given = sum((each for each in fields if each is not None), np.zeros((4, x.shape[1])))
+        none = np.zeros((system.full(body).components, x.shape[1]))
+        given = sum((each for each in fields if each is not None), none)
         return x, given, to_tensor(system.response(body, rest).stress)
 
     def plastic_strain(self, body: str, stage: str = "unloaded") -> Array:
@@ -146,10 +149,10 @@ class Solution:
         ``plastic_strain`` (n,), its equivalent. Raises `ModelError` for an unknown body or
         stage, or places of another shape.
         """
-        X = np.asarray(places, dtype=float)
-        if X.ndim != 2 or len(X) != 2:
-            raise ModelError("places", X.shape, "must be positions (2, n) [mm]")
-        (found,) = self._fields.at_places(Places(self._known(body), X), [self._at(stage)])
+        X, dim = np.asarray(places, dtype=float), self.system.full(self._known(body)).dim
+        if X.ndim != 2 or len(X) != dim:
+            raise ModelError("places", X.shape, f"must be positions ({dim}, n) [mm]")
+        (found,) = self._fields.at_places(Places(body, X), [self._at(stage)])
         return found._asdict()
 
     def contact(self, pair: int = 0, stage: str = "loaded") -> ContactResult:
@@ -171,7 +174,8 @@ class Solution:
 
     def reaction(self, body: str, stage: str = "loaded") -> tuple[float, float, float]:
         """Return the forces x, y [N] and moment [N mm] on a rigid body, without contact."""
-        return self._observed(body, stage).reactions[body]
+        x, y, moment = self._observed(body, stage).reactions[body]
+        return x, y, moment
 
     def _observed(self, body: str, stage: str) -> Observed:
         known = [rigid.name for rigid in self.system.model.rigid]

@@ -457,7 +457,7 @@ def _given_mesh(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) 
     from solver.mesh.elements import known_elements
 
     if table.mesh is None:
-        kind = known_elements().get(table.element or "")  # `Body` refuses an unknown element
+        kind = known_elements(2).get(table.element or "")  # `Body` refuses any other
         return mesh_of(table.shape, kind.cells if kind else "quad")
     if meshes is None:
         raise ModelError("mesh", table.mesh, "is not at hand: read the scene from its file")

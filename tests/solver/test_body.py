@@ -8,7 +8,7 @@ import pytest
 from solver import Body, ContactPair, Material, Model, ModelError, solve
 from solver.fem.discretisation import Discretisation
 from solver.mesh import graded, grid, mapped
-from solver.mesh.elements import ELEMENTS
+from solver.mesh.elements import known_elements
 from solver.tensors import SQRT2
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
@@ -28,7 +28,7 @@ LEFT = grid(np.arange(-1.0, 2.0), np.arange(3.0))
 """A square across the axis."""
 
 
-@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("element", known_elements(2))
 def test_pressure_has_its_resultant(element):
     """100 MPa on a top 2 long and 3 thick pushes down with 600 N."""
     load = Discretisation(square(element, pressure={"top": 100.0}, thickness=3.0)).external(1.0)
@@ -36,7 +36,7 @@ def test_pressure_has_its_resultant(element):
     assert load[0::2].sum() == pytest.approx(0.0, abs=1e-10)
 
 
-@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("element", known_elements(2))
 def test_axisymmetric_pressure_acts_on_the_whole_disc(element):
     load = Discretisation(
         square(element, pressure={"top": 100.0}, kinematics="axisymmetric")
@@ -44,7 +44,7 @@ def test_axisymmetric_pressure_acts_on_the_whole_disc(element):
     assert load[1::2].sum() == pytest.approx(-100.0 * np.pi * 4.0)
 
 
-@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("element", known_elements(2))
 @pytest.mark.parametrize("state", STATES)
 def test_rigid_motions_strain_nothing(element, state):
     part = Discretisation(square(element, kinematics=state))
@@ -53,7 +53,7 @@ def test_rigid_motions_strain_nothing(element, state):
         assert np.abs(part.strain(motion)).max() < 1e-13
 
 
-@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("element", known_elements(2))
 @pytest.mark.parametrize("state", STATES)
 def test_linear_displacements_have_uniform_strain(element, state):
     part = Discretisation(square(element, kinematics=state))
@@ -66,7 +66,7 @@ def test_linear_displacements_have_uniform_strain(element, state):
     assert strain == pytest.approx(np.tile(expected[:, None], strain.shape[1]), abs=1e-14)
 
 
-@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("element", known_elements(2))
 @pytest.mark.parametrize("state", STATES)
 def test_internal_forces_do_the_work_of_the_stress(element, state):
     """Virtual work: f . u = integral of stress : strain, for any u and any stress."""
@@ -74,10 +74,10 @@ def test_internal_forces_do_the_work_of_the_stress(element, state):
     rng = np.random.default_rng(4)
     u, stress = rng.standard_normal(part.n), rng.standard_normal((4, part.weights.size))
     work = (stress * part.strain(u)).sum(axis=0) @ part.weights.ravel()
-    assert part.internal_force(stress) @ u == pytest.approx(work, rel=1e-12)
+    assert part.undeformed.internal_force(stress) @ u == pytest.approx(work, rel=1e-12)
 
 
-@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("element", known_elements(2))
 def test_weights_sum_to_the_volume(element):
     assert Discretisation(square(element, thickness=2.5)).weights.sum() == pytest.approx(10.0)
 
@@ -95,7 +95,7 @@ def test_tangent_is_the_derivative_of_the_internal_force(element, state):
     rng = np.random.default_rng(6)
     u = 4e-3 * rng.standard_normal(part.n)
     response = part.respond(u, part.virgin(), 0.0)
-    assert response.yielding.mean() > 0.5
+    assert response.law.yielding.mean() > 0.5
     K = part.pattern.copy()
     K.data = part.tangent_data(response)
     full = (K + K.T).toarray() - np.diag(K.diagonal())
@@ -103,7 +103,7 @@ def test_tangent_is_the_derivative_of_the_internal_force(element, state):
     step[part.active] = rng.standard_normal(len(part.active))
     h = 1e-9
     forces = [
-        part.internal_force(part.respond(u + s * step, part.virgin(), 0.0).stress)[part.active]
+        -part.residual(0.0, u, part.respond(u + s * step, part.virgin(), 0.0))[part.active]
         for s in (h, -h)
     ]
     difference = (forces[0] - forces[1]) / (2 * h)
@@ -177,7 +177,7 @@ def test_mapped_meshes_keep_names_and_follow_the_curve():
     ("fields", "message"),
     [
         ({"kinematics": "plain"}, "kinematics = 'plain': must be one of plane_strain"),
-        ({"element": "hex8"}, "element = 'hex8': must be one of quad8"),
+        ({"element": "hex9"}, "element = 'hex9': must be one of quad8"),
         ({"element": "tri6", "mesh": grid(np.arange(3.0), np.arange(3.0))}, "corners"),
         ({"thickness": 0.0}, "thickness = 0.0: must be positive"),
         ({"thickness": np.nan}, "thickness = nan: must be positive"),

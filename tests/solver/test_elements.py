@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from skfem import (
     Element,
-    ElementHex1,
+    ElementLineP1,
     ElementQuadS2,
     ElementTriCR,
     ElementTriP1B,
@@ -26,13 +26,15 @@ def test_cells_and_sides_are_those_of_the_shape_functions() -> None:
         "quad4": ("quad", False),
         "tri6": ("tri", True),
         "tri3": ("tri", False),
+        "hex8": ("hex", False),
+        "tet10": ("tet", True),
     }
 
 
 @pytest.mark.parametrize(
     ("element", "allowed"),
     [
-        (ElementHex1(), "must be of quadrilaterals or triangles"),
+        (ElementLineP1(), "must be of triangles, quadrilaterals, tetrahedra or hexahedra"),
         (ElementTriP3(), "must have 3 or 6 nodes"),
         (ElementTriP1B(), "must have 3 or 6 nodes"),
         (ElementTriCR(), "must have 3 or 6 nodes"),

@@ -10,7 +10,7 @@ from solver.fem.discretisation import Discretisation
 from solver.fem.error import ErrorPoints, error_estimate
 from solver.fem.fields import Sampler, recovery
 from solver.mesh import graded, grid, mapped
-from solver.mesh.elements import ELEMENTS
+from solver.mesh.elements import known_elements
 from solver.tensors import SQRT2, to_tensor, von_mises
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
@@ -24,7 +24,7 @@ def square(element="quad8", n=5, curved=False, **fields):
     return Discretisation(Body(name="square", mesh=mesh, material=STEEL, element=element, **fields))
 
 
-@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("element", known_elements(2))
 def test_recovery_keeps_a_uniform_stress(element):
     part = square(element)
     assert recovery(part) @ np.ones(part.weights.size) == pytest.approx(np.ones(part.X.shape[1]))

@@ -165,7 +165,7 @@ def reaction(solution: Solution, body: str, boundary: str, stage: str = "loaded"
     """Return the upward force on a boundary that stress in the body balances [N]."""
     whole = solution.system.full(body)
     response = solution.system.response(body, getattr(solution, stage))
-    force = whole.internal_force(response.stress)
+    force = whole.undeformed.internal_force(response.stress)
     return float(force[2 * whole.boundary_nodes(boundary) + 1].sum())
 
 

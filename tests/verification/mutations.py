@@ -20,6 +20,7 @@ from solver.contact import candidates, complementarity
 from solver.contact.problem import OPEN, STICK, ContactSolution
 from solver.contact.system import System
 from solver.fem import kinematics, substructure
+from solver.fem.deformation import PartResponse, SmallStrain
 from solver.fem.discretisation import Discretisation
 from solver.fem.wheel import Wheel
 from solver.loading.control import Tolerances
@@ -161,7 +162,8 @@ def other_material(**changes: float) -> Fault:
         material = self.body.material
         fields = {name: factor * getattr(material, name) for name, factor in changes.items()}
         other = replace(self.body, material=replace(material, **fields))
-        return other.law.respond(self.strain(u), state)
+        deformation = self.kinematics.at(u)
+        return PartResponse(other.law.respond(deformation.strain, state), deformation)
 
     def fault(patch: Patch) -> None:
         patch.setattr(Discretisation, "respond", with_other)
@@ -174,8 +176,10 @@ def more_flow(patch: Patch) -> None:
 
     def flowing(self: Any, u: Any, state: Any, time: float) -> Any:
         found = respond(self, u, state, time)
-        plastic = state.plastic_strain + 1.3 * (found.state.plastic_strain - state.plastic_strain)
-        return found._replace(state=PlasticState(plastic, found.state.accumulated))
+        after = found.law.state
+        plastic = state.plastic_strain + 1.3 * (after.plastic_strain - state.plastic_strain)
+        flown = PlasticState(plastic, after.accumulated)
+        return found._replace(law=found.law._replace(state=flown))
 
     patch.setattr(Discretisation, "respond", flowing)
 
@@ -212,6 +216,7 @@ def heavier_points(patch: Patch) -> None:
     def heavier(self: Any, body: Any) -> None:
         build(self, body)
         self.weights = 1.1 * self.weights
+        self.kinematics = SmallStrain(replace(self.undeformed, weights=self.weights))
 
     patch.setattr(Discretisation, "__init__", heavier)
 

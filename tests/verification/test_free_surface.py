@@ -39,7 +39,7 @@ def bent(element, state, turned):
     x, y = turn.T @ part.X
     u = np.stack([k * x * (y + y0), -k * x**2 / 2 - m * k * (y**2 / 2 + y0 * y)])
     u = (turn @ u).T.ravel()
-    return part, u, part.respond(u, part.virgin(), 0.0).stress
+    return part, u, part.respond(u, part.virgin(), 0.0).law.stress
 
 
 @pytest.mark.parametrize("element", ["quad8", "quad9", "tri6"])
@@ -93,8 +93,8 @@ def strained_layer(thickness, n):
     plastic = np.stack([2e-3 * np.exp(y), -3e-3 * np.exp(y), 1e-3 * np.exp(y), 0.0 * y])
     stiffness = part.elastic_matrix()[part.active][:, part.active]
     u = np.zeros(part.n)
-    stress = part.respond(u, replace(part.virgin(), plastic_strain=plastic), 0.0).stress
-    force = -part.internal_force(stress)[part.active]
+    stress = part.respond(u, replace(part.virgin(), plastic_strain=plastic), 0.0).law.stress
+    force = -part.undeformed.internal_force(stress)[part.active]
     u[part.active] = np.linalg.solve(stiffness.toarray(), force)
     return part, u, plastic
 

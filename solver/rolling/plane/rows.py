@@ -132,7 +132,7 @@ class FlowRows:
         part = self.part
         n_points = part.weights.shape[1]
         element, point = np.divmod(points.ravel(), n_points)
-        B = part.B[element, point]
+        B = part.undeformed.B[element, point]
         columns = np.broadcast_to(part.dofs[element][:, None, :], B.shape)
         indptr = np.arange(0, B.size + 1, B.shape[2])
         return sparse.csr_array(

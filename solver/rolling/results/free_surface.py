@@ -40,6 +40,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.fem.discretisation import Discretisation
+from solver.fem.dofs import vectors
 from solver.fem.surface import edges_of
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.tensors import SQRT2
@@ -110,7 +111,7 @@ class FreeSurface:
 
     def strain(self, u: Array) -> Array:
         """Return components t and z (2, n) of strain at the surface for displacements [mm]."""
-        nodal = u.reshape(-1, 2)[self.nodes]
+        nodal = vectors(u, 2).T[self.nodes]
         along = np.einsum("nic,ni,cn->n", nodal, self.dN, self.tangent)
         if self.part.body.kinematics != "axisymmetric":
             return np.stack([along, np.zeros_like(along)])

@@ -167,7 +167,7 @@ def _balance(passed: Passed, own: RollingParameters) -> dict[str, float]:
     run = passed.run
     part = run.system.full("half_space")
     stress = run.loaded.response.stress[:, : part.weights.size]
-    left = part.internal_force(stress).reshape(-1, 2)
+    left = part.undeformed.internal_force(stress).reshape(-1, 2)
     held = np.ones(part.n, dtype=bool)
     held[part.free] = False
     top = np.zeros(len(left), dtype=bool)

@@ -192,7 +192,7 @@ def _wheel(rolled: Rolled) -> dict[str, Figure]:
     system = rolled.system
     track = system.full("half_space")
     nodes = track.boundary_nodes("top")
-    left = track.internal_force(system.response("half_space", loaded).stress)
+    left = track.undeformed.internal_force(system.response("half_space", loaded).stress)
     force = left.reshape(-1, 2)[nodes].T
     u = system.displacement("half_space", loaded.state).reshape(-1, 2)[nodes].T
     hub = np.array([0.0, p.radius]) + loaded.state.u[0][-3:-1]

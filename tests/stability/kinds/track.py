@@ -110,7 +110,7 @@ def _forces(stepped: Stepped, converged: Converged) -> tuple[np.ndarray, float]:
     """Return the force (2,) that stress leaves at the surface, and the largest below it [N]."""
     part = stepped.run.system.full("half_space")
     stress = stepped.run.system.response("half_space", converged).stress
-    force = part.internal_force(stress).reshape(-1, 2)
+    force = part.undeformed.internal_force(stress).reshape(-1, 2)
     x, y = part.X
     edge = 1e-9 * float(np.ptp(x))
     if part.body.periodic is not None:  # both sides are one

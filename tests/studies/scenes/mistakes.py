@@ -133,7 +133,7 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
     ),
     "unknown word": (put("kinematics", "flat"), "kinematics", "'plane_strain'"),
     "unknown element": (
-        put("bodies", "upper", "element", "hex8"),
+        put("bodies", "upper", "element", "hex9"),
         "bodies.upper.element",
         "must be one of quad8",
     ),

@@ -1,0 +1,120 @@
+"""The strain of a body at its displacements, and what it makes of stress.
+
+With the Mandel strain E at the points, its derivative B by displacements and the volume w of the
+points, a stress S has the nodal forces ``sum w B' S``. Their derivative is ``sum w B' D B``, with
+the tangent D of the law, and a geometric term, the derivative of B under S. Small strain has a
+constant B and no such term.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from solver.materials.state import Response
+from solver.typing import Array, Bools, Ints
+
+Some = Ints | slice
+"""Numbers of elements, or a slice of all."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Deformation:
+    """A body at its displacements.
+
+    Attributes
+    ----------
+    n : number of unknowns
+    dofs : (n_elements, m) unknowns of the elements
+    strain : (n_components, n_points) Mandel strain
+    B : (n_elements, n_points, n_components, m) its derivative by the unknowns [1/mm]
+    weights : (n_elements, n_points) volume of the points [mm3]
+    geometric : (stress (n_components, n_points) [MPa], elements) -> geometric stiffness (k, m, m)
+        of some elements [N/mm]; None if there is none
+    linear : whether the strain of the points (n_points,) is linear in all displacements
+    """
+
+    n: int
+    dofs: Ints
+    strain: Array
+    B: Array
+    weights: Array
+    geometric: Callable[[Array, Some], Array] | None = None
+    linear: Bools | bool = True
+
+    @property
+    def _flat(self) -> Array:
+        return self.B.reshape(len(self.B), -1, self.B.shape[-1])
+
+    def change(self, step: Array) -> Array:
+        """Return the change of strain (n_components, n_points) of a small displacement (n,)."""
+        flat = np.matmul(self._flat, step[self.dofs][:, :, None])
+        return np.asarray(flat.reshape(-1, self.B.shape[2]).T)
+
+    def internal_force(self, stress: Array) -> Array:
+        """Return nodal forces (n,) that balance ``stress`` (n_components, n_points) [N]."""
+        weighted = (stress * self.weights.ravel()).T.reshape(len(self.B), 1, -1)
+        forces = np.matmul(weighted, self._flat)[:, 0]
+        nodal = np.bincount(self.dofs.ravel(), weights=forces.ravel(), minlength=self.n)
+        return np.asarray(nodal, dtype=float)
+
+    def stiffness(self, elements: Some, tangent: Array, stress: Array | None = None) -> Array:
+        """Return the stiffness (k, m, m) of some elements [N/mm].
+
+        Parameters
+        ----------
+        tangent : (k or 1, n_points_of_one or 1, n_components, n_components) [MPa]
+        stress : (n_components, n_points) [MPa]; without it there is no geometric term
+        """
+        B = self.B[elements]
+        DB = np.matmul(tangent, B) * self.weights[elements][:, :, None, None]
+        flat = B.reshape(len(B), -1, B.shape[-1])
+        stiffness = np.matmul(flat.swapaxes(1, 2), DB.reshape(flat.shape))
+        if self.geometric is None or stress is None:
+            return stiffness
+        return np.asarray(stiffness + self.geometric(stress, elements))
+
+
+class Kinematics(Protocol):
+    """How strain follows from displacements."""
+
+    @property
+    def undeformed(self) -> Deformation:
+        """The body before loading."""
+
+    def at(self, u: Array) -> Deformation:
+        """Return the body at displacements (n,) [mm]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SmallStrain:
+    """Strain that is linear in displacements."""
+
+    undeformed: Deformation
+
+    def at(self, u: Array) -> Deformation:
+        """Return the body at displacements (n,) [mm]: its strain alone differs."""
+        return replace(self.undeformed, strain=self.undeformed.change(u))
+
+
+class PartResponse(NamedTuple):
+    """The response of the law of a part to its strain, and the part at its displacements."""
+
+    law: Response
+    deformation: Deformation
+
+    @property
+    def linear(self) -> Bools:
+        """Whether the stiffness of the points (n_points,) is elastic, as before loading."""
+        return ~self.law.yielding & self.deformation.linear
+
+
+def without_points(n: int, law: Response) -> PartResponse:
+    """Return the response of a part without points, of its law to no strain."""
+    dofs, strain = np.zeros((0, 0), dtype=np.int64), law.stress
+    nothing = np.zeros((0, 0, len(strain), 0))
+    at = Deformation(n=n, dofs=dofs, strain=strain, B=nothing, weights=np.zeros((0, 0)))
+    return PartResponse(law, at)
