@@ -9,10 +9,9 @@ import numpy as np
 
 from solver.materials.curves import Curve
 from solver.materials.elasticity import Elasticity
-from solver.materials.principal import PAIRS, dyad, principal
 from solver.materials.scalar import falling_root
 from solver.materials.state import PlasticState, Response
-from solver.tensors import von_mises
+from solver.tensors import PAIRS, dyad, principal, von_mises
 from solver.typing import Array
 
 _ALIKE = 1e-10

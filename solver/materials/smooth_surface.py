@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.errors import ModelError
-from solver.materials.principal import dyad, principal
 from solver.materials.scalar import falling_root
 from solver.materials.yield_surface import Tension
+from solver.tensors import dyad, principal
 from solver.typing import Array
 
 SIXTH = math.pi / 3

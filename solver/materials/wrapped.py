@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from solver.materials.attribute import attribute
-from solver.materials.law import Law
+from solver.materials.law import Law, attribute
 from solver.materials.state import PlasticState
 from solver.typing import Array
 

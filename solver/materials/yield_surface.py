@@ -8,8 +8,7 @@ from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
 
-from solver.materials.principal import PAIRS, dyad, principal
-from solver.tensors import deviator, von_mises
+from solver.tensors import PAIRS, deviator, dyad, principal, von_mises
 from solver.typing import Array
 
 Tension = TypeVar("Tension", float, Array)
