@@ -28,6 +28,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from solver.materials.elasticity import Elasticity
+from solver.materials.radial_return import LinearHardening
 from solver.materials.state import PlasticState, Response
 from solver.materials.yield_surface import VonMises, YieldSurface
 from solver.typing import Array, Ints
@@ -83,6 +84,14 @@ class Law(ABC):
         """Return the centre of the yield surface (n_components, n_points), Mandel [MPa]."""
         return np.zeros_like(state.plastic_strain)
 
+    @attribute
+    def linear_hardening(self) -> LinearHardening | None:
+        """Its hardening, if it is von Mises' law with linear hardening; None otherwise.
+
+        Its responses then have closed forms, and its flow along rows is compiled.
+        """
+        return None
+
     # -- response ------------------------------------------------------------------------------
 
     def initial(self, n_points: int, n_components: int) -> PlasticState:
@@ -102,10 +111,6 @@ class Law(ABC):
     def stiffness(self, n_components: int) -> Array:
         """Return the elastic stiffness (n_components, n_components) on Mandel strain [MPa]."""
         return self.elasticity.stiffness(n_components)
-
-    def in_plane_stress(self) -> Law | None:
-        """Return a special form of this law for plane stress; None means `PlaneStress`."""
-        return None
 
     def elastic_strain(self, stress: Array) -> Array:
         """Return the elastic Mandel strain (n_components, n_points) of a stress, all components."""

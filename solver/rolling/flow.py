@@ -8,7 +8,6 @@ from typing import Protocol
 import numpy as np
 
 from solver.materials.law import Law
-from solver.materials.material import Material
 from solver.materials.state import PlasticState
 from solver.rolling.layers import Layers
 from solver.rolling.plane.rows import FlowRows
@@ -72,11 +71,11 @@ def allowed_inflow(law: Law, most_added: float) -> float:
 
 def usual_parts(law: Law) -> int:
     """Return the usual number of increments between two points of a row."""
-    return _COMPILED if isinstance(law, Material) else _STEPPED
+    return _COMPILED if law.linear_hardening else _STEPPED
 
 
 def sweep_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Sweep:
-    """Return the sweep of material along rows; `Material` uses compiled code.
+    """Return the sweep of material along rows; linear hardening uses compiled code.
 
     Parameters
     ----------
@@ -85,15 +84,15 @@ def sweep_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Sweep:
     start : internal variables (..., n_rows) before the pass
     parts : number of equal increments of strain from one column to the next
     """
-    if isinstance(law, Material):
-        return CompiledSweep(law, strain, start, parts)
+    if law.linear_hardening:
+        return CompiledSweep(law.elasticity, law.linear_hardening, strain, start, parts)
     return SteppedSweep(law, strain, start, parts)
 
 
 def flow_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Flow:
     """Return the sweep and the residual state behind it; for arguments see `sweep_of`, n is 4."""
-    if isinstance(law, Material):
-        return CompiledFlow(law, strain, start, parts)
+    if law.linear_hardening:
+        return CompiledFlow(law.elasticity, law.linear_hardening, strain, start, parts)
     return SteppedFlow(law, strain, start, parts)
 
 
