@@ -22,10 +22,10 @@ window is; a ratio of 5 % changes stress by 1 % of the yield stress."""
 LEAST = 0.05
 """Ratio of the plastic strain of a pass to the yield strain; below it `INFLOW` refers to this
 level. The deepest row may have `INFLOW` times this level."""
-_COMPILED, _STEPPED = 16, 4
-"""Number of increments between two points of a row: the error is of first order in their length.
-Four cost a third of sixteen, and change stress by 1 MPa in 500 at a spacing of points of 1/16 of
-the half-width."""
+PARTS = 16
+"""Number of increments between two points of a row, for every law: the error is of first order in
+their length. Under a braked wheel at draft accuracy residual stress is wrong by 2 MPa in 500, and
+by 8 to 9 MPa with four."""
 
 
 class Sweep(Protocol):
@@ -67,11 +67,6 @@ class Flow(Sweep, Protocol):
 def allowed_inflow(law: Law, most_added: float) -> float:
     """Return the plastic strain that points at the edge of a window may add; see `INFLOW`."""
     return INFLOW * max(LEAST * law.yield_stress / law.elasticity.youngs_modulus, most_added)
-
-
-def usual_parts(law: Law) -> int:
-    """Return the usual number of increments between two points of a row."""
-    return _COMPILED if law.linear_hardening else _STEPPED
 
 
 def sweep_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Sweep:

@@ -150,9 +150,8 @@ def test_so_are_those_of_a_wheel(monkeypatch):
 def test_a_back_stress_without_recall_is_kinematic_hardening():
     # a second one, of no size, keeps the law from the closed form
     prager, kinematic = chaboche((MODULUS, 0.0), (0.0, 1.0)), linear("kinematic")
-    for one, other in zip(
-        *(passes(law, [1, -1], parts=4) for law in (prager, kinematic)), strict=True
-    ):
+    # every law takes the same number of increments
+    for one, other in zip(*(passes(law, [1, -1]) for law in (prager, kinematic)), strict=True):
         for left, own in ((one.left, other.left), (one.left.top, other.left.top)):
             np.testing.assert_allclose(left.plastic_strain, own.plastic_strain, atol=1e-9)
             back = 2 / 3 * MODULUS * own.plastic_strain.T
