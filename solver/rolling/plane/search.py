@@ -79,9 +79,8 @@ def search(
             tolerance=_TOLERANCE, budget=budget,
         )  # fmt: skip
 
-    own = 0.0
-    if isinstance(material, Material) and material.hardens:
-        own = material.hardening_ratio
+    linear, E = material.linear_hardening, material.elasticity.youngs_modulus
+    own = linear.modulus / (E + linear.modulus) if linear else 0.0
     largest = np.inf if material.hardens else _LARGE
     found = _tried(exactly, load, guess)
     if isinstance(found, NoContact):  # contact on the elastic track differs from the final one
