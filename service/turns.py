@@ -1,6 +1,6 @@
 """Turns: what is read and computed for answers, fairly among callers, with limits.
 
-A caller has one call at a time, whatever it asks for, and the callers take turns: one who asks a
+A caller has one call at a time in each queue, and the callers take turns: one who asks a
 hundred times waits for its own calls, and others wait for one of them. Each has a budget of
 processor time.
 
@@ -37,7 +37,7 @@ from solver.files import read_file
 from studies import StudyError
 
 READING, COMPUTING, COMBINING = 2, 2, 1
-"""Number of calls at a time: answers wait for none of the data sets that are combined meanwhile."""
+"""Slots of each queue. Combining has its own, so that no other answer waits for it."""
 
 FILES = Lock()
 """Held while a file is read: the netCDF library ends the process if two threads do it."""
@@ -102,44 +102,54 @@ class Turns:
         """Time at which the budget of a caller is whole again [s]."""
 
     @asynccontextmanager
-    async def turn(self, caller: str, patient: bool = False) -> AsyncIterator[Turn]:
+    async def turn(
+        self, caller: str, patient: bool = False, begun: bool = False
+    ) -> AsyncIterator[Turn]:
         """Give a caller its turn: those who wait are served in order, one call of each.
 
         What it takes is charged to the caller.
 
         Parameters
         ----------
-        patient : wait for the budget, and do not refuse: the answer has begun, or is part of one
+        patient : wait for the budget, and do not refuse
+        begun : the answer has begun: do not refuse either if many calls wait
 
         Raises
         ------
         TooMany
             if too many calls of the caller wait, or its budget is used
         """
-        while True:
-            try:
-                self.remaining(caller)
-                break
-            except TooMany as error:
-                if not patient:
-                    raise
-                await asyncio.sleep(error.seconds)
-        if self.seconds is not None and self.waiting[caller] >= WAITING and not patient:
+        if not patient:
+            self.remaining(caller)
+        if self.seconds is not None and self.waiting[caller] >= WAITING and not begun:
             raise TooMany(f"{WAITING} of your requests wait already: ask later")
         self.waiting[caller] += 1
         own = asyncio.Lock()
         if self.seconds is not None:
             own = self.own.setdefault(caller, own)
         try:
-            async with own, self.slots:
-                turn = Turn(inf if patient else self.remaining(caller))
-                try:
-                    yield turn
-                finally:
-                    self.charge(caller, turn.spent)
+            async with own:
+                if patient:
+                    await self._refilled(caller)
+                async with self.slots:
+                    turn = Turn(inf if patient else self.remaining(caller))
+                    try:
+                        yield turn
+                    finally:
+                        self.charge(caller, turn.spent)
         finally:
             self.waiting[caller] -= 1
             self.waiting += Counter()  # forgets those that have none
+
+    async def _refilled(self, caller: str) -> None:
+        """Wait until a caller has processor time."""
+        while True:
+            try:
+                self.remaining(caller)
+            except TooMany as error:
+                await asyncio.sleep(error.seconds)
+            else:
+                return
 
     def remaining(self, caller: str) -> float:
         """Return the processor time that a caller may still take [s]; raise `TooMany` without any.
@@ -244,16 +254,17 @@ class Share:
     Attributes
     ----------
     turns, caller : the slots, and whose share it is
-    patient : as of `Turns.turn`
+    patient, begun : as of `Turns.turn`
     """
 
     turns: Turns
     caller: str
     patient: bool = False
+    begun: bool = False
 
     def turn(self) -> AbstractAsyncContextManager[Turn]:
         """Give the caller its turn."""
-        return self.turns.turn(self.caller, self.patient)
+        return self.turns.turn(self.caller, self.patient, self.begun)
 
     async def here(self, function: Callable[..., Found], *given: object) -> Found:
         """Return what `Turn.here` does, in the caller's turn."""
@@ -262,7 +273,7 @@ class Share:
 
     async def each(self, pieces: Iterator[Found]) -> AsyncIterator[Found]:
         """Yield the pieces of an answer that has begun, each made in a turn."""
-        share = replace(self, patient=True)
+        share = replace(self, patient=True, begun=True)
         while (piece := await share.here(next, pieces, None)) is not None:
             yield piece
 

@@ -47,7 +47,8 @@ class Deformation:
 
     @property
     def _flat(self) -> Array:
-        return self.B.reshape(len(self.B), -1, self.B.shape[-1])
+        elements, points, components, unknowns = self.B.shape
+        return self.B.reshape(elements, points * components, unknowns)
 
     def change(self, step: Array) -> Array:
         """Return the change of strain (n_components, n_points) of a small displacement (n,)."""

@@ -1,7 +1,7 @@
 """The name, meaning and unit of each number in a record, declared in the module that computes it.
 
 The data set, the captions of pictures and the pages read these declarations. Other
-modules declare, when they are imported; `solver.scenes` names them, and they are imported when a
+modules declare, when they are imported; `solver.shipped` names them, and they are imported when a
 name is asked for that is not known.
 """
 
@@ -91,8 +91,8 @@ class Quantities(Mapping[str, Quantity]):
 
     @property
     def _all(self) -> dict[str, Quantity]:
-        while DECLARING:
-            import_module(DECLARING.pop())
+        for module in DECLARING:
+            import_module(module)
         return self.known
 
 

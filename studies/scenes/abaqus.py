@@ -353,7 +353,7 @@ class _Deck:
                 found = {index[key] for key in _keys(members, self.nodes, "node")}
                 new = np.array(sorted(found), dtype=np.int64)
                 if not np.array_equal(nodes.setdefault(name, new), new):
-                    line = next(iter(members.values()))
+                    line = next(iter(members.values()), 0)
                     _refuse(line, f"a surface has other nodes than the set {name}")
         return MeshData(
             np.array(list(self.nodes.values()), dtype=float).reshape(-1, 3),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from functools import wraps
 from hashlib import sha256
 from typing import ParamSpec, TypeVar
@@ -30,7 +31,7 @@ def by_content(make: Callable[Given, Made]) -> Callable[Given, Made]:
         try:
             return make(*given, **named), None
         except StudyError as error:
-            return None, error
+            return None, error.with_traceback(None)
 
     @wraps(make)
     def kept(*given: Given.args, **named: Given.kwargs) -> Made:
@@ -38,7 +39,7 @@ def by_content(make: Callable[Given, Made]) -> Callable[Given, Made]:
         key = (make, *map(_key, given))
         found, refused = remembered(key, lambda: made(*given, **named))
         if refused is not None:
-            raise refused.with_traceback(None)
+            raise copy(refused)  # an error that is raised holds what its callers have
         return found  # type: ignore[return-value]
 
     return kept

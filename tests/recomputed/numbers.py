@@ -97,7 +97,7 @@ def _whole(
 
 
 def _at_end(rules: Rules, number: RequestedNumber) -> Own:
-    """A value at the end of a stage, of the course, which is compared itrules."""
+    """A value at the end of a stage, of the course, which is compared itself."""
     course, times = rules.stored(number.course), rules.stored("increment_time")
     names = list(rules.system.all_names)
     if number.contact is not None:

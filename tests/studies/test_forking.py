@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import sys
-import time
+import threading
 from pathlib import Path
 from typing import Self
 
@@ -93,12 +93,17 @@ def test_a_process_of_ours_with_one_thread_is_forked_without_its_files(
 def test_workers_end_though_ctrl_c_comes_while_they_start(monkeypatch: pytest.MonkeyPatch) -> None:
     """Their folder is there until they have ended."""
     ended: list[bool] = []
+    left = threading.Event()
+
+    def interrupted(*_: object) -> None:
+        left.set()
+        raise KeyboardInterrupt
 
     class Starting:
         def __init__(self, **_: object) -> None:
             self.folder = Path(dask.config.get("temporary-directory"))
             os.kill(os.getpid(), signal.SIGINT)
-            time.sleep(0.2)  # the caller has left meanwhile
+            assert left.wait(60.0)
 
         def __enter__(self) -> Self:
             return self
@@ -108,6 +113,10 @@ def test_workers_end_though_ctrl_c_comes_while_they_start(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(distributed, "LocalCluster", Starting)
     monkeypatch.setattr(cluster, "prepare_workers", lambda: "spawn")
-    with pytest.raises(KeyboardInterrupt), own_workers(1):
-        pytest.fail("they had started")
+    before = signal.signal(signal.SIGINT, interrupted)
+    try:
+        with pytest.raises(KeyboardInterrupt), own_workers(1):
+            pytest.fail("they had started")
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert ended == [True]

@@ -80,7 +80,8 @@ def search(
         )  # fmt: skip
 
     linear, E = material.linear_hardening, material.elasticity.youngs_modulus
-    own = linear.modulus / (E + linear.modulus) if linear else 0.0
+    # without the rounding of this ratio, which would decide by the last digit of E
+    own = round(linear.modulus / (E + linear.modulus), 12) if linear else 0.0
     largest = np.inf if material.hardens else _LARGE
     found = _tried(exactly, load, guess)
     if isinstance(found, NoContact):  # contact on the elastic track differs from the final one

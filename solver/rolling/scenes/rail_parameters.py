@@ -76,7 +76,7 @@ class PrismParameters(MaterialParameters):
 
     @property
     def motion(self) -> Mapping[str, Any]:
-        """Drive and creepages of the wheel, as `solver.rolling.rail.RollingPatch` takes them."""
+        """Drive and creepages of the wheel, as `RollingPatch` takes them."""
         locked = self.traction == 1.0
         return {
             "drive": None if locked or self.control == "creepage" else self.traction,
