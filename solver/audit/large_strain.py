@@ -18,8 +18,9 @@ where f are nodal forces. Forces of loads and contact are those of T. Thus the d
 what the body is free to relax, such as the shortening of a beam that bends. Where material has
 yielded, E - e is left out, and x is the plastic strain with the least energy of s, by conjugate
 gradients; elsewhere x is zero. It does not change the part of s that f(R N - T) causes, which no
-stress with less energy balances. What a rigid body turns by links, by an angle w, v moves back by
-the stretch of its linear displacements: by -ln(1 + w^2) / 2 times the distance from its centre.
+stress with less energy balances. Linear displacements stretch a body that links turn by an angle
+w, by ln(1 + w^2) / 2. v takes this back: it includes -ln(1 + w^2) / 2 times the position from the
+centre of rotation.
 
 The share is the energy norm of s over that of T, or that of s + N - T, the change of nominal
 stress, where a displacement is prescribed and the force on it errs.
