@@ -20,6 +20,7 @@ from service.maps import draw_scene
 from service.schemas import KeptScene, SketchQuery
 from service.turns import MINUTE, Share, beyond
 from solver.files import LARGEST
+from solver.results.quantities import QUANTITIES
 from studies import Store, Study, StudyError
 from studies.definition.parameters import read_values
 from studies.errors import SceneError
@@ -110,11 +111,11 @@ class Inspector:
 
 def inspected(files: Mapping[str, bytes], seconds: float) -> Answer:
     """Return what a copy of this process, which has loaded what a scene needs, finds in files."""
-    import solver.contact.system
-    import solver.results.samples  # noqa: F401
-    import studies.scenes.building  # noqa: F401
+    import studies.scenes.building
+    import studies.scenes.scene  # noqa: F401
 
     load_readers()
+    list(QUANTITIES)  # loads all that declare some: the copy cannot compile what it loads
     with scratch() as folder:
         for name, data in files.items():
             (folder / name).write_bytes(data)

@@ -37,6 +37,7 @@ from service.settings import Settings
 from service.turns import Share, Turns
 from studies import FileDamaged, Store, Study, StudyError, estimate, open_netcdf
 from studies.errors import CatalogueDamaged, SceneError
+from studies.scenes import scene as scene_module
 from studies.scenes.scene import FileScene, read_scene
 from studies.storage import seal, shelf
 from tests.architecture.sources import ROOT
@@ -316,14 +317,14 @@ def test_a_scene_that_a_later_version_refuses_stays_and_is_not_listed(
     store, wrong = Store(tmp_path), StudyError("clearance", 0.01, "must be larger")
     for each in (SceneError("pin.toml", [wrong]), ValueError("a stricter rule")):
         with monkeypatch.context() as patch:
-            patch.setattr(shelf, "file_scene", lambda description, each=each: raised(each))
+            patch.setattr(scene_module, "file_scene", lambda description, each=each: raised(each))
             assert [store.scenes(9), store.scenes(9), store.scene(pin.id)] == [[], [], None]
     assert len(warned(caplog, f"scenes/{pin.id} is not allowed in this version: ")) == 1
     assert not (tmp_path / "unreadable").exists()
     (kept,) = store.scene_files()
     assert kept.size > len(pin.description.meshes["pin.msh"].data), "its files count"
     assert [each.id for each in Store(tmp_path).scenes(9)] == [pin.id], "this version allows it"
-    monkeypatch.setattr(shelf, "file_scene", lambda description: raised(wrong))
+    monkeypatch.setattr(scene_module, "file_scene", lambda description: raised(wrong))
     app = create_app(Settings(data=tmp_path, max_scenes_bytes=kept.size))
     with pytest.raises(Conflict, match="the posted scenes would take"):
         app.state.keeper.keep_scene("0" * 32, pin.description, "anna")

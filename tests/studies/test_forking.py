@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 from typing import Self
 
@@ -104,6 +105,7 @@ def test_workers_end_though_ctrl_c_comes_while_they_start(monkeypatch: pytest.Mo
             self.folder = Path(dask.config.get("temporary-directory"))
             os.kill(os.getpid(), signal.SIGINT)
             assert left.wait(60.0)
+            time.sleep(0.2)  # the caller leaves meanwhile
 
         def __enter__(self) -> Self:
             return self

@@ -16,14 +16,13 @@ from solver.results.shakedown import ShakedownState, classify
 from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.audit.rail import audit_prism
 from solver.rolling.passing import Pass, passing
-from solver.rolling.rail.given_patch import EllipticPatch
 from solver.rolling.rail.patch_passing import PatchPassing
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.initial_stress import OverHeight
 from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
 from tests.solver.yield_surfaces import Hosford
 from tests.verification.prism_blocks import AHEAD, PERFECT, RE, A, block, residual, stressed
-from tests.verification.stepped_prism import SteppedPrism
+from tests.verification.stepped_prism import SteppedEllipse, SteppedPrism
 
 CURVE = ((0.0, RE), (0.002, 560.0), (0.02, 640.0))
 WORDS: dict[str, dict[str, Any]] = {
@@ -67,9 +66,9 @@ def plain(of: PrismTrack) -> PlainPrism:
     return PlainPrism(of)
 
 
-def pressure(peak: float, a: float = A, b: float = 4.0) -> EllipticPatch:
+def pressure(peak: float, a: float = A, b: float = 4.0) -> SteppedEllipse:
     """The pressure of an ellipse, as wide as the coarse block allows."""
-    return EllipticPatch(grid=track().grid, force=2 * np.pi * a * b * peak / 3, a=a, b=b)
+    return SteppedEllipse(grid=track().grid, force=2 * np.pi * a * b * peak / 3, a=a, b=b)
 
 
 def compared(own: PrismTrack, material: Law) -> None:
