@@ -223,6 +223,8 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
             )
             return ends.enter_context(cluster)
 
+        # An interrupt while the thread itself starts would leave a thread that nobody waits for.
+        starter.submit(int).result()
         try:
             cluster = starter.submit(start).result()
         except RuntimeError as error:  # as where a thread of the script asks for them
