@@ -4,20 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
-import threading
-import time
 from pathlib import Path
-from typing import Self
 
-import dask
-import distributed
 import pytest
 
-from studies.execution import cluster
-from studies.execution.cluster import own_workers
 from tests.architecture.sources import ROOT
 
 pytestmark = pytest.mark.processes
@@ -89,36 +81,3 @@ def test_a_process_of_ours_with_one_thread_is_forked_without_its_files(
         "parent": "program.py" if forked else "-c",
         "cwd of the server": "/",
     }
-
-
-def test_workers_end_though_ctrl_c_comes_while_they_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Their folder is there until they have ended."""
-    ended: list[bool] = []
-    left = threading.Event()
-
-    def interrupted(*_: object) -> None:
-        left.set()
-        raise KeyboardInterrupt
-
-    class Starting:
-        def __init__(self, **_: object) -> None:
-            self.folder = Path(dask.config.get("temporary-directory"))
-            os.kill(os.getpid(), signal.SIGINT)
-            assert left.wait(60.0)
-            time.sleep(0.2)  # the caller leaves meanwhile
-
-        def __enter__(self) -> Self:
-            return self
-
-        def __exit__(self, *error: object) -> None:
-            ended.append(self.folder.is_dir())
-
-    monkeypatch.setattr(distributed, "LocalCluster", Starting)
-    monkeypatch.setattr(cluster, "prepare_workers", lambda: "spawn")
-    before = signal.signal(signal.SIGINT, interrupted)
-    try:
-        with pytest.raises(KeyboardInterrupt), own_workers(1):
-            pytest.fail("they had started")
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert ended == [True]
