@@ -20,7 +20,6 @@ from solver.fem.dofs import vectors
 from solver.fem.surface import edges_of
 from solver.materials.heated import Heated
 from solver.materials.law import Law
-from solver.materials.state import PlasticState
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.mesh.elements import element_type
 from solver.model.amplitude import Amplitude
@@ -149,7 +148,7 @@ class PlainBody:
                 out -= (1 + nu) / elasticity.youngs_modulus * stress
         return out
 
-    def _left(self, time: float) -> tuple[Array, Array]:
+    def shares(self, time: float) -> tuple[Array, Array]:
         """Return the ratios of Young's modulus and of the yield stress to their cold values."""
         stiff, strong = np.ones((2, self.points.shape[1]))
         for load in self.body.every_load:
@@ -192,38 +191,10 @@ class PlainBody:
 
     def law(self, time: float) -> Law:
         """Return the law of the points at a time."""
-        stiff, strong = self._left(time)
+        stiff, strong = self.shares(time)
         if (stiff == 1).all() and (strong == 1).all():
             return self.body.law
         return Heated(law=self.body.law, stiff=stiff, strong=strong)
-
-    def strains(self, u: Array, plastic: PlasticState | None, time: float) -> tuple[Array, Array]:
-        """Return the strain and its elastic part (4, n_points), Mandel, in plane stress with zz.
-
-        Parameters
-        ----------
-        u : (n,) displacements [mm]
-        plastic : internal variables at the points, None if nothing has yielded
-        """
-        inelastic = self.eigenstrain(time)
-        if plastic is not None:
-            inelastic = inelastic + plastic.plastic_strain
-        elastic = self.strain(u).reshape(4, -1) - inelastic
-        if self.body.kinematics == "plane_stress":
-            nu = self.body.material.elasticity.poisson_ratio
-            elastic[2] = -nu / (1 - nu) * (elastic[0] + elastic[1])
-        return elastic + inelastic, elastic
-
-    def stress(self, u: Array, plastic: PlasticState | None, time: float) -> Array:
-        """Return Mandel stress (4, n_points) by Hooke's law [MPa]; see `strains`."""
-        elasticity = self.body.material.elasticity
-        nu, double_shear = elasticity.poisson_ratio, 2 * elasticity.shear_modulus
-        _, strain = self.strains(u, plastic, time)
-        out = double_shear * strain
-        out[:3] += double_shear * nu / (1 - 2 * nu) * strain[:3].sum(axis=0)
-        if self.body.kinematics == "plane_stress":
-            out[2] = 0.0
-        return np.asarray(self._left(time)[0] * out)
 
     def forces(self, stress: Array) -> Array:
         """Return the nodal forces (n_nodes, dim) that balance a Mandel stress of the points [N]."""

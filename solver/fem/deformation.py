@@ -34,7 +34,7 @@ class Deformation:
     weights : (n_elements, n_points) volume of the points [mm3]
     geometric : (stress (n_components, n_points) [MPa], elements) -> geometric stiffness (k, m, m)
         of some elements [N/mm]; None if there is none
-    linear : whether the strain of the points (n_points,) is linear in all displacements
+    linear : whether strain is linear in displacements
     """
 
     n: int
@@ -43,7 +43,7 @@ class Deformation:
     B: Array
     weights: Array
     geometric: Callable[[Array, Some], Array] | None = None
-    linear: Bools | bool = True
+    linear: bool = True
 
     @property
     def _flat(self) -> Array:

@@ -6,6 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from solver.errors import ModelError
+from solver.fem.deformation import without_points
 from solver.fem.discretisation import Discretisation
 from solver.fem.part import Part
 from solver.materials.state import Response
@@ -156,4 +157,4 @@ def elastic_energy(part: Part, u: Array, response: Response, time: float) -> flo
     """Return the elastic energy of a part [N mm]; without points, from its condensed stiffness."""
     if part.meshed:
         return float(part.law(time).energy_density(response.stress) @ part.volumes)
-    return part.stiffness_along(u, part.respond(u, part.virgin(), time))[1] / 2
+    return part.stiffness_along(u, without_points(part.n, response))[1] / 2

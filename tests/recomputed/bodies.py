@@ -164,12 +164,20 @@ class Fields:
 
 def of_state(plain: PlainBody, u: Array, plastic: Any, time: float) -> Fields:
     """Fields of a body by its displacements (n,), internal variables and declared loads."""
-    stress, nothing = tensor(plain.stress(u, plastic, time)), np.zeros((4, plain.points.shape[1]))
+    elasticity, nothing = plain.body.material.elasticity, np.zeros((4, plain.points.shape[1]))
+    flow = nothing if plastic is None else plastic.plastic_strain
+    inelastic = plain.eigenstrain(time) + flow
+    elastic = plain.strain(u).reshape(4, -1) - inelastic
+    if plane_stress := plain.body.kinematics == "plane_stress":
+        nu = elasticity.poisson_ratio
+        elastic[2] = -nu / (1 - nu) * (elastic[0] + elastic[1])
+    stress = plain.shares(time)[0] * hooke(elasticity, elastic)
+    if plane_stress:
+        stress[2] = 0.0
     gone = (plain.left(time) <= GHOST).reshape(plain.volume.shape)[:, 0]
     return Fields(
         plain, stress, nothing[0] if plastic is None else plastic.accumulated,
-        strain=plain.strains(u, plastic, time)[0],
-        plastic=nothing if plastic is None else plastic.plastic_strain,
+        strain=elastic + inelastic, plastic=flow,
         u=u.reshape(-1, 2).T, gone=gone,
     )  # fmt: skip
 

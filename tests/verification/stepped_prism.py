@@ -23,6 +23,7 @@ is solved by GMRES on the points that yield, on which alone the right side depen
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, Protocol, Self
@@ -37,6 +38,7 @@ from solver.rolling.flow import allowed_inflow, sweep_of, usual_parts
 from solver.rolling.passing import TOLERANCE, deviation, searched
 from solver.rolling.rail.friction_cone import OPEN
 from solver.rolling.rail.given_patch import EllipticPatch
+from solver.rolling.rail.modes import Modes
 from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.rolling.rail.track import PrismTrack
@@ -70,6 +72,14 @@ class SteppedState:
     def accumulated(self) -> Array:
         """Accumulated plastic strain (n, stations)."""
         return self.state.accumulated.reshape(self.strain.shape[:2])
+
+
+def everywhere(modes: Modes) -> Modes:
+    """The same waves, with forces and results at all stations."""
+    other = copy(modes)
+    other.x, other.behind = -modes.length / modes.stations * np.arange(modes.stations), np.zeros(0)
+    other._set_transforms(modes.stations, other.behind)
+    return other
 
 
 class SteppedContact(Protocol):
@@ -162,7 +172,7 @@ class SteppedPrism:
     """
 
     def __init__(self, track: PrismTrack, law: Law, parts: int | None = None) -> None:
-        self._track, self._law, self._modes = track, law, track.modes.everywhere
+        self._track, self._law, self._modes = track, law, everywhere(track.modes)
         self._parts = parts or usual_parts(law)
         self._double_shear = 2 * law.elasticity.shear_modulus
         self._stiffness = law.stiffness(6)

@@ -125,14 +125,6 @@ class Modes:
         )
 
     @cached_property
-    def everywhere(self) -> Modes:
-        """The same waves, with forces and results at all stations."""
-        other = copy(self)
-        other.x, other.behind = -self.length / self.stations * np.arange(self.stations), np.zeros(0)
-        other._set_transforms(self.stations, other.behind)
-        return other
-
-    @cached_property
     def single(self) -> Modes:
         """The same waves, in single precision."""
         other, kind = copy(self), np.dtype(np.float32)
