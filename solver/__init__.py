@@ -10,9 +10,7 @@ points up.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
-
+from solver.late import front
 from solver.version import __version__ as __version__
 
 _HOMES = {
@@ -54,9 +52,5 @@ _HOMES = {
 
 __all__ = list(_HOMES)
 
-
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used: to name the runs of a study needs no solver."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+# A public name is imported when it is first used.
+__getattr__ = front(__name__, _HOMES)

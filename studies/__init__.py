@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from solver.late import front
 from studies.errors import (
     CatalogueDamaged,
     FileDamaged,
@@ -101,9 +101,5 @@ __all__ = [
     "to_xarray",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used: reading a study file needs no xarray."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"studies.{_HOMES[name]}"), name)
+# A public name is imported when it is first used.
+__getattr__ = front(__name__, _HOMES)

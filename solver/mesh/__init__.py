@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
+from solver.late import front
 
 _HOMES = {
     "Near": "shapes",
@@ -26,9 +25,5 @@ _HOMES = {
 
 __all__ = list(_HOMES)
 
-
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used: grid lines need no mesh."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+# A public name is imported when it is first used.
+__getattr__ = front(__name__, _HOMES)

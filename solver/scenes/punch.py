@@ -22,11 +22,11 @@ from typing import Annotated, Literal, NamedTuple
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
+from solver.late import late
 from solver.mesh.lines import refined
 from solver.model.singular import SingularPoint
 from solver.parameters import Accuracy, Length, Ratio, by_accuracy, described
 from solver.results.record import Status
-from solver.scenes.late import late
 from solver.scenes.material_parameters import ContactParameters
 from solver.scenes.scene import Scene
 from solver.typing import Array

@@ -6,6 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Seq
 from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn
 
+from solver.late import late
 from solver.loading.control import INCREMENT_ERROR
 from solver.loading.program import Program
 from solver.loading.refinement import StepRefinement
@@ -13,7 +14,6 @@ from solver.results.quantities import QUANTITIES, Quantity
 from solver.results.record import Record, Status
 from solver.results.view import View
 from solver.scenes.effort import Effort
-from solver.scenes.late import late
 
 Monitor = Callable[[float], None]
 """Called after every increment with the fraction of the work done (0-1).

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from solver.scenes.late import Late
+from solver.late import Late
 from solver.scenes.scene import Scene
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
+from solver.late import Late
 from solver.scenes import Scene
-from solver.scenes.late import Late
 from solver.shipped import SCENES
 from studies.errors import StudyError, one_of
 from studies.scenes.file_scene import FileScene

@@ -14,8 +14,8 @@ from tests.architecture.sources import ROOT, modules
 LAYERS = {
     # from the ground up; a module may import from its own layer and from those before it
     "solver": (
-        "version", "typing", "errors", "files", "parameters", "kinds", "parts", "memory", "tensors",
-        "linear", "mesh", "materials", "model", "fem", "contact", "loading",
+        "version", "late", "typing", "errors", "files", "parameters", "kinds", "parts", "memory",
+        "tensors", "linear", "mesh", "materials", "model", "fem", "contact", "loading",
         "results.quantities", "audit", "results", "scenes", "rolling", "shipped",
     ),
     "studies": (

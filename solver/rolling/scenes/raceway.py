@@ -12,9 +12,9 @@ A.R.S. Ponter, A.D. Hearle, K.L. Johnson, J. Mech. Phys. Solids 33 (1985) 339-36
 
 from __future__ import annotations
 
+from solver.late import late
 from solver.results.record import Status
 from solver.rolling.scenes.raceway_parameters import RacewayParameters
-from solver.scenes.late import late
 from solver.scenes.scene import Scene
 
 _method, _view, _sketch, _effort, _setup = late(

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import math
 
+from solver.late import late
 from solver.rolling.scenes.rolling_parameters import RollingParameters
-from solver.scenes.late import late
 from solver.scenes.scene import Scene
 
 _method, _program, _refinement, _warnings, _advice = late(

@@ -11,9 +11,9 @@ P. Marek, PhD thesis, Warsaw University of Technology (1995), chapter 6.
 
 from __future__ import annotations
 
+from solver.late import late
 from solver.results.record import Status
 from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.late import late
 from solver.scenes.scene import Scene
 
 _method, _view, _sketch, _effort, _setup = late(

@@ -10,6 +10,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
+from solver.late import late
 from solver.parameters import Other, Stress, described
 from solver.parts import declared
 from solver.rolling.rail.profiles.points import as_points
@@ -18,7 +19,6 @@ from solver.rolling.scenes.initial_stress import INITIAL_STRESS, SectionStress
 from solver.rolling.scenes.rail_parameters import PrismParameters
 from solver.rolling.scenes.sequence import block_of
 from solver.rolling.scenes.traffic import CUT, check_spreads, deviations
-from solver.scenes.late import late
 
 ELEMENT_SIZE: Mapping[str, float] = {"draft": 2.0, "standard": 1.0, "fine": 0.5}
 """Side of the elements under the contact, across and in depth [mm]."""

@@ -1,8 +1,13 @@
-"""Functions by their names: a scene is listed without the modules that compute it."""
+"""What is imported when it is first used: names of a package, functions of a scene.
+
+A scene is listed without the modules that compute it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from pkgutil import resolve_name
 from typing import Any
 
@@ -30,3 +35,19 @@ class Late:
 def late(module: str, *functions: str) -> tuple[Late, ...]:
     """Return functions of a module of the solver."""
     return tuple(Late(f"solver.{module}:{function}") for function in functions)
+
+
+def front(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
+    """Return the ``__getattr__`` of a package whose public names are imported when they are used.
+
+    Parameters
+    ----------
+    homes : public name -> module of the package that defines it
+    """
+
+    def public(name: str) -> Any:
+        if name not in homes:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return getattr(import_module(f"{package}.{homes[name]}"), name)
+
+    return public
