@@ -13,34 +13,16 @@ A.R.S. Ponter, A.D. Hearle, K.L. Johnson, J. Mech. Phys. Solids 33 (1985) 339-36
 from __future__ import annotations
 
 from solver.late import late
-from solver.results.record import Status
 from solver.rolling.scenes.raceway_parameters import RacewayParameters
-from solver.scenes.scene import Scene
+from solver.rolling.scenes.rail_scene import rail_scene
 
-_method, _view, _sketch, _effort, _setup = late(
-    "rolling.scenes.raceway_setup", "method", "view", "sketch", "effort", "setup"
-)
-
-RACEWAY = Scene(
-    name="raceway",
-    summary="ball or roller rolling along an elastic-plastic raceway, in three dimensions",
-    parameters=RacewayParameters,
-    branch="passes",
-    method=_method,
-    view=_view,
-    sketch=_sketch,
+RACEWAY = rail_scene(
+    "raceway",
+    "ball or roller rolling along an elastic-plastic raceway, in three dimensions",
+    RacewayParameters,
     outputs=(
-        *late("results.maps", "maps", "profiles"),
-        *late("results.extremes", "residual_extremes"),
-        *late("results.figures", "extremes"),
-        *late("rolling.scenes.rail_outputs", "patch", "section", "cycles"),
+        *late("rolling.scenes.rail_outputs", "cycles"),
         *late("rolling.scenes.raceway_setup", "elastic"),
     ),
-    costs=late("results.figures", "cost"),
-    effort=_effort,
-    setup=_setup,
-    advice={
-        Status.LIMIT_LOAD: "lower load or traction, or let the material harden",
-        Status.NOT_CONVERGED: "lower load or traction, or choose another accuracy",
-    },
+    advice="lower load or traction, or choose another accuracy",
 )

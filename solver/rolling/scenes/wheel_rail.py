@@ -12,35 +12,14 @@ P. Marek, PhD thesis, Warsaw University of Technology (1995), chapter 6.
 from __future__ import annotations
 
 from solver.late import late
-from solver.results.record import Status
+from solver.rolling.scenes.rail_scene import rail_scene
 from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.scenes.scene import Scene
 
-_method, _view, _sketch, _effort, _setup = late(
-    "rolling.scenes.wheel_rail_setup", "method", "view", "sketch", "effort", "setup"
-)
-
-WHEEL_RAIL = Scene(
-    name="wheel_rail",
-    summary="railway wheel rolling along an elastic-plastic rail, in three dimensions",
-    parameters=WheelRailParameters,
-    branch="passes",
-    method=_method,
-    view=_view,
-    sketch=_sketch,
-    outputs=(
-        *late("results.maps", "maps", "profiles"),
-        *late("results.extremes", "residual_extremes"),
-        *late("results.figures", "extremes"),
-        *late("rolling.scenes.rail_outputs", "patch", "section"),
-        *late("rolling.scenes.wheel_rail_setup", "traffic", "wheel"),
-    ),
-    costs=late("results.figures", "cost"),
-    effort=_effort,
-    setup=_setup,
-    advice={
-        Status.LIMIT_LOAD: "lower load or traction, or let the material harden",
-        Status.NOT_CONVERGED: "choose a finer accuracy, above all at the gauge corner, or another "
-        "position; or lower load or traction",
-    },
+WHEEL_RAIL = rail_scene(
+    "wheel_rail",
+    "railway wheel rolling along an elastic-plastic rail, in three dimensions",
+    WheelRailParameters,
+    outputs=late("rolling.scenes.wheel_rail_setup", "traffic", "wheel"),
+    advice="choose a finer accuracy, above all at the gauge corner, or another "
+    "position; or lower load or traction",
 )

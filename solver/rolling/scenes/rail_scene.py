@@ -1,0 +1,47 @@
+"""What scenes of passes over a prism have in common."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from solver.late import Late, late
+from solver.results.record import Status
+from solver.scenes.scene import Scene
+
+
+def rail_scene(
+    name: str, summary: str, parameters: type[Any], outputs: tuple[Late, ...], advice: str
+) -> Scene:
+    """Return a scene whose set-up is in ``NAME_setup``.
+
+    Parameters
+    ----------
+    outputs : those beside maps, profiles, extremes, the contact patch and the section
+    advice : what to do if a pass does not converge
+    """
+    method, view, sketch, effort, setup = late(
+        f"rolling.scenes.{name}_setup", "method", "view", "sketch", "effort", "setup"
+    )
+    return Scene(
+        name=name,
+        summary=summary,
+        parameters=parameters,
+        branch="passes",
+        method=method,
+        view=view,
+        sketch=sketch,
+        outputs=(
+            *late("results.maps", "maps", "profiles"),
+            *late("results.extremes", "residual_extremes"),
+            *late("results.figures", "extremes"),
+            *late("rolling.scenes.rail_outputs", "patch", "section"),
+            *outputs,
+        ),
+        costs=late("results.figures", "cost"),
+        effort=effort,
+        setup=setup,
+        advice={
+            Status.LIMIT_LOAD: "lower load or traction, or let the material harden",
+            Status.NOT_CONVERGED: advice,
+        },
+    )
