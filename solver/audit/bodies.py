@@ -114,10 +114,10 @@ class AuditedBody:
         """Return the error (dim, dim) of first moments of nodal forces, over the body's size [N].
 
         First moments, force times position, also show loads without a resultant, such as
-        centrifugal forces. Moving loads and periodic bodies are left out.
+        centrifugal forces. Moving loads are left out.
         """
         body, whole = self.plain.body, self.plain.part
-        if body.axle or body.travelling or body.periodic:
+        if body.axle or body.travelling:
             return np.zeros((2, 2))
         force = vectors(whole.external(self._converged.state.time), whole.dim)
         moments = self.plain.moments(force, whole.X) - self._declared
@@ -130,10 +130,8 @@ class AuditedBody:
 
     @property
     def free(self) -> Bools:
-        """Whether unknowns (n_nodes, dim) are free; False for the copies of a periodic body."""
-        part = self.plain.part
-        own = part.same == np.arange(len(part.same))
-        return np.asarray(~self.held & own[:, None])
+        """Whether unknowns (n_nodes, dim) are free."""
+        return np.asarray(~self.held)
 
     def stored(self) -> float:
         """Return the elastic energy [N mm]; of a condensed body from its kept unknowns."""

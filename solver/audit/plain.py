@@ -66,7 +66,7 @@ class PlainBody:
 
     @cached_property
     def _nodes(self) -> Ints:
-        return np.asarray(self.part.same[self.part.basis.element_dofs])
+        return np.asarray(self.part.basis.element_dofs)
 
     @cached_property
     def _gradients(self) -> Array:

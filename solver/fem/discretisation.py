@@ -21,7 +21,7 @@ from solver.fem.loads import (
 )
 from solver.fem.nodes import Nodes
 from solver.fem.operators import Operators
-from solver.fem.part import Part, same_unknowns
+from solver.fem.part import Part
 from solver.fem.softening import Softening
 from solver.fem.surface import Surface, edges_of, extract, gathered, shortest
 from solver.linear import solvers as linear
@@ -50,7 +50,7 @@ class Discretisation(Nodes, Part):
     kinematics : how strain follows from displacements
     loads : nodal forces (n,) of pressures and tractions [N]
     condensable : ``loads`` plus the nodal forces of the eigenstrain in an elastic body [N]
-    free : unknowns that no support holds, without periodic copies
+    free : unknowns that no support holds
     driven : prescribed displacements (n,) [mm]
     active : unknowns of ``free`` that are not pinned
     rigid : (n, n_rigid) rigid motions the supports leave free
@@ -62,7 +62,7 @@ class Discretisation(Nodes, Part):
         super().__init__(body)
         self.nodes = self.X
         kind = element_type(body.element)
-        self.dofs = Dofs(self.same[self.basis.element_dofs].T, self.dim).every
+        self.dofs = Dofs(self.basis.element_dofs.T, self.dim).every
         values = np.array([np.broadcast_to(np.asarray(b[0]), self.basis.dx.shape)
                            for b in self.basis.basis])  # fmt: skip
         gradients = np.array([b[0].grad for b in self.basis.basis]).swapaxes(0, 1)
@@ -96,17 +96,12 @@ class Discretisation(Nodes, Part):
     def _hold(self) -> None:
         """Find the supported unknowns, the remaining rigid motions, and one pin for each motion."""
         self.driven, self._held = prescribed(self)
-        fixed = self._held.copy()
-        fixed[self.copied[fixed]] = True
         motions = kinematics.rigid_motions(self.X, self.body.kinematics)
-        copies = self.copied != np.arange(self.n)
-        free = np.flatnonzero(~fixed & ~copies)
-        held = np.vstack([motions[fixed], (motions - motions[self.copied])[copies]])
-        if len(held):
-            motions = motions @ linalg.null_space(held, rcond=1e-9)
+        if self._held.any():
+            motions = motions @ linalg.null_space(motions[self._held], rcond=1e-9)
         self.rigid = motions
-        self.free = free
-        self.active = choose_pins(motions, free)
+        self.free = np.flatnonzero(~self._held)
+        self.active = choose_pins(motions, self.free)
 
     def chain(self, boundary: str, any_shape: bool = False) -> Surface:
         """Return the surface of a named boundary: one open chain, unless any shape is allowed."""
@@ -141,14 +136,6 @@ class Discretisation(Nodes, Part):
         """Return how far its travelling pressure moves along x between two times [mm]."""
         position = self.body.travelling.position if self.body.travelling else None
         return position.at(after) - position.at(before) if position else 0.0
-
-    def sources(self, way: float) -> Ints:
-        """Return for each unknown the one that lies ``way`` [mm] behind it along x, or -1."""
-        places = self.nodes - np.array([[way], [0.0]])
-        if self.period:
-            start = self.nodes[0].min()
-            places[0] = start + (places[0] - start) % self.period
-        return same_unknowns(self.nodes, places)[self.copied]
 
     @property
     def travels(self) -> bool:
@@ -254,7 +241,7 @@ class Discretisation(Nodes, Part):
             return u
         force = self.elastic_matrix() @ change
         change[self.active] = self._elastic_solver.solve(-force[self.active])
-        return u + change[self.copied]
+        return u + change
 
     @cached_property
     def _elastic_solver(self) -> LinearSolver:

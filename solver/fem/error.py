@@ -104,12 +104,10 @@ class ErrorPoints:
         # on a boundary edge the weights of inner vertices vanish, but their ratio has a limit
         within = local + _INWARD * ((1 / 2 if self._corners == 4 else 1 / 3) - local)
         values = self._recovered(stress, within, np.asarray(basis.mapping.F(local)))
-        nodes = self._part.same[basis.element_dofs.T].ravel()
+        nodes = basis.element_dofs.T.ravel()
         count = self._part.X.shape[1]
         sums = np.stack([np.bincount(nodes, one.ravel(), count) for one in values])
-        return np.asarray(
-            (sums / np.maximum(np.bincount(nodes, minlength=count), 1))[:, self._part.same]
-        )
+        return np.asarray(sums / np.maximum(np.bincount(nodes, minlength=count), 1))
 
     def _recovered(self, stress: Array, local: Array, x: Array) -> Array:
         """Return the recovered stress at x (2, n_elements, n), with the weights of local points."""

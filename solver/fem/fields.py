@@ -44,7 +44,7 @@ def recovery(part: Discretisation) -> sparse.csr_array:
     count = 4 if cells == 4 and n_points >= 4 else 3 if n_points >= 3 else 1
     fit = np.linalg.pinv(_monomials(np.asarray(part.basis.X), count))
     at_nodes = _monomials(np.asarray(part.basis.elem.doflocs, dtype=float).T, count) @ fit
-    nodes = part.same[part.basis.element_dofs]
+    nodes = part.basis.element_dofs
     volume = part.weights.sum(axis=1)
     n_nodes = part.X.shape[1]
     shares = np.broadcast_to(volume, nodes.shape).ravel()
@@ -53,11 +53,10 @@ def recovery(part: Discretisation) -> sparse.csr_array:
     data = share[:, :, None] * at_nodes[:, None, :]
     rows = np.broadcast_to(nodes[:, :, None], data.shape)
     columns = np.arange(n_elements * n_points).reshape(n_elements, n_points)
-    operator = sparse.csr_array(
+    return sparse.csr_array(
         (data.ravel(), (rows.ravel(), np.broadcast_to(columns, data.shape).ravel())),
         shape=(n_nodes, n_elements * n_points),
     )
-    return sparse.csr_array(operator[part.same])
 
 
 def recovered_beside(matrix: sparse.csr_array, points: Array) -> Array:

@@ -33,7 +33,6 @@ class Following:
         own = self.source == np.arange(part.n)
         self._known = (self.source >= 0) & (free | own)
         self._others = np.flatnonzero(free & (self.source < 0))
-        self._copied = part.copied
         if len(self._others):
             self._rows = part.elastic_matrix()[self._others]
             upper = sparse.csr_array(sparse.triu(self._rows[:, self._others], format="csr"))
@@ -45,4 +44,4 @@ class Following:
         moved = np.where(self._known, change[self.source], 0.0)
         if len(self._others):
             moved[self._others] = self._solver.solve(-(self._rows @ moved))
-        return moved[self._copied]
+        return moved

@@ -95,7 +95,7 @@ def _body_forces(part: Nodes, load: Load) -> Array | None:
     cells = smooth_cells(basis, force)
     local, x, area = cells.points(rule, rule)
     given, nodal = force(x) * area, np.zeros((part.X.shape[1], 2))
-    for k, own in enumerate(part.same[basis.element_dofs]):
+    for k, own in enumerate(basis.element_dofs):
         shape = np.asarray(basis.elem.lbasis(local, k)[0])
         np.add.at(nodal, own[cells.element], (given * shape).sum(axis=2).T)
     return nodal.ravel()
@@ -242,7 +242,7 @@ def check_removed(part: Nodes, loads: Superposed) -> None:
 
 def travelling_forces(part: Nodes, travelling: TravellingPressure, time: float) -> Array:
     """Return the nodal forces (n,) of a travelling pressure at a time [N]."""
-    force = _tractions(part, travelling.boundary, travelling.pushing(time, part.period), 8)
+    force = _tractions(part, travelling.boundary, travelling.pushing(time), 8)
     return np.zeros(part.n) if force is None else force
 
 
@@ -256,7 +256,7 @@ def _tractions(part: Nodes, boundary: str, push: Push, points: int = 0) -> Array
     points : Gauss points of each edge; 0 for four of each of as many parts as are needed
     """
     edges = edges_of(part, boundary)
-    X, edges = part.X[:, edges], part.same[edges]
+    X = part.X[:, edges]
     if push(X.mean(axis=2), X[..., 1] - X[..., 0]) is None:
         return None
 

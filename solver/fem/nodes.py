@@ -1,14 +1,11 @@
-"""The nodes of a body, its quadrature, and the periodic copies of nodes."""
+"""The nodes of a body and its quadrature."""
 
 from __future__ import annotations
 
 import numpy as np
 from skfem import CellBasis
 
-from solver.errors import ModelError
-from solver.fem.dofs import Dofs
 from solver.mesh.elements import element_type
-from solver.mesh.rounding import ROUNDED
 from solver.model.body import Body
 from solver.typing import Array, Ints
 
@@ -16,8 +13,7 @@ from solver.typing import Array, Ints
 class Nodes:
     """The unknowns and the integration points of one body, and their positions.
 
-    Unknowns are numbered node by node (`Dofs`), points element by element. Nodes on the far side of
-    a periodic body repeat those on the near side: their unknowns are copies.
+    Unknowns are numbered node by node (`Dofs`), points element by element.
 
     Attributes
     ----------
@@ -25,9 +21,6 @@ class Nodes:
     X : (dim, n_nodes) node positions [mm]
     dim : number of axes
     n : number of unknowns
-    same : (n_nodes,) for each node, the node whose unknowns it uses: itself, unless it is a copy
-    copied : (n,) for each unknown, the unknown whose value it takes
-    period : period of a periodic body, else 0 [mm]
     points : (dim, n_elements, n_points) positions of the points [mm]
     """
 
@@ -41,8 +34,6 @@ class Nodes:
         )
         self.X = self.basis.doflocs
         self.dim, self.n = len(self.X), self.X.size
-        self.same, self.period = self._copies()
-        self.copied = Dofs(self.same, self.dim).every
         self.points = np.asarray(self.basis.global_coordinates())
 
     @property
@@ -64,22 +55,3 @@ class Nodes:
     def boundary_nodes(self, boundary: str) -> Ints:
         """Return the nodes on a named boundary."""
         return np.unique(self.basis.get_dofs(self.body.facets(boundary)).flatten())
-
-    def _copies(self) -> tuple[Ints, float]:
-        """Return the node whose unknowns each node uses, and the period."""
-        same = np.arange(self.X.shape[1])
-        if self.body.periodic is None:
-            return same, 0.0
-        near, far = (self.boundary_nodes(name) for name in self.body.periodic)
-        near, far = (nodes[np.argsort(self.X[1, nodes])] for nodes in (near, far))
-        apart = self.X[:, far] - self.X[:, near] if len(far) == len(near) else np.ones((2, 1))
-        period = float(apart[0].mean())
-        if not (np.abs(apart - [[period], [0.0]]) < ROUNDED * abs(period)).all() or period <= 0:
-            allowed = "the second must be a copy of the first, one period along +x"
-            raise ModelError("periodic", self.body.periodic, allowed)
-        travelling = self.body.travelling
-        if travelling is not None and 2 * travelling.half_width > period:
-            allowed = f"half_width must be at most half the period, {period / 2:g} mm"
-            raise ModelError("travelling", travelling.half_width, allowed)
-        same[far] = near
-        return same, period

@@ -31,13 +31,11 @@ class Operator(Protocol):
 class Stiff(Protocol):
     """A part whose stiffness is assembled.
 
-    The unknowns ``active`` of all ``n`` are solved for; ``copied`` (n,) gives for each unknown the
-    one whose value it takes; ``pattern`` is the upper triangle on the active ones.
+    The unknowns ``active`` of all ``n`` are solved for; ``pattern`` is the upper triangle on them.
     """
 
     n: int
     active: Ints
-    copied: Ints
 
     @property
     def pattern(self) -> sparse.csr_array:
@@ -88,9 +86,9 @@ class Factored:
         def finish(change: Array) -> Array:
             u = np.zeros(part.n)
             u[part.active] = begun.finish(change[contact])
-            return u[part.copied]
+            return u
 
-        return Begun(motion[part.copied], finish)
+        return Begun(motion, finish)
 
     def compliance(self, dofs: Ints, rows: Array) -> Array:
         """See `Operator`."""

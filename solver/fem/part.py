@@ -45,7 +45,6 @@ class Part(ABC):
     body : as declared
     loads : nodal forces (n,) of the body's loads [N]
     driven : prescribed motions (n,) [mm]
-    copied : (n,) for each unknown the one whose value it takes
     free : unknowns that no support holds
     active : those of them that are not pinned to hold its rigid motions
     rigid : (n, n_rigid) rigid motions that the supports leave free
@@ -58,7 +57,6 @@ class Part(ABC):
     body: Body | RigidBody
     loads: Superposed
     driven: Superposed
-    copied: Ints
     free: Ints
     active: Ints
     rigid: Array

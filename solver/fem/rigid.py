@@ -77,7 +77,6 @@ class RigidPart(Part):
         self.free = np.flatnonzero(~self._held)
         self.active = np.zeros(0, dtype=np.int64)
         self.rigid = np.eye(3)[:, self.free]
-        self.copied = np.arange(3)
 
     def during(self, time: float, u: Array) -> RigidPart:
         """See `Part.during`."""

@@ -81,7 +81,6 @@ class Substructure(Part):
         self.elastic = slice(len(kept))
         self.n = len(kept)
         self.nodes = whole.X[:, nodes]
-        self.copied = np.arange(self.n)
         self.driven = Superposed.of(self.n, ())
         self.rigid = whole.rigid[kept]
         self.free = np.flatnonzero(np.isin(kept, whole.free))
@@ -156,12 +155,12 @@ class Substructure(Part):
         """See `Part.begin`."""
         own, begun = np.zeros(self.n), self._condensed.begin(force)
         own[self.elastic] = begun.condensed
-        return Eliminated(own, lambda u: begun.finish(u[self.elastic])[self.whole.copied])
+        return Eliminated(own, lambda u: begun.finish(u[self.elastic]))
 
     def expand(self, u: Array, time: float) -> Array:
         """Return the whole body's displacements [mm]; those of a wheel in its hub's frame."""
         factors = self.loads.factors(time)
-        return self._condensed.expand(u[self.elastic], factors)[self.whole.copied]
+        return self._condensed.expand(u[self.elastic], factors)
 
 
 def _key(part: Discretisation, kept: Ints, linear_solver: str) -> str:
@@ -173,7 +172,7 @@ def _key(part: Discretisation, kept: Ints, linear_solver: str) -> str:
     digest.update(
         repr((
             linear_solver, body.kinematics, body.element,
-            body.full_integration, body.thickness, body.periodic,
+            body.full_integration, body.thickness,
             sorted((name, held, body.facets(name).tobytes())
                    for name, held in body.supports.items()),
         )).encode()

@@ -148,10 +148,7 @@ def _thickness(part: Nodes) -> float | None:
 
 
 def extract(part: Nodes, boundary: str) -> Surface:
-    """Return the surface of a named boundary, which must be one open chain.
-
-    The surface of a periodic body is continued for half a period beyond either end.
-    """
+    """Return the surface of a named boundary, which must be one open chain."""
     edges = edges_of(part, boundary)
     following = {int(start): i for i, start in enumerate(edges[:, 0])}
     heads = set(edges[:, 0].tolist()) - set(edges[:, 1].tolist())
@@ -167,16 +164,10 @@ def extract(part: Nodes, boundary: str) -> Surface:
         )
         raise ModelError("boundary", f"{part.body.name}.{boundary}", allowed)
     nodes, local = np.unique(edges[order], return_inverse=True)
-    X, chain = part.X[:, nodes], local.reshape(edges.shape)
-    if part.period:
-        length = abs(X[0, chain[-1, 1]] - X[0, chain[0, 0]])
-        if not np.isclose(length, part.period):
-            allowed = "a contact surface of a periodic body must run over the whole period"
-            raise ModelError("boundary", boundary, allowed)
-        nodes, X, chain = _repeated(part.same[nodes], X, chain)
     first, last = edges[order[0]], edges[order[-1]]
     beyond = (_goes_on(part, first, 0), _goes_on(part, last, 1))
-    return Surface(nodes, chain, X, _thickness(part), (True, True) if part.period else beyond)
+    chain = local.reshape(edges.shape)
+    return Surface(nodes, chain, part.X[:, nodes], _thickness(part), beyond)
 
 
 def _goes_on(part: Nodes, edge: Ints, at: int) -> bool:
@@ -206,18 +197,3 @@ def _leaving(X: Array, end: int, other: int, middle: int | None) -> Array:
     if middle is None:
         return np.asarray(X[:, other] - X[:, end])
     return np.asarray(4 * X[:, middle] - 3 * X[:, end] - X[:, other])
-
-
-def _repeated(nodes: Ints, X: Array, chain: Ints) -> tuple[Ints, Array, Ints]:
-    """Return nodes, positions and edges of a chain with half a copy of it at either end."""
-    start, end = chain[0, 0], chain[-1, 1]
-    shift = X[0, end] - X[0, start]
-    half = len(chain) // 2
-    size = len(nodes)
-    before, after = chain[half:] + size, chain[:half] + 2 * size
-    before[-1, 1], after[0, 0] = start, end
-    edges = np.vstack([before, chain, after])
-    across = np.array([[shift], [0.0]])
-    everywhere = np.hstack([X, X - across, X + across])
-    used, local = np.unique(edges, return_inverse=True)
-    return np.tile(nodes, 3)[used], everywhere[:, used], local.reshape(edges.shape)

@@ -36,7 +36,6 @@ class Wheel(Substructure):
         self.axle = axle
         self._hub = self.n
         self.n += 3
-        self.copied = np.arange(self.n)
         self.loads = Superposed.of(self.n, ())
         free = [_Y] if axle.rotation is not None else [_Y, _TURN]
         self.rigid = np.zeros((self.n, len(free)))

@@ -58,7 +58,7 @@ class Region:
         near[whole.dofs[_layered(whole, touched, layers)]] = True
         contact = np.zeros(whole.n, dtype=bool)
         for surface in surfaces:
-            contact[surface.dofs] = near[whole.copied[surface.dofs]]
+            contact[surface.dofs] = near[surface.dofs]
         yields = inner.elements if inner.elements.any() else touched
         return cls(_layered(whole, yields, layers), contact)
 
@@ -103,8 +103,6 @@ class Windowed(Discretisation):
         nodes = np.zeros(whole.X.shape[1], dtype=bool)
         nodes[whole.dofs[region.elements] // whole.dim] = True
         nodes[np.flatnonzero(region.contact) // whole.dim] = True
-        nodes[whole.same[nodes]] = True
-        nodes |= nodes[whole.same]
         self.whole, self.body = whole, whole.body
         self.elements = nodes[whole.dofs // whole.dim].all(axis=1)
         at = np.flatnonzero(nodes)
@@ -114,7 +112,6 @@ class Windowed(Discretisation):
         number[kept] = np.arange(len(kept))
         self.n = len(kept)
         self.X = self.nodes = whole.X[:, at]
-        self.copied = number[whole.copied[kept]]
         self.rigid = whole.rigid[kept]
         self.free = np.flatnonzero(np.isin(kept, whole.free))
         self.active = choose_pins(self.rigid, self.free)
@@ -166,7 +163,7 @@ class Windowed(Discretisation):
         """Return the whole body's displacements [mm]."""
         del time
         change = self._outer.finish(u - self._begin[self.kept])
-        return (self._begin + change)[self.whole.copied]
+        return self._begin + change
 
     def inverses(self, elastic: Operator, linear_solver: str) -> Operators:
         """Return its inverse stiffnesses, given the elastic operator of the whole body."""

@@ -49,8 +49,6 @@ class Body:
     condense : reduce the body to its contact surfaces if its material is elastic
     axle : makes an elastic body a wheel; its supports then hold it to the hub
     travelling : a pressure that moves along a boundary
-    periodic : two straight boundaries, the second a copy of the first, shifted by one period along
-        x; the body is repeated beyond them
     """
 
     name: str
@@ -67,7 +65,6 @@ class Body:
     condense: bool = True
     axle: Axle | None = None
     travelling: TravellingPressure | None = None
-    periodic: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
         check_kinds(Body, self)
@@ -114,8 +111,6 @@ class Body:
             self.facets(self.travelling.boundary, "travelling", outer=True)
             if self.material.elastic and self.condense:
                 raise ModelError("travelling", self.name, "an elastic body needs condense=False")
-        if self.periodic is not None:
-            self._check_periodic(self.periodic)
         moved = self.axle is not None or self.travelling is not None
         for load in self.every_load if moved else ():
             allowed = "must not be given on a body with an axle or a travelling pressure"
@@ -128,7 +123,7 @@ class Body:
 
     def _check_solid(self) -> None:
         """Refuse what bodies in space have not yet: all but supports and displacements."""
-        plane = ("kinematics", "thickness", "pressure", "axle", "travelling", "periodic")
+        plane = ("kinematics", "thickness", "pressure", "axle", "travelling")
         defaults = {each.name: each.default for each in fields(self)} | {"pressure": {}}
         given = {name: getattr(self, name) for name in plane}
         given |= {
@@ -157,22 +152,6 @@ class Body:
         each = self.pressure.items()
         pushing = (Pressure(boundary=b, value=p, amplitude=self.amplitude) for b, p in each)
         return (*pushing, *self.loads)
-
-    def _check_periodic(self, sides: tuple[str, str]) -> None:
-        if not isinstance(sides, tuple) or len(sides) != 2:
-            raise ModelError("periodic", sides, "must be two names of boundaries")
-        if self.kinematics == "axisymmetric":
-            raise ModelError("periodic", sides, "an axisymmetric body cannot be periodic")
-        for load in self.every_load:
-            if load.removes:
-                raise ModelError(load.name, load.removes, "must not be given in a periodic body")
-        for boundary in sides:
-            self.facets(boundary, "periodic", outer=True)
-            loads = ((load.name, load.boundaries) for load in self.every_load)
-            for kind, names in (("supports", self.supports), *loads):
-                if boundary in names:
-                    allowed = "must not be given on a side of a periodic body"
-                    raise ModelError(f"{kind}.{boundary}", boundary, allowed)
 
     def region(self, name: str, field: str = "region") -> np.ndarray:
         """Return the element numbers of a named set of elements, which is a part of the body.

@@ -84,8 +84,8 @@ class Model:
             if not isinstance(body, Body):
                 allowed = "must be a boundary of a body with a mesh: name a rigid body by rigid"
                 raise ModelError(f"{name}.{side}", (of, boundary), allowed)
-            if body.axle is not None or body.periodic is not None:
-                allowed = "must be of a body without an axle that is not periodic"
+            if body.axle is not None:
+                allowed = "must be of a body without an axle"
                 raise ModelError(f"{name}.{side}", (of, boundary), allowed)
             body.facets(boundary, f"{name}.{side}", outer=True)
             for j, pair in enumerate(self.contacts):

@@ -59,23 +59,17 @@ class TravellingPressure:
         """Return the factor of the pressure, its centre [mm] and the ratio of shear to it."""
         return self.amplitude.at(time), self.position.at(time), self.shear_ratio.at(time)
 
-    def at(self, time: float, x: Array, period: float = 0.0) -> tuple[Array, float]:
-        """Return the pressure at positions x [MPa] and the ratio of shear to it.
-
-        On a periodic body the pressure is repeated after each ``period`` [mm].
-        """
+    def at(self, time: float, x: Array) -> tuple[Array, float]:
+        """Return the pressure at positions x [MPa] and the ratio of shear to it."""
         amplitude, centre, ratio = self.now(time)
-        away = x - centre
-        if period:
-            away -= period * np.round(away / period)
-        inside = 1 - (away / self.half_width) ** 2
+        inside = 1 - ((x - centre) / self.half_width) ** 2
         return amplitude * self.peak * np.sqrt(np.maximum(inside, 0.0)), ratio
 
-    def pushing(self, time: float, period: float = 0.0) -> Callable[[Array, Array], Array]:
+    def pushing(self, time: float) -> Callable[[Array, Array], Array]:
         """Return its traction at a time, as a function like `solver.model.loads.Load.push`."""
 
         def push(x: Array, along: Array) -> Array:
-            pressure, ratio = self.at(time, x[0], period)
+            pressure, ratio = self.at(time, x[0])
             return pressure * (np.stack([-along[1], along[0]]) - ratio * along)
 
         return push

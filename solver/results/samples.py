@@ -81,9 +81,7 @@ class Samples:
         stress = self.fields.at_nodes(at, name).mises[nodes]
         stress = np.minimum(stress, np.nanmax(self.fields.at_points(at, name)[1]))
         x = self.view.axis.reached(body.X[:, nodes]) - centre
-        beyond = {"left": np.nan, "right": np.nan}
-        way = {"period": body.period} if body.period else beyond
-        return np.asarray(np.interp(self.view.s, x, stress, **way))
+        return np.asarray(np.interp(self.view.s, x, stress, left=np.nan, right=np.nan))
 
 
 def _extent(view: View) -> list[float]:

@@ -102,15 +102,14 @@ class PairTractions:
 
 
 class PrescribedTractions:
-    """A travelling pressure; the surface is periodic with ``period`` [mm], unless it is 0."""
+    """A travelling pressure."""
 
-    def __init__(self, travelling: TravellingPressure, period: float) -> None:
+    def __init__(self, travelling: TravellingPressure) -> None:
         self._travelling = travelling
-        self._period = period
 
     def along(self, converged: Solved, x: Array) -> tuple[Array, Array, Array]:
         """See `SurfaceTractions`."""
-        pressure, ratio = self._travelling.at(converged.state.time, x, self._period)
+        pressure, ratio = self._travelling.at(converged.state.time, x)
         return pressure, ratio * pressure, np.full_like(x, np.nan)
 
     def extent(self, converged: Solved) -> tuple[float, float]:
@@ -169,5 +168,5 @@ def tractions_of(system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> Su
         return PairTractions(system, symmetric=symmetric, axis=axis)
     for body in system.model.bodies:
         if body.travelling is not None:
-            return PrescribedTractions(body.travelling, system.full(body.name).period)
+            return PrescribedTractions(body.travelling)
     return NoTractions()

@@ -51,7 +51,6 @@ def runs() -> dict[str, tuple[str, dict[str, Any]]]:
     add("rolling", "finite, quad4", **_TRACK, element="quad4")
     add("rolling", "finite, slip", **_TRACK, traction=1.0, hardening="kinematic")
     add("rolling", "finite, two passes", **_TRACK, load="hertz", passes=2)
-    add("rolling", "finite, periodic", accuracy="draft", track=60.0, periodic=True, load="hertz")
     add("rolling", "creepage", **draft, control="creepage", given_creepage=2e-3)
     add("rolling", "Hertz", **draft, load="hertz", friction=0.3, traction=1.0, load_ratio=5.0)
     add("rolling", "five passes", **draft, passes=5, hardening="kinematic", load_ratio=5.0)

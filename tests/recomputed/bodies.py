@@ -93,9 +93,9 @@ def recovered(plain: PlainBody, values: Array, gone: NDArray[np.bool_]) -> Array
     weighted = np.where(gone[:, None], 0.0, weighted)
     rows = np.moveaxis(weighted @ to_nodes.T, -1, -2).reshape(-1, nodes.size)
     total = np.bincount(nodes.ravel(), np.tile(np.where(gone, 0, volume), len(nodes)), count)
-    total[total == 0] = np.nan if gone.any() else 1.0  # 1: copies of a periodic body
+    total[total == 0] = np.nan
     sums = np.stack([np.bincount(nodes.ravel(), one, count) for one in rows]) / total
-    return np.asarray(sums[:, plain.part.same].reshape(*values.shape[:-1], count))
+    return np.asarray(sums.reshape(*values.shape[:-1], count))
 
 
 class Fields:
@@ -277,7 +277,7 @@ class Located:
         _, first = np.unique(place[best], return_index=True)
         best = best[first]
         self._at, self._count = place[best], X.shape[1]
-        self._nodes = np.asarray(part.same[dofs[:, element[best]]])
+        self._nodes = np.asarray(dofs[:, element[best]])
         each = [np.asarray(shape(at[:, best], i)[0]) for i in range(len(dofs))]
         self._shape = np.array(each).reshape(len(dofs), -1)
 

@@ -70,11 +70,6 @@ class Tractions:
         return np.asarray(self._contact.normal > 0)
 
     @property
-    def repeated(self) -> bool:
-        """Whether the body is periodic: the surface then has copies at its ends."""
-        return len(np.unique(self._chain.nodes)) < len(self._chain.nodes)
-
-    @property
     def measured(self) -> bool:
         """Whether gaps and motions are means with another projection than the solver's."""
         return self._surfaces.finite or self._surfaces.curved
@@ -234,8 +229,6 @@ def of_pair(found: Tractions, at: Array, x: Array, *, symmetric: bool) -> Acting
         between(x, at[order], (values + unknown)[order])
         for values in (found.pressure(moved=False), -found.shear(moved=False), found.gap)
     )
-    if found.repeated:  # the gaps of periodic copies are not measured
-        gap = np.full_like(x, np.nan)
     mean = found.pressure(moved=False)
     width = np.nan
     if found.known[mean.argmax()]:
@@ -245,11 +238,9 @@ def of_pair(found: Tractions, at: Array, x: Array, *, symmetric: bool) -> Acting
     return Acting(pressure, shear, gap, found.way, found.measured, width, width, peak)
 
 
-def of_pressure(moving: TravellingPressure, time: float, x: Array, period: float) -> Acting:
+def of_pressure(moving: TravellingPressure, time: float, x: Array) -> Acting:
     """What a travelling Hertz pressure exerts at places x (n,)."""
     away = x - load_factor(moving.position, time)
-    if period:
-        away = (away + period / 2) % period - period / 2
     peak, width = load_factor(moving.amplitude, time) * moving.peak, moving.half_width
     pressure = peak * np.sqrt(np.clip(1 - (away / width) ** 2, 0.0, None))
     shear = load_factor(moving.shear_ratio, time) * pressure

@@ -293,7 +293,7 @@ class Rules:
         if isinstance(self.system, TrackBody):
             released = stage == self.view.unloaded
             if isinstance(self.run.tractions, PrescribedTractions):
-                return of_pressure(self.run.tractions._travelling, float(released), x, 0.0)
+                return of_pressure(self.run.tractions._travelling, float(released), x)
             if released:
                 return Acting(np.zeros_like(x), np.zeros_like(x), nowhere)
             return of_wheel(self.track, self.passed, x)
@@ -304,9 +304,7 @@ class Rules:
             return of_pair(found, self._along(found.X), x, symmetric=self.view.symmetric)
         if self._travelling is None:
             return Acting(nowhere, nowhere, nowhere)
-        body = next(b for b in self.system.model.bodies if b.travelling is not None)
-        period = float((body.periodic and body.box[0]) or 0.0)
-        return of_pressure(self._travelling, float(self.state(stage).time), x, period)
+        return of_pressure(self._travelling, float(self.state(stage).time), x)
 
     def contact_line(self, kind: str) -> Own | None:
         """Pressure, shear or gap along the view, or along each contact."""

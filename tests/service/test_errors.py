@@ -248,7 +248,7 @@ def test_a_method_that_is_not_offered_is_named(service: Server) -> None:
         ("/runs?traction=much", "traction"),
         ("/runs?traction=0.1&traction=0.2", "traction"),
         ("/runs?traction=" + "[" * 5000, "traction"),
-        ("/runs?periodic=1", "periodic"),
+        ("/runs?elastic_punch=1", "elastic_punch"),
         ("/runs?seconds=NaN", "seconds"),
         ("/runs?scene=bogus", "scene"),
         ("/runs?status=bogus", "status"),

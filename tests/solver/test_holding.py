@@ -226,3 +226,26 @@ def test_a_fit_that_is_loaded_in_cycles_is_judged_by_its_last_touch(
     found = solve(Model(bodies=(block,), rigid=(ball,), contacts=(pair,)), stages=stages)
     first, last = (found.audit(name).figures["audit_touch_time"] for name in ("1", "7"))
     assert 0 < last <= 1.01 * first
+
+
+@pytest.mark.parametrize("solver", ["auto", "superlu"])
+def test_a_surface_that_supports_hold_bears_contact(solver):
+    """A rigid die: all unknowns of its contact surface are held."""
+    die = Body(
+        name="die",
+        mesh=grid(np.linspace(0.0, 4.0, 5), np.linspace(-1.0, 0.0, 3)),
+        material=ELASTIC,
+        supports={"top": "xy", "bottom": "xy"},
+        condense=False,
+    )
+    block = Body(
+        name="block",
+        mesh=grid(np.linspace(0.5, 3.5, 4), np.linspace(0.0, 1.0, 3)),
+        material=ELASTIC,
+        pressure={"top": 50.0},
+        supports={"left": "x"},
+    )
+    pair = ContactPair(slave=("block", "bottom"), master=("die", "top"))
+    solution = solve(Model(bodies=(die, block), contacts=(pair,)), linear_solver=solver)
+    pressure = solution.contact().pressure
+    assert pressure == pytest.approx(50.0, rel=1e-6)

@@ -35,7 +35,6 @@ def plate(name="plate", height=0.0, **fields):
     [
         ({"pressure": {"seam": 1.0}}, "pressure"),
         ({"travelling": TRAVELLING, "condense": False}, "travelling"),
-        ({"periodic": ("seam", "right")}, "periodic"),
     ],
 )
 def test_loads_inside_a_body_are_refused(fields, field):

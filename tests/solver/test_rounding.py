@@ -9,7 +9,6 @@ import pytest
 from skfem import Mesh, MeshQuad2
 
 from solver import Body, Material, ModelError
-from solver.fem.discretisation import Discretisation
 from solver.mesh import grid
 from solver.mesh.grids import marked, within, without
 from solver.mesh.rounding import with_zeros
@@ -66,11 +65,3 @@ def test_a_table_covers_a_body_whose_end_a_mesher_rounds() -> None:
     table = Tabulated.of("x,stress\n0,1\n10,2\n", "stress")
     found = table(np.array([[-4e-7, 10.0 + 4e-7], [0.0, 0.0]]))
     assert found == pytest.approx([1.0, 2.0])
-
-
-def test_sides_of_a_periodic_body_may_differ_by_rounding() -> None:
-    p = PLATE.doflocs.copy()
-    p[0, np.flatnonzero(p[0] == 0.0)[0]] = 4e-8
-    sides = {"mesh": replace(PLATE, doflocs=p), "periodic": ("left", "right")}
-    body = Body(name="strip", material=STEEL, supports={"bottom": "xy"}, **sides)
-    assert Discretisation(body).period == pytest.approx(10.0)

@@ -237,7 +237,6 @@ def test_a_pass_whose_surface_strains_by_more_than_a_tenth_is_outside_theory():
 @pytest.mark.parametrize(
     ("fields", "name"),
     [
-        ({"periodic": True}, "periodic"),
         ({"advance_tolerance": 0.01}, "advance_tolerance"),
         ({"track": 50.0, "until": "decided"}, "until"),
         ({"track": "long"}, "track"),

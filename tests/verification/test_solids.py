@@ -210,7 +210,6 @@ def test_a_cube_that_nothing_holds_is_refused():
         ({"pressure": {"top": 1.0}}, "pressure = .*: must be left out"),
         ({"loads": (Traction(boundary="top", y=1.0),)}, "traction = .*: must be left out"),
         ({"loads": (Gravity(density=8e-9),)}, "gravity = .*: must be left out"),
-        ({"periodic": ("left", "right")}, "periodic = .*: must be left out"),
         ({"supports": {"left": "zx"}}, "supports.left = 'zx': must be x, y, z, xy, xz, yz or xyz"),
         (
             {"element": "quad8"},

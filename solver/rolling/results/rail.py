@@ -63,7 +63,7 @@ class PrismBody:
         self.names = (name,)
         plane = track.section.plane
         self._part = SimpleNamespace(
-            X=in_space(plane.X), same=plane.same, basis=plane.basis, period=0.0,
+            X=in_space(plane.X), basis=plane.basis,
             weights=track.section.weights, points=in_space(plane.points.reshape(2, -1)),
             body=Body(name=name, mesh=plane.body.mesh, material=law),
             boundary_nodes=plane.boundary_nodes,

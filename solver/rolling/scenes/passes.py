@@ -123,7 +123,7 @@ def shakedown_of(parameters: RollingParameters, traces: Sequence[Trace]) -> Shak
     accumulated, left = _increments(traces, cycle)
     last = slice((len(traces) - 1) % cycle, None, cycle)
     found = classify(accumulated[last], _equivalent(left)[last], yield_strain, hardens=hardens)
-    if parameters.endless or parameters.periodic or found.state is ShakedownState.ELASTIC:
+    if parameters.endless or found.state is ShakedownState.ELASTIC:
         return found
     return Shakedown(ShakedownState.UNDECIDED, found.accumulated, found.net)
 

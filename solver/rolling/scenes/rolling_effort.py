@@ -60,15 +60,11 @@ def _size(parameters: RollingParameters) -> tuple[int, int]:
 
 @lru_cache(maxsize=4096)
 def _track(
-    fine: float, far: float, a: float, h: float, growth: float, periodic: bool, element: str
+    fine: float, far: float, a: float, h: float, growth: float, element: str
 ) -> tuple[int, int]:
     """Return elements and unknowns of the half-space."""
-    x, y = half_space_nodes(fine, far, a, h, growth, periodic)
-    if not periodic:
-        return _held(len(x), len(y), element)
-    track = grid_size(len(x) - 1, len(y) - 1, element)
-    # the right side has the unknowns of the left one; the bottom is held
-    return track.elements, 2 * (track.nodes - track.up) - 2 * (track.along - 1)
+    x, y = half_space_nodes(fine, far, a, h, growth)
+    return _held(len(x), len(y), element)
 
 
 @lru_cache(maxsize=4096)

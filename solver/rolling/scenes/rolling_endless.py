@@ -231,7 +231,7 @@ def _tractions(parameters: RollingParameters, way: int) -> SurfaceTractions:
     """Return pressure and shear on the half-space."""
     if parameters.load == "contact":
         return SteadyTractions(way)
-    return PrescribedTractions(_moving(parameters, way), 0.0)
+    return PrescribedTractions(_moving(parameters, way))
 
 
 def _moving(parameters: RollingParameters, way: int) -> TravellingPressure:

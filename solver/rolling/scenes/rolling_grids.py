@@ -20,19 +20,19 @@ _HUB = 0.3
 
 
 def half_space_nodes(
-    fine: float, far: float, a: float, h: float, growth: float, periodic: bool
+    fine: float, far: float, a: float, h: float, growth: float
 ) -> tuple[Array, Array]:
     """Return x and y of the grid lines of the half-space [mm].
 
     Parameters
     ----------
     fine : half the length with elements of side ``h`` [mm]
-    far : depth, and width beyond the fine length if not ``periodic`` [mm]
+    far : depth, and width beyond the fine length [mm]
     a : Hertz half-width [mm]
     growth : ratio of neighbouring element sides in depth
     """
     track = np.linspace(-fine, fine, 2 * math.ceil(fine / h) + 1)
-    x = track if periodic else continued(track, far, h, 1.4, far / 4, both=True)
+    x = continued(track, far, h, 1.4, far / 4, both=True)
     deep = graded(_DEEP * a, h, growth, _DEEP * a)
     return x, -continued(deep, far - deep[-1], deep[-1] - deep[-2], 1.4, far / 4)[::-1]
 

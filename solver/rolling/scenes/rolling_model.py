@@ -20,16 +20,14 @@ from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.scenes.sketch import Sketch
 
 
-def track_grid(parameters: RollingParameters) -> tuple[float, float, float, float, float, bool]:
+def track_grid(parameters: RollingParameters) -> tuple[float, float, float, float, float]:
     """Return the arguments of `half_space_nodes`."""
     p, a = parameters, parameters.half_width
-    far = p.length if p.periodic else p.half_space_size * a
-    return p.fine, far, a, p.element_size, p.growth, p.periodic
+    return p.fine, p.half_space_size * a, a, p.element_size, p.growth
 
 
 def _half_space(parameters: RollingParameters) -> Body:
     x, y = half_space_nodes(*track_grid(parameters))
-    periodic = parameters.periodic
     travelling = None
     if parameters.load == "hertz":
         schedule = parameters.schedule
@@ -47,9 +45,8 @@ def _half_space(parameters: RollingParameters) -> Body:
         mesh=within(grid(x, y), "track", ["top"], x=(-parameters.fine, parameters.fine)),
         material=parameters.material(),
         element=parameters.element,
-        supports={"bottom": "xy"} if periodic else {"left": "x", "right": "x", "bottom": "xy"},
+        supports={"left": "x", "right": "x", "bottom": "xy"},
         travelling=travelling,
-        periodic=("left", "right") if periodic else None,
     )
 
 

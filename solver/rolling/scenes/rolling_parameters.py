@@ -33,8 +33,6 @@ _MARGIN = 2.5
 _SPREAD = 0.65
 """Ratio of the length that a sinking wheel touches beyond the end of the track to the Hertz
 half-width times the load ratio."""
-_PERIOD = 6.0
-"""Smallest ratio of the length of a periodic track to the Hertz half-width."""
 _LONGEST_REACH = 0.8
 """Largest ratio of `RollingParameters.reach` to half the circumference of the wheel."""
 _MOST_INCREMENTS = 100_000
@@ -70,11 +68,6 @@ class RollingParameters(WheelParameters):
         "passes",
         "last pass on an endless track: that of `passes`, or the first after which the shakedown "
         "state is decided",
-    )
-    periodic: bool = described(
-        False,
-        "whether half-space and load are repeated along x after each track length; the half-space "
-        "is then as deep as the track is long",
     )
     half_space_size: Annotated[float, Interval(ge=5.0, le=1e5), Unit("1")] = described(
         400.0,
@@ -135,8 +128,7 @@ class RollingParameters(WheelParameters):
     def _check_endless(self) -> None:
         """Raise `ModelError` for parameters that an endless track cannot have."""
         for name, usual in (
-            ("periodic", False), ("advance_tolerance", 0.0), ("half_space_size", 400.0),
-            ("element", "quad8"),
+            ("advance_tolerance", 0.0), ("half_space_size", 400.0), ("element", "quad8")
         ):  # fmt: skip
             if (value := getattr(self, name)) != usual:
                 raise ModelError(name, value, f"must be {usual} with track = endless")
@@ -172,15 +164,6 @@ class RollingParameters(WheelParameters):
                 "passes", self.passes,
                 f"make {increments:.0f} increments of press_steps, advance_step and unload_steps; "
                 f"at most {_MOST_INCREMENTS}",
-            )  # fmt: skip
-        if self.periodic and self.half_space_size != 400.0:
-            allowed = "cannot be set with periodic = true: the depth is the length of the track"
-            raise ModelError("half_space_size", self.half_space_size, allowed)
-        if self.periodic and self.length < _PERIOD * self.half_width:
-            raise ModelError(
-                "track", self.track,
-                f"must be at least {_PERIOD:g} Hertz half-widths with periodic = true, "
-                f"{_PERIOD * self.half_width:.4g} mm",
             )  # fmt: skip
 
     def _check_rim(self) -> None:
@@ -235,7 +218,7 @@ class RollingParameters(WheelParameters):
     @property
     def fine(self) -> float:
         """Half the length of the half-space with elements of the given side [mm]."""
-        return self.length / 2 + (0.0 if self.periodic else self.margin)
+        return self.length / 2 + self.margin
 
     @property
     def guided(self) -> bool:

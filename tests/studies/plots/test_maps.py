@@ -307,11 +307,11 @@ def test_zoom_to_an_edge_that_is_not_known_says_what_is_missing() -> None:
 
 def test_a_figure_tells_every_parameter_that_is_not_the_default() -> None:
     run = grid_map(np.arange(-20.0, 21.0), np.arange(-20.0, 0.0))
-    given = {"track": 64.0, "passes": 1, "periodic": True, "load": "hertz", "friction": 0.1}
+    given = {"track": 64.0, "passes": 1, "until": "decided", "load": "hertz", "friction": 0.1}
     run = run.assign_attrs(scene="rolling", parameters=json.dumps(given))
     run = run.assign_coords(friction=0.3)
     words = texts_of(map_figure(run, "quantity"))
-    assert "rolling · friction 0.3 · track 64 mm · periodic · load hertz" in words
+    assert "rolling · friction 0.3 · track 64 mm · until decided · load hertz" in words
     assert "passes" not in words, "one pass is the default"
 
 
@@ -357,9 +357,11 @@ def test_a_field_that_is_zero_everywhere_is_drawn(store: Store) -> None:
             assert low < high
 
 
-@pytest.mark.parametrize(("held", "told"), [("true", "periodic"), ("false", "not periodic")])
+@pytest.mark.parametrize(
+    ("held", "told"), [("true", "elastic punch"), ("false", "not elastic punch")]
+)
 def test_a_swept_truth_value_is_told_by_its_name(held: str, told: str) -> None:
-    run = xr.Dataset(coords={"periodic": held}, attrs={"scene": "rolling", "parameters": "{}"})
+    run = xr.Dataset(coords={"elastic_punch": held}, attrs={"scene": "punch", "parameters": "{}"})
     assert setting(run).replace("\u00a0", " ").endswith(f"· {told}")
 
 

@@ -190,7 +190,7 @@ def test_nothing_is_cut_and_the_legend_lies_beside_panels_of_a_good_size(
     dataset = swept(hardening=hardening)
     dataset["status"][0, 0, 0] = "limit_load"
     dataset["load_ratio"].attrs["long_name"] = "a very long description " * 8
-    given = {"poisson_ratio": 0.3, "passes": 10, "track": 64.0, "periodic": True, "growth": 1.2}
+    given = {"poisson_ratio": 0.3, "passes": 10, "track": 64.0, "until": "decided", "growth": 1.2}
     dataset.attrs["parameters"] = json.dumps(given | {"element_size": 2.0, "advance_step": 4.0})
     sheet = sweep_figure(dataset, field)
     sheet.draw_without_rendering()
