@@ -23,7 +23,7 @@ from solver.fem.nodes import Nodes
 from solver.fem.operators import Operators
 from solver.fem.part import Part
 from solver.fem.softening import Softening
-from solver.fem.surface import Surface, edges_of, extract, gathered, shortest
+from solver.fem.surface import Surface, extract, gathered
 from solver.linear import solvers as linear
 from solver.linear.solvers import LinearSolver
 from solver.materials import Law, PlasticState, Response
@@ -124,18 +124,6 @@ class Discretisation(Nodes, Part):
         if self._travelling[0] != time:  # an increment asks many times
             self._travelling = time, travelling_forces(self, self.body.travelling, time)
         return self._travelling[1]
-
-    @property
-    def side(self) -> float:
-        """Shortest element side under the body's moving load [mm]; inf without such a load."""
-        if self.body.travelling is None:
-            return super().side
-        return shortest(self.X, edges_of(self, self.body.travelling.boundary))
-
-    def way(self, before: float, after: float) -> float:
-        """Return how far its travelling pressure moves along x between two times [mm]."""
-        position = self.body.travelling.position if self.body.travelling else None
-        return position.at(after) - position.at(before) if position else 0.0
 
     @property
     def travels(self) -> bool:

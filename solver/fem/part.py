@@ -189,13 +189,8 @@ class Part(ABC):
         del time
         return u
 
-    @property
-    def side(self) -> float:
-        """Shortest element side under the part's moving load [mm]; inf without such a load."""
-        return np.inf
-
     def way(self, before: float, after: float) -> float:
-        """Return how far the part's moving load goes along x between two times [mm]."""
+        """Return how far a wheel rolls along x between two times [mm]."""
         del before, after
         return 0.0
 

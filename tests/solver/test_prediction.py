@@ -38,7 +38,6 @@ def stress(system, outcome):
         (0.85, {"advance_step": 1.5}),
         (0.85, {"advance_step": 1.5, "traction": 0.75}),
         (0.85, {"advance_step": 1.5, "heading": "backward", "traction": -0.5}),
-        (0.85, {"advance_step": 1.5, "load": "hertz"}),
     ],
     ids=str,
 )
