@@ -206,8 +206,14 @@ def test_a_worker_that_does_not_see_the_directory_computes_nothing(
             seen.touch()
 
     stage.ready()
-    with pytest.raises(GridLost, match="does not see the directory out"):
-        run_study(fake_study(), store, scheduler=stage.address, limits=Limits(patience=4.0))
+    for patience in (4.0, 16.0, 64.0):  # the worker may still load
+        with pytest.raises(GridLost) as lost:
+            run_study(
+                fake_study(), store, scheduler=stage.address, limits=Limits(patience=patience)
+            )
+        if "none takes the work" not in str(lost.value):  # else it still loads
+            break
+    assert "does not see the directory out" in str(lost.value)
     assert store.catalogue.runs()[1] == 0
     assert not list(Path("out").rglob("*.nc"))
     outcome = run_study(fake_study(), store, scheduler=stage.address, on_event=hear)
