@@ -14,14 +14,14 @@ from solver.typing import Array, Ints
 
 
 class Nodes:
-    """The unknowns and the integration points of one body, and their positions.
+    """The nodes, the unknowns and the integration points of one body.
 
     Unknowns are numbered node by node (`Dofs`), points element by element. Nodes on the far side of
     a periodic body repeat those on the near side: their unknowns are copies.
 
     Attributes
     ----------
-    basis : elements and quadrature, of scikit-fem
+    basis : elements and quadrature in scikit-fem
     X : (dim, n_nodes) node positions [mm]
     dim : number of axes
     n : number of unknowns
