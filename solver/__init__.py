@@ -1,11 +1,11 @@
-"""Elastic-plastic bodies in frictional contact, and the residual stress they keep.
+"""Elastic-plastic bodies in frictional contact, and their residual stress.
 
-`Body` (mesh, element, kinematics, `Material`, supports, pressure) and `ContactPair` make a `Model`;
-a `System` is the model discretised. A `Program` of `Stage`s is its loading history. A `Walker`
-solves it increment by increment, with plasticity in the outer iteration and contact in the inner
-one, and gives an `Outcome`. `solve` does this for a model of your own and returns a `Solution`; a
-`Scene` of `SCENES` gives a `Record` for each run. Numbers are in N, mm, MPa; tension is positive; y
-points up.
+A `Model` consists of bodies (`Body`: mesh, element, kinematics, `Material`, supports, loads) and
+contact pairs (`ContactPair`); a `System` is the discretised model. A `Program` of `Stage`s is its
+loading history. A `Walker` solves it increment by increment, with plasticity in the outer iteration
+and contact in the inner one, and yields an `Outcome`. `solve` does this for a model of your own and
+returns a `Solution`; a `Scene` of `SCENES` yields a `Record` for each run. Units are N, mm, MPa;
+tension is positive; y points up.
 """
 
 from __future__ import annotations

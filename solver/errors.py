@@ -8,19 +8,19 @@ class SolverError(Exception):
 
 
 def plain(value: object) -> object:
-    """Return a value as a message shows it: a number of an array as a plain number."""
+    """Return a value as messages show it: NumPy numbers become plain numbers."""
     is_number = hasattr(value, "dtype") and getattr(value, "ndim", 1) == 0
     return value.item() if is_number else value  # type: ignore[attr-defined]
 
 
 class ModelError(SolverError, ValueError):
-    """Bad input; the message says which field, which value and what is allowed.
+    """Bad input; the message states the field, the value and what is allowed.
 
     Parameters
     ----------
-    field : name of the offending input, dotted for nested ones (``"material.yield_stress"``)
-    value : what was given
-    allowed : what would have been accepted, in words
+    field : name of the input, dotted if nested (``"material.yield_stress"``)
+    value : the given value
+    allowed : description of allowed values
     """
 
     def __init__(self, field: str, value: object, allowed: str) -> None:
@@ -37,8 +37,8 @@ class ModelError(SolverError, ValueError):
 class NotConverged(SolverError):
     """The iteration failed although an equilibrium may exist.
 
-    ``reached`` is the time of the last converged increment, ``attempted`` that of the increment
-    that failed. Time is the load factor where the pressures of the bodies have no amplitude.
+    ``reached`` is the time at the end of the last converged increment, ``attempted`` that of the
+    increment that failed. Without amplitudes the time is the load factor.
     """
 
     def __init__(self, message: str, reached: float = 0.0, attempted: float = 0.0) -> None:
@@ -51,19 +51,19 @@ class NotConverged(SolverError):
 
 
 class WindowTooSmall(NotConverged):
-    """Plastic zone or contact of a steady pass reaches the edge of its mesh: use a larger one."""
+    """The plastic zone or the contact of a steady pass reaches the edge of its mesh."""
 
 
 class NoContact(NotConverged):
-    """The contact problem has no solution for this shape of the surfaces; for another it may."""
+    """The contact problem has no solution for this shape of the surfaces, but may for another."""
 
 
 class TooLong(NotConverged):
-    """A search used up the work that it may take; the message says how to make it easier."""
+    """A search has used all the work allowed to it; the message says how to make it easier."""
 
 
 class LimitLoad(NotConverged):
-    """No equilibrium exists above the load ``reached``: a body flows plastically, or slides off."""
+    """No equilibrium exists above the load ``reached``: a body flows plastically, or slides."""
 
 
 class Spins(LimitLoad):

@@ -1,6 +1,6 @@
-"""Files: regular ones are read without waiting, up to a size; written ones appear when complete.
+"""Reading of regular files up to a size, and writing of files that appear when complete.
 
-A name may be that of a device or of a pipe, or a link to one: to read it could wait, or never end.
+Devices and pipes, and links to them, are refused: reading could wait, or never end.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 LARGEST = 50_000_000
-"""Largest size of a file that is read whole, where no other one is given [bytes]."""
+"""Largest size of a file that is read as a whole, by default [bytes]."""
 
 _PIECE = 1 << 20
 _KINDS = {
@@ -26,7 +26,7 @@ _KINDS = {
 
 
 class NoFile(OSError):
-    """A path is not that of a regular file, or the file is too large; `strerror` is the reason."""
+    """A path is not a regular file, or the file is too large; `strerror` is the reason."""
 
     def __init__(self, path: Path | str, reason: str) -> None:
         super().__init__(0, reason, str(path))
@@ -39,9 +39,9 @@ class NoFile(OSError):
 
 
 def special(path: Path, links: bool = True) -> str:
-    """Return what a path is if it is not a regular file, such as a pipe; empty if it is or may be.
+    """Return the kind of a path that is not a regular file, such as "a pipe"; otherwise empty.
 
-    With `links`, a link is what it leads to.
+    It is empty also if nothing has this path. If ``links``, links are followed.
     """
     try:
         return _kind(path.stat(follow_symlinks=links).st_mode)
@@ -50,19 +50,19 @@ def special(path: Path, links: bool = True) -> str:
 
 
 def descriptor_of(path: Path | str, flags: int = os.O_RDONLY) -> int:
-    """Return the descriptor of a regular file; to open it never waits.
+    """Return the descriptor of a regular file, opened without waiting.
 
     Raises
     ------
     NoFile
-        if it is something else
+        if it is not a regular file
     OSError
         if it cannot be opened
     """
     try:
         descriptor = os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC, 0o644)
     except OSError:
-        if kind := special(Path(path)):  # such as a socket, which cannot be opened
+        if kind := special(Path(path)):  # a socket, for example, cannot be opened
             raise NoFile(path, f"it is {kind}") from None
         raise
     if kind := _kind(os.fstat(descriptor).st_mode):
@@ -72,21 +72,21 @@ def descriptor_of(path: Path | str, flags: int = os.O_RDONLY) -> int:
 
 
 def opened(path: Path | str) -> BinaryIO:
-    """Return a regular file, open to be read; errors as `descriptor_of`."""
+    """Return a regular file opened for reading; errors as of `descriptor_of`."""
     return os.fdopen(descriptor_of(path), "rb")
 
 
 def read_file(path: Path | str, largest: int = LARGEST) -> bytes:
-    """Return the content of a regular file of at most `largest` bytes.
+    """Return the content of a regular file of at most ``largest`` bytes.
 
     Raises
     ------
     NoFile
-        if it is something else, or larger
+        if it is not a regular file, or larger
     OSError
         if it cannot be read
     """
-    with opened(path) as file:  # what grows meanwhile has an end, too
+    with opened(path) as file:  # in pieces: the file may grow meanwhile
         pieces = islice(iter(partial(file.read, _PIECE), b""), largest // _PIECE + 1)
         content = b"".join(pieces)
     if len(content) > largest:
@@ -96,9 +96,9 @@ def read_file(path: Path | str, largest: int = LARGEST) -> bytes:
 
 @contextmanager
 def appearing(path: Path) -> Iterator[Path]:
-    """Give a temporary path to write to; the finished file then gets the name `path` at once.
+    """Yield a temporary path to write to; at the end the file is renamed to ``path``.
 
-    It replaces a regular file. Raises `NoFile` if `path` is something else, such as a link.
+    It replaces a regular file. Raises `NoFile` if ``path`` is something else, such as a link.
     """
     if kind := special(path, links=False):
         raise NoFile(path, f"it is {kind}, and only files are replaced")

@@ -1,6 +1,6 @@
-"""What is imported when it is first used: names of a package, functions of a scene.
+"""Late imports, at first use: public names of a package, functions of a scene.
 
-A scene is listed without the modules that compute it.
+Scenes are thus listed without importing the modules that compute them.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ class Late:
 
     def __post_init__(self) -> None:
         module, _, function = self.name.partition(":")
-        vars(self).update(__module__=module, __qualname__=function)  # as the function has them
+        vars(self).update(__module__=module, __qualname__=function)  # those of the function
 
     def __call__(self, *given: Any, **named: Any) -> Any:
-        """Return what the function returns."""
+        """Return the result of the function."""
         return resolve_name(self.name)(*given, **named)
 
 
 def late(module: str, *functions: str) -> tuple[Late, ...]:
-    """Return functions of a module of the solver."""
+    """Return late functions of a module of the solver."""
     return tuple(Late(f"solver.{module}:{function}") for function in functions)
 
 
 def front(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return the ``__getattr__`` of a package whose public names are imported when they are used.
+    """Return the ``__getattr__`` of a package that imports its public names at first use.
 
     Parameters
     ----------

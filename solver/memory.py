@@ -1,8 +1,8 @@
-"""Set-ups that a process keeps for its next runs: the last used ones, up to a number of bytes.
+"""Cache of set-ups that a process keeps for its next runs, limited in bytes.
 
-A set-up (mesh, operators, factors) grows while it is used. Therefore kept values are measured, with
-all that they hold, when another one is made and when `release` is called: those used longest ago go
-first. One that is still in use elsewhere is found again until it ends.
+A set-up (mesh, operators, factors) grows while it is used. Kept values are therefore measured, with
+all objects that they refer to, when another one is made and when `release` is called; the least
+recently used ones are dropped first. A dropped value is found again while it is in use elsewhere.
 """
 
 from __future__ import annotations
@@ -30,19 +30,18 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 SETTING, USUAL = "RESIDUA_KEPT_MEMORY", "300MB"
-"""Environment variable with the most that a process keeps, such as ``"2GB"``, and its default."""
+"""Environment variable with the most memory of kept values, such as ``"2GB"``, and its default."""
 _SHARE = 16
-"""Least ratio of the address space of a process, if it is limited, to what the process keeps: of
-1 GiB, libraries take 640 MB, and a Gaussian process of 1000 runs 270 MB while it is made."""
+"""Limited address space of a process over the memory of kept values, at least. Of 1 GiB, libraries
+use 640 MB, and a Gaussian process of 1000 runs 270 MB while it is made."""
 _SIZE = re.compile(r"(\d+(?:\.\d+)?) ?([kMGT]?)(i?)B")
 _GROWN, _FREE = 32_000_000, 128_000_000
-"""Bytes by which a process has grown, beside what it keeps, above which it is searched for what can
-be freed; free bytes above which memory is given to the system. Below, both would cost more than
-they gain."""
+"""Growth of a process, without kept values, that starts a garbage collection, and free memory that
+is returned to the system [bytes]. With less, both would cost more than they gain."""
 
 
 def bytes_in(text: str) -> int | None:
-    """Return the bytes in a size such as ``"500MB"``, ``"2 GiB"``, ``"0B"``; None if it is none."""
+    """Return the bytes of a size such as ``"500MB"``, ``"2 GiB"``, ``"0B"``; None for others."""
     found = _SIZE.fullmatch(text)
     if found is None:
         return None
@@ -51,7 +50,7 @@ def bytes_in(text: str) -> int | None:
 
 
 def most_kept() -> int:
-    """Return how many bytes this process may keep: at most a share of its address space.
+    """Return the bytes that this process may keep, at most a share of its address space.
 
     Raises
     ------
@@ -68,18 +67,18 @@ def most_kept() -> int:
 _KEPT: OrderedDict[Hashable, Any] = OrderedDict()
 """Values by key, the last used one at the end."""
 _UNKNOWN: Any = object()
-"""What stands for a value that is not kept."""
+"""Placeholder of a value that is not kept."""
 _PATH = object()
-"""Key in between: values that were used since the last `release` stand behind it."""
+"""Key of a mark in `_KEPT`: values after it have been used since the last `release`."""
 _IN_USE: weakref.WeakValueDictionary[Hashable, Any] = weakref.WeakValueDictionary()
-"""Values that something holds, if weak references to them are possible."""
+"""Values in use, if weak references to them are possible."""
 _LOCK = threading.RLock()
 
 
 def remembered(key: Hashable, make: Callable[[], R]) -> R:
     """Return the value of a key, made anew if it is not kept.
 
-    All values together have at most the bytes of `most_kept` when another one is made.
+    Before another value is made, the kept ones are reduced to the bytes of `most_kept`.
     """
     with _LOCK:
         value: R = _KEPT.get(key, _IN_USE.get(key, _UNKNOWN))
@@ -89,15 +88,15 @@ def remembered(key: Hashable, make: Callable[[], R]) -> R:
     with _LOCK:
         _KEPT[key] = value
         _KEPT.move_to_end(key)
-        with suppress(TypeError):  # nothing refers weakly to some kinds of objects
+        with suppress(TypeError):  # some kinds of objects have no weak references
             _IN_USE[key] = value
     return value
 
 
 def kept(function: Callable[P, R]) -> Callable[P, R]:
-    """Remember the results of a function of hashable arguments, see `remembered`.
+    """Decorate a function of hashable arguments, to keep its results: see `remembered`.
 
-    It replaces `functools.lru_cache` where a result has megabytes.
+    It replaces `functools.lru_cache` for results of megabytes.
     """
 
     @wraps(function)
@@ -109,15 +108,15 @@ def kept(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def release(most: int | None = None) -> None:
-    """Drop kept values beyond a number of bytes, and give memory that is free to the system.
+    """Drop kept values beyond a number of bytes, and return free memory to the system.
 
-    To be called between two loading paths: what a path has left in circles of references, with the
-    factors of its matrices, is freed too.
+    Call it between two loading paths: it also frees cyclic garbage of a path, with the factors of
+    its matrices.
 
     Parameters
     ----------
-    most : number of bytes; by default `most_kept`, or more if the path that has ended used more:
-        the next path of a study most often has the same set-up
+    most : number of bytes; by default `most_kept`, or more if the last path used more, because the
+        next path of a study mostly has the same set-up
     """
     held = _evict(most_kept() if most is None else most, spare=most is None)
     with _LOCK:
@@ -127,15 +126,15 @@ def release(most: int | None = None) -> None:
 
 
 def bytes_of(*values: object) -> list[int]:
-    """Return the bytes of values with all that they hold; what several hold counts once."""
+    """Return the bytes of values with all objects that they refer to, each counted once."""
     seen: set[int] = set()
     return [_measured(value, seen) for value in values]
 
 
 def _evict(most: int, *, spare: bool = False) -> int:
-    """Drop values that do not fit beside those used later; return the bytes of those that stay.
+    """Drop the least recently used values beyond ``most`` bytes; return the bytes of the others.
 
-    Those used since `release` stay in any case if it is to `spare` them.
+    If ``spare``, values used since `release` are not dropped.
     """
     with _LOCK:
         keys, total = list(reversed(_KEPT)), 0
@@ -151,20 +150,20 @@ def _evict(most: int, *, spare: bool = False) -> int:
 
 
 def _measured(value: object, seen: set[int]) -> int:
-    """Return the bytes of a value and of what it holds, but not of what was seen before."""
-    total, left = 0, [value]
-    while left:
-        each = left.pop()
+    """Return the bytes of a value and of all objects that it refers to, except those ``seen``."""
+    total, pending = 0, [value]
+    while pending:
+        each = pending.pop()
         if id(each) in seen or isinstance(each, type | ModuleType):
             continue
         seen.add(id(each))
         total += sys.getsizeof(each)
         if isinstance(each, np.ndarray):
-            left.append(each.base)  # has the memory of a view
+            pending.append(each.base)  # has the memory of a view
         elif isinstance(each, FunctionType):
-            left.extend(each.__closure__ or ())  # not the module of the function
+            pending.extend(each.__closure__ or ())  # not the module of the function
         else:
-            left.extend(gc.get_referents(each))
+            pending.extend(gc.get_referents(each))
     return total
 
 
@@ -179,7 +178,7 @@ class _Usage(ctypes.Structure):
 
 
 class _Heap:
-    """The memory of this process: collected when it has grown, and given back when it is free."""
+    """The memory of this process: collected when it has grown, returned when it is free."""
 
     def __init__(self) -> None:
         self._libc: ctypes.CDLL | None = ctypes.CDLL(None)
@@ -190,26 +189,25 @@ class _Heap:
             self._libc = None
 
     def tidy(self, held: int) -> None:
-        """Free what only circles of references hold, and give free memory to the system.
+        """Free cyclic garbage, and return free memory to the system.
 
-        Both cost as much as a small run, and are left out where they gain little: circles are
-        searched for when the bytes in use, beside those ``held`` on purpose, have grown since they
-        were least.
+        Both cost as much as a small run, and are left out if they gain little: garbage is collected
+        when the bytes in use, without those ``held`` by the cache, have grown since their minimum.
         """
         if self._libc is None:
             gc.collect()
             return
-        beside = self._in_use - held
-        if beside > self._least + _GROWN:
+        others = self._in_use - held
+        if others > self._least + _GROWN:
             gc.collect()
-            self._least = beside = self._in_use - held
-        self._least = min(self._least, beside)
+            self._least = others = self._in_use - held
+        self._least = min(self._least, others)
         if self._libc.mallinfo2().fordblks > _FREE:
             self._libc.malloc_trim(0)
 
     @property
     def _in_use(self) -> int:
-        """Bytes that the C library has given out."""
+        """Bytes that the C library has allocated."""
         assert self._libc is not None
         usage = self._libc.mallinfo2()
         return int(usage.uordblks + usage.hblkhd)

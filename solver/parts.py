@@ -1,9 +1,8 @@
 """Parts that studies and scene files name by a word, such as hardening rules and loads.
 
 A part is a frozen dataclass whose fields are its parameters; a decorator on the class gives its
-word. Studies, scene files and the documentation take their lists of words and parameters from
-these declarations. A user's own files, named in the environment variable ``RESIDUA_PARTS``, add
-parts in the same way.
+word. Studies, scene files and the documentation read words and parameters from these declarations.
+A user's own files, named in the environment variable ``RESIDUA_PARTS``, add parts in the same way.
 """
 
 from __future__ import annotations
@@ -32,9 +31,9 @@ class Parts(Generic[T]):
 
     Parameters
     ----------
-    kind : the parameter that names one of them, such as ``hardening``
-    alike : whether parts that share a parameter must declare it in the same way; False if each
-        part has its own table in a scene file
+    kind : parameter that names one of them, such as ``hardening``
+    alike : whether parts that share a parameter must declare it in the same way; false if each part
+        has its own table in a scene file
     """
 
     def __init__(self, kind: str, *, alike: bool = True) -> None:
@@ -48,7 +47,7 @@ class Parts(Generic[T]):
         Raises
         ------
         ModelError
-            when another class has the word, or declares one of its parameters otherwise
+            if another class has the word, or declares one of its parameters differently
         """
 
         def named(part: C) -> C:
@@ -84,7 +83,7 @@ class Parts(Generic[T]):
         Raises
         ------
         ModelError
-            when two parts declare one parameter with another type, range, default or meaning
+            if two parts declare a parameter with different type, range, default or meaning
         """
         found: dict[str, tuple[Any, dataclasses.Field[Any]]] = {}
         for word, part in self._known.items():
@@ -100,17 +99,17 @@ class Parts(Generic[T]):
         return found
 
     def fields(self, cls: C) -> C:
-        """Decorate a class: annotate its word with all words, and add all parameters as fields.
+        """Decorate a class: annotate the parameter `kind` with all words, and add all parameters.
 
-        Write it below ``@dataclass``, which turns the annotations into fields. The attribute
+        Write it below ``@dataclass``, which makes fields of the annotations. The attribute
         ``PARTS`` of the class lists all kinds of parts whose parameters it has.
 
         Raises
         ------
         ModelError
-            when a class that it inherits from has a field of one of these names
+            if a base class has a field of one of these names
         ImportError
-            while a user's own file is being run: its parts are not known yet
+            while a user's own file is running: its parts are not known yet
         """
         if _RUNNING:
             raise ImportError("it imports scenes, whose parameters include those of its parts")
@@ -129,14 +128,14 @@ class Parts(Generic[T]):
         return frozenset(declared(self[word]))
 
     def needs(self) -> dict[str, dict[str, tuple[str, ...]]]:
-        """Return what each parameter needs to have an effect: ``kind`` with a word that uses it."""
+        """Return for each parameter what it needs to have an effect: ``kind`` -> words."""
         return {
             name: {self.kind: tuple(word for word in self if name in self.used(word))}
             for name in self.parameters()
         }
 
     def made(self, word: str, values: Any) -> T:
-        """Return the part of a word with its parameters, attributes of ``values``."""
+        """Return the part of a word; its parameters are attributes of ``values``."""
         part = self[word]
         return part(**{name: getattr(values, name) for name in declared(part)})
 
@@ -163,12 +162,12 @@ def own_files() -> tuple[Path, ...]:
 
 @cache
 def load_own_parts() -> None:
-    """Run the user's own files, once in a process.
+    """Run the user's own files, once per process.
 
     Raises
     ------
     ModelError
-        naming the file that cannot be read or run
+        if a file cannot be read or run
     """
     for k, path in enumerate(own_files()):
         name = f"residua_parts_{k}_{path.stem}"
@@ -194,7 +193,7 @@ _RUNNING: list[str] = []
 
 
 def run_again(one: Any, other: Any) -> bool:
-    """Whether two objects come from one definition whose file ran as script and as parts."""
+    """Whether two objects have one definition, whose file ran both as script and as parts."""
     return (one.__qualname__, _file(one)) == (other.__qualname__, _file(other))
 
 

@@ -1,10 +1,10 @@
 """Names of axes and tensor components, and the scaling of components of symmetric tensors.
 
 Inside the solver strain and stress are Mandel vectors, components first, points last:
-``(xx, yy, zz, sqrt(2) xy)`` in two dimensions, followed by ``(sqrt(2) yz, sqrt(2) zx)`` in three,
-so that the dot product of two vectors is the double contraction of the tensors, the norm is the
-tensor norm and a tangent that has a potential is a symmetric matrix. Results leave the solver as
-tensor components (``xy`` without the factor): `to_tensor`.
+``(xx, yy, zz, sqrt(2) xy)`` in two dimensions, followed by ``(sqrt(2) yz, sqrt(2) zx)`` in three.
+The dot product of two vectors is the double contraction of the tensors, the norm is the tensor
+norm, and a tangent that has a potential is a symmetric matrix. Results leave the solver as tensor
+components (``xy`` without the factor): `to_tensor`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from solver.typing import Array
 
 AXES = ("x", "y", "z")
-"""Names of coordinates; a place has the first two or all of them."""
+"""Names of coordinates: two in the plane, three in space."""
 _COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "zx")
 SQRT2 = float(np.sqrt(2.0))
 
@@ -62,20 +62,17 @@ def deviator(mandel: Array) -> Array:
 
 
 def von_mises(mandel: Array) -> Array:
-    """Return the von Mises stress (...) of Mandel components (n_components, ...) [MPa]."""
+    """Return the von Mises stress (...) from Mandel components (n_components, ...) [MPa]."""
     return np.asarray(np.sqrt(1.5 * (deviator(mandel) ** 2).sum(axis=0)))
 
 
 def not_below_zero(values: Array) -> Array:
-    """Return values of an invariant that cannot be negative, with negative ones set to zero.
-
-    Interpolation can make them slightly negative.
-    """
+    """Return values without negative ones, which interpolation may cause, replaced by zero."""
     return np.maximum(values, 0.0)
 
 
 def stress_difference(stress: Array, plane: tuple[str, str] = ("x", "y")) -> Array:
-    """Return sigma1 - sigma2 (...) of a plane, of tensor components (n_components, ...) [MPa].
+    """Return sigma1 - sigma2 (...) in a plane, from tensor components (n_components, ...) [MPa].
 
     Parameters
     ----------

@@ -1,3 +1,3 @@
-"""The version of the project, where every module can read it."""
+"""The version of the project."""
 
 __version__ = "0.1.0"

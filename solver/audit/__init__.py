@@ -2,9 +2,8 @@
 
 `plain` evaluates bodies without the solver's operators, `surfaces` measures contact on the
 deformed bodies; `bodies`, `pairs`, `links` and `forces` compute the figures from these, and
-`report` compares them with their limits. `steady` and `prism` check passes, whose material `flow`
-follows. The audit reads states and declarations, and no code of `results`.
+`report` compares them with their limits. The audit reads states and declarations.
 
-Taken from the solver without a check are meshes, supports, the edges of contact surfaces, and the
+It takes from the solver, without a check, meshes, supports, the edges of contact surfaces, and the
 displacements of condensed bodies.
 """

@@ -19,7 +19,7 @@ from solver.typing import Array, Bools
 
 
 class AuditedBody:
-    """A body of a system in a converged increment; common values are computed once.
+    """A body of a system in a converged increment.
 
     ``plain`` evaluates the body independently; all states of the body share it.
     """
@@ -37,7 +37,7 @@ class AuditedBody:
 
     @property
     def meshed(self) -> bool:
-        """Whether the system solves for all of its nodes: the body is not condensed."""
+        """Whether the body is not condensed: the system solves for all of its nodes."""
         return self.part.meshed
 
     @cached_property
@@ -53,7 +53,7 @@ class AuditedBody:
 
     @cached_property
     def stress(self) -> Array:
-        """Mandel stress (n_components, n_points) [MPa]; of a condensed body by Hooke's law."""
+        """Mandel stress (n_components, n_points) [MPa], by Hooke's law if the body is condensed."""
         if self.meshed:
             return self._response.stress
         return self.plain.body.law.stiffness(len(self._reached)) @ self._reached
@@ -75,8 +75,8 @@ class AuditedBody:
         return self.plain.forces(self.stress)
 
     @property
-    def borne(self) -> float:
-        """Norm of the nodal forces that removed elements bear by what is left of them [N]."""
+    def force_of_removed(self) -> float:
+        """Norm of the nodal forces that removed elements still transmit [N]."""
         kept = np.isfinite(self.plain.known(self.stress, self._converged.state.time))
         if kept.all():
             return 0.0
@@ -91,9 +91,9 @@ class AuditedBody:
 
     @cached_property
     def lacking(self) -> Array:
-        """Nodal forces (n_nodes, dim) that contact and supports must add to loads and links [N]."""
+        """Nodal forces (n_nodes, dim) that contact and supports must exert for balance [N]."""
         whole = self.plain.part
-        wheel = self.plain.body.axle is not None  # its load acts on the hub
+        wheel = self.plain.body.axle is not None  # the load of a wheel acts on its hub
         external = np.zeros(whole.n) if wheel else whole.external(self._converged.state.time)
         return self.balancing - vectors(external, whole.dim).T - self.linked
 
@@ -134,7 +134,7 @@ class AuditedBody:
         return np.asarray(~self.held)
 
     def stored(self) -> float:
-        """Return the elastic energy [N mm]; of a condensed body from its kept unknowns."""
+        """Return the elastic energy [N mm], from the kept unknowns if the body is condensed."""
         if self.meshed:
             return self.plain.elastic_energy(self.stress, self._converged.state.time)
         return elastic_energy(self.part, self._u, self._response, self._converged.state.time)
@@ -143,7 +143,7 @@ class AuditedBody:
     def strength(self) -> float:
         """The yield stress, or the largest stress of an elastic body [MPa].
 
-        It is at least the rounding of stress in a body that moves without strain.
+        The latter is at least the rounding of stress in a body that moves without strain.
         """
         law = self.plain.body.law
         if not law.elastic:

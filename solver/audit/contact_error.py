@@ -2,12 +2,12 @@
 
 Pressure comes from the contact forces. The stress of the body gives a second value, -n . sigma . n,
 with sigma recovered from patches of elements inside the body (`ErrorPoints`), without the contact
-forces. Both tend to the true pressure as the mesh is refined, but differently: their difference has
-the size of the error. It is large if few edges lie across a contact.
+forces. Both converge to the true pressure as the mesh is refined, but differently: their difference
+has the magnitude of the error. It is large if the contact has few edges.
 
-It is evaluated on the slave, or on the master of a rigid slave, which has no stress. The absolute
-difference is integrated over the area before loading, and given as a share of the contact force.
-The square of the difference would be unbounded under refinement at a sharp corner.
+It is evaluated on the slave, or on the master if the slave is rigid and has no stress. The figure
+is the integral of the absolute difference over the area before loading, over the contact force.
+(The integral of the square is unbounded under refinement at a sharp corner.)
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from solver.typing import Array
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
 _ROUNDING = 1e-6
-"""Ratio of pressure to the largest stress of the body; below it pressure is rounding."""
+"""Pressure over the largest stress of the body: a smaller ratio is rounding."""
 _BEYOND = 1e-6
-"""Fraction of a chord by which a point may lie beyond its end and still belong to it."""
+"""Distance of a point beyond the end of a chord, over its length: up to it the point belongs to the
+chord."""
 
 
 def contact_error(system: System, converged: Converged) -> float:
@@ -62,20 +63,19 @@ def contact_error(system: System, converged: Converged) -> float:
 def _carried(
     system: System, number: int, state: State, chain: Surface, at_vertices: Array
 ) -> Array:
-    """Return the pressure of a rigid slave at points of its master (n_edges, n_points).
+    """Return the pressure of a rigid slave at points of its master (n_edges, n_points) [MPa].
 
-    Each point takes the pressure of the nearest place on the chords with pressure, or zero if it
-    lies beyond their ends.
+    It is the pressure at the nearest place on the chords with pressure, or zero beyond their ends.
     """
     pair = system.model.contacts[number]
     slave, finite = system.chain(*pair.slave), state.contacts[number].finite
-    x, moved = slave.X, chain.X  # small sliding pairs places before loading
+    x, moved = slave.X, chain.X  # small sliding pairs positions before loading
     if finite:
         x = deformed(system, pair.slave[0], state)[0][:, slave.nodes]
         moved = deformed(system, pair.master[0], state)[0][:, chain.nodes]
     x = x[:, slave.vertices]
-    bears = (at_vertices[:-1] != 0) | (at_vertices[1:] != 0)
-    start, way = x[:, :-1][:, bears], np.diff(x)[:, bears]
+    pressed = (at_vertices[:-1] != 0) | (at_vertices[1:] != 0)
+    start, way = x[:, :-1][:, pressed], np.diff(x)[:, pressed]
     points = moved[:, chain.edges] @ shape_functions(_XI, chain.edges.shape[1]).T
     out = np.zeros(points.shape[1:])
     reach = np.hypot(*way).max()
@@ -87,7 +87,7 @@ def _carried(
     foot = np.clip(share, 0.0, 1.0)
     nearest = np.hypot(*(to - foot * way[:, None])).argmin(axis=1)
     at = np.arange(len(nearest)), nearest
-    first, last = at_vertices[:-1][bears][nearest], at_vertices[1:][bears][nearest]
+    first, last = at_vertices[:-1][pressed][nearest], at_vertices[1:][pressed][nearest]
     value = first + foot[at] * (last - first)
     out[near] = np.where(np.abs(share[at] - foot[at]) < _BEYOND, value, 0.0)
     return out
@@ -109,6 +109,6 @@ def _integrals(chain: Surface, pressure: Array, stress: Array) -> tuple[float, f
     xx, yy, _, xy = stress[:, chain.edges] @ shape.T
     across = nx**2 * xx + ny**2 * yy + 2 * nx * ny * xy
     area = _WEIGHT * length * chain.depth(at @ shape.T) * (pressure != 0).any(axis=1, keepdims=True)
-    area = np.where(np.isnan(across), 0.0, area)  # beside removed elements
+    area = np.where(np.isnan(across), 0.0, area)  # next to removed elements
     off = np.abs(pressure + np.nan_to_num(across))
     return float((area * off).sum()), float((area * pressure).sum())

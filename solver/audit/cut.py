@@ -12,8 +12,12 @@ from solver.typing import Array
 def cut_force(part: Discretisation, stress: Array, where: Array) -> float:
     """Return the normal force on a plane cut, over yield stress times area of the cut.
 
-    ``where`` (2, n) are points along the straight cut [mm]; ``stress`` (4, n_points) is Mandel
-    [MPa]. A residual stress is self-equilibrated: the result is zero up to discretisation error.
+    A residual stress is self-equilibrated: the result is zero up to discretisation error.
+
+    Parameters
+    ----------
+    stress : (4, n_points) Mandel [MPa]
+    where : (2, n) points along the straight cut [mm]
     """
     along = where[:, -1] - where[:, 0]
     length = float(np.linalg.norm(along))

@@ -135,4 +135,4 @@ LIMITS = {
     "audit_slip_resolution": 0.5,
     "audit_history": 1e-6,
 }
-"""Limits that no run changes; `solver.audit.report.limits_at` has those of a run."""
+"""Limits that are the same for all runs; `solver.audit.report.limits_at` adds those of a run."""

@@ -17,10 +17,9 @@ from solver.fem.wheel import Wheel
 from solver.typing import Array, Bools
 
 _ROUNDED = 1e-5
-"""Ratio to the force level up to which rounding is subtracted from nodal forces."""
+"""Rounding that is subtracted from nodal forces, over the force level, at most."""
 _LITTLE = 1e-4
-"""Ratio of the contact force to the force level; below it errors refer to this ratio of the level.
-"""
+"""Least force to which errors refer, over the force level."""
 
 
 def _on_bodies(system: System, converged: Converged) -> dict[str, Array]:
@@ -43,37 +42,41 @@ def imbalance(system: System, bodies: Sequence[AuditedBody], converged: Converge
     It is the sum of external, internal and contact forces at nodes.
     """
     contact = _on_bodies(system, converged)
-    left = [_beyond_rounding(body, contact[body.name] - body.lacking) for body in bodies]
-    return float(np.linalg.norm(left)) / (converged.state.force_scale or 1.0)
+    each = [_beyond_rounding(body, contact[body.name] - body.lacking) for body in bodies]
+    return float(np.linalg.norm(each)) / (converged.state.force_scale or 1.0)
 
 
 def _beyond_rounding(body: AuditedBody, force: Array) -> float:
     """Return the norm of forces (n_nodes, 2) on free unknowns, minus rounding [N].
 
-    At most `_ROUNDED` of the force level is subtracted: a body that has flowed far moves far.
+    At most the share `_ROUNDED` of the force level is subtracted, because the rounding of a body
+    that has flowed far may be large.
     """
     rounding = min(body.rounding, _ROUNDED * body.force_level)
     return max(float(np.linalg.norm(force[body.free])) - rounding, 0.0)
 
 
-def left_on(bodies: Sequence[AuditedBody]) -> float:
-    """Return the out-of-balance force of the stress of released bodies at free nodes [N].
+def imbalance_released(bodies: Sequence[AuditedBody]) -> float:
+    """Return the out-of-balance force of released bodies at free nodes [N].
 
-    Neither loads nor contact act on released bodies: their stress must balance itself and links.
+    Neither loads nor contact act on them: their stress must balance itself and links.
     """
-    left = [_beyond_rounding(body, body.balancing - body.linked) for body in bodies]
-    return float(np.linalg.norm(left))
+    each = [_beyond_rounding(body, body.balancing - body.linked) for body in bodies]
+    return float(np.linalg.norm(each))
 
 
 def _of_pairs(body: AuditedBody, pairs: Sequence[AuditedPair]) -> tuple[Array, Bools]:
-    """Return nodal forces (n_nodes, dim) of the pairs on a body, in space, and whether they act."""
+    """Return the nodal forces (n_nodes, dim) of the pairs on a body in the fixed frame [N].
+
+    The second array (n_nodes,) is whether they act on a node.
+    """
     whole = body.plain.part
     force = np.zeros(whole.X.T.shape)
     for pair in pairs:
-        surfaces, touching = pair.surfaces, pair.touching
+        surfaces, measured = pair.surfaces, pair.measured
         for (name, _), chain, nodal in (
-            (surfaces.pair.slave, surfaces.slave, touching.on_slave),
-            (surfaces.pair.master, surfaces.master, touching.on_master),
+            (surfaces.pair.slave, surfaces.slave, measured.on_slave),
+            (surfaces.pair.master, surfaces.master, measured.on_master),
         ):
             if name == body.name:
                 np.add.at(force, chain.nodes, nodal)
@@ -90,8 +93,8 @@ def action_reaction(
 
     For both bodies of every pair, resultant and moment of the contact forces are compared with
     those of the nodal forces that balance the stress at the contact surfaces. Differences are
-    divided by the sum of normal forces of the body's least loaded pair (the moment also by the
-    length of the contact).
+    divided by the normal force of the body's least loaded pair (the moment also by the length of
+    the contact).
     """
     scale = _LITTLE * converged.state.force_scale
     turning = any(pair.surfaces.finite for pair in pairs)
@@ -118,16 +121,16 @@ def reactions(
 ) -> float:
     """Return the sum of loads, forces of contact and links, and reactions, over the force level.
 
-    The resultant of pressures comes from the shape of their boundary, that of forces per volume
-    from separate points, that of a wheel from the amplitude of its axle; reactions come from the
-    stress at supports. First moments of nodal forces are also compared with those of the loads.
+    The resultant of pressures follows from the shape of their boundary, that of forces per volume
+    from other integration points, that of a wheel from the amplitude of its axle; reactions follow
+    from the stress at supports. First moments of nodal forces are compared with those of the loads.
     """
     worst = 0.0
     for body in bodies:
         contact, _ = _of_pairs(body, pairs)
         total = contact.sum(axis=0)
         if isinstance(body.part, Wheel):
-            # the advance is prescribed: its force along x is not known beforehand
+            # the advance is prescribed: its force along x is unknown
             force = body.part.axle.force.at(converged.state.time)
             total = np.array([0.0, total[1] - force])
         else:

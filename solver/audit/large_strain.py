@@ -1,29 +1,28 @@
-"""Estimate of what small-strain theory leaves out: the stress that large strain would add.
+"""Estimate of the error of small-strain theory: the stress that large strain would add.
 
-Let T be the stress of a converged state, with H the displacement gradient and e its symmetric part,
-the strain. A theory of large strain differs in two ways.
+Let T be the stress of a converged state, H the displacement gradient and e its symmetric part, the
+strain. A theory of large strain differs in two ways.
 
-1. Balance holds in the deformed place. T turns with the material by R, the rotation of I + H, and
-   acts on areas that have stretched: its nominal stress is R N, with N = T - (T e + e T) / 2.
-2. The strain is the logarithmic one, E = ln((I + H)'(I + H)) / 2. It is that of the same
-   displacements, so where a body turns E - e also has the stretch of its linear displacements,
-   about half of the square of the angle.
+1. Equilibrium holds in the deformed configuration. T rotates with the material by R, the rotation
+   of I + H, and acts on stretched areas: its nominal stress is R N, with N = T - (T e + e T) / 2.
+2. The strain is logarithmic, E = ln((I + H)'(I + H)) / 2. For a body that rotates, the same linear
+   displacements give a stretch in E - e of about half the square of the angle.
 
-The estimate is the stress s nearest to zero with which T + s fulfils both. With C the elastic
-stiffness, K that of the bodies joined by their links, and B their strain operator,
+The estimate is the smallest stress s with which T + s satisfies both. With the elastic stiffness C,
+the stiffness K of the bodies joined by their links, and their strain operator B,
 
     s = C (E - e + x + B v),   K v = -f(R N - T) - f(C (E - e + x))
 
-where f are nodal forces. Forces of loads and contact are those of T. Thus the displacements v relax
-what the body is free to relax, such as the shortening of a beam that bends. Where material has
-yielded, E - e is left out, and x is the plastic strain with the least energy of s, by conjugate
-gradients; elsewhere x is zero. It does not change the part of s that f(R N - T) causes, which no
-stress with less energy balances. Linear displacements stretch a body that links turn by an angle
-w, by ln(1 + w^2) / 2. v takes this back: it includes -ln(1 + w^2) / 2 times the position from the
-centre of rotation.
+where f are nodal forces. Forces of loads and contact are those of T. The displacements v relax the
+strains that the bodies are free to relax, such as the shortening of a beam that bends. In yielded
+material E - e is left out, and x is the plastic strain with the least energy of s, by conjugate
+gradients; elsewhere x is zero. x does not change the part of s that f(R N - T) causes, which no
+stress with less energy balances. Links that rotate a body by w stretch it by ln(1 + w^2) / 2,
+because its displacements are linear. v removes this stretch: it includes -ln(1 + w^2) / 2 times the
+position relative to the centre of rotation.
 
-The share is the energy norm of s over that of T, or that of s + N - T, the change of nominal
-stress, where a displacement is prescribed and the force on it errs.
+The estimated share is the energy norm of s over that of T. If it is larger, the norm of s + N - T
+is used, the change of nominal stress: under prescribed displacements it is the error of forces.
 
 C. Miehe, N. Apel, M. Lambrecht, Comput. Methods Appl. Mech. Engrg 191 (2002) 5383-5425: plasticity
 in the space of logarithmic strain.
@@ -50,17 +49,15 @@ from solver.tensors import SQRT2, to_tensor
 from solver.typing import Array
 
 _FEW = 0.01
-"""Least share of a body in the elastic energy of all; the stress of a body with less counts as that
-of this energy."""
+"""Elastic energy of a body, over that of all bodies: errors refer to at least this energy."""
 _FAINT = 1e-5
-"""Tensile stress over Young's modulus; the stress of a body with less energy counts as this one."""
+"""Tensile stress over Young's modulus: errors refer to at least the energy of this stress."""
 _SURE = 0.01
-"""Estimate up to which plastic strain need not relax it: that can only make it smaller."""
+"""Estimate up to which plastic strain is not computed: it can only reduce the estimate."""
 _STEPS, _SETTLED = 20, 1e-5
-"""Largest number of conjugate gradients; and the energy of what is left to relax, over that of the
-stress, at which they end."""
+"""Most conjugate gradients. Energy of the residual over that of the stress: they end below it."""
 _FLAT = 1e-6
-"""Least stretch; elements that turn over are taken as flat."""
+"""Least stretch; inverted elements count as flat."""
 
 
 def large_strain(
@@ -71,27 +68,27 @@ def large_strain(
 
 
 def _largest(each: Iterable[Neglected]) -> Neglected:
-    """Return the largest share; one that is no number is the largest of all."""
+    """Return the largest share; NaN is larger than all numbers."""
     return max(each, key=lambda one: np.nan_to_num(one.share, nan=np.inf), default=Neglected())
 
 
 def _neglected(share: float, body: str) -> Neglected:
     return Neglected(
         share,
-        f"balance in the deformed place and logarithmic strain would change the stress of {body} "
-        f"by {share:.0%}: small-strain theory leaves that out, reduce the load",
+        f"equilibrium in the deformed configuration and logarithmic strain would change the stress "
+        f"of {body} by {share:.0%}: small-strain theory neglects this, reduce the load",
     )
 
 
 def of_material(
     body: str, elasticity: Elasticity, stress: Array, strain: Array, volume: Array
 ) -> Neglected:
-    """Return the norm of N - T over that of T, where a body turns no more than it strains.
+    """Return the norm of N - T over that of T: the estimate for rotations as small as strains.
 
     Parameters
     ----------
-    stress, strain : (n_components, n_points) Mandel [MPa]
-    volume : (n_points,) of the points [mm3]
+    stress, strain : (n_components, n_points) Mandel, stress in MPa
+    volume : (n_points,) volume of the points [mm3]
     """
     changed, own = (
         float(elasticity.energy_density(each) @ volume)
@@ -111,7 +108,7 @@ def _in_state(system: System, plain: Sequence[PlainBody], converged: Converged) 
 
 
 def _worst(bodies: Sequence[_Deformed], added: Sequence[Array], least: float) -> Neglected:
-    """Return the largest ratio of the norm of added stresses to that of the stress of a body."""
+    """Return the largest norm of added stress over that of the stress, of all bodies."""
     own = [each.energy(each.stress) for each in bodies]
     least = max(_FEW * sum(own), least)
     changed = [
@@ -128,7 +125,7 @@ def _worst(bodies: Sequence[_Deformed], added: Sequence[Array], least: float) ->
 
 
 class _Deformed:
-    """A body in a state: its stress, and what large strain changes.
+    """A body in a state: its stress, and its changes by large strain.
 
     Attributes
     ----------
@@ -137,7 +134,7 @@ class _Deformed:
     force : nodal forces (n,) of R N - T [N]
     yielded : (n_points,) whether the material has yielded
     strain : E - e (4, n_points), Mandel, zero where it has yielded
-    volume : (n_points,) of the points that count, away from singular points [mm3]
+    volume : (n_points,) volume of the points [mm3], zero near singular points and where removed
     """
 
     def __init__(self, system: System, plain: PlainBody, converged: Converged) -> None:
@@ -149,7 +146,7 @@ class _Deformed:
             converged.responses[self.number] if meshed else system.response(self.name, converged)
         )
         self.stress, self.yielded = response.stress, response.state.accumulated > 0
-        counts = plain.left(state.time) > GHOST
+        counts = plain.remaining(state.time) > GHOST
         for point in system.model.singular:
             counts &= ~point.reaches(plain.points)
         self.volume = np.where(counts, plain.volume.ravel(), 0.0)
@@ -167,16 +164,16 @@ class _Deformed:
 
     @property
     def faint(self) -> float:
-        """Elastic energy of the least stress that counts [N mm]."""
+        """Elastic energy of the least stress to which errors refer [N mm]."""
         return float(_FAINT**2 * self.elasticity.youngs_modulus / 2 * self.volume.sum())
 
     def energy(self, stress: Array) -> float:
-        """Return the elastic energy of a stress (4, n_points) at the points that count [N mm]."""
+        """Return the elastic energy of a stress (4, n_points), with ``volume`` [N mm]."""
         return float(self.elasticity.energy_density(stress) @ self.volume)
 
 
 class _Joined:
-    """The elastic bodies of a system, joined by their links, under what large strain changes.
+    """The elastic bodies of a system, joined by their links, under the changes by large strain.
 
     Points are those of all bodies, one after the other: strain (4, n_points), yielded (n_points,).
     """
@@ -197,10 +194,10 @@ class _Joined:
     def stress(
         self, strain: Array, forces: Sequence[Array] | None = None, *, turned: bool = True
     ) -> Array:
-        """Return the stress (4, n_points) that an eigenstrain, with forces, causes [MPa].
+        """Return the stress (4, n_points) that an eigenstrain and nodal forces cause [MPa].
 
-        Its nodal forces are minus those given (n,), of each body. What links hold moves from where
-        small rotations of rigid bodies have it to where they have ``turned`` it.
+        ``forces`` (n,) of each body act with the opposite sign. If ``turned``, linked boundaries
+        also move by the motions of `_turned`.
         """
         parts, strains = self._system.parts, self.each(strain)
         own, begun = [np.zeros(part.n) for part in parts], []
@@ -222,18 +219,18 @@ class _Joined:
         )
 
     def relaxing(self) -> Array:
-        """Return the stress of the plastic strain that leaves the least energy [MPa].
+        """Return the stress of the plastic strain x with which the energy of s is least [MPa].
 
-        Conjugate gradients for the plastic strain, where material has yielded. Its stress balances
-        itself, so that it leaves the least energy of all where it leaves the least of the stress
-        of ``E - e``. The elastic strain of the residual is the preconditioned gradient.
+        It is found by conjugate gradients. The stress of x balances itself, so the energy of s is
+        least if that of the stress of ``E - e + x`` is least. The elastic strain of the residual is
+        the preconditioned gradient.
         """
-        left = self.stress(self.strain)
-        made, way, last = np.zeros_like(left), np.zeros_like(left), np.inf
+        given = self.stress(self.strain)
+        made, way, last = np.zeros_like(given), np.zeros_like(given), np.inf
         level = _SETTLED * sum(2 * each.energy(each.stress) for each in self._bodies)
         volumes = np.concatenate([each.part.volumes for each in self._bodies])
         for _ in range(_STEPS):
-            residual = np.where(self.yielded, -(left + made), 0.0)
+            residual = np.where(self.yielded, -(given + made), 0.0)
             elastic = zip(self._bodies, self.each(residual), strict=True)
             down = np.hstack([body.elasticity.strain(r) for body, r in elastic])
             now = float((residual * down).sum(axis=0) @ volumes)
@@ -247,10 +244,10 @@ class _Joined:
 
 
 def _turned(system: System, state: State) -> Array:
-    """Return the motions (c,) that take from what links turn the stretch of linear rotation [mm].
+    """Return the motions (c,) of links that remove the stretch of their linear rotations [mm].
 
-    A boundary turned by w has the displacements w J (X - c), and I + w J stretches by
-    sqrt(1 + w^2). The logarithm of that is no strain: what holds the boundary draws it back.
+    A linked boundary rotated by w has the displacements w J (X - c), and I + w J stretches by
+    sqrt(1 + w^2). This is no strain of the true rotation, so the boundary moves back by it.
     """
     links, found = system.links, np.zeros(len(system.links))
     for k, link in enumerate(system.model.links):
@@ -272,20 +269,20 @@ def _product(one: Array, other: Array) -> Array:
 
 
 def _nominal(stress: Array, strain: Array) -> Array:
-    """Return N - T = -(T e + e T) / 2 of Mandel components (n_components, ...) [MPa]."""
+    """Return N - T = -(T e + e T) / 2 in Mandel components (n_components, ...) [MPa]."""
     product = _product(_matrix(stress), _matrix(strain))
     xy, yz, zx = (-(product[i, j] + product[j, i]) / 2 * SQRT2 for i, j in ((0, 1), (1, 2), (2, 0)))
     return np.stack([*(-product[k, k] for k in range(3)), xy, yz, zx])[: len(stress)]
 
 
 def _matrix(mandel: Array) -> Array:
-    """Return tensors (3, 3, ...) of Mandel components (n_components, ...)."""
+    """Return tensors (3, 3, ...) from Mandel components (n_components, ...)."""
     xx, yy, zz, xy, yz, zx = *to_tensor(mandel), *np.zeros((6 - len(mandel), *mandel.shape[1:]))
     return np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
 
 
 def _mandel(plane: Array, hoop: Array) -> Array:
-    """Return Mandel components (4, ...) of symmetric tensors (2, 2, ...) and their zz."""
+    """Return Mandel components (4, ...) from symmetric tensors (2, 2, ...) and their zz."""
     return np.array([plane[0, 0], plane[1, 1], hoop, SQRT2 * plane[0, 1]])
 
 

@@ -1,7 +1,7 @@
-"""Links measured on the bodies: what they should prevent, and the balance of their forces.
+"""Links measured on the bodies: the motion that they should prevent, and the balance of forces.
 
-Their conditions are not used. The motion of the slave is compared at many points with that of the
-nearest place of the master, and of the rigid body.
+The conditions of links are not used. At many points the motion of the slave is compared with that
+of the nearest place of the master, and of the rigid body.
 """
 
 from __future__ import annotations
@@ -23,28 +23,29 @@ from solver.model.link import Link, Side
 from solver.typing import Array
 
 _PIECES = 16
-"""Number of pieces of an edge; more where edges of the other side are shorter."""
+"""Number of pieces of an edge; more if edges of the other side are shorter."""
 _GAUSS = 6
 """Number of Gauss points of an edge, for normals and areas of nodes."""
 _PAIRS = 1_000_000
-"""Number of places times pieces of the other side that are looked at together: 64 MB."""
+"""Number of places times pieces of the other side in memory at a time: 64 MB."""
 _FACING = 0.05
-"""Ratio of the distance from the master to the length of the slave; above it a place of the slave
+"""Distance of the slave from the master over its length: a place of the slave above this ratio
 faces no master."""
 _HALVINGS = 20
-"""How often a piece is halved to find the end of the master beside it."""
+"""Number of halvings of a piece to find the end of the master opposite it."""
 _BEYOND = 1e-6
-"""Ratio of a distance to the length of a piece; up to it a place beside a piece counts as on it."""
-
+"""Distance of a place beyond the end of a piece, over its length: up to it the place belongs to the
+piece."""
 _SMALL = 0.1
-"""Largest rotation by links [rad]. Taken for small it stretches by half of its square, 0.5 %."""
+"""Largest rotation by links [rad]; as a linear displacement it stretches by half its square, 0.5 %.
+"""
 
 
 class _Sampled(NamedTuple):
     """Pieces of a boundary.
 
-    Middles X (2, n), their motion u (2, n) [mm] and area (n,); ``ends`` (2, 2, n) are starts and
-    ends, ``moved`` is their motion.
+    Middles X (2, n), their motion u (2, n) [mm] and area (n,) [mm2]; ``ends`` (2, 2, n) are starts
+    and ends, ``moved`` (2, 2, n) their motions.
     """
 
     X: Array
@@ -55,7 +56,7 @@ class _Sampled(NamedTuple):
 
 
 def links_error(system: System, converged: Converged) -> float:
-    """Return the worst ratio of a motion that links should prevent, or of force out of balance."""
+    """Return the worst relative motion that links should prevent, or relative force imbalance."""
     level = converged.state.force_scale or 1.0
     return max(
         (max(_misfit(system, k, converged), _unbalanced(system, k, converged) / level)
@@ -67,7 +68,7 @@ def links_error(system: System, converged: Converged) -> float:
 def _places(
     system: System, side: Side, converged: Converged, opposite: _Sampled | None = None
 ) -> _Sampled:
-    """Return the pieces of a boundary; they are no longer than those of the ``opposite`` one."""
+    """Return the pieces of a boundary, in the mean no longer than those of the ``opposite`` one."""
     name, boundary = side
     whole = system.full(name)
     edges, count = edges_of(whole, boundary), _PIECES
@@ -93,23 +94,23 @@ def _places(
 
 
 def least_energy(system: System, force: float) -> float:
-    """Return the energy [N mm] below which values are rounding, if links hold bodies.
+    """Return the rounding level of energy [N mm] if links hold bodies, else 0.
 
-    A condensed body may be held at all unknowns that are left: then its energy counts from zero.
+    Without it a condensed body of which links hold all unknowns would have the level zero.
     """
     held = {link.slave[0] for link in system.model.links}
     return LEAST_ENERGY * force * max((_moved_by(system, name, force) for name in held), default=0)
 
 
 def turned(system: System, converged: Converged) -> tuple[str, ...]:
-    """Return messages on rigid bodies that turn boundaries too far for links."""
+    """Return messages on rigid bodies that rotate boundaries too far for links."""
     found = []
     for name in dict.fromkeys(link.rigid for link in system.model.links if link.rigid):
         angle = abs(_motion(system, name, converged).rotation)
         if not angle <= _SMALL:
             found.append(
-                f"{name} turns by {angle:.2g} rad what is linked to it: links take rotations for "
-                f"small, which stretches it by {angle**2 / 2:.2g}; turn it less"
+                f"{name} rotates its linked boundaries by {angle:.2g} rad: links assume small "
+                f"rotations, and stretch them by {angle**2 / 2:.2g}; reduce the rotation"
             )
     return tuple(found)
 
@@ -122,13 +123,13 @@ def _motion(system: System, name: str, converged: Converged) -> RigidMotion:
 
 
 def _forces(system: System, k: int, converged: Converged, name: str) -> tuple[Array, Array]:
-    """Return the forces of a link on a body, resultant (2,) [N], and their moment [N mm]."""
+    """Return the resultant (2,) [N] and the moment [N mm] of a link on a body."""
     own = np.where(system.links.whose == k, converged.state.links, 0.0)
     return _resultant(system, own, name)
 
 
 def _resultant(system: System, own: Array, name: str) -> tuple[Array, Array]:
-    """Return resultant (2,) [N] and moment [N mm] on a body of forces of conditions (c,)."""
+    """Return the resultant (2,) [N] and the moment [N mm] on a body of link forces (c,) [N]."""
     links, number = system.links, system.part(name)
     part = system.parts[number]
     force = links.on_part(number, own, part.n)
@@ -144,7 +145,7 @@ def _unbalanced(system: System, k: int, converged: Converged) -> float:
     """Return the sum of the forces of a link on slave and partners, moments over their size [N].
 
     With a master and a rigid body, the force on either is opposite to that on the slave. Forces of
-    a tie act on either surface: their moment across a gap, as between coarse arcs, is left out.
+    a tie act on both surfaces: their moment across a gap, as between coarse arcs, is subtracted.
     """
     link = system.model.links[k]
     size = float(np.abs(system.full(link.slave[0]).X).max())
@@ -153,19 +154,19 @@ def _unbalanced(system: System, k: int, converged: Converged) -> float:
     if link.master is not None:
         slave, master = (_places(system, side, converged) for side in link.sides)
         far, _ = _facing(slave.X, master)
-        arm = float(far.max(initial=0.0, where=far < _beside(slave.X)))
-    left = arm / size * converged.state.force_scale
+        arm = float(far.max(initial=0.0, where=far < _reach(slave.X)))
+    across_gap = arm / size * converged.state.force_scale
     force, moment = _forces(system, k, converged, link.slave[0])
-    for name in partners:  # in a tie within one body, the force is that on both sides
+    for name in partners:  # in a tie within one body the force is already the sum of both sides
         same = name == link.slave[0]
         other, its = (0.0, 0.0) if same else _forces(system, k, converged, name)
-        turning = 0.0 if _is_ring(system, link) else abs(float(moment + its)) / size - left
+        turning = 0.0 if _is_ring(system, link) else abs(float(moment + its)) / size - across_gap
         worst = max(worst, float(np.abs(force + other).max()), turning)
     return worst
 
 
 def _misfit(system: System, k: int, converged: Converged) -> float:
-    """Return the motion that a link should prevent over the largest motion of what it joins."""
+    """Return the motion that a link should prevent over the largest motion of its sides."""
     link: Link = system.model.links[k]
     others, master = [], link.master and _places(system, link.master, converged)
     slave = _places(system, link.slave, converged, master)
@@ -197,10 +198,10 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
 
 
 def _misfit_at_nodes(system: System, k: int, converged: Converged, size: float) -> float:
-    """Return the motion over ``size`` that springs, or a link along normals, should prevent.
+    """Return the motion that springs, or a link along normals, should prevent, over ``size``.
 
-    It is looked for at the nodes, where it is held, node by node: around a hole the forces of
-    springs may have no resultant.
+    It is measured node by node, as these links act: around a hole the forces of springs may have no
+    resultant.
     """
     link = system.model.links[k]
     name, boundary = link.slave
@@ -236,11 +237,11 @@ def _misfit_at_nodes(system: System, k: int, converged: Converged, size: float) 
 
 
 def _opposite(slave: _Sampled, master: _Sampled) -> _Sampled:
-    """Return the slave, of each piece that part which faces the master."""
-    most, (start, end) = _beside(slave.X), slave.ends
+    """Return the parts of the slave's pieces that face the master."""
+    most, (start, end) = _reach(slave.X), slave.ends
     begins, stops = (_facing(X, master)[0] < most for X in (start, end))
     cut = np.flatnonzero(begins != stops)
-    kept = np.where(begins[cut], 0.0, 1.0)  # the end that faces the master, as a share
+    kept = np.where(begins[cut], 0.0, 1.0)  # coordinate of the end that faces the master
     inside, outside = kept, 1 - kept
     for _ in range(_HALVINGS):
         middle = (inside + outside) / 2
@@ -255,11 +256,11 @@ def _opposite(slave: _Sampled, master: _Sampled) -> _Sampled:
 
 
 def _is_ring(system: System, link: Link) -> bool:
-    """Whether a link holds the mean motion of a ring, which is that along its axis."""
+    """Whether a link holds the mean motion of a ring, which is its motion along the axis."""
     return link.distributed and system.full(link.slave[0]).body.kinematics == "axisymmetric"
 
 
-def _beside(X: Array) -> float:
+def _reach(X: Array) -> float:
     """Return the distance up to which places of a slave at X (2, n) face its master [mm]."""
     return _FACING * float(np.ptp(X, axis=1).max())
 
@@ -276,7 +277,7 @@ def _facing(X: Array, master: _Sampled) -> tuple[Array, Array]:
 
 
 def _facing_few(X: Array, master: _Sampled) -> tuple[Array, Array]:
-    """Return what `_facing` does, by the distances of all places from all pieces."""
+    """Return the result of `_facing`, from the distances of all places from all pieces."""
     begin, end = master.ends
     along = end - begin
     share = (X.T @ along - (begin * along).sum(axis=0)) / (along**2).sum(axis=0)

@@ -18,24 +18,22 @@ from solver.model.friction import ContactPlaces, lines_of
 from solver.typing import Array, Bools
 
 PRESSED = 1e-6
-"""Ratio of the normal force to the force level; below it a vertex counts as open."""
+"""Normal force of a vertex over the force level: the vertex is open below this ratio."""
 GAP = 2e-3
-"""Ratio of the largest permitted gap to the elastic approach."""
+"""Gap over the elastic approach, at most."""
 OVERLAP = (0.02, 2.5e-3)
-"""Ratios of the largest permitted overlap to the elastic approach, and to the side of an element;
-the larger limit counts."""
+"""Overlap over the elastic approach, and over the side of an element, at most; the larger limit
+counts."""
 COARSE = 0.36
-"""Ratio of the largest permitted edge to the width of the contact of curved surfaces: about three
-vertices across it, with which Hertz's pressure has an error of 4 %."""
+"""Edge over the width of the contact of curved surfaces, at most: about three vertices across the
+contact, with which the error of Hertz's pressure is 4 %."""
 _LITTLE = 0.01
-"""Ratio of the force of a pair to the force level; below it the resolution of its contact does not
-count."""
+"""Force of a pair over the force level: below it the resolution of its contact is not checked."""
 _CUT = 0.9
-"""Share of a hat that must face the master; below it the pressure at the vertex, which is a mean
-under the whole hat, is too low by more than a tenth."""
+"""Share of a hat that faces the master: with less the pressure at the vertex, a mean under the
+whole hat, is too low by more than a tenth."""
 STILL = 1e-3
-"""Ratio of the least slip to the elastic approach in the friction work that is the scale of wrong
-slip."""
+"""Least slip over the elastic approach, in the friction work to which wrong slip refers."""
 
 
 class LeftOut(NamedTuple):
@@ -44,7 +42,7 @@ class LeftOut(NamedTuple):
     Attributes
     ----------
     way : motion along the partner [mm]
-    sides, length : this motion over the side of an element, and over the length of the contact
+    sides, length : the same over the side of an element, and over the length of the contact
     off : error of the gap over the elastic approach
     x, y : position of the largest motion [mm]
     """
@@ -65,8 +63,8 @@ def untouched(system: System, states: Iterable[Converged]) -> tuple[str, ...]:
     """Return a warning for each pair that touches in none of the states."""
     every = [converged.state for converged in states]
     return tuple(
-        f"{_words(pair)} do not touch at the end of any stage: move them together, or remove the "
-        "pair"
+        f"{' and '.join(_names(pair))} do not touch at the end of any stage: move them together, "
+        "or remove the pair"
         for k, pair in enumerate(system.model.contacts)
         if not any(_closed(state, k).any() for state in every)
     )
@@ -74,10 +72,6 @@ def untouched(system: System, states: Iterable[Converged]) -> tuple[str, ...]:
 
 def _closed(state: State, number: int) -> Bools:
     return np.asarray(state.contacts[number].normal > PRESSED * state.force_scale)
-
-
-def _words(pair: ContactPair) -> str:
-    return " and ".join(_names(pair))
 
 
 def _names(pair: ContactPair) -> tuple[str, str]:
@@ -89,7 +83,7 @@ class AuditedPair:
 
     Attributes
     ----------
-    touching : gaps, slips and nodal forces, measured on the bodies
+    measured : gaps, slips and nodal forces, measured on the bodies
     normal, tangential : contact forces (n,) of the state [N]
     """
 
@@ -102,7 +96,7 @@ class AuditedPair:
         self._state = converged.state
         self._closed = _closed(converged.state, number)
         self.surfaces = Surfaces(system, number, finite=contact.finite)
-        self.touching: PairState = self.surfaces.touching(
+        self.measured: PairState = self.surfaces.measured(
             converged.state, converged.start, self.normal, self.tangential
         )
 
@@ -113,15 +107,12 @@ class AuditedPair:
 
     @property
     def approach(self) -> float:
-        """The elastic approach of the bodies [mm].
-
-        It is peak pressure over contact modulus E*, times the width of the contact.
-        """
-        closed, area = self._closed & (self.touching.area > 0), self.touching.area
+        """Elastic approach of the bodies [mm]: peak pressure over E*, times the contact's width."""
+        closed, area = self._closed & (self.measured.area > 0), self.measured.area
         if not closed.any():
             return 0.0
         pressure = float((self.normal[closed] / area[closed]).max())
-        return pressure * self._compliance * float(self.touching.edge[closed].sum())
+        return pressure * self._compliance * float(self.measured.edge[closed].sum())
 
     @property
     def _compliance(self) -> float:
@@ -131,10 +122,10 @@ class AuditedPair:
 
     @property
     def rounding(self) -> float:
-        """Gap or slip that counts as zero for the forces in the model [mm]."""
-        depth = self.touching.area.sum() / self.touching.edge.sum()
+        """Gap or slip that counts as zero, at the force level of the model [mm]."""
+        depth = self.measured.area.sum() / self.measured.edge.sum()
         closer = self._state.force_scale * self._compliance / depth if depth else 0.0
-        return max(LEAST * closer, self._system.touching)
+        return max(LEAST * closer, self._system.gap_tolerance)
 
     @property
     def force(self) -> float:
@@ -143,8 +134,8 @@ class AuditedPair:
 
     @property
     def limits(self) -> dict[str, float]:
-        """Limits of this pair: gap and overlap [mm], and coarseness of the contact."""
-        edges = self.touching.edge[self._closed] if self._closed.any() else self.touching.edge
+        """Limits of this pair, by figure."""
+        edges = self.measured.edge[self._closed] if self._closed.any() else self.measured.edge
         overlap = max(OVERLAP[0] * self.approach, OVERLAP[1] * float(edges.mean()))
         return {
             "audit_closed_gap": max(GAP * self.approach, self.rounding),
@@ -158,10 +149,10 @@ class AuditedPair:
         if self.surfaces.finite or self.force <= 0.0:
             return None
         share = np.where(self._closed, self.normal, 0.0) / self.force
-        edge, touching = self.touching.edge, self.touching
-        moved = np.abs(np.nan_to_num(touching.way)) * share
+        edge, measured = self.measured.edge, self.measured
+        moved = np.abs(np.nan_to_num(measured.way)) * share
         way = float(moved.sum())
-        off = float(np.abs(np.nan_to_num(touching.true_gap - touching.gap)) @ share)
+        off = float(np.abs(np.nan_to_num(measured.true_gap - measured.gap)) @ share)
         slave = self.surfaces.slave
         x, y = slave.X[:, slave.vertices[moved.argmax()]]
         return LeftOut(
@@ -181,7 +172,7 @@ class AuditedPair:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Messages if small sliding errs less than that, but it matters; and of a cut peak."""
+        """Messages on a smaller but relevant error of small sliding, and on a cut peak."""
         left_out, cut = self.left_out, self._cut_peak
         if not left_out or self.outside:
             return cut
@@ -192,20 +183,20 @@ class AuditedPair:
     def _cut_peak(self) -> tuple[str, ...]:
         """A message if the largest pressure is where the master ends under the slave."""
         slave = self.surfaces.slave
-        cut = self._closed & (self.touching.area < _CUT * slave.hats)
+        cut = self._closed & (self.measured.area < _CUT * slave.hats)
         if not cut.any():
             return ()
         pressure, _ = contact_pressure(self._system, self._state, self._number)
-        beside = cut | np.append(cut[1:], False) | np.append(False, cut[:-1])
-        at = int(np.where(beside, pressure, -np.inf).argmax())
+        near = cut | np.append(cut[1:], False) | np.append(False, cut[:-1])
+        at = int(np.where(near, pressure, -np.inf).argmax())
         if pressure[at] < pressure.max():
             return ()
         x, y = slave.X[:, slave.vertices[at]]
         own, other = _names(self._pair)
         return (
-            f"{own} has its largest pressure at ({x:z.4g}, {y:z.4g}), where it goes on beyond the "
-            f"end of {other}: pressure there is a mean over an edge that is covered in part, and "
-            "too low. Exchange slave and master of this pair, or use smaller elements there",
+            f"{own} has its largest pressure at ({x:z.4g}, {y:z.4g}), where it extends beyond the "
+            f"end of {other}: pressure there is a mean over a partly covered edge, and too low. "
+            "Exchange slave and master of this pair, or use smaller elements there",
         )
 
     def _describe(self, left_out: LeftOut) -> str:
@@ -214,30 +205,30 @@ class AuditedPair:
             f"{slave} moved {left_out.way:.2g} mm along {master}, mostly at ({left_out.x:z.4g}, "
             f"{left_out.y:z.4g}): {left_out.sides:.2g} sides of an element, "
             f"{left_out.length:.1%} of the length of contact; gaps differ by {left_out.off:.1%} of "
-            "the elastic approach. Small sliding neglects this: where the pair is "
-            'your own, in a scene file or a model, give it sliding = "finite"'
+            "the elastic approach. Small sliding neglects this: for a pair of your own, in a scene "
+            'file or a model, set sliding = "finite"'
         )
 
     @cached_property
     def _bound(self) -> Array:
-        """The friction bound (n,) [N], with area and strength as measured here."""
+        """The friction bound (n,) [N], from the measured area and strength."""
         places = ContactPlaces(
             n=len(self.normal),
-            find_strength=lambda: self.touching.strength,
+            find_strength=lambda: self.measured.strength,
             find_plastic_strain=lambda: self._system.plastic_strain(self._number, self._start),
             find_slip=lambda: self._start.contacts[self._number].slipped,
         )
-        return lines_of(self._pair.law, places).over(self.touching.area).least(self.normal)
+        return lines_of(self._pair.law, places).over(self.measured.area).least(self.normal)
 
     @cached_property
     def figures(self) -> dict[str, float]:
         """The figures of the pair; lengths in mm, forces in N."""
-        gap, true = np.nan_to_num(self.touching.gap), np.nan_to_num(self.touching.true_gap)
+        gap, true = np.nan_to_num(self.measured.gap), np.nan_to_num(self.measured.true_gap)
         pressed = np.where(self._closed, self.normal, 0.0)
         pressed /= max(float(pressed.sum()), 1e-300)
-        # mean over the area: at a sharp corner the last vertex overlaps mostly by distortion
-        deep = np.maximum(-np.minimum(gap, true), 0.0) @ self.touching.area
-        area = float(self.touching.area[self._closed].sum() or self.touching.area.sum())
+        # the mean over the area: at a sharp corner the overlap of the last vertex is distortion
+        deep = np.maximum(-np.minimum(gap, true), 0.0) @ self.measured.area
+        area = float(self.measured.area[self._closed].sum() or self.measured.area.sum())
         found = {
             "audit_overlap": max(float(deep) / (area or 1.0), float(np.abs(true) @ pressed)),
             "audit_closed_gap": float(np.abs(gap) @ pressed),
@@ -249,21 +240,21 @@ class AuditedPair:
             "audit_contact_resolution": self._coarseness(),
         }
         if self._pair.left(self._start.time, self._state.time) is not None:
-            # of a pair that leaves the forces are given, wherever its surfaces are
+            # forces of a pair being removed are prescribed, whatever its gaps
             found |= dict.fromkeys((*self.limits, "audit_slip"), 0.0)
         return found
 
     def _coarseness(self) -> float:
         """Return the longest edge in a contact of curved surfaces over its width; 0 if flat.
 
-        If no vertex has force although the bodies overlap, the width is that of the overlap.
+        If bodies overlap although no vertex has a force, the width is that of the overlap.
         """
         if not self.surfaces.curved:
             return 0.0
         if not self._closed.any():
-            deep = self.touching.point_gap < -self.limits["audit_overlap"]
-            width = float(self.touching.point_length[deep].sum())
-            return float(self.touching.edge.max()) / width if width else 0.0
+            deep = self.measured.point_gap < -self.limits["audit_overlap"]
+            width = float(self.measured.point_length[deep].sum())
+            return float(self.measured.edge.max()) / width if width else 0.0
         little = _LITTLE * self._state.force_scale
         if self.force <= little:
             return 0.0
@@ -272,12 +263,12 @@ class AuditedPair:
     def _wrong_slip(self) -> float:
         """Return the friction work missing because of wrong slip, over the friction work.
 
-        Slip is wrong if the shear is below its bound, or if it has the direction of the friction
-        force on the vertex, which must oppose it. Vertices new in contact are left out.
+        Slip is wrong if the shear is below its bound, or if the friction force on the vertex does
+        not oppose it. Vertices new in contact are left out.
         """
         before = self._start.contacts[self._number].touching
-        judged = self._closed & before & (self.touching.area > 0)
-        bound, slip = self._bound[judged], np.nan_to_num(self.touching.slip[judged])
+        judged = self._closed & before & (self.measured.area > 0)
+        bound, slip = self._bound[judged], np.nan_to_num(self.measured.slip[judged])
         least = max(STILL * self.approach, self.rounding)
         should = float(bound @ np.maximum(np.abs(slip), least))
         if should == 0.0:

@@ -1,8 +1,8 @@
 """A second, independent evaluation of a body: strain, stress, forces, applied loads, energy.
 
-The solver's operators are not used: gradients come from the elements, volumes from the quadrature,
-heat and initial stress from the declared loads, and resultants of pressures from the shape of the
-boundary. Stress and strain are Mandel vectors, elements and points last.
+The solver's operators are not used: gradients follow from the elements, volumes from the
+quadrature, heat and initial stress from the declared loads, and resultants of pressures from the
+shape of the boundary. Stress and strain are Mandel vectors, elements and points last.
 """
 
 from __future__ import annotations
@@ -29,27 +29,27 @@ from solver.tensors import SQRT2, to_mandel, to_tensor
 from solver.typing import Array, Ints
 
 _CHORDS, _HALVINGS, _BENT = 64, 40, 1e-7
-"""Number of chords into which an edge is divided, and of times that chords are halved on which the
-force at the middle, or the mean at the ends, is not the mean at the Gauss points, to this share of
-the whole force: loads may bend and jump."""
+"""Number of chords of an edge. Most halvings of a chord. Difference of the force at its middle, or
+of the mean at its ends, from the mean at its Gauss points, over the whole force: a chord with a
+larger one is halved, because loads may have kinks and jumps."""
 _GAUSS = (0.5 - 0.75**0.5 / 3, 0.5 + 0.75**0.5 / 3)
 _INSIDE = (0.5, 1e-6, 1 - 1e-6)
-"""Gauss points of a chord; its middle, and its ends, where neighbours may have other loads."""
+"""Positions on a chord: Gauss points; middle and both ends, just inside."""
 _SHEARS = ((0, 1), (1, 2), (2, 0))
 _COMPONENT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
-"""Axes of the shear components xy, yz, zx; and the number of the component of two axes."""
+"""Axes of the shear components xy, yz, zx; and number of the component of two axes."""
 _PARTS = 7
-"""Number of parts of an element along a side, if elements are few, on which a force per volume is
-first looked at."""
+"""Number of cells along the side of an element at first, for a force per volume; fewer if there are
+many elements."""
 LEAST, LEAST_ENERGY = 1e-7, 1e-8
-"""Ratios of what rounding leaves of forces, and of energies, to their values if each element were
-clamped: free expansion leaves 1e-13 of the energy. Ratios refer to nothing smaller."""
+"""Rounding levels of forces and of energies over their values in clamped elements: free expansion
+leaves 1e-13 of the energy. They are the least values that errors are divided by."""
 GHOST = 1e-7
-"""Share of stiffness that elements keep when they are removed."""
+"""Stiffness of a removed element over its value before."""
 
 
 def load_factor(amplitude: Amplitude | None, time: float) -> float:
-    """Return the load factor at a time: that of the amplitude, or without one the time itself."""
+    """Return the load factor at a time: by the amplitude, or without one the time itself."""
     return time if amplitude is None else float(np.interp(time, amplitude.time, amplitude.value))
 
 
@@ -110,10 +110,10 @@ class PlainBody:
         return out
 
     def gradient(self, u: Array) -> tuple[Array, Array]:
-        """Return the gradient of displacements (n,) [mm] at the points, and their hoop strain.
+        """Return the gradient of displacements (n,) [mm] at the points, and the hoop strain.
 
-        They are (dim, dim, n_elements, n_points), direction of displacement first, and (n_elements,
-        n_points).
+        Shapes are (dim, dim, n_elements, n_points), direction of displacement first, and
+        (n_elements, n_points).
         """
         at = vectors(u, self.part.dim).T[self._nodes]  # (n_element_nodes, n_elements, dim)
         gradient = np.einsum("ijep,iek->kjep", self._gradients, at)
@@ -149,7 +149,7 @@ class PlainBody:
         return out
 
     def shares(self, time: float) -> tuple[Array, Array]:
-        """Return the ratios of Young's modulus and of the yield stress to their cold values."""
+        """Return Young's modulus and yield stress (n_points,) over their cold values."""
         stiff, strong = np.ones((2, self.points.shape[1]))
         for load in self.body.every_load:
             lost = load.softening(self.points)
@@ -157,7 +157,7 @@ class PlainBody:
                 factor = load_factor(load.amplitude, time)
                 stiff -= factor * lost[0]
                 strong -= factor * lost[1]
-        return self.left(time) * stiff, strong
+        return self.remaining(time) * stiff, strong
 
     def prescribed(self, time: float) -> Array:
         """Return the displacements (n_nodes, dim) of supports and loads, NaN where free [mm]."""
@@ -176,18 +176,18 @@ class PlainBody:
             given[self.part.boundary_nodes(boundary), axis] = value
         return given
 
-    def left(self, time: float) -> Array:
-        """Return the shares of stiffness (n_points,) that removal leaves; 1 where none is."""
-        left = np.ones(self.volume.shape)
+    def remaining(self, time: float) -> Array:
+        """Return the share of stiffness (n_points,) that remains after removal of elements."""
+        share = np.ones(self.volume.shape)
         for load in self.body.every_load:
             if load.removes:
                 elements = np.asarray(self.body.mesh.subdomains[load.removes])
-                left[elements] -= load_factor(load.amplitude, time)
-        return np.maximum(left, GHOST).ravel()
+                share[elements] -= load_factor(load.amplitude, time)
+        return np.maximum(share, GHOST).ravel()
 
     def known(self, values: Array, time: float) -> Array:
-        """Return values (..., n_points), NaN in elements that are removed."""
-        return np.where(self.left(time) > GHOST, values, np.nan)
+        """Return values (..., n_points), NaN in removed elements."""
+        return np.where(self.remaining(time) > GHOST, values, np.nan)
 
     def law(self, time: float) -> Law:
         """Return the law of the points at a time."""
@@ -219,11 +219,11 @@ class PlainBody:
         return np.stack([np.bincount(nodes, f.ravel(), count) for f in each], axis=1)
 
     def applied(self, time: float) -> Array:
-        """Return the resultant [N] of the loads at a time, first moments [N mm] (1 + dim, dim).
+        """Return the resultant [N] and the first moments [N mm] of the loads (1 + dim, dim).
 
-        First moments are force times x, y and z, from the centre of the body. A pressure p
-        gives the force p times depth times length, against the outward normal, at the Gauss points
-        of many pieces of each edge.
+        First moments are force times x, y (and z) relative to the centre of the body. A pressure p
+        has the force p times depth times length, against the outward normal, at the Gauss points of
+        many chords of each edge.
         """
         total = np.zeros((1 + self.part.dim, self.part.dim))
         for load, own in zip(self.body.every_load, self._on_body, strict=True):
@@ -232,21 +232,21 @@ class PlainBody:
 
     @cached_property
     def _on_body(self) -> list[Array]:
-        """The moments (1 + dim, dim) of the forces of each load."""
-        if self.part.dim == 3:
-            return [np.zeros((4, 3)) for _ in self.body.every_load]  # none has a force
+        """The sums of `moments` for the forces of each load at load factor 1."""
+        if self.part.dim == 3:  # loads in space have no forces
+            return [np.zeros((4, 3)) for _ in self.body.every_load]
         return [
             sum((self._on_boundary(load, b) for b in load.boundaries), self._on_volume(load))
             for load in self.body.every_load
         ]
 
     def moments(self, force: Array, x: Array) -> Array:
-        """Return the sums (1 + dim, dim) of forces (dim, n) times 1, x, y (, z), at places."""
+        """Return the sums (1 + dim, dim) of forces (dim, n) at x (dim, n), times 1, x, y (, z)."""
         arm = x - self.part.X.mean(axis=1, keepdims=True)
         return np.asarray(np.vstack([np.ones_like(arm[:1]), arm]) @ force.T)
 
     def _on_boundary(self, load: Load, boundary: str) -> Array:
-        """Return the moments (3, 2) of the forces on a boundary, by Gauss's rule on chords."""
+        """Return the `moments` (3, 2) of the forces on a boundary, by Gauss's rule on chords."""
         edges = self.part.X[:, edges_of(self.part, boundary)]
         row = np.repeat(np.arange(edges.shape[1]), _CHORDS)
         start, width = (
@@ -254,7 +254,7 @@ class PlainBody:
             2 / _CHORDS,
         )
         total, whole = np.zeros((3, 2)), 0.0
-        for left in reversed(range(_HALVINGS)):
+        for further in reversed(range(_HALVINGS)):
 
             def at(share: float, of: Any = shape_functions) -> Array:
                 shapes = of(start + share * width, edges.shape[-1])  # noqa: B023
@@ -271,7 +271,7 @@ class PlainBody:
             mean = (first + last) / 2
             bent = np.abs([mean - middle, mean - (one + other) / 2]).max(axis=(0, 1))
             whole = whole or np.abs(mean).sum()
-            halved = (bent > _BENT * whole) & (left > 0)
+            halved = (bent > _BENT * whole) & (further > 0)
             for force, share in zip((first, last), _GAUSS, strict=True):
                 total += self.moments(force[:, ~halved], at(share)[:, ~halved]) / 2
             if not halved.any():
@@ -281,9 +281,9 @@ class PlainBody:
         return total
 
     def _on_volume(self, load: Load) -> Array:
-        """Return the moments (3, 2) of a load's force per volume, integrated over elements.
+        """Return the `moments` (3, 2) of a load's force per volume.
 
-        Cells are found as in the solver, from smaller ones: it may miss what is narrow.
+        The cells of integration begin smaller than in the solver, which may miss narrow features.
         """
         if load.body_force(self.points) is None:
             return np.zeros((3, 2))

@@ -10,7 +10,7 @@ import numpy as np
 from solver.audit.bodies import AuditedBody, misplaced
 from solver.audit.contact_error import contact_error
 from solver.audit.figures import LIMITS
-from solver.audit.forces import action_reaction, imbalance, left_on, reactions
+from solver.audit.forces import action_reaction, imbalance, imbalance_released, reactions
 from solver.audit.large_strain import large_strain
 from solver.audit.links import least_energy, links_error, turned
 from solver.audit.pairs import AuditedPair
@@ -24,7 +24,7 @@ from solver.fem.error import error_estimate
 from solver.loading.integration import missed
 from solver.typing import Array
 
-_TOLD = {
+_WARNED = {
     "audit_surface_shear": (
         1.1, "surface shear reaches {:.2f} of the shear yield stress: refine the mesh"
     ),
@@ -32,12 +32,17 @@ _TOLD = {
         0.1, "contact pressure has an estimated error of {:.0%}: use smaller elements there"
     ),
 }  # fmt: skip
-"""Figures that a warning tells: above which value, and its text."""
-_REACTIONS, _TRAVELLING = 1e-5, 5e-3  # elements integrate a Hertz pressure with its steep ends
-_ENERGY, _TURNING = 1e-5, 0.02  # with finite sliding contact normals rotate within an increment
-_FORCE = 1e-6  # of the force level
-_BORNE = 1e-4
-"""Ratio of the force of removed elements to the force level; above it they hold what is cut off."""
+"""Figures with a warning: the value above which it is given, and its text."""
+_REACTIONS, _TRAVELLING = 1e-5, 5e-3
+"""Limits of ``audit_reactions``; the second is for a travelling Hertz pressure, whose steep ends
+cause an error of integration."""
+_ENERGY, _TURNING = 1e-5, 0.02
+"""Limits of ``audit_energy``; the second is for finite sliding, whose normals rotate within an
+increment."""
+_FORCE = 1e-6
+"""Limit of forces over the force level."""
+_SEVERED = 1e-4
+"""Force of removed elements over the force level, at most; with more they hold a part cut off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,11 +82,11 @@ def audit(
     lost: float = 0.0,
     stages: Iterable[Converged] = (),
 ) -> Audit:
-    """Check one run: its state under load and, if there is one, that after unloading.
+    """Return the audit of a run: of its state under load and, if any, of that after unloading.
 
-    ``least_dissipation`` [MPa] and ``lost`` are the extremes over all its increments, see `Tally`.
-    Strain is judged at the end of all ``stages``. Bodies in space have no estimate of the error of
-    the mesh, and of large strain only that of plastic strain.
+    ``least_dissipation`` [MPa] and ``lost`` are the extremes over all increments, see `Tally`.
+    Strain is checked at the end of all ``stages``. In space there is no estimate of the error of
+    the mesh, and large strain is estimated from plastic strain only.
     """
     states = (loaded, unloaded or loaded)
     plain = [PlainBody(system.full(body.name)) for body in system.model.bodies]
@@ -110,7 +115,7 @@ def audit(
         "audit_slip_resolution": loaded.timing.passage,
         "audit_dissipation": least_dissipation,
         "audit_history": lost,
-        "audit_contact_after_unloading": left_on(released) if unloaded else 0.0,
+        "audit_contact_after_unloading": imbalance_released(released) if unloaded else 0.0,
     }  # fmt: skip
     figures |= _strength(system, loaded)
     plane = all(body.dim == 2 for body in system.model.bodies)
@@ -178,7 +183,7 @@ def _discretisation(
 ) -> dict[str, float]:
     """Return the estimated relative errors of stress in the energy norm.
 
-    Stress whose energy is rounding, compared with that of the run, has no error.
+    They refer to an energy of at least the rounding level of the run.
     """
     names = [body.name for body in system.model.bodies]
     return {
@@ -223,15 +228,16 @@ def _violations(
 
 
 def _severed(bodies: Sequence[AuditedBody]) -> tuple[str, ...]:
-    """Return messages on bodies of which removed elements still bear force."""
+    """Return messages on bodies whose removed elements still transmit force."""
     found: dict[str, float] = {}
     for body in bodies:
-        found[body.name] = _largest(found.get(body.name, 0.0), body.borne / (body.force_level or 1))
+        share = body.force_of_removed / (body.force_level or 1)
+        found[body.name] = _largest(found.get(body.name, 0.0), share)
     return tuple(
-        f"removed elements of {name} bear {share:.2g} of the force: nothing else holds what is cut "
-        "off, hold it or end its loads before"
+        f"removed elements of {name} transmit {share:.2g} of the force: nothing else holds the "
+        "part that is cut off. Hold this part, or end its loads before"
         for name, share in found.items()
-        if not share <= _BORNE
+        if not share <= _SEVERED
     )
 
 
@@ -241,8 +247,8 @@ def limits_at(scale: float, *, travelling: bool = False, turning: bool = False) 
     Parameters
     ----------
     scale : force level [N]
-    travelling : whether a pressure travels along a body
-    turning : whether contact normals turn within an increment
+    travelling : whether a pressure moves along a body
+    turning : whether contact normals rotate within an increment
     """
     return LIMITS | {
         "audit_reactions": _TRAVELLING if travelling else _REACTIONS,
@@ -275,6 +281,6 @@ def warnings(figures: Mapping[str, float]) -> tuple[str, ...]:
     """Return the warnings that follow from figures."""
     return tuple(
         text.format(figures[name])
-        for name, (limit, text) in _TOLD.items()
+        for name, (limit, text) in _WARNED.items()
         if figures.get(name, 0.0) > limit
     )

@@ -1,8 +1,8 @@
 """Contact measured on the bodies: gaps, slips, and the nodal forces of contact.
 
-Surfaces are taken in their deformed positions, and distances are measured from points to the
-nearest place of the partner; derivative rows of the contact problem are not used. Means are taken
-under the hats of the slave's vertices, to which contact forces belong.
+Surfaces are in their deformed positions, and gaps are distances along the slave's normals to the
+nearest place of the partner; the derivative rows of the contact problem are not used. Means are
+those under the hats of the slave's vertices, to which contact forces belong.
 """
 
 from __future__ import annotations
@@ -28,16 +28,18 @@ from solver.typing import Array, Bools, Ints
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)
 _NEWTON_STEPS = 5
 _BLOCK = 1000
-"""Number of points that are treated at once, each with every edge."""
-_CORNER = float(np.radians(40.0))  # angle between the normals of edges that form a corner
-_OPPOSED = 0.25  # least cosine of the angle between surfaces that face each other
+"""Number of points processed at once, each with every edge."""
+_CORNER = float(np.radians(40.0))
+"""Angle between the normals of two edges: they form a corner at a larger angle."""
+_OPPOSED = 0.25
+"""Cosine of the angle between surfaces that face each other, at least."""
 _STRAIGHT = 1e-6
-"""Change of the normals [rad] up to which a surface counts as straight."""
+"""Change of the normals along a straight surface [rad], at most."""
 _SHARE = 0.05
-"""Ratio of the force of a patch of contact to that of its pair; below it the patch does not count.
-"""
+"""Force of a patch of contact over that of its pair: weaker patches are ignored."""
 _BESIDE = 1e-9
-"""Ratio of a distance to the length of an edge, by which a line may miss the edge it intersects."""
+"""Distance of a line from the end of an edge over its length: up to it the line intersects the
+edge."""
 
 
 def deformed(system: System, name: str, state: State) -> tuple[Array, Array]:
@@ -61,7 +63,7 @@ def _rotation(angle: float) -> Array:
 
 
 def _turned(x: Array, centre: Array, angle: float, moved: tuple[float, float]) -> Array:
-    """Return points (2, n) after a rotation about a centre and a displacement of it [mm]."""
+    """Return points (2, n) after a rotation about a centre and a displacement [mm]."""
     from_centre = _rotation(angle) @ (x - centre[:, None])
     return np.asarray(from_centre + (centre + np.array(moved))[:, None])
 
@@ -123,15 +125,15 @@ class Surfaces:
         return _on(self.slave, xs), _on(self.master, xm)
 
     def coarseness(self, state: State, normal: Array) -> float:
-        """Return the longest edge with contact forces (n,), over the width of its contact.
+        """Return the longest edge over the width of the contact, of the worst patch.
 
-        It is the worst of all patches of contact that are curved and have more than `_SHARE` of the
-        force; 0 if there are none. At the axis, or at a support on a plane of symmetry, the width
-        includes the other half of a patch.
+        ``normal`` (n,) are the normal forces [N]. Patches are curved and have more than the share
+        `_SHARE` of the force; 0 without any. At the axis, or at a support on a plane of symmetry,
+        the width includes the other half of a patch.
         """
         xs, xm = self._at(state)
         closed, halved = normal > 0, self._halved()
-        closed[[0, -1]] |= closed[[1, -2]] & halved  # next to the axis hats are small
+        closed[[0, -1]] |= closed[[1, -2]] & halved  # at the axis the hat is small, and its force
         closed[1:-1] |= closed[:-2] & closed[2:]  # one open vertex does not divide a contact
         bounds = np.flatnonzero(np.diff(np.pad(closed.astype(int), 1)))
         worst = 0.0
@@ -145,7 +147,7 @@ class Surfaces:
             sides = ((self.pair.slave, self.slave, patch), (self.pair.master, self.master, near))
             if not any(_bent(chain, vertices) for _, chain, vertices in sides):
                 continue
-            longest = max(  # the edges of rigid surfaces do not count
+            longest = max(  # edges of rigid surfaces are left out
                 float(chain.spacing[vertices].max())
                 for (name, _), chain, vertices in sides
                 if name in self._system.names
@@ -158,7 +160,7 @@ class Surfaces:
     def _halved(self) -> Bools:
         """Return whether the slave ends at the axis or a plane of symmetry, for both ends (2,).
 
-        At a plane of symmetry a support holds it along its surface, and not across.
+        At a plane of symmetry a support holds the end along the surface, but not across.
         """
         name, _ = self.pair.slave
         if name not in self._system.names:
@@ -180,8 +182,8 @@ class Surfaces:
     ) -> Array:
         """Return the mean shear yield stress (n,) of the weaker body under the hats [MPa].
 
-        ``mean`` takes the mean under the hats of values at points, ``on_slave`` gives the values of
-        a field of the slave at points.
+        ``mean`` returns the means under the hats of values at points, ``on_slave`` the values at
+        points of a nodal field of the slave.
         """
         weaker = np.full(len(self.slave.edges) + 1, np.inf)
         for (name, _), chain, at_points in (
@@ -190,16 +192,16 @@ class Surfaces:
             body = self._system.model.body(name)
             if body.material.elastic:
                 continue
-            left = np.ones((1, len(chain.nodes)))
-            for load in body.every_load if name in self._system.names else ():  # not a rigid one
+            ratio = np.ones((1, len(chain.nodes)))
+            for load in body.every_load if name in self._system.names else ():  # not if rigid
                 lost = load.softening(self._system.full(name).X[:, chain.nodes])
                 if lost is not None:
-                    left -= load_factor(load.amplitude, time) * lost[1]
+                    ratio -= load_factor(load.amplitude, time) * lost[1]
             strength = body.material.shear_yield_stress
-            weaker = np.fmin(weaker, strength * mean(at_points(left)[0], partner.faces))
+            weaker = np.fmin(weaker, strength * mean(at_points(ratio)[0], partner.faces))
         return weaker
 
-    def touching(self, state: State, start: State, normal: Array, tangential: Array) -> PairState:
+    def measured(self, state: State, start: State, normal: Array, tangential: Array) -> PairState:
         """Return the pair in ``state``, after ``start``, with the given contact forces (n,) [N]."""
         slave, master = self.slave, self.master
         (xs, xm), (xs0, xm0) = self._at(state), self._at(start)
@@ -215,11 +217,11 @@ class Surfaces:
 
         n = _normals(xs, slave, edges, xi)
         true = partner = _Partner(xm, master, on_slave(xs), n, self._thickness / 2)
-        if small:  # places and directions are those of the bodies at rest
+        if small:  # positions and normals are those before loading
             n = _normals(slave.X, slave, edges, xi)
             partner = _Partner(master.X, master, on_slave(slave.X), n, self._overlap)
         if self.pair.presence is not None and not load_factor(self.pair.presence, state.time):
-            true.faces, partner.faces = 0 * true.faces, 0 * partner.faces  # there is no pair
+            true.faces, partner.faces = 0 * true.faces, 0 * partner.faces  # an absent pair
         t = np.stack([-n[1], n[0]])
         apart = partner.of(xm) - on_slave(xs)
         moved = on_slave(xs - xs0) - partner.of(xm - xm0)
@@ -264,8 +266,8 @@ class Surfaces:
 def _points(slave: Surface, xs: Array, master: Surface, xm: Array) -> tuple[Ints, Array, Array]:
     """Return edge, coordinate on it and weight of the integration points (n,) on the slave.
 
-    The edges are cut opposite the master's vertices, at the kinks of the integrand. The normals of
-    the master are used; at surfaces that touch they are also those of the slave.
+    Edges are cut opposite the master's vertices, where the integrand has kinks, along the master's
+    normals; where surfaces touch, these are also those of the slave.
     """
     last = len(master.edges) - 1
     corners = np.append(np.arange(len(master.edges)), last)
@@ -290,14 +292,14 @@ def _on(surface: Surface, x: Array) -> Array:
 
 
 def _spread(force: Array, nodes: Ints, shape: Array, count: int) -> Array:
-    """Return nodal forces (count, 2) of point forces (2, n) by shape functions (n, k)."""
+    """Return nodal forces (count, 2) from point forces (2, n) by shape functions (n, k)."""
     return np.stack(
         [np.bincount(nodes.ravel(), (f[:, None] * shape).ravel(), count) for f in force], axis=1
     )
 
 
 def _bent(surface: Surface, vertices: Ints) -> bool:
-    """Whether the undeformed surface is curved next to vertices; a corner does not count."""
+    """Whether the undeformed surface is curved next to vertices; a corner is not curved."""
     first, last = _at_ends(surface.X, surface)
     within = np.pad(np.linalg.norm(last - first, axis=0), 1)
     turn = np.linalg.norm(first[:, 1:] - last[:, :-1], axis=0)
@@ -333,8 +335,8 @@ def _at_ends(x: Array, surface: Surface) -> tuple[Array, Array]:
 class _Partner:
     """Intersections of lines through points (2, n) along ``way`` with the outside of a surface.
 
-    Of several intersections on a line the nearest counts, if it is at most ``reach`` [mm] behind
-    the point. ``faces`` (n,) is 1 if there is one, else 0.
+    It is the nearest one on the line that is at most ``reach`` [mm] behind the point. ``faces``
+    (n,) is 1 if there is one, else 0.
     """
 
     def __init__(self, x: Array, surface: Surface, points: Array, way: Array, reach: float) -> None:
@@ -354,7 +356,7 @@ class _Partner:
         self.point = self.of(x)
 
     def of(self, field: Array) -> Array:
-        """Return the values (2, n) at the places, for a field on the surface's nodes."""
+        """Return the values (2, n) of a nodal field of the surface at the intersections."""
         return np.asarray((field[:, self.nodes] * self.shape).sum(axis=-1))
 
     def distance(self, points: Array) -> Array:
@@ -367,7 +369,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _met(corners: Array, points: Array, way: Array, reach: float) -> tuple[Ints, Array, Array]:
-    """Return the chord (n,) that lines intersect from outside, the coordinate on it, and 1 or 0."""
+    """Return the nearest chord (n,) that each line enters, the coordinate on it, and 1 or 0."""
     side = _cross(way[:, :, None], corners[:, None, :] - points[:, :, None])
     chord = np.diff(corners)
     beside = _BESIDE * np.linalg.norm(chord, axis=0)
@@ -387,7 +389,7 @@ def _met(corners: Array, points: Array, way: Array, reach: float) -> tuple[Ints,
 def _foot(xe: Array, points: Array, way: Array, eta: Array) -> Array:
     """Return the coordinates of intersections of lines with edges (2, n, k), by Newton's method.
 
-    ``eta`` (n,) are the starting values; edges are continued beyond their ends.
+    ``eta`` (n,) are the starting values; edges extend beyond their ends.
     """
     count = xe.shape[-1]
     for _ in range(_NEWTON_STEPS):

@@ -1,4 +1,4 @@
-"""Where small-strain theory ends: what it leaves out, and the plastic strain of bodies."""
+"""Limits of small-strain theory: the share that it neglects, and the plastic strain of bodies."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from solver.model.singular import SingularPoint
 from solver.typing import Array
 
 LARGE = 0.05
-"""Largest share that small-strain theory may leave out."""
+"""Largest share of stress or strain that small-strain theory may neglect."""
 
 
 class Neglected(NamedTuple):
-    """The share of stress or strain that small-strain theory leaves out, and where."""
+    """The share of stress or strain that small-strain theory neglects, and a message on it."""
 
     share: float = 0.0
     text: str = ""
 
     @property
     def outside(self) -> tuple[str, ...]:
-        """A message if it is too much."""
+        """The message if the share is too large."""
         return () if self.share <= LARGE else (self.text,)
 
 
@@ -39,7 +39,7 @@ class Strained(NamedTuple):
 
     @property
     def neglected(self) -> Neglected:
-        """Half of the strain: the share by which engineering and logarithmic strain differ."""
+        """Half of the strain: the relative difference of engineering and logarithmic strain."""
         return Neglected(
             self.value / 2,
             f"equivalent plastic strain reaches {self.value:.0%} in {self.body} at "
@@ -49,9 +49,9 @@ class Strained(NamedTuple):
 
 
 def equivalent(state: PlasticState) -> Array:
-    """Return the equivalent (...) of the plastic strain tensor, sqrt(2/3) times its norm.
+    """Return the equivalent plastic strain (...), sqrt(2/3) times the norm of the present tensor.
 
-    The accumulated plastic strain grows in every cycle, also where strain stays small.
+    (The accumulated plastic strain would also grow in cycles of small strain.)
     """
     return np.asarray(np.sqrt(2 / 3) * np.linalg.norm(state.plastic_strain, axis=0))
 
@@ -63,15 +63,15 @@ def largest_strain(
 
     Parameters
     ----------
-    bodies : name, positions (2, n) [mm] and equivalent plastic strain (n,) of each
+    bodies : for each body name, positions (2, n) [mm] and equivalent plastic strain (n,)
     """
     most = Strained()
     for name, X, strain in bodies:
-        judged = np.ones(len(strain), dtype=bool)
+        outside = np.ones(len(strain), dtype=bool)
         for point in singular:
-            judged &= ~point.reaches(X)
-        if judged.any():
-            at = int(np.where(judged, strain, -1.0).argmax())
+            outside &= ~point.reaches(X)
+        if outside.any():
+            at = int(np.where(outside, strain, -1.0).argmax())
             most = max(most, Strained(float(strain[at]), name, float(X[0, at]), float(X[1, at])))
     return most
 
@@ -84,7 +84,7 @@ def accumulated_strain(system: System, converged: Converged) -> float:
 
 
 def plastic_strain(system: System, states: Iterable[Converged]) -> Strained:
-    """Return the largest equivalent of the plastic strain tensor in some states."""
+    """Return the largest equivalent plastic strain (of the tensor) in some states."""
     each = (body for converged in states for body in _yielding(system, converged.state))
     bodies = ((name, X, equivalent(plastic)) for name, X, plastic in each)
     return largest_strain(bodies, system.model.singular)

@@ -1,6 +1,6 @@
-"""Candidates: the vertices near contact at given displacements, with gaps, slips and rows.
+"""Candidates: the vertices near contact at given displacements, with their gaps and slips.
 
-The conditions of links, which always hold, follow after the gaps and slips.
+The conditions of links follow after the gaps and slips; they hold at any time.
 """
 
 from __future__ import annotations
@@ -22,38 +22,41 @@ from solver.model.friction import BoundLines
 from solver.typing import Array, Ints
 
 _MARGIN = 0.25
-"""Vertices nearer than this many element lengths are candidates."""
+"""Gap over element length: vertices with a smaller one are candidates."""
 _POWER = 5 / 3
-"""Power of the gap in the slip of a vertex that comes near."""
+"""Exponent of the gap in the slip before contact, see `_slip_before_contact`."""
 _FELL = 0.5
-"""Ratio of normal forces that fell to those that rose, up to which a contact grows."""
+"""The contact counts as growing if the normal forces that fell sum to at most this share of those
+that rose."""
 
 
 @dataclass(frozen=True, slots=True)
 class Candidates(OnParts):
-    """Vertices near contact; gaps first, then slips since the last converged state, then links.
+    """Vertices near contact, n in all interfaces together, and the c conditions of links.
+
+    Arrays of all conditions have gaps first, then slips since the last converged state if there is
+    friction, then links: n + c or 2 n + c values.
 
     Attributes
     ----------
     vertices : for each interface, the slave vertices that are candidates
-    lines : the friction bound, the least of these lines: tangential over normal force [N]
-    motion : (n or 2n, and c of links,) gap, with friction also slip, and what links violate [mm]
+    lines : friction bound, the least of these lines of tangential over normal force [N]
+    motion : (m,) gaps, slips and violations of links [mm]
     uncounted : (n,) slip before the vertex touched, not counted in ``motion`` [mm]
-    forces : (n or 2n, and c,) normal, with friction tangential, and link forces of the current
-        iterate [N]
+    forces : (m,) normal, tangential and link forces of the current iterate [N]
     status : (n,) of the current iterate, as in `solver.contact.problem`
-    unsure : (n,) the possible error of ``uncounted`` [mm]; inf if the time of touch is not known
-    rows : one per part, None for a part without contact surface
-    turned : one per part, the derivatives (n, n_rigid) of gaps by its rigid motions
+    unsure : (n,) possible error of ``uncounted`` [mm]; inf if the time of first contact is unknown
+    rows : for each part, the derivatives of all conditions; None without contact surface or link
+    turned : for each part, the derivatives (n, n_rigid) of gaps by its rigid motions
     covered : for each interface, the share of each candidate's hat function that faces the master
     gaps, slips : for each interface, gap and slip of all its vertices [mm]; the gap is inf where no
         master faces them, the slip 0 without friction
     beyond : smallest gap of the vertices that are not candidates [mm]
-    leaving : for each interface that leaves, the normal and tangential forces (2, n) that are left
-        of its last ones [N]; None for the others. Its vertices are no candidates
-    pushes : nodal forces (n,) of these on each part [N]
-    holds : for each part, whether a pair is there that may hold its rigid motions
-    links : the conditions of links, the last of the rows
+    leaving : for each interface that is being removed, the normal and tangential forces (2, n)
+        that remain of its last ones [N]; None for the others. Its vertices are no candidates
+    pushes : for each part, the nodal forces (n_dofs,) of pairs that are being removed [N]
+    holds : for each part, whether a contact pair may hold its rigid motions
+    links : the conditions of links
     """
 
     vertices: tuple[Ints, ...]
@@ -100,9 +103,10 @@ class Candidates(OnParts):
         return _places(self.vertices)
 
     def motions(self, part: int, rigid: Array) -> Array:
-        """Return the gaps and slips that the free rigid motions (n, k) of a part cause [mm].
+        """Return the conditions (m, k) per rigid motion (n_dofs, k) of a part [mm].
 
-        Gaps are those of ``turned``; `of_part` has what forces work on instead.
+        Gaps change along the master's normals (``turned``); `of_part` returns the motions along
+        the forces, which act along the slave's normals.
         """
         moved = self.of_part(part, rigid)
         if moved.size:
@@ -111,7 +115,7 @@ class Candidates(OnParts):
 
     @property
     def stays(self) -> tuple[bool, ...]:
-        """For each part, whether neither pairs nor links hold it: it stays where it is."""
+        """For each part, whether neither pairs nor links hold it; it then keeps its position."""
         return self.links.loose(self.holds)
 
     def smooth(self) -> Candidates:
@@ -119,12 +123,12 @@ class Candidates(OnParts):
         return replace(self, lines=BoundLines.none(self.n))
 
     def all_on_part(self, part: int, forces: Array) -> Array:
-        """Return the nodal forces on a part, with those of pairs that leave [N]."""
+        """Return the nodal forces on a part, including those of pairs being removed [N]."""
         pushes = self.pushes[part]
         return self.on_part(part, forces, len(pushes)) + pushes
 
     def of_part(self, part: int, u: Array) -> Array:
-        """Return the gaps and slips that displacements ``u`` (n, ...) of a part cause [mm]."""
+        """Return the motions (m, ...) along the forces per displacement (n_dofs, ...) [mm]."""
         rows = self.rows[part]
         if rows is None:
             return np.zeros((len(self.motion), *u.shape[1:]))
@@ -136,7 +140,7 @@ class Candidates(OnParts):
         return pushed if rows is None else np.union1d(rows.dofs, pushed)
 
     def compliance(self, operators: Sequence[Operator]) -> Array:
-        """Return the compliance W of the contact points: gaps and slips per force [mm/N]."""
+        """Return the compliance W (m, m): motions of the conditions per force [mm/N]."""
         W = np.zeros((len(self.motion), len(self.motion)))
         for operator, rows in zip(operators, self.rows, strict=True):
             if rows is not None:
@@ -159,21 +163,21 @@ class Candidates(OnParts):
         return max(worst, float(np.abs(off[self.linked]).max(initial=0.0)))
 
     def work(self, before: tuple[ContactState, ...]) -> tuple[float, float]:
-        """Return the work of friction and of the bodies against contact in an increment [N mm].
+        """Return the work of friction and the work against contact in an increment [N mm].
 
-        Both use the mean of the forces before and after. Work against contact is then zero except
-        at vertices that open or close within the increment, where the mean is not the true history.
+        Both use the mean of the forces before and after. Work against contact is then an error of
+        this mean, at vertices that open or close within the increment; elsewhere it is zero.
         """
         normal, friction = 0.0, 0.0
         each = zip(
             before, self.vertices, self.gaps, self.places, self.leaving, self.slips, strict=True
         )
-        for state, vertices, gap, here, left, slip in each:
+        for state, vertices, gap, here, remaining, slip in each:
             force = state.normal.copy()
             force[vertices] += self.forces[: self.n][here]
-            if left is not None:
-                force += left[0]
-                normal -= float((state.tangential + left[1]) @ slip) / 2
+            if remaining is not None:
+                force += remaining[0]
+                normal -= float((state.tangential + remaining[1]) @ slip) / 2
             moved = force > 0
             with np.errstate(invalid="ignore"):
                 opened = np.nan_to_num(gap - state.gap, posinf=0.0, neginf=0.0)
@@ -192,8 +196,9 @@ class Candidates(OnParts):
         """Return the contact states with these forces and statuses."""
         out = []
         each = zip(before, self.vertices, self.places, self.leaving, strict=True)
-        for state, vertices, here, left in each:
-            normal, tangential = np.zeros((2, len(state.normal))) if left is None else left.copy()
+        for state, vertices, here, remaining in each:
+            nothing = np.zeros((2, len(state.normal)))
+            normal, tangential = nothing if remaining is None else remaining.copy()
             normal[vertices] = forces[: self.n][here]
             if self.frictional:
                 tangential[vertices] = forces[self.along][here]
@@ -207,7 +212,7 @@ class Candidates(OnParts):
     ) -> tuple[ContactState, ...]:
         """Return the contact states after an increment over ``span`` of time.
 
-        ``grows`` is whether contact may grow about its middle: not if a load moves along a body.
+        ``grows`` is false if a load moves along a body: the contact then moves instead of growing.
         """
         after = self.states(before, self.forces, self.status)
         moved = np.abs(self.motion[self.along]) if self.frictional else np.zeros(self.n)
@@ -233,7 +238,7 @@ def _places(vertices: Sequence[Ints]) -> list[slice]:
 
 
 def no_candidates(system: System, u: tuple[Array, ...], links: Array) -> Candidates:
-    """Return an empty set of candidates, with the links: the bodies are separated."""
+    """Return the candidates of separated bodies: the links alone."""
     empty, off = np.zeros(0), system.links.off(u, links)
     none = tuple(np.zeros(0, dtype=int) for _ in system.interfaces)
     rows = system.links.rows
@@ -261,10 +266,8 @@ def find_candidates(
 ) -> Candidates:
     """Return the candidates at displacements ``u``, a ``span`` of time after ``start``.
 
-    ``contacts`` and ``links`` have the forces of the current iterate.
-
-    Slips count from the state ``start`` or, where a vertex had no contact then, from the moment
-    it touched, if its approach is known from the last increments.
+    ``contacts`` and ``links`` have the forces of the current iterate. Slip counts from ``start``;
+    of a vertex without contact then, from its first contact, extrapolated from the last increments.
     """
     time = start.time + span
     shares = [interface.declared.left(start.time, time) for interface in system.interfaces]
@@ -303,8 +306,8 @@ def find_candidates(
     ):
         tangent = slice(n + normal.start, n + normal.stop)
         motion[normal] = pairing.gap[at]
-        left = leaving[pair]
-        if left is None:
+        remaining = leaving[pair]
+        if remaining is None:
             beyond = min(beyond, np.delete(pairing.gap, at).min(initial=np.inf))
         approach = np.where(before.touching, 0.0, _slip_before_contact(before, span))
         uncounted[normal], unsure[normal] = approach[:, at]
@@ -322,8 +325,8 @@ def find_candidates(
             pieces[number].append(ContactRows(dofs, block))
             if len(closing):
                 turned[number][normal] += closing @ part.rigid[dofs]
-            if left is not None and left.any():
-                rows = left[:1] @ pairing.normal[side], left[1:] @ pairing.tangent[side]
+            if remaining is not None and remaining.any():
+                rows = remaining[:1] @ pairing.normal[side], remaining[1:] @ pairing.tangent[side]
                 dofs, both = part.pull_back(surface, u[number], np.vstack(rows), 1)
                 np.add.at(pushes[number], dofs, both.sum(axis=0))
         slip = np.zeros(len(pairing.gap))
@@ -359,7 +362,7 @@ def find_candidates(
 
 
 def _below(m: int, rows: ContactRows | None) -> list[ContactRows]:
-    """Return the rows of links of a part as the last of m rows."""
+    """Return the rows of links on a part, padded with zeros above to m rows."""
     if rows is None:
         return []
     return [ContactRows(rows.dofs, np.pad(rows.block, ((m - len(rows.block), 0), (0, 0))))]
@@ -368,14 +371,13 @@ def _below(m: int, rows: ContactRows | None) -> list[ContactRows]:
 def _slip_before_contact(before: ContactState, span: float) -> tuple[Array, Array]:
     """Return the slip (n,) before contact, and its possible error [mm].
 
-    Gap and slip continue at their last rates; a vertex that would close later than ``span`` is
-    taken to touch at its end. If contact grew in the last two increments, slip continues as a
-    function of the gap, ``a + b gap + c gap^(5/3)`` through the last three states, and what that
-    changes is the possible error: beyond the end of a contact that grows, surfaces move with the
-    root of the distance y to this end, gap and slip are ``y^1.5`` times a series in y, and the
-    change of slip with the gap is one in ``gap^(2/3)``.
+    Gap and slip continue at their last rates. A vertex that would close after ``span`` touches at
+    its end. If contact grew in the last two increments, slip continues as a function of the gap,
+    ``a + b gap + c gap^(5/3)`` through the last three states; the difference from the line is the
+    possible error. The power is that of a growing contact: at the distance y beyond its end, gap
+    and slip are ``y^1.5`` times series in y, and d slip / d gap is a series in ``gap^(2/3)``.
 
-    Where the gap does not close, or its rates are not known, the slip is 0, its possible error inf.
+    If the gap does not close, or the rates are unknown, the slip is 0 and its possible error inf.
     """
     closing, sliding = before.rates * span
     share = np.divide(before.gap, -closing, out=np.full_like(closing, np.nan), where=closing < 0)
@@ -393,7 +395,7 @@ def _slip_before_contact(before: ContactState, span: float) -> tuple[Array, Arra
 
 
 def _grew(before: Array, after: Array) -> bool:
-    """Whether normal forces (n,) of a contact mostly grew: in one that moves on as many fell."""
+    """Whether the normal forces (n,) mostly grew; if a contact moves, as many fall."""
     change = after - before
     return bool(-change.sum(where=change < 0) <= _FELL * change.sum(where=change > 0))
 

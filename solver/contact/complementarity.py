@@ -1,8 +1,8 @@
 """The frictional contact problem on the contact points, solved exactly.
 
 `solver.contact.problem` states it. A semismooth Newton method on the active sets solves nearly
-every instance in a few dense solves. If the sets cycle, the friction bound is held at its value of
-the previous pass: each pass is then a convex problem, solved by Lemke's method, and gives a better
+every instance in a few dense solves. If the sets cycle, passes follow with the friction bound of
+the previous pass: each is a convex problem, solved by Lemke's method, and its result is a better
 start for the active sets. (Lemke's method on the whole frictional problem in A. Klarbring's form,
 Ingenieur-Archiv 56 (1986) 529-541, ends in a ray for most instances: its matrix is not copositive.)
 """
@@ -22,22 +22,22 @@ from solver.typing import Array, Ints
 _MAX_SETS = 40
 _MAX_PASSES = 20
 _LESS = 0.1
-"""Ratio of a friction bound to the one before, with which friction alone bore the load."""
+"""Factor of the friction bound in the next pass, after friction alone carried the load."""
 _TOLERANCE = LEAST_FRICTION
 _FAR = 1e-4
-"""Share of the largest gap that lengths of what touches are not below, for its rounding."""
+"""Least length scale of closed points, over the largest gap: gaps are known up to rounding."""
 _ROUNDING = 1e-14
 _ACCURATE = 1e-6
 _CONSISTENT = 1e-12
-"""Relative residual of a least-squares solution up to which it counts as rounding. Without a
-solution it is larger: the part of the load that contact cannot balance, even with tiny friction."""
+"""Relative residual of a least-squares solution: a smaller one is rounding. A larger one is a load
+that contact cannot balance, even with tiny friction."""
 _FIRST = 1e3
-"""Weight of the balance of forces over gaps in a least-squares solution."""
+"""Weight of the force balance, relative to that of gaps, in a least-squares solution."""
 _KNOWN = 1e-8
 
 
 def solve_contact(problem: ContactProblem, start: Ints) -> ContactSolution | None:
-    """Return the solution, or None when there is none or none was found.
+    """Return the solution; None if there is none or none was found.
 
     ``start`` (n,) is the initial status of the points, usually that of the previous iteration.
     """
@@ -52,7 +52,7 @@ def solve_contact(problem: ContactProblem, start: Ints) -> ContactSolution | Non
 
 
 def _at_rest(problem: ContactProblem) -> bool:
-    """Whether no point touches and no force acts: a body held by contact alone then stays put."""
+    """Whether no point touches and no force acts: free bodies then keep their positions."""
     gaps = problem.offset[: problem.n]
     force, length = replace(problem, balance=np.zeros(0)).scales
     apart = bool((gaps > _TOLERANCE * length).all())
@@ -62,9 +62,10 @@ def _at_rest(problem: ContactProblem) -> bool:
 def change_of(
     problem: ContactProblem, solution: ContactSolution, offset: Array
 ) -> tuple[Array, Array]:
-    """Return the change of forces (m,) and rigid motions (k,) with the offset, at fixed status.
+    """Return the changes of forces (m,) and rigid motions (k,) if the offset changes.
 
-    Tangential forces at their bound stay there.
+    ``offset`` (m,) is its change [mm]. The status of all points is fixed; slipping points keep
+    their tangential force at the bound.
     """
     lines = problem.lines
     piece = lines.piece(solution.forces[: problem.n])
@@ -80,9 +81,9 @@ def _forces(
 ) -> tuple[Array, Array, Array] | None:
     """Return forces and rigid motions of given statuses, or None for a singular system.
 
-    Where a point slips, ``piece`` says which line of the ``bound`` its tangential force is on.
-    The third array is the rest (k,) of the load that these points cannot balance, as a motion that
-    none of them resists, or zero.
+    ``piece`` (n,) is the line of the ``bound`` that gives the tangential force of a slipping point.
+    The third array (k,) is the part of the load that these points cannot balance, a motion that
+    none of them resists; zero if they balance all of it.
     """
     n, k, rough = problem.n, len(problem.balance), problem.lines.rough
     closed = np.flatnonzero(status != OPEN)
@@ -91,8 +92,8 @@ def _forces(
         stick = stick[rough[stick]]
     if not len(closed) and not k:
         return np.zeros(len(problem.offset)), np.zeros(0), np.zeros(0)
-    # columns of F: a normal force, together with the share of friction proportional to it where
-    # the point slips; the constant share of friction is known
+    # columns: normal forces, with the friction proportional to them where the point slips, then
+    # tangential forces of sticking points; the constant part of friction is known
     P = np.zeros((len(problem.offset), len(closed) + len(stick)))
     known = np.zeros(len(problem.offset))
     P[closed, np.arange(len(closed))] = 1.0
@@ -117,8 +118,8 @@ def _forces(
         weight[size:] = np.abs(problem.W[rows, rows]).max() / np.abs(problem.A).max()
         S *= weight[:, None] * weight[None, :]
     rhs *= weight
-    # fewer conditions than rigid motions: the body can rotate about its only contact point. A
-    # factorisation of the singular matrix would rotate it by rounding; least squares does not
+    # with fewer conditions than rigid motions the matrix is singular: the body can rotate about its
+    # only contact point. A factorisation would rotate it by rounding; least squares does not
     free, rest = 0 < size < k, np.zeros(k)
     if not free:
         _, _, solution, info = linalg.lapack.dgesv(S, rhs)
@@ -126,8 +127,8 @@ def _forces(
         if free and (not size or np.linalg.matrix_rank(problem.turned[rows]) == k):
             return None
     if free:
-        # where a body slips on all points, the rounding of positions may leave no exact solution:
-        # gaps then miss their conditions by it, forces do not
+        # if a body slips on all points, rounding of positions may prevent an exact solution: gaps
+        # may miss their conditions by this rounding, the force balance may not
         forces = np.arange(size + k) >= size
         first = np.where(forces, _FIRST, 1.0)
         solution = linalg.lstsq(first[:, None] * S, first * rhs)[0]
@@ -148,16 +149,16 @@ def _solves(S: Array, solution: Array, rhs: Array) -> bool:
 
 
 def _active_sets(problem: ContactProblem, start: Ints, piece: Ints) -> ContactSolution | None:
-    """Return the solution that is reached from a status, or None if the active sets cycle.
+    """Return the solution reached from a status; None if the sets cycle or a system is singular.
 
-    ``piece`` (n,) belongs to the status: the line of the bound that a sliding point is on.
+    ``piece`` (n,) is the line of the bound that gives the tangential force of a slipping point.
     """
     n, lines, points = problem.n, problem.lines, np.arange(problem.n)
     rough, steepest = lines.rough, lines.slope.max(axis=0)
     force, length = problem.scales
-    near = max(-problem.offset[:n].min(), _FAR * length)  # of what touches
+    near = max(-problem.offset[:n].min(), _FAR * length)  # length scale of closed points
     tiny_force, tiny_length = _TOLERANCE * force, _TOLERANCE * near
-    # with little friction: a small part of the tangential force, but not less than rounding
+    # a small share of the tangential force even with little friction, but not below rounding
     tiny_shear = force * np.clip(_ACCURATE * steepest, _ROUNDING, _TOLERANCE)
     status = start.copy()
     if problem.balance.size and not (status != OPEN).any():
@@ -191,7 +192,7 @@ def _active_sets(problem: ContactProblem, start: Ints, piece: Ints) -> ContactSo
             new[keep & (status == STICK) & (T < -bound)] = FORWARD
             new[keep & (status == FORWARD) & (slip < -tiny_length)] = STICK
             new[keep & (status == BACKWARD) & (slip > tiny_length)] = STICK
-        # a point stays on its line within the tolerance: rounding must not make a cycle
+        # a point keeps its line within the tolerance, so that rounding causes no cycle
         bounds = lines.slope * N + lines.level
         least = bounds.argmin(axis=0)
         stays = bounds[piece, points] <= bounds[least, points] + tiny_force
@@ -203,34 +204,34 @@ def _active_sets(problem: ContactProblem, start: Ints, piece: Ints) -> ContactSo
 
 
 def _stopped(status: Ints, motion: Array, rate: Array) -> Ints | None:
-    """Return the statuses once a body has moved until one more point closes or sticks.
+    """Return the statuses after a body has moved until one more point closes or sticks.
 
-    ``rate`` is that of ``motion``, gaps and slips. None if it moves for ever.
+    ``rate`` (m,) is the rate of ``motion``, the gaps and slips. None if no point stops the body.
     """
     n = len(status)
-    ways = np.zeros_like(motion)
-    ways[:n][status == OPEN] = 1.0
+    signs = np.zeros_like(motion)
+    signs[:n][status == OPEN] = 1.0
     if len(motion) > n:
-        ways[n:][status == FORWARD], ways[n:][status == BACKWARD] = 1.0, -1.0
-    nears = ways * rate < 0
-    if not nears.any():
+        signs[n:][status == FORWARD], signs[n:][status == BACKWARD] = 1.0, -1.0
+    approaches = signs * rate < 0
+    if not approaches.any():
         return None
     time = np.full(len(motion), np.inf)
-    time[nears] = -motion[nears] / rate[nears]
+    time[approaches] = -motion[approaches] / rate[approaches]
     out = status.copy()
     out[np.argmin(time) % n] = STICK
     return out
 
 
 def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
-    """Solve in passes, each a convex problem with the friction bound of the previous pass.
+    """Return the solution found in passes, each a convex problem with the bound of the last one.
 
-    After every pass the active-set method restarts from its status. The solution is therefore
-    exact, and the passes themselves need not converge.
+    The active-set method restarts from the status of every pass. Its solution is exact, and the
+    passes themselves need not converge.
     """
     n, lines, rough = problem.n, problem.lines, problem.lines.rough
     force, _ = problem.scales
-    # start with a large bound: in every pass friction must suffice to hold a floating body
+    # begin with a large bound: in every pass friction must be able to hold a floating body
     bound = lines.least(np.full(n, force if len(problem.balance) else 0.0))
     for _ in range(_MAX_PASSES):
         solved = given_bound(problem, bound)
@@ -243,7 +244,7 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
             sliding = (status != OPEN) & rough
             reached = np.abs(F[n:]) >= bound * (1 - 1e-9)
             slip = problem.moved(F, q)[n:]
-            ahead = np.where(bound > 0, -F[n:], slip)  # without a force the slip says which way
+            ahead = np.where(bound > 0, -F[n:], slip)  # without friction the slip has the direction
             status[sliding & reached & (ahead > 0)] = FORWARD
             status[sliding & reached & (ahead < 0)] = BACKWARD
         on = np.where(status > STICK, lines.piece(N), 0)
@@ -251,7 +252,7 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
         if found is not None:
             return ContactSolution(found.forces, found.rigid, found.status, True)
         touching = (status != OPEN).any()
-        # friction along surfaces that lean may bear all of the load, without any pressure
+        # friction on inclined surfaces may carry the whole load without any pressure
         before, bound = bound, lines.least(N) if touching else _LESS * bound
         settled = np.abs(bound - before).max() <= 1e-12 * before.max()
         if settled or not touching:
@@ -264,10 +265,10 @@ def _lag_bound(problem: ContactProblem) -> ContactSolution | None:
 
 
 def _holds(problem: ContactProblem, F: Array, q: Array) -> bool:
-    """Whether forces and motions meet all conditions.
+    """Whether forces and motions satisfy all conditions.
 
-    Passes can find a solution that belongs to no set of statuses: if no force rotates a body,
-    every rotation that keeps its open points open is a solution.
+    A solution of a pass may belong to no set of statuses: if no force rotates a body, every
+    rotation that keeps its open points open is a solution.
     """
     n, (force, length) = problem.n, problem.scales
     motion = problem.moved(F, q)

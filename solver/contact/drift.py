@@ -1,4 +1,4 @@
-"""When ``sliding = "auto"`` goes from small to finite sliding, because the bodies have moved."""
+"""Automatic sliding: change a pair from small to finite sliding when its bodies have moved."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from solver.contact.state import ContactState, State
 from solver.contact.system import System
 
 _STILL, _FAR = 0.01, 0.5
-"""Ratios of the slip to the length of an element edge. Below the first, small sliding is exact
-enough; above the second, the pair becomes finite, before the audit rejects small sliding."""
+"""Slip over the length of an element edge. Small sliding is accurate below the first ratio; above
+the second the pair becomes finite, before the audit rejects small sliding."""
 _GAP = 1e-3
-"""Ratio of the gap error to the length of an element edge; above it the pair becomes finite."""
+"""Gap error over the length of an element edge: with a larger one the pair becomes finite."""
 
 
 def followed(system: System, before: State, after: State) -> State | None:

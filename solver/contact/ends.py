@@ -1,8 +1,7 @@
-"""Contact must stay on the surfaces of its pair.
+"""Contact must not reach the end of a surface if the boundary of the body continues beyond it.
 
-The boundary of a body may continue beyond the end of a contact surface. The model has no contact
-there, so a state in which contact has reached such an end is wrong, even in equilibrium. If the
-surface ends at a corner of the body, contact may reach that end.
+The model has no contact there, so such a state is wrong, even in equilibrium. If the surface ends
+at a corner of the body, contact may reach this end.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from solver.contact.system import System
 from solver.typing import Array, Ints
 
 _COVERED = 1 - 1e-6
+"""Share of a hat function that faces the master: with less the master ends under the hat."""
 
 
 def beyond_end(system: System, u: tuple[Array, ...], candidates: Candidates) -> str:
@@ -27,8 +27,8 @@ def beyond_end(system: System, u: tuple[Array, ...], candidates: Candidates) -> 
         if side is not None:
             body = interface.parts[side].body.name
             return (
-                f"contact has reached the end of the surface of body {body!r}, but the body goes "
-                "on beyond it: make the boundary of this contact pair longer"
+                f"contact has reached the end of the surface of body {body!r}, but the body "
+                "continues beyond it: extend the boundary of this contact pair"
             )
     return ""
 

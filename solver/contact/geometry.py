@@ -1,7 +1,7 @@
 """Gap and slip of two surfaces, weighted by linear hats on the slave's vertices (mortar).
 
-Slave edges are cut where the master's vertices project on them, so every integrand is smooth
-on its segment and a uniform pressure passes across non-matching meshes exactly (up to the
+The master's vertices are projected on the slave and cut its edges into segments. The integrands are
+smooth on a segment, so non-matching meshes transmit a uniform pressure exactly (up to the
 curvature of the edges). Points are projected along the slave's normals in the current
 configuration; these are continuous except at corners. Gap and slip are means over the reference
 area, because weights that change with the strain would have to be differentiated too.
@@ -25,10 +25,11 @@ from solver.typing import Array, Bools, Ints
 _GAUSS_XI, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 _NEWTON_STEPS = 6
 _LAST_STEP = 1e-9
-"""Step of Newton's method below which the projection has converged: the next is rounding."""
+"""Step of Newton's method for a projection: it ends after a smaller one; the next is rounding."""
 _BEYOND = 1.5
 _OPPOSED = 0.25
-"""Least cosine of the angle between one normal and the opposite of the other, of facing edges."""
+"""Least cosine of the angle between a slave's normal and the reversed normal of an edge it faces:
+75 degrees."""
 _EDGE_TOLERANCE = 1e-8
 _MIN_COVERED = 1e-3
 
@@ -39,19 +40,20 @@ class Pairing:
 
     Attributes
     ----------
-    area, deformed : (n,) integral of the hat over the part that faces the master, over the
-        reference and over the current area [mm2]
-    shared : (n - 1,) integral of the product of the two hats of each edge, over the part that
-        faces the master [mm2]
+    area, deformed : (n,) integral of the hat where the slave faces the master, over the reference
+        and over the current area [mm2]
+    shared : (n - 1,) integral of the product of the two hats of each edge, where the slave faces
+        the master [mm2]
     covered : (n,) share of the hat that faces the master
     length : (n,) mean length of the edges at the vertex [mm]
     gap : (n,) mean gap under the hat, negative where the bodies overlap [mm]; inf where
         no master faces the vertex
-    normal, tangent : pairs ``(slave, master)`` of (n, 2 n_nodes) rows of gap and of slip (slave
+    normal, tangent : pairs ``(slave, master)`` of rows (n, 2 n_nodes) of gap and of slip (slave
         relative to master along the surface) on the surfaces' unknowns, along the slave's normals,
         as the forces act
-    closing : the same rows of the gap along the master's normals: its derivative. Under a hat that
-        is wider than the contact normals lean: a round body that rotates changes its gaps
+    closing : the derivatives of the gap, rows as ``normal`` along the master's normals. The two
+        differ where the hat of a curved body is wider than the contact: a round body that rotates
+        changes its gaps
     """
 
     area: Array
@@ -66,7 +68,7 @@ class Pairing:
 
     @property
     def parted(self) -> Pairing:
-        """The pairing with surfaces that face each other nowhere."""
+        """The same pairing as if the surfaces faced each other nowhere."""
         none = np.zeros_like(self.area)
         return replace(
             self, area=none, deformed=none, shared=none[1:], covered=none, gap=none + np.inf
@@ -120,15 +122,14 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _beside(points: Array, normals: Array, others: Array) -> Array:
-    """Return the distances (n, m) of other points (2, m) from the lines through points (2, n)."""
+    """Return the signed distances (n, m) of ``others`` (2, m) from the normals at points (2, n)."""
     return np.stack([-normals[1], normals[0]], axis=-1) @ others - _cross(normals, points)[:, None]
 
 
 def _near(start: Array, end: Array) -> tuple[Ints, ...]:
-    """Return the edges that a line may cross, given its signed distances from their ends.
+    """Return the pairs of line and edge that may cross, given signed distances of edge ends.
 
-    The line is tested against the chord, extended for the curvature of the edge: it may cross the
-    chord up to `_BEYOND` half-lengths from the middle.
+    The line may cross the chord up to `_BEYOND` half-lengths from its middle: edges are curved.
     """
     return np.nonzero(np.abs(start + end) <= _BEYOND * np.abs(start - end))
 
@@ -140,21 +141,21 @@ def _project_on_slave(
     powers: Array,
     points: Array,
 ) -> tuple[Ints, Array]:
-    """Return edges, and xi on them, where the slave's normal passes through a point."""
+    """Return edges, and xi on them, where the slave's normal passes through one of the points."""
     ends = x[:, slave.edges[:, :2].T]
     edge, point = _near(*(_beside(ends[:, k], normals[:, k], points) for k in (0, 1)))
     offset = _from(points[:, point], powers[..., edge])
     n0, n1 = normals[:, 0, edge], normals[:, 1, edge]
-    beside = np.zeros((offset.shape[1] + 1, len(edge)))  # the normal is linear along an edge
+    beside = np.zeros((offset.shape[1] + 1, len(edge)))  # powers of xi: the normal is linear in xi
     beside[:-1] += _cross((n0 + n1)[:, None] / 2, offset)
     beside[1:] += _cross((n1 - n0)[:, None] / 2, offset)
     return edge, _root(beside)
 
 
 def _project_on_master(powers: Array, points: Array, normals: Array) -> tuple[Array, Array]:
-    """Return eta (n,) and the distance of points (2, n) along ``normals`` on one edge each.
+    """Return eta (n,) of points (2, n), each on its edge, and their distances along ``normals``.
 
-    ``powers`` (2, 2 or 3, n) are those of these edges of the master.
+    ``powers`` (2, 2 or 3, n) are those of the master's edges.
     """
     offset = _from(points, powers)
     eta = _root(_cross(normals[:, None], offset))
@@ -169,10 +170,10 @@ def _nearest(
     normals: Array,
     reach: float,
 ) -> tuple[Ints, Bools]:
-    """Return the master edge that faces each point and is nearest, and whether there is one.
+    """Return the nearest master edge that faces each point, and whether there is one.
 
-    An edge faces a point if the normals are opposite within 75 degrees, at any distance in front
-    of the slave, and up to ``reach`` [mm] behind it, where the bodies overlap.
+    An edge faces a point if the normals are opposite within 75 degrees. It may be at any distance
+    in front of the slave, and up to ``reach`` [mm] behind it, where the bodies overlap.
     """
     passing = _beside(points, normals, x[:, master.vertices])
     point, edge = _near(passing[:, :-1], passing[:, 1:])
@@ -188,7 +189,7 @@ def _nearest(
 
 
 def _segments(edge: Ints, xi: Array, n_edges: int) -> tuple[Ints, Array, Array]:
-    """Return edge, start and end of the pieces that breakpoints ``xi`` on ``edge`` cut."""
+    """Return edge, start and end of the segments between breakpoints ``xi`` on ``edge``."""
     inner = np.abs(xi) < 1 - _EDGE_TOLERANCE
     owner = np.concatenate([edge[inner], np.arange(n_edges), np.arange(n_edges)])
     place = np.concatenate([xi[inner], np.full(n_edges, -1.0), np.full(n_edges, 1.0)])
@@ -209,9 +210,8 @@ def pair(
 ) -> Pairing:
     """Pair two surfaces displaced by ``slave_u`` and ``master_u`` (2, n_nodes) [mm].
 
-    A master that lies more than ``reach`` [mm] behind the slave does not face it. Of a ``tied``
-    pair the rows are those of the displacement of the master relative to the slave along x and y,
-    in place of normal and tangent.
+    A master more than ``reach`` [mm] behind the slave does not face it. If ``tied``, ``normal`` and
+    ``tangent`` have the displacement of the master relative to the slave along x and y.
     """
     xs, xm = slave.X + slave_u, master.X + master_u
     own, its = _powers(xs, slave), _powers(xm, master)
@@ -257,10 +257,10 @@ def _integrate(
     weight: Array,
     areas: Sequence[Array],
 ) -> Pairing:
-    """Sum pieces of edges into rows, one per slave vertex, along ways (2 or 3, 2, n_points).
+    """Sum segments of edges into rows, one per slave vertex, along ways (2 or 3, 2, n_points).
 
-    ``edge`` and ``partner`` belong to pieces, all else to their integration points. ``weight`` is
-    that of xi, ``areas`` are those of the points over the reference and over the current area.
+    ``edge`` and ``partner`` are those of segments; the other arrays are at integration points.
+    ``weight`` is the weight in xi, ``areas`` are the weights in the reference and current area.
     """
     points = len(edge), len(_GAUSS_XI)
     xi, eta, distance, weight, area, deformed = (
@@ -268,7 +268,7 @@ def _integrate(
     )
     ways = ways.reshape(*ways.shape[:2], *points)
     rows, vertex = len(slave.edges) + 1, np.stack([edge, edge + 1])
-    hats = np.stack([(1 - xi) / 2, (1 + xi) / 2])  # of the vertices of a piece at its points
+    hats = np.stack([(1 - xi) / 2, (1 + xi) / 2])  # of a segment's two vertices, at its points
 
     def summed(values: Array) -> Array:
         pieces = (hats * values).sum(axis=-1)
@@ -284,7 +284,7 @@ def _integrate(
     for surface, own, at, sign in ((slave, edge, xi, -1.0), (master, partner, eta, 1.0)):
         N, size = sign * shape_functions(at, surface.edges.shape[1]), 2 * len(surface.nodes)
         unknowns = 2 * surface.edges[own][:, None] + np.arange(2)[:, None]
-        place = first * size + unknowns[:, None, None]  # piece, way, vertex, axis, node
+        place = first * size + unknowns[:, None, None]  # segment, way, vertex, axis, node
         value = along.reshape(len(edge), 4 * len(ways), len(_GAUSS_XI)) @ N
         each = np.bincount(place.ravel(), value.ravel(), len(ways) * rows * size)
         sides.append(each.reshape(len(ways), rows, size))
@@ -303,6 +303,6 @@ def _integrate(
 
 
 def _area_per_xi(surface: Surface, powers: Array, xi: Array) -> Array:
-    """Return the derivative of area along edges, whose powers are (2, 2 or 3, n) [mm2]."""
+    """Return the area per xi (n,) along edges with these powers (2, 2 or 3, n) [mm2]."""
     along = _value(_slopes(powers), xi)
     return np.asarray(np.hypot(*along) * surface.depth(_value(powers, xi)))

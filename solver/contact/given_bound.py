@@ -1,4 +1,4 @@
-"""The contact problem with given friction bounds: convex, solved by Lemke's method."""
+"""The contact problem with fixed friction bounds, a convex problem, by Lemke's method."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ _PIVOTS_PER_UNKNOWN = 20
 
 
 def given_bound(problem: ContactProblem, bound: Array) -> tuple[Array, Array] | None:
-    """Return forces and rigid motions when |T| <= bound is given, or None if there are none.
+    """Return forces (m,) and rigid motions (k,) with |T| <= bound (n,), or None without a solution.
 
     z = (N, tau, back), w = (gap, fore, sigma) with tau = T / bound + 1, sigma = 1 - T / bound
-    and slip = fore - back. Up to a scaling of its columns the matrix is positive semidefinite, so
-    the method finds a solution if one exists. A tangential force is measured in units of its bound,
-    and so is as accurate as a normal force, even with tiny friction. Rigid motions are eliminated
-    by a principal pivot on as many contact forces as there are motions.
+    and slip = fore - back. The matrix is positive semidefinite up to a scaling of its columns, so
+    the method finds a solution if one exists. Tangential forces in units of their bounds are as
+    accurate as normal forces, even with tiny friction. Rigid motions are eliminated by a principal
+    pivot on as many normal forces.
     """
     n, k = problem.n, len(problem.balance)
-    # scaled so that forces and gaps are of order one
+    # scales make forces and gaps of order one
     force, length = problem.scales
     at = np.flatnonzero(bound > 0) if problem.frictional else np.zeros(0, dtype=int)
     m = len(at)
@@ -45,7 +45,7 @@ def given_bound(problem: ContactProblem, bound: Array) -> tuple[Array, Array] | 
         balance = problem.balance / (force * shape) - columns[:, n : n + m].sum(axis=1)
         held = linalg.qr(A[: n + m].T, mode="r", pivoting=True)[1][:k]
         if len(held) < k or np.linalg.matrix_rank(A[held]) < k:
-            return None  # too few points, or too close ones, to hold the floating bodies
+            return None  # the points are too few, or too close, to hold the floating bodies
         eliminated = _eliminate(M, r, A, columns, balance, held)
         if eliminated is None:
             return None

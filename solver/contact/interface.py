@@ -26,8 +26,9 @@ from solver.typing import Array
 class Interface:
     """A declared contact pair on its two parts of the system.
 
-    ``hot`` gives how heat lowers the yield stress of slave and master; ``reference`` is the pairing
-    before loading, which small sliding keeps.
+    ``hot`` is the thermal softening of slave and master; ``reach`` the largest overlap [mm] at
+    which surfaces still face each other; ``reference`` the pairing before loading, which small
+    sliding keeps.
     """
 
     declared: ContactPair
@@ -56,7 +57,7 @@ class Interface:
 
     @property
     def finite(self) -> bool:
-        """Whether sliding is finite from the beginning: surfaces are paired in each iteration."""
+        """Whether sliding is finite from the beginning, so that each iteration pairs surfaces."""
         return self.reference is None
 
     @property
@@ -67,27 +68,24 @@ class Interface:
     def pairing(self, u: tuple[Array, ...], time: float = 0.0, *, finite: bool = False) -> Pairing:
         """Return gap, area and derivative rows at displacements ``u`` and a time.
 
-        With ``finite`` the surfaces are paired in their current positions; without it a pair of
-        small sliding keeps the pairing before loading. Those of an absent pair face nowhere.
+        If ``finite``, the surfaces are paired in their current positions; otherwise small sliding
+        keeps the pairing before loading. The surfaces of an absent pair face each other nowhere.
         """
         found = self.facing(u, time, finite=finite)
         return found.parted if self.declared.absent(time) else found
 
     def facing(self, u: tuple[Array, ...], time: float, *, finite: bool) -> Pairing:
-        """Return the pairing as if the pair were there."""
+        """Return the pairing of `pairing`, but as if an absent pair were present."""
         as_meshed = self._as_meshed(u, finite)
         return replace(as_meshed, gap=as_meshed.gap + self.declared.offset(time))
 
     def strength(self, pairing: Pairing, time: float) -> Array:
-        """Return the shear yield stress (n,) of the weaker body at a time [MPa].
-
-        The weaker body is the one with the lower mean shear yield stress under a vertex's hat.
-        """
+        """Return the mean shear yield stress (n,) under each hat, of the weaker body [MPa]."""
         least = np.full(len(pairing.gap), np.inf)
         for part, hot, rows in zip(self.parts, self.hot, pairing.normal, strict=True):
             strength = part.body.material.shear_yield_stress
-            left = 1.0 if hot is None else _mean(rows, hot.strong(time))
-            least = np.minimum(least, strength * left)
+            ratio = 1.0 if hot is None else _mean(rows, hot.strong(time))
+            least = np.minimum(least, strength * ratio)
         return least
 
     def slip(
@@ -98,7 +96,7 @@ class Interface:
     ) -> Array:
         """Return the slip (n,) of the slave's vertices at displacements ``u`` [mm].
 
-        Slip counts from the displacements ``since``, or from those before loading if absent.
+        Slip counts from the displacements ``since``, by default from the undeformed bodies.
         """
         slip = np.zeros(len(pairing.gap))
         for (number, part, chain), rows in zip(self.sides, pairing.tangent, strict=True):
@@ -121,9 +119,9 @@ class Interface:
 
 
 def _mean(rows: Array, values: Array) -> Array:
-    """Return the means (n,) under the hats of values at a surface's nodes; 1 without a partner.
+    """Return the means (n,) under the hats of ``values`` at a surface's nodes; 1 without a partner.
 
-    ``rows`` (n, 2 n_nodes) are those of gaps: the same means, times the normal.
+    ``rows`` (n, 2 n_nodes) are those of gaps, which are the weights of the means times the normal.
     """
     each = rows.reshape(len(rows), -1, 2)
     normal = each.sum(axis=1)
@@ -137,7 +135,7 @@ def surfaces_of(
 ) -> dict[tuple[str, str], Surface]:
     """Return the surfaces of all pairs in the numbering of the whole bodies.
 
-    If a surface continues as the surface of another pair, contact may pass over that end.
+    If a surface continues as the surface of another pair, contact may pass this end.
     """
     found = {
         side: wholes[side[0]].chain(side[1])
@@ -165,7 +163,15 @@ def interface_of(
     names: list[str],
     surfaces: dict[tuple[str, str], Surface],
 ) -> Interface:
-    """Return a contact pair on the parts ``names``, given all surfaces by body and boundary."""
+    """Return a contact pair on the parts, which ``names`` lists in their order.
+
+    ``surfaces`` are those of all pairs, by body and boundary.
+
+    Raises
+    ------
+    ModelError
+        if the bodies overlap too much, or the surfaces do not face each other before loading
+    """
     sides = []
     for side in (contact.slave, contact.master):
         number, chain = names.index(side[0]), surfaces[side]
@@ -187,8 +193,8 @@ def interface_of(
             raise ModelError(
                 "contacts", ".".join(contact.slave),
                 f"this and {'.'.join(contact.master)} do not face each other: before loading no "
-                "normal of the slave reaches the outside of the master; check the boundaries and "
-                "the positions of the bodies",
+                "normal of the slave meets the outside of the master. Check the boundaries and the "
+                "positions of the bodies",
             )  # fmt: skip
     hot = [part.hot(chain) for part, (_, chain) in zip(both, sides, strict=True)]
     return Interface(

@@ -15,7 +15,7 @@ def lemke(M: Array, r: Array, max_pivots: int) -> tuple[Array, bool]:
 
     Returns
     -------
-    z (n,), and whether it is a solution: False for a secondary ray or too many pivots.
+    z (n,), and whether it is a solution: false after a secondary ray or too many pivots.
     """
     n = len(r)
     z = np.zeros(n)
@@ -46,7 +46,7 @@ def lemke(M: Array, r: Array, max_pivots: int) -> tuple[Array, bool]:
 
 
 def _leaving(column: Array, values: Array, artificial: Bools) -> int:
-    """Return the row of the least ratio, of equal ones that of z0; -1 if there is none."""
+    """Return the row of the least ratio, preferably that of z0 among equal ones; -1 if none."""
     rows = np.flatnonzero(column > 1e-11 * np.abs(column).max())
     ratios = np.maximum(values[rows], 0.0) / column[rows]
     best, found = np.inf, -1

@@ -1,9 +1,9 @@
 """Links of a model as linear conditions between the unknowns of its parts.
 
 Each condition is ``C u + compliance F = 0`` with a force F of any sign, which acts on the parts by
-``C' F``. In a Newton step they are eliminated exactly, together with the rigid motions that they
-hold; what is left is a contact problem like any other. It is symmetric but for bodies that links
-hold and whose normals lean, see `solver.contact.problem`.
+``C' F``. A Newton step eliminates the conditions exactly, together with the rigid motions that they
+hold; a contact problem without links remains. It is symmetric unless G differs from A for a body
+that links hold, see `solver.contact.problem`.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from solver.model.model import Model
 from solver.typing import Array, Bools, Ints
 
 _DEPENDENT = 1e-9
-"""Ratio of what is left of a condition without the others to the condition; below it the condition
-follows from them. Also the least singular value of the rigid motions that links hold."""
+"""Part of a condition that is independent of the others, over the condition: with a smaller ratio
+the condition depends on them. Also the least singular value of rigid motions that links hold."""
 _ALIKE = 1e-13
-"""Ratio of the mean square of a motion of a slave to the largest; below it is that of rounding."""
+"""Mean square of a motion of a slave over the largest one: a smaller ratio is rounding."""
 _LITTLE = 1e-9
-"""Ratio of the area of a node to the largest; below it no spring acts there."""
+"""Area of a node over the largest one: no spring acts on nodes with a smaller ratio."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +47,8 @@ class Links(OnParts):
     Attributes
     ----------
     rows : for each part, the derivatives C (c, ...) on its unknowns; None if no link acts on it
-    compliance : (c,) of springs [mm/N], 0 where a link is rigid
-    whose : (c,) number of the link of each condition
+    compliance : (c,) compliance of springs [mm/N], 0 if the link is rigid
+    whose : (c,) number of the link that a condition belongs to
     """
 
     rows: tuple[ContactRows | None, ...]
@@ -60,12 +60,12 @@ class Links(OnParts):
         return len(self.compliance)
 
     def loose(self, paired: Sequence[bool]) -> tuple[bool, ...]:
-        """Return for each part whether nothing holds it, no link and none of the pairs given."""
+        """Return for each part whether no link and no pair (``paired``) holds it."""
         each = zip(self.rows, paired, strict=True)
         return tuple(rows is None and not held for rows, held in each)
 
     def off(self, u: Sequence[Array], forces: Array) -> Array:
-        """Return how far the conditions (c,) are not met by unknowns and forces [mm]."""
+        """Return the violation (c,) of the conditions by unknowns and forces [mm]."""
         out = self.compliance * forces
         for own, rows in zip(u, self.rows, strict=True):
             if rows is not None:
@@ -77,7 +77,10 @@ class Links(OnParts):
         return float(self.compliance @ forces**2) / 2
 
     def clamped(self, parts: Sequence[Part], time: float) -> tuple[float, float]:
-        """Return the force [N] and energy [N mm] of prescribed motions on linked nodes alone."""
+        """Return a force [N] and an energy [N mm] if only the linked nodes moved as prescribed.
+
+        They use the diagonal of the stiffness, as the level of rounding: see `System.least`.
+        """
         moved, force, energy = np.zeros(len(self)), 0.0, 0.0
         each = [(p, rows) for p, rows in zip(parts, self.rows, strict=True) if rows is not None]
         for part, rows in each:
@@ -93,15 +96,15 @@ class Links(OnParts):
 def solve_linked(
     problem: ContactProblem, links: int, touched: Bools, start: Ints
 ) -> ContactSolution | None:
-    """Return the solution with links, or None when there is none or none was found.
+    """Return the solution with links; None if there is none or none was found.
 
-    If none is found, G is replaced by A: pivoting then has a symmetric problem, and such a step of
+    If none is found, A replaces G: the problem is then symmetric, and this approximate step of
     Newton's method may still lead to a solution.
 
     Parameters
     ----------
-    links, touched : as of `eliminated`
-    start : (n,) as of `solve_contact`
+    links, touched : see `eliminated`
+    start : (n,) see `solve_contact`
     """
     rest, whole = eliminated(problem, links, touched) if links else (problem, None)
     found = solve_contact(rest, start)
@@ -113,13 +116,13 @@ def solve_linked(
 def eliminated(
     problem: ContactProblem, links: int, touched: Bools
 ) -> tuple[ContactProblem, Callable[[ContactSolution], ContactSolution]]:
-    """Return the contact problem without its last conditions, and the way back to all unknowns.
+    """Return the contact problem without links, and a function from its solution to the whole one.
 
     Parameters
     ----------
-    links : number of conditions, the last of ``offset``, ``W`` and ``A``; their force has any sign
-    touched : (k,) whether contact may hold the rigid motion: those that no link and no contact
-        holds stay zero
+    links : number of conditions of links, the last of ``offset``, ``W`` and ``A``
+    touched : (k,) whether contact may hold the rigid motion; motions that neither links nor contact
+        hold stay zero
 
     Raises
     ------
@@ -134,7 +137,7 @@ def eliminated(
     held, loose = ways[:rank].T, ways[rank:].T
     _, moved, ways = linalg.svd(loose[touched])
     loose = loose @ ways[: int((moved > _DEPENDENT).sum())].T
-    # of forces and motions, which differ in magnitude by the compliance; supports have none
+    # scale: forces and motions differ in magnitude by the compliance; that of supports is zero
     held = held * ((np.abs(np.diag(W)[m:]).max(initial=0.0) or 1.0) / size)
     S = np.zeros((links + rank,) * 2)
     S[:links, :links] = W[m:, m:]
@@ -144,7 +147,7 @@ def eliminated(
     alone = np.concatenate([offset[m:], held.T @ problem.balance])
     try:
         inverse = np.linalg.solve(S, np.column_stack([by_force, alone]))
-    except np.linalg.LinAlgError as error:  # what is linked flows without stiffness
+    except np.linalg.LinAlgError as error:  # the linked boundary flows without stiffness
         raise Singular("links cannot hold bodies without stiffness") from error
     change = by_force.T @ inverse
     lean = (problem.turned - A)[:m] @ held @ inverse[links:]
@@ -180,12 +183,12 @@ def surfaces_of_links(
 def links_of(
     model: Model, parts: Sequence[Part], names: Sequence[str], surfaces: Mapping[Side, Surface]
 ) -> Links:
-    """Return the conditions of all links of a model.
+    """Return the independent conditions of all links of a model.
 
     Raises
     ------
     ModelError
-        where motions contradict supports or other links
+        if surfaces do not face each other, or prescribed motions contradict supports or other links
     """
     pieces: list[list[ContactRows]] = [[] for _ in parts]
     compliance, places, whose = [np.zeros(0)], [np.zeros((2, 0))], [np.zeros(0, dtype=int)]
@@ -210,7 +213,7 @@ def links_of(
 
 @dataclass(frozen=True, slots=True)
 class _LinkRows:
-    """The conditions of one link: rows by number of the part, compliance (c,), places X (2, c)."""
+    """The conditions of one link: rows by number of the part, compliance (c,), positions (2, c)."""
 
     rows: list[tuple[int, ContactRows]]
     compliance: Array
@@ -271,7 +274,7 @@ def _conditions(
 
 
 def _ways(link: Link, slave: Surface) -> list[Array]:
-    """Return unit vectors (2, n_nodes) along each of the components of a link at its slave."""
+    """Return the unit vectors (2, n_nodes) of each component of a link at its slave."""
     if link.local:
         x, y = slave.normals
         return [np.stack([x, y] if link.components == "normal" else [-y, x])]
@@ -281,11 +284,11 @@ def _ways(link: Link, slave: Surface) -> list[Array]:
 def _mean(
     name: str, link: Link, block: Array, motion: Array, areas: Array, *, around: bool
 ) -> tuple[Array, Array]:
-    """Return the conditions that the mean motion of a slave is that of a rigid body.
+    """Return rows of slave and rigid body: the mean motion of the slave equals the rigid motion.
 
-    The mean is that of least squares, over the motions (c, 3) of the slave by the rigid body. They
-    may depend on each other: on a straight boundary a rotation about a point beside it is also a
-    translation. ``around`` an axis radial motions and rotations have no mean.
+    The mean is the rigid motion of least squares over the rows; ``motion`` (c, 3) are the motions
+    of the rows per rigid motion. They may be dependent: a rotation moves a straight boundary along
+    itself as a translation does. ``around`` an axis only y has a mean.
     """
     motion = motion * ([0.0, 1.0, 0.0] if around else 1.0)
     weighted = motion.T * areas
@@ -299,9 +302,9 @@ def _mean(
 
 
 def _independent(made: Links, parts: Sequence[Part], X: Array) -> Ints:
-    """Return the conditions that do not follow from supports and the others.
+    """Return the conditions that do not depend linearly on supports and on each other.
 
-    Raises `ModelError` for one that follows from them but for prescribed motions, which contradict.
+    Raises `ModelError` if a dependent condition contradicts the others by prescribed motions.
     """
     each = [(p, rows) for p, rows in zip(parts, made.rows, strict=True) if rows is not None]
     times = comparing([load for part, _ in each for load in part.driven.cases])
@@ -326,7 +329,7 @@ def _independent(made: Links, parts: Sequence[Part], X: Array) -> Ints:
         x, y = X[:, rigid[wrong[0]]]
         raise ModelError(
             f"links[{made.whose[rigid[wrong[0]]]}]", f"({x:g}, {y:g})",
-            "must not move what supports, motions or other links move in another way: shorten one "
-            "of the boundaries by an element, or leave a component out",
+            "must not contradict supports, prescribed motions or other links at this node: shorten "
+            "one of the boundaries by an element, or leave a component out",
         )  # fmt: skip
     return np.setdiff1d(np.arange(len(made)), rigid[others])

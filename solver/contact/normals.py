@@ -9,14 +9,14 @@ from solver.mesh.edges import shape_derivatives
 from solver.typing import Array
 
 _CORNER = float(np.cos(np.radians(40.0)))
-"""Cosine of the angle between the normals of two edges; at a larger angle they form a corner."""
+"""Cosine of the angle between the normals of two edges: they form a corner at a larger angle."""
 _STRAIGHT = 1e-6
-"""Change of the normal along a surface [rad] up to which it counts as straight, as rounding may
-cause it; the sagitta of an element is then 1e-7 of its length."""
+"""Change of the normal along a straight surface by rounding [rad], at most; the sagitta of an
+element is then 1e-7 of its length."""
 
 
 def _edge_normal(x: Array, surface: Surface, xi: float) -> Array:
-    """Return outward unit normals (2, n_edges) at ``xi`` of every edge."""
+    """Return outward unit normals (2, n_edges) at ``xi`` on every edge."""
     count = surface.edges.shape[1]
     d = shape_derivatives(np.array(xi), count)
     t = x[:, surface.edges] @ d

@@ -1,7 +1,8 @@
-"""Bodies that overlap before loading: by how much, and how much is allowed.
+"""Overlap of bodies before loading, and the largest one allowed.
 
-Bodies with a small overlap are pushed apart before any load acts. A large overlap is a mistake in
-the model: small strains cannot remove it, and the surface through which a point entered is unknown.
+Contact pushes bodies with a small overlap apart before any load acts. A large overlap is an error
+of the model: small strains cannot remove it, and it is unknown through which surface a point
+entered.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from solver.model.rigid import RigidBody
 from solver.typing import Array
 
 _ALLOWED = 0.05
+"""Largest overlap over the smaller body's narrow side."""
 
 
 def largest_overlap(first: Body | RigidBody, second: Body | RigidBody) -> float:

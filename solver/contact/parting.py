@@ -1,4 +1,4 @@
-"""Remove overlap before loading by rigid motions of bodies that no support holds."""
+"""Removal of overlap before loading, by rigid motions of bodies that no support holds."""
 
 from __future__ import annotations
 
@@ -13,25 +13,23 @@ from solver.contact.system import System
 from solver.typing import Array
 
 _ROUNDS = 5
-"""Number of times the motion is computed: surfaces that are curved need corrections."""
+"""Most computations of the motion: curved surfaces need corrections."""
 _FARTHEST = 5.0
-"""Ratio of the motion to the overlap; above it bodies are not moved: a wedge or a taper would
-lose its fit."""
+"""Largest motion over the overlap; with a larger one, as of a wedge, bodies are not moved."""
 _HELD = 1e-9
-"""Residual of the dual problem; below it no rigid motion removes the overlap. Also the ratio of a
-rigid motion by which links count as met to what they prevent."""
+"""Residual of the dual problem: with a smaller one no rigid motion removes the overlap. Also the
+least singular value, over the largest one, of a rigid motion that links prevent."""
 
 
 def parted(system: System, state: State) -> State:
     """Return the state with floating bodies moved until nothing overlaps.
 
-    The state is returned unchanged if no motion removes the overlap, or only a much larger one.
+    The state is unchanged if no rigid motion removes the overlap, or only one much larger than it;
+    the bodies then deform. Rigid motions that links prevent are left out.
 
-    The smallest rigid motion q for which ``gap + A q >= 0`` is that of least distance (Lawson and
-    Hanson 1974, chapter 23): of r, the residual of ``min |E y - f|, y >= 0`` with the rows of
-    ``E' = [A, -gap]`` and f the last unit vector, ``q = -r / r_last``. If r is zero, no such motion
-    exists: the overlap of bodies that are supported is removed by their deformation. Of rigid
-    motions only those are made that links leave free.
+    The smallest rigid motion q with ``gap + A q >= 0`` is a problem of least distance (Lawson and
+    Hanson 1974, chapter 23): ``q = -r / r_last`` with the residual r of ``min |E y - f|, y >= 0``,
+    the rows of ``E' = [A, -gap]`` and f the last unit vector. If r is zero, there is no such q.
     """
     ends = np.cumsum([part.rigid.shape[1] for part in system.parts])
     linked = system.linked_motions()
@@ -46,13 +44,13 @@ def parted(system: System, state: State) -> State:
             rows.append(A[at])
             gaps.append(pairing.gap[at])
         A, gap = np.vstack(rows) @ free, np.concatenate(gaps)
-        if not (gap < -system.touching).any():
+        if not (gap < -system.gap_tolerance).any():
             return system.at_rest(moved)
         overlap = max(overlap, -float(gap.min()))
         scale = float(np.abs(gap).max())
         E = np.vstack([A.T, -gap / scale])
         f = np.append(np.zeros(free.shape[1]), 1.0)
-        y = _least_squares(E, f)
+        y: Array = scipy.optimize.nnls(E, f)[0]
         r = E @ y - f
         if np.linalg.norm(r) < _HELD:
             return state
@@ -63,9 +61,3 @@ def parted(system: System, state: State) -> State:
         if max(ways) > _FARTHEST * overlap:
             return state
     return state
-
-
-def _least_squares(E: Array, f: Array) -> Array:
-    """Return the vector y without negative numbers for which |E y - f| is smallest."""
-    found: Array = scipy.optimize.nnls(E, f)[0]
-    return found

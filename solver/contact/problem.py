@@ -6,10 +6,11 @@ motions q of bodies held by contact alone. With ``F = (N, T)`` (without friction
     (gap, slip) = offset + W F + G q        0 = balance + A' F
     N >= 0, gap >= 0, N gap = 0
     |T| <= s,  slip = 0 where |T| < s,  T = -s sign(slip) where |T| = s
-    s = min_k (slope_k N + level_k),  the lines of a law of friction (`solver.model.friction`)
+    s = min_k (slope_k N + level_k),  the lines of a friction law (`solver.model.friction`)
 
-G is A, but for normals that lean under a hat: forces act along the slave's, gaps change along the
-master's. Without this a ring that rests on two vertices could turn without opening either.
+G equals A unless the normals of the two surfaces differ under a hat: forces act along the slave's
+normals, gaps change along the master's. With A a ring that rests on two vertices could turn without
+opening either.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ class ContactProblem:
 
     Attributes
     ----------
-    W : (m, m) compliance of the contact points [mm/N], m = 2n with friction, n without; symmetric,
-        but for links that hold a body with a G of its own
+    W : (m, m) compliance of the contact points [mm/N], m = 2n with friction, n without; symmetric
+        unless links hold a body whose G differs from A
     offset : (m,) gap and slip at zero force [mm]
-    lines : the friction bound at each point, the least of lines of tangential over normal force [N]
-    A : (m, k) motions along the forces of the free rigid motions
-    balance : (k,) resultants of all other forces on those motions [N]
-    G : (m, k) gap and slip of the free rigid motions; A if absent
+    lines : friction bound at each point, the least of lines of tangential over normal force [N]
+    A : (m, k) motion of the points along the forces, per free rigid motion
+    balance : (k,) resultants of all other forces on the rigid motions [N]
+    G : (m, k) gap and slip per free rigid motion; by default A
     """
 
     W: Array
@@ -49,7 +50,7 @@ class ContactProblem:
 
     @property
     def turned(self) -> Array:
-        """G, or A if absent."""
+        """G, by default A."""
         return self.A if self.G is None else self.G
 
     def moved(self, F: Array, q: Array) -> Array:

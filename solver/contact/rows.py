@@ -18,13 +18,13 @@ class ContactRows:
 
 
 class OnParts:
-    """Conditions between parts: ``rows`` are their derivatives on each part, or None."""
+    """Base of conditions between parts; ``rows`` are their derivatives on each part, or None."""
 
     __slots__ = ()
     rows: tuple[ContactRows | None, ...]
 
     def on_part(self, part: int, forces: Array, size: int) -> Array:
-        """Return the forces (size,) that forces of the conditions exert on a part [N]."""
+        """Return the nodal forces (size,) on a part, given the forces of the conditions [N]."""
         rows, nodal = self.rows[part], np.zeros(size)
         if rows is not None:
             nodal[rows.dofs] = forces @ rows.block
@@ -32,10 +32,7 @@ class OnParts:
 
 
 def joined(pieces: list[ContactRows]) -> ContactRows | None:
-    """Return the rows of all surfaces of a part, on the unknowns that change a gap or slip.
-
-    Unknowns that surfaces share occur once.
-    """
+    """Return the sum of the rows of all surfaces of a part, on the unknowns that change them."""
     if not pieces:
         return None
     every, block = np.concatenate([p.dofs for p in pieces]), np.hstack([p.block for p in pieces])

@@ -1,10 +1,10 @@
-"""Choose the slave of a pair: the surface whose vertices carry the contact forces.
+"""Choice of the slave of a pair: the surface whose vertices carry the contact forces.
 
 Contact forces need displacements of the same resolution. A rigid body has no displacement unknowns
 at its vertices: it is the slave only if its edges are about as long as those of its partner. Two
-curved surfaces touch in a narrow zone; the surface with much longer edges would not resolve it.
-A curved body that contact alone holds stands on one vertex at first. It can stand on a vertex of
-its own, which moves with it; on one of its partner any small moment turns it to the next vertex.
+curved surfaces touch in a narrow zone, which a surface with much longer edges does not resolve.
+A curved body held by contact alone stands on one vertex at first. As the slave it stands on a
+vertex of its own, which moves with it; as the master any small moment turns it to the next vertex.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from solver.model.model import Model
 from solver.model.rigid import RigidBody
 
 _RIGID = (0.4, 1.1)
-"""Permitted range of the edge length of a rigid slave over that of its partner."""
+"""Edge length of a rigid slave over that of its partner: permitted range."""
 _COARSE = 2.0
-"""Ratio of the edge length of a slave to that of its partner; above it the partner becomes the
+"""Edge length of a slave over that of its partner: with a larger ratio the partner becomes the
 slave if one of them is curved."""
 _STANDS = 0.75
-"""The same ratio if contact alone holds the partner, and the partner is curved."""
+"""The same ratio if the partner is curved and contact alone holds it."""
 _AT_ONCE = 1_000_000
-"""Number of distances between vertices that are in memory at a time, about."""
+"""Number of distances between vertices in memory at a time, about."""
 _NEAR = 0.01
-"""Ratio of (distance of a vertex - least distance) to the edge length; up to it the vertex is near
+"""(Distance of a vertex - least distance) over the edge length: vertices up to this ratio are near
 contact."""
 
 
 def with_slaves(
     model: Model, surfaces: Mapping[tuple[str, str], Surface], free: Collection[str]
 ) -> Model:
-    """Return the model with slave and master exchanged in the pairs where that is better.
+    """Return the model with slave and master exchanged in the pairs where this is better.
 
-    ``surfaces`` has the surfaces of all pairs, by body and boundary; ``free`` are the names of the
-    bodies that contact alone holds.
+    ``surfaces`` are those of all pairs, by body and boundary; ``free`` are the names of bodies held
+    by contact alone.
     """
     contacts = tuple(_ordered(model, contact, surfaces, free) for contact in model.contacts)
     return replace(model, contacts=contacts)
@@ -52,22 +52,22 @@ def _ordered(
     surfaces: Mapping[tuple[str, str], Surface],
     free: Collection[str],
 ) -> ContactPair:
-    """Return the pair, its sides exchanged where that is better."""
+    """Return the pair, its sides exchanged if this is better."""
     slave, master = surfaces[contact.slave], surfaces[contact.master]
     if isinstance(model.body(contact.master[0]), RigidBody):
         return contact
     ratio = _edges(slave, master)
     if isinstance(model.body(contact.slave[0]), RigidBody):
-        bears = _RIGID[0] <= ratio <= _RIGID[1]
+        suitable = _RIGID[0] <= ratio <= _RIGID[1]
     else:
         stands = is_curved(master) and contact.master[0] in free and contact.slave[0] not in free
         most = _STANDS if stands else _COARSE
-        bears = ratio <= most or not (is_curved(slave) or is_curved(master))
-    return contact if bears else replace(contact, slave=contact.master, master=contact.slave)
+        suitable = ratio <= most or not (is_curved(slave) or is_curved(master))
+    return contact if suitable else replace(contact, slave=contact.master, master=contact.slave)
 
 
 def _edges(slave: Surface, master: Surface) -> float:
-    """Return the median ratio of slave to master edge lengths, of the vertices near contact."""
+    """Return the median ratio of edge lengths, slave over master, at the vertices near contact."""
     at, partner = slave.X[:, slave.vertices], master.X[:, master.vertices]
     pieces = np.array_split(at, at.shape[1] * partner.shape[1] // _AT_ONCE + 1, axis=1)
     each = (np.hypot(*(piece[:, :, None] - partner[:, None])) for piece in pieces)

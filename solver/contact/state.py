@@ -1,4 +1,4 @@
-"""The state an increment starts from, and what it gives when it has converged."""
+"""The state between two increments, and the results of a converged increment."""
 
 from __future__ import annotations
 
@@ -14,17 +14,19 @@ from solver.typing import Array, Bools, Ints
 
 @dataclass(frozen=True, slots=True)
 class ContactState:
-    """What a contact pair carries from one increment to the next, one value per slave vertex.
+    """Variables of a contact pair that one increment passes to the next, one per slave vertex.
 
-    ``normal``, ``tangential`` are forces [N], the tangential one on the slave along the
-    surface's tangent; ``status`` as in `solver.contact.problem`; ``touching`` says
-    whether the vertex had contact, so that its friction has a history. ``gap`` is inf where no
-    master faces the vertex [mm]; ``slipped`` is the accumulated length of its slip in contact since
-    the first increment, without regard to direction [mm]; ``rates`` (2, n) are the rates of gap and
-    slip in the last increment, NaN where not known; ``earlier`` (3, n) are the gaps before the last
-    increment and before the one before, and the change of slip over that of the gap in that one,
-    NaN unless contact grew in both. ``finite`` says whether the surfaces are paired in their
-    current positions, or always as before loading.
+    Attributes
+    ----------
+    normal, tangential : (n,) forces [N]; the tangential one acts on the slave, along its tangent
+    status : (n,) as in `solver.contact.problem`
+    touching : (n,) whether the vertex is in contact, so that its friction has a history
+    gap : (n,) [mm]; inf where no master faces the vertex
+    rates : (2, n) rates of gap and slip in the last increment [mm]; NaN where not known
+    earlier : (3, n) gaps at the beginning of the last increment and of the one before, and slip
+        over change of the gap in the latter; NaN unless contact grew in both
+    finite : whether the surfaces are paired in their current positions, or always as before loading
+    slipped : (n,) accumulated length of slip in contact since the first increment [mm]
     """
 
     normal: Array
@@ -46,9 +48,9 @@ class ContactState:
         finite: bool,
         before: ContactState | None,
     ) -> ContactState:
-        """Return the state of vertices without forces, those that touch sticking.
+        """Return the state without forces, in which vertices that touch stick.
 
-        The accumulated slip of the state ``before`` is kept.
+        It keeps the accumulated slip of the state ``before``.
         """
         n = len(touching)
         slipped = np.zeros(n) if before is None else before.slipped
@@ -58,7 +60,7 @@ class ContactState:
         return cls(*nothing, status, touching, gap, rates, earlier, finite, slipped)
 
     def halted(self) -> ContactState:
-        """Return the state without its past: another motion begins."""
+        """Return the state without rates and earlier gaps: another motion begins."""
         unknown = {name: np.full_like(getattr(self, name), np.nan) for name in ("rates", "earlier")}
         return replace(self, **unknown)
 
@@ -67,9 +69,9 @@ class ContactState:
 class State:
     """A converged state of the whole system; never changed, only replaced.
 
-    ``time`` is the load factor where the pressures of the bodies have no amplitude.
-    ``force_scale`` is the largest force level so far, to which tolerances refer [N]. ``links`` are
-    the forces of the conditions of links (`solver.contact.links`) [N].
+    ``time`` is the load factor of loads without an amplitude. ``force_scale`` is the largest force
+    level so far, the scale of tolerances [N]. ``links`` are the forces of the conditions of links
+    (`solver.contact.links`) [N].
     """
 
     time: float
@@ -90,11 +92,11 @@ class Energy:
     external : work of loads, of prescribed motions and of heat
     plastic : work of stress on plastic strain, by the mean of stress before and after
     friction : work of friction on slip, positive
-    contact : work against contact where points open or close within an increment, which is an
-        integration error; and the work of contact forces that vanish when bodies are separated
-    supplied : external work of all increments in which it is positive: it grows with every cycle,
-        as errors of integration do
-    scale : the largest of these terms so far, at least the rounding level of `System.least`
+    contact : work against contact of points that open or close within an increment, an integration
+        error; and the work of contact forces that vanish when bodies are separated
+    supplied : sum of the external work of increments in which it is positive: like integration
+        errors it grows with every cycle
+    scale : largest of these terms so far, at least the rounding level of `System.least`
     """
 
     stored: float = 0.0
@@ -111,18 +113,17 @@ def _none() -> Array:
 
 
 _LITTLE = 0.01
-"""Ratio of the force of a pair to that of the pair with the largest; below it the timing of the
-pair does not count."""
+"""Force of a pair over the largest force of all pairs: the timing of a weaker pair is ignored."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Timing:
-    """How well increments have resolved contact in time; all (n_pairs,) [N].
+    """Resolution of contact in time by the increments; all (n_pairs,) [N].
 
     Attributes
     ----------
-    untimed : friction that is uncertain, because vertices touched at unknown times: the sum over
-        increments since the pair was last open, at most ``stuck``
+    untimed : uncertain friction, of vertices that touched at unknown times: sum over the increments
+        since the pair was last open, limited by ``stuck``
     friction : largest friction that the contact could carry since then
     passed : largest normal force x (distance that the contact moved in an increment / its width)
     normal : largest normal force
@@ -137,16 +138,16 @@ class Timing:
 
     @property
     def unknown(self) -> float:
-        """Ratio of the uncertain friction to the largest friction, of the worst pair."""
+        """Uncertain friction over the largest friction, of the worst pair."""
         return _worst(self.untimed, self.friction)
 
     @property
     def passage(self) -> float:
-        """Ratio of a contact's motion in an increment to its width, of the worst pair."""
+        """Motion of a contact in an increment over its width, of the worst pair."""
         return _worst(self.passed, self.normal)
 
     def beside(self, other: Timing) -> Timing:
-        """Return this timing, its ratios referred to the larger forces of both."""
+        """Return this timing with the larger reference forces of both, pair by pair."""
         friction, normal = (
             np.maximum(getattr(self, name), getattr(other, name)) for name in ("friction", "normal")
         )
@@ -177,8 +178,8 @@ class Converged:
 
     Attributes
     ----------
-    forces : for each part, loads and the forces of supports and prescribed motions on its
-        unknowns; they balance the contact forces [N]
+    forces : for each part, forces of loads, supports and prescribed motions on its unknowns; they
+        balance the contact forces [N]
     contact_forces : forces of contact and links on the unknowns of each part [N]
     responses : stress and internal variables of each part at its points
     iterations : number of Newton iterations
@@ -191,11 +192,11 @@ class Converged:
     separated : whether the bodies were separated in the increment
     energy : work since the lap began
     timing : how well contact was resolved in time since then
-    added : error of stress that the length of the increment adds, over the yield stress
-    missed : for each part, what is left of these errors since the path began (n_components,
-        n_points) [MPa]; None where nothing has flowed
+    added : error of stress by the length of the increment, over the yield stress
+    missed : for each part, the remaining sum of these errors since the path began (n_components,
+        n_points) [MPa]; None if nothing has flowed
     lost : difference between the beginning of this increment and the end of the previous one
-    windows : for each part, the region of the window in which it was solved, if in any
+    windows : for each part, the region of the window in which it was solved; None without
     """
 
     start: State

@@ -1,4 +1,4 @@
-"""A model made ready to solve: its parts, their operators, its contact pairs, its states."""
+"""The discretised model: parts with their operators, interfaces, links and states."""
 
 from __future__ import annotations
 
@@ -32,22 +32,21 @@ from solver.materials.law import Law
 from solver.materials.state import Response
 from solver.model.friction import BoundLines, ContactPlaces, lines_of
 from solver.model.link import Side
-from solver.model.loads import Load
 from solver.model.model import Model
 from solver.model.rigid import RigidBody
 from solver.typing import Array
 
 LEAST = 1e-7
-"""Ratio of the rounding level of forces to the nodal forces of heat, initial stress and prescribed
-motion. Ratios of forces refer to nothing smaller than that level."""
+"""Rounding level of forces over the nodal forces of heat, initial stress and prescribed motion. It
+is the least force that errors are divided by."""
 LEAST_ENERGY = 1e-8
 """The same ratio for energies: free expansion leaves 1e-13 of the energy by rounding."""
 _TOUCHING = 1e-9
-"""Ratio of the gap to the length of the longest contact surface; below it vertices touch."""
+"""Gap over the length of the longest contact surface: vertices with a smaller ratio touch."""
 _SET_DOWN = 1e-9
-"""Ratio of the gap to the radius of a wheel that is set down; below it vertices touch."""
+"""Gap over the radius of a wheel that is set down: vertices with a smaller ratio touch."""
 _EXPANDED = 8
-"""Number of displacement fields of condensed bodies that are kept for results and audit."""
+"""Number of displacement fields of condensed bodies kept in memory for results and audit."""
 
 
 def _part(whole: Discretisation | RigidPart, own: list[Surface], linear_solver: str) -> Part:
@@ -63,14 +62,14 @@ def _part(whole: Discretisation | RigidPart, own: list[Surface], linear_solver: 
 
 
 def _reach(body: RigidBody, model: Model, linked: Mapping[Side, Surface]) -> float:
-    """Return the largest distance from a rigid body's centre to what it moves by links [mm]."""
+    """Return the largest distance of linked nodes from the centre of a rigid body [mm]."""
     moved = (linked[link.slave].X for link in model.links if link.rigid == body.name)
     away = (np.hypot(*(X - np.reshape(body.centre, (2, 1)))).max() for X in moved)
     return float(max(away, default=0.0))
 
 
 class System:
-    """A model's parts, operators and interfaces, built once and shared by all its runs.
+    """The parts, operators and interfaces of a model, built once for all its runs.
 
     Attributes
     ----------
@@ -114,12 +113,12 @@ class System:
         self._least: tuple[float, tuple[float, float]] = (np.nan, (0.0, 0.0))
         self._at_vertices: dict[int, csr_array] = {}
         self._expanded: deque[tuple[Array, float, Array]] = deque(maxlen=_EXPANDED)
-        # of one state: the rows of a pairing may be large
+        # the pairings of one state only: their rows may be large
         self._paired: deque[tuple[State, int, Pairing]] = deque(maxlen=len(self.interfaces))
         self._check_held()
 
     def _check_held(self) -> None:
-        """Raise `ModelError` when a body has a rigid motion that nothing resists."""
+        """Raise `ModelError` if a body has a rigid motion that nothing resists."""
         sizes = [part.rigid.shape[1] for part in self.parts]
         ends = np.cumsum(sizes)
         u = tuple(part.start() for part in self.parts)
@@ -139,7 +138,7 @@ class System:
                 raise ModelError("supports", held, f"body {part.body.name!r} {allowed}")
 
     def linked_motions(self) -> Array:
-        """Return how the rigid motions of all parts violate the conditions of links (c, n)."""
+        """Return the violations of links (c, n_rigid) per rigid motion of all parts."""
         each = zip(self.parts, self.links.rows, strict=True)
         return np.hstack([
             np.zeros((len(self.links), part.rigid.shape[1]))
@@ -154,9 +153,10 @@ class System:
         u: tuple[Array, ...],
         gaps: int,
     ) -> Array:
-        """Return gaps or slips (n, n_rigid) per rigid motion that the parts are free to make.
+        """Return gaps or slips (n, n_rigid) per free rigid motion of all parts.
 
-        ``kind`` are the rows of a pairing at displacements ``u``, the first ``gaps`` those of gaps.
+        ``kind`` are the rows of a pairing at displacements ``u``; its first ``gaps`` rows are gaps,
+        the others slips.
         """
         ends = np.cumsum([0, *(part.rigid.shape[1] for part in self.parts)])
         A = np.zeros((len(kind[0]), ends[-1]))
@@ -166,13 +166,13 @@ class System:
         return A
 
     def least(self, time: float) -> tuple[float, float]:
-        """Return the force [N] and energy [N mm] below which values are rounding.
+        """Return the rounding levels of force [N] and energy [N mm]; smaller values are rounding.
 
         Under heat, initial stress or prescribed motion a body may deform freely: large forces of
         its elements cancel, and only their rounding remains.
         """
         at, found = self._least
-        if at != time:  # an increment asks for it, and then its energy
+        if at != time:  # several callers need it at the same time
             each = [part.clamped(time) for part in self.parts]
             force, energy = np.array([*each, self.links.clamped(self.parts, time)]).T
             found = LEAST * float(np.linalg.norm(force)), LEAST_ENERGY * float(energy.sum())
@@ -188,13 +188,13 @@ class System:
         )
 
     def window(self, number: int, region: Region) -> Windowed:
-        """Return a meshed body of which only a region may yield and touch.
+        """Return a meshed body that may yield and touch only in a region.
 
         The last window of each body is kept in memory.
         """
         known = self._windows.get(number)
         if known is None or known[0] != region.key:
-            self._windows.pop(number, None)  # its factors go before others are made
+            self._windows.pop(number, None)  # frees its factors before new ones are made
             part = self.parts[number]
             assert isinstance(part, Discretisation)
             made = Windowed(part, region, self._linear_solver)
@@ -203,7 +203,7 @@ class System:
         return known[1]
 
     def during(self, start: State) -> System:
-        """Return the system in an increment that begins at a state, some motions of it locked."""
+        """Return the system for an increment from ``start``; it locks motions of rigid bodies."""
         each = zip(self.parts, start.u, strict=True)
         parts = tuple(part.during(start.time, u) for part, u in each)
         unchanged = all(one is other for one, other in zip(parts, self.parts, strict=True))
@@ -212,7 +212,7 @@ class System:
     def holds(self, before: float, time: float) -> tuple[bool, ...]:
         """Return for each part whether a pair may hold its rigid motions between two times.
 
-        A pair that leaves, or is absent, holds nothing.
+        A pair that is absent, or being removed, holds nothing.
         """
         held = {
             number
@@ -223,7 +223,7 @@ class System:
         return tuple(number in held for number, _ in enumerate(self.parts))
 
     def within(self, parts: tuple[Part, ...]) -> System:
-        """Return the system with the last windows in the place of some of its parts."""
+        """Return the system with other ``parts``; windowed ones use the operators of `window`."""
         small = copy(self)
         small.parts = parts
         small.operators = tuple(
@@ -247,14 +247,14 @@ class System:
         return sum(len(part.free) for part in self.parts)
 
     @cached_property
-    def touching(self) -> float:
+    def gap_tolerance(self) -> float:
         """Largest gap or overlap before loading that counts as touching [mm]."""
         lengths = [np.ptp(i.slave_surface.X, axis=1).max() for i in self.interfaces]
         return _TOUCHING * float(max(lengths, default=0.0))
 
     @cached_property
     def blur(self) -> float:
-        """Error of a gap by rounding of positions [mm]."""
+        """Rounding error of a gap [mm]."""
         farthest = [np.abs(i.slave_surface.X).max() for i in self.interfaces]
         return float(np.finfo(float).eps * max(farthest, default=0.0))
 
@@ -264,13 +264,9 @@ class System:
         return any(part.moves for part in self.parts)
 
     @property
-    def _loads(self) -> list[Load]:
-        return [load for part in self.parts for load in part.body.every_load]
-
-    @property
     def has_amplitude(self) -> bool:
-        """Whether a load follows an amplitude of its own, not the time."""
-        amplitudes = [load.amplitude for load in self._loads]
+        """Whether a load, an interference or the presence of a pair has an amplitude."""
+        amplitudes = [load.amplitude for part in self.parts for load in part.body.every_load]
         for contact in self.model.contacts:
             amplitudes += [contact.amplitude, contact.presence]
         return any(amplitude is not None for amplitude in amplitudes)
@@ -286,33 +282,30 @@ class System:
         return self.overlaps(self.initial())
 
     def overlaps(self, state: State) -> bool:
-        """Whether bodies overlap in a state; False if loads move: these are set down to touch."""
+        """Whether bodies overlap in a state; false if loads move: these are set down to touch."""
         gaps = (contact.gap for contact in state.contacts)
-        return not self.moves and any((gap < -self.touching).any() for gap in gaps)
+        return not self.moves and any((gap < -self.gap_tolerance).any() for gap in gaps)
 
     @cached_property
     def proportional(self) -> bool:
         """Whether an elastic state depends on the load alone, and not on its history.
 
-        True without friction, or if all facing vertices touch before loading: every status then
-        stays the same while the load grows. It is False if the friction bound is not proportional
-        to the pressure, as with cohesion or a shear limit, if bodies overlap before loading, and if
-        sliding is declared finite: normals rotate, and the work of contact needs increments.
+        True without friction, or if all facing vertices touch before loading: their status does not
+        change while the load grows. False if the friction bound is not proportional to the pressure
+        (cohesion, shear limit), if bodies overlap before loading, or if sliding is declared finite:
+        normals rotate, and the work of contact needs increments.
         """
         finite = any(i.declared.sliding == "finite" for i in self.interfaces)
         if finite or self.overlapping or not all(i.law.proportional for i in self.interfaces):
             return False
         gaps = np.concatenate([np.zeros(0), *(c.gap for c in self.initial().contacts)])
-        conforming = (np.isinf(gaps) | (np.abs(gaps) < self.touching)).all()
+        conforming = (np.isinf(gaps) | (np.abs(gaps) < self.gap_tolerance)).all()
         return bool(conforming) or not any(i.rough for i in self.interfaces)
 
     def bound(self, pair: int, pairing: Pairing, start: State, time: float) -> BoundLines:
         """Return the friction bound at the vertices of a slave: lines of shear over pressure [MPa].
 
-        Parameters
-        ----------
-        pairing : pairing of the interface at the time
-        start : state at the beginning of the increment
+        ``pairing`` belongs to ``time``, ``start`` is the state at the beginning of the increment.
         """
         interface, contact = self.interfaces[pair], start.contacts[pair]
         return lines_of(
@@ -356,7 +349,7 @@ class System:
             if of is u and at == time:
                 return known
         found = part.expand(u, time)
-        if found is not u:  # of a condensed body: its inside is solved for
+        if found is not u:  # a condensed body: the inner displacements need a solve
             self._expanded.append((u, time, found))
         return found
 
@@ -374,12 +367,12 @@ class System:
         return found
 
     def axle(self, converged: Converged) -> RigidMotion | None:
-        """Return the motion of the first wheel, where there is one."""
+        """Return the motion of the first wheel; None without a wheel."""
         both = zip(self.parts, converged.state.u, strict=True)
         return next((part.motion_of(u) for part, u in both if isinstance(part, Wheel)), None)
 
     def sampler(self, name: str, X: Array) -> Sampler:
-        """Return the interpolation of nodal fields of a body at positions (2, n) [mm]."""
+        """Return a sampler of nodal fields of a body at positions (2, n) [mm]."""
         return Sampler(self.full(name), X)
 
     def recovery(self, name: str) -> csr_array:
@@ -429,33 +422,33 @@ class System:
         known = state.contacts or (None,) * len(self.interfaces)
         for interface, before in zip(self.interfaces, known, strict=True):
             gap = interface.pairing(state.u, state.time).gap
-            touching = gap <= self.touching
+            touching = gap <= self.gap_tolerance
             contacts.append(
                 ContactState.at_rest(gap, touching, finite=interface.finite, before=before)
             )
         return replace(state, contacts=tuple(contacts))
 
     def joined(self, state: State, time: float) -> State:
-        """Return a state with the pairs at rest that come in before a time.
+        """Return a state in which pairs that are present at ``time`` but had no gap are at rest.
 
-        These are pairs that were absent, or of bodies that were separated: their gap is not known.
+        These pairs were absent, or their bodies were separated.
         """
         contacts = list(state.contacts)
         for k, interface in enumerate(self.interfaces):
             apart = not np.isfinite(contacts[k].gap).any()
             if apart and not interface.declared.absent(time):
                 gap = interface.pairing(state.u, time, finite=contacts[k].finite).gap
-                touching, finite = gap <= self.touching, contacts[k].finite
+                touching, finite = gap <= self.gap_tolerance, contacts[k].finite
                 contacts[k] = ContactState.at_rest(gap, touching, finite=finite, before=contacts[k])
         return replace(state, contacts=tuple(contacts))
 
     def moved(self, state: State, time: float) -> State:
-        """Return a state with prescribed motions at their values for a time."""
+        """Return a state with prescribed motions at their values at a time."""
         parts = zip(self.parts, state.u, strict=True)
         return replace(state, u=tuple(part.moved(u, time) for part, u in parts))
 
     def set_down(self, state: State, time: float) -> State:
-        """Return the state at the time a lap begins: its wheels undeformed and just touching."""
+        """Return the state at the beginning of a lap: its wheels are undeformed and just touch."""
         u, contacts = list(state.u), list(state.contacts)
 
         def gaps(pairs: Sequence[int]) -> list[Array]:

@@ -1,1 +1,1 @@
-"""Bodies discretised: unknowns, strains, forces, stiffness, surfaces, fields."""
+"""Discretised bodies: unknowns, strains, forces, stiffness, surfaces, fields."""

@@ -1,4 +1,4 @@
-"""Assembly of element matrices: the sparsity pattern once, the values each time."""
+"""Assembly of element matrices: the sparsity pattern is computed once, the values many times."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ class Assembly:
     Parameters
     ----------
     dofs : (n_elements, m) unknowns of each element
-    active : unknowns that are rows of the matrix, out of all ``n``
-    block : (b,) unknowns that a dense matrix couples too; none by default
+    active : unknowns that are rows of the matrix
+    n : number of all unknowns
+    block : (b,) unknowns that a dense matrix couples too; by default none
 
     Attributes
     ----------
@@ -47,7 +48,7 @@ class Assembly:
         self._place = at.reshape(len(dofs), -1)
 
     def values(self, elements: Ints | slice, matrices: Array) -> Array:
-        """Return the values on `pattern` of the sum of some elements' matrices."""
+        """Return the values on `pattern` of the sum of the matrices of some elements."""
         return self._summed(self._place[elements], matrices)
 
     def block_values(self, matrix: Array) -> Array:
@@ -70,7 +71,7 @@ def _pairs(local: Ints) -> Ints:
 
 def whole_matrix(dofs: Ints, matrices: Array, n: int) -> sparse.csr_array:
     """Return the matrix (n, n) of all elements on all unknowns."""
-    at = dofs.astype(np.int32)  # SciPy keeps the kind of index, and what is cut from it has it too
+    at = dofs.astype(np.int32)  # SciPy keeps the index type, also in submatrices
     rows = np.broadcast_to(at[:, :, None], matrices.shape)
     columns = np.broadcast_to(at[:, None, :], matrices.shape)
     return sparse.csr_array((matrices.ravel(), (rows.ravel(), columns.ravel())), shape=(n, n))

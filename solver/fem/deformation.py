@@ -1,9 +1,9 @@
-"""The strain of a body at its displacements, and what it makes of stress.
+"""The strain of a body at its displacements, and nodal forces and stiffness from stress.
 
-With the Mandel strain E at the points, its derivative B by displacements and the volume w of the
-points, a stress S has the nodal forces ``sum w B' S``. Their derivative is ``sum w B' D B``, with
-the tangent D of the law, and a geometric term, the derivative of B under S. Small strain has a
-constant B and no such term.
+With the Mandel strain E at the points, its derivative B with respect to displacements and the
+volume w of the points, a stress S has the nodal forces ``sum w B' S``. Their derivative is
+``sum w B' D B``, with the tangent D of the law, plus a geometric term, the change of B at constant
+S. For small strain B is constant and this term is zero.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ class Deformation:
     n : number of unknowns
     dofs : (n_elements, m) unknowns of the elements
     strain : (n_components, n_points) Mandel strain
-    B : (n_elements, n_points, n_components, m) its derivative by the unknowns [1/mm]
+    B : (n_elements, n_points, n_components, m) derivative of the strain by the unknowns [1/mm]
     weights : (n_elements, n_points) volume of the points [mm3]
     geometric : (stress (n_components, n_points) [MPa], elements) -> geometric stiffness (k, m, m)
-        of some elements [N/mm]; None if there is none
+        of some elements [N/mm]; None for small strain
     linear : whether strain is linear in displacements
     """
 
@@ -80,7 +80,7 @@ class Deformation:
 
 
 class Kinematics(Protocol):
-    """How strain follows from displacements."""
+    """Strain as a function of displacements."""
 
     @property
     def undeformed(self) -> Deformation:
@@ -97,7 +97,7 @@ class SmallStrain:
     undeformed: Deformation
 
     def at(self, u: Array) -> Deformation:
-        """Return the body at displacements (n,) [mm]: its strain alone differs."""
+        """Return the body at displacements (n,) [mm]; only its strain changes."""
         return replace(self.undeformed, strain=self.undeformed.change(u))
 
 
@@ -109,12 +109,12 @@ class PartResponse(NamedTuple):
 
     @property
     def linear(self) -> Bools:
-        """Whether the stiffness of the points (n_points,) is elastic, as before loading."""
+        """Whether the stiffness of the points (n_points,) is the elastic one before loading."""
         return ~self.law.yielding & self.deformation.linear
 
 
 def without_points(n: int, law: Response) -> PartResponse:
-    """Return the response of a part without points, of its law to no strain."""
+    """Return the response of a part without points; ``law`` is that of zero points."""
     dofs, strain = np.zeros((0, 0), dtype=np.int64), law.stress
     nothing = np.zeros((0, 0, len(strain), 0))
     at = Deformation(n=n, dofs=dofs, strain=strain, B=nothing, weights=np.zeros((0, 0)))

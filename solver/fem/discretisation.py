@@ -53,7 +53,7 @@ class Discretisation(Nodes, Part):
     free : unknowns that no support holds
     driven : prescribed displacements (n,) [mm]
     active : unknowns of ``free`` that are not pinned
-    rigid : (n, n_rigid) rigid motions the supports leave free
+    rigid : (n, n_rigid) rigid motions that the supports leave free
     """
 
     body: Body
@@ -82,7 +82,7 @@ class Discretisation(Nodes, Part):
         self._hold()
 
     def _strain_by(self, B: Array) -> None:
-        """Take strain linear in displacements, by the operator B of the elements."""
+        """Set the kinematics to small strain with the operator B of the elements."""
         at_rest = np.zeros((self.components, self.weights.size))
         self.kinematics: Kinematics = SmallStrain(
             Deformation(n=self.n, dofs=self.dofs, strain=at_rest, B=B, weights=self.weights)
@@ -94,7 +94,7 @@ class Discretisation(Nodes, Part):
         return self.kinematics.undeformed
 
     def _hold(self) -> None:
-        """Find the supported unknowns, the remaining rigid motions, and one pin for each motion."""
+        """Find the held unknowns, the free rigid motions, and one pin for each of these."""
         self.driven, self._held = prescribed(self)
         motions = kinematics.rigid_motions(self.X, self.body.kinematics)
         if self._held.any():
@@ -121,13 +121,13 @@ class Discretisation(Nodes, Part):
         """Return the external nodal forces (n,) at a time [N]."""
         if self.body.travelling is None:
             return super().external(time)
-        if self._travelling[0] != time:  # an increment asks many times
+        if self._travelling[0] != time:  # an increment needs it many times
             self._travelling = time, travelling_forces(self, self.body.travelling, time)
         return self._travelling[1]
 
     @property
     def travels(self) -> bool:
-        """Whether it may move as a whole: only contact holds it, or a boundary of it is moved."""
+        """Whether it may move as a whole: contact alone holds it, or a motion is prescribed."""
         return super().travels or bool(self.driven.fields.any())
 
     def grows(self, before: float, after: float) -> bool:
@@ -153,11 +153,11 @@ class Discretisation(Nodes, Part):
 
     def gone(self, time: float) -> Bools | None:
         """Return whether elements at the points (n_points,) are removed; None if none ever are."""
-        lost = self.softening
-        return lost.gone(time) if lost and lost.removed.cases else None
+        softening = self.softening
+        return softening.gone(time) if softening and softening.removed.cases else None
 
     def hot(self, surface: Surface) -> Softening | None:
-        """Return how heat lowers the yield stress at a surface's nodes; None if it does not."""
+        """Return the softening at a surface's nodes; None if the yield stress is constant."""
         heat = Softening.of(self, self.X[:, surface.nodes])
         return heat if heat and heat.strength.fields.any() else None
 
@@ -195,10 +195,10 @@ class Discretisation(Nodes, Part):
         return float(np.linalg.norm(self.condensable.at(time)))
 
     def clamped(self, time: float) -> tuple[float, float]:
-        """Return the force [N] and energy [N mm] of heat and prescribed motion on clamped elements.
+        """Return force [N] and energy [N mm] of heat, initial stress and motion, as if clamped.
 
-        Heat, initial stress and prescribed displacements act on each element alone. The magnitudes
-        of element forces are added at the nodes, where they cancel in a body that can deform.
+        All displacements are zero except the prescribed ones. The magnitudes of element forces are
+        added at the nodes; in a body that can deform these forces cancel.
         """
         nodal, energy = np.zeros(self.n), 0.0
         if self.eigenstrains.cases:
@@ -218,9 +218,10 @@ class Discretisation(Nodes, Part):
         return float(np.linalg.norm(nodal)), energy
 
     def moved(self, u: Array, time: float) -> Array:
-        """Return ``u`` with prescribed displacements at their values for a time.
+        """Return ``u`` with prescribed displacements at their values at a time.
 
-        The other unknowns follow elastically, so that no single element takes all of the motion.
+        The other unknowns follow elastically, so that the motion does not strain one row of
+        elements only.
         """
         if not self.driven.cases:
             return u
@@ -252,8 +253,8 @@ class Discretisation(Nodes, Part):
         tangent = float(np.einsum("ap,abp,bp->p", some, D, some) @ self.volumes[~linear])
         if deformation.geometric is not None:
             each = step[self.dofs]
-            bent = deformation.geometric(law.stress, slice(None))
-            tangent += float(np.einsum("ei,eij,ej", each, bent, each))
+            geometric = deformation.geometric(law.stress, slice(None))
+            tangent += float(np.einsum("ei,eij,ej", each, geometric, each))
         return float(elastic[linear].sum() + tangent), float(elastic.sum())
 
     def place(self, point: int) -> tuple[float, ...]:

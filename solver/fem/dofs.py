@@ -1,4 +1,4 @@
-"""The unknowns of nodes: those of a node follow one another, one for each axis."""
+"""Numbering of unknowns: node by node, one per axis."""
 
 from __future__ import annotations
 

@@ -4,14 +4,14 @@ The stress of an element is the polynomial through the stresses at its integrati
 reduced integration (``quad8``, ``tri6``) it is (bi)linear. Stress at these points is one order more
 accurate than between them, so an error measured at the points alone would be far too small.
 
-1. In every element take the stress at its superconvergent points: 2 x 2 in quadratic
+1. Take the stress of every element at its superconvergent points: 2 x 2 in quadratic
    quadrilaterals, 3 in quadratic triangles, the middle of others.
-2. To the elements around each inner vertex fit a polynomial of the degree of the element, by least
-   squares.
+2. Around each inner vertex fit a polynomial of the degree of the element to the elements of its
+   patch, by least squares.
 3. The recovered stress is the mean of the polynomials of an element's inner vertices, weighted with
    their linear shape functions. It is one order more accurate than the stress, and continuous
    except on edges between two vertices of the boundary. If an element has no inner vertex, its
-   boundary vertices count instead; their patches also have the neighbours of the elements around.
+   boundary vertices count instead; their patches include the neighbours of the elements around.
 4. The energy of recovered minus computed stress, by full integration, estimates that of the error.
 
 A patch lies in one body: stress may jump where bodies touch.
@@ -37,16 +37,16 @@ from solver.mesh.elements import element_type
 from solver.typing import Array, Bools, Ints
 
 _INWARD = 1e-6
-"""Fraction of the distance to the element's centre by which nodes are moved inside, for weights."""
+"""Shift of nodes towards the element's centre, over their distance from it, for the weights."""
 _SMALL = 1e-9
-"""Regularisation of the terms of highest degree: a patch of one row does not determine them."""
+"""Regularisation of the terms of highest degree: one row of elements does not determine them."""
 
 
 def error_estimate(part: Discretisation, stress: Array) -> tuple[float, float]:
     """Return twice the elastic energy [N mm] of recovered minus computed stress, and of stress.
 
-    The square root of their ratio estimates the relative error in the energy norm. Elements at
-    which stress is NaN, and those beside them, do not count.
+    The square root of their ratio estimates the relative error in the energy norm. Elements whose
+    stress is NaN, and their neighbours, do not count.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class ErrorPoints:
         """
         basis = self._part.basis
         local = np.asarray(basis.elem.doflocs, dtype=float).T
-        # on a boundary edge the weights of inner vertices vanish, but their ratio has a limit
+        # on a boundary edge the weights of inner vertices vanish, but their ratios have a limit
         within = local + _INWARD * ((1 / 2 if self._corners == 4 else 1 / 3) - local)
         values = self._recovered(stress, within, np.asarray(basis.mapping.F(local)))
         nodes = basis.element_dofs.T.ravel()
@@ -110,7 +110,7 @@ class ErrorPoints:
         return np.asarray(sums / np.maximum(np.bincount(nodes, minlength=count), 1))
 
     def _recovered(self, stress: Array, local: Array, x: Array) -> Array:
-        """Return the recovered stress at x (2, n_elements, n), with the weights of local points."""
+        """Return the recovered stress at x (2, n_elements, n), weighted at local points."""
         out = np.zeros((len(stress), *x.shape[1:]))
         total = np.zeros(x.shape[1:])
         fitted, scale = self._fitted(stress)

@@ -1,4 +1,4 @@
-"""From quadrature points to nodes, lines and grids."""
+"""Values of fields at nodes and other places, from integration points."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _INSIDE = 1e-7
 _NEWTON_STEPS = 6
 _EXACT = 1e-12
 _KNOWN = 1e-9
-"""Share of a value by unknown points or nodes that counts as rounding."""
+"""Share of unknown points or nodes in a value: a smaller one is rounding."""
 
 
 def _monomials(x: Array, count: int) -> Array:
@@ -35,8 +35,8 @@ def _check_plane(part: Discretisation) -> None:
 def recovery(part: Discretisation) -> sparse.csr_array:
     """Return the operator (n_nodes, n_points) that recovers nodal values from point values.
 
-    In each element a (bi)linear field is fitted to the points by least squares and evaluated
-    at the nodes; at a node the elements around it are averaged by volume.
+    In each element a (bi)linear field is fitted to the points by least squares and evaluated at the
+    nodes; the value of a node is the mean over the elements around it, weighted by volume.
     """
     _check_plane(part)
     cells = part.basis.mesh.t.shape[0]
@@ -119,7 +119,7 @@ def _locate(part: Discretisation, x: Array) -> tuple[Ints, Ints, Array]:
     else:
         miss = np.maximum(-local.min(axis=0), local.sum(axis=0) - 1.0)
     order = np.lexsort((miss, point))
-    rounded = ROUNDED * np.ptp(part.X, axis=1).max() / extent.min(axis=0)  # of the side of each
+    rounded = ROUNDED * np.ptp(part.X, axis=1).max() / extent.min(axis=0)  # over the side
     order = order[miss[order] < np.maximum(_INSIDE, rounded)[element[order]]]
     _, first_of = np.unique(point[order], return_index=True)
     best = order[first_of]
@@ -147,13 +147,13 @@ def _reference(part: Discretisation, element: Ints, x: Array) -> Array:
         (a, b), (c, d) = np.asarray(mapping.DF(local, tind=element))
         step = np.stack([d * miss[0] - b * miss[1], a * miss[1] - c * miss[0]]) / (a * d - b * c)
         local = np.clip(local + step, -2.0, 3.0)
-        if np.abs(step).max() < _EXACT:  # as in rectangles after the first step
+        if np.abs(step).max() < _EXACT:  # in rectangles after the first step
             break
     return np.asarray(local[:, :, 0])
 
 
 def elastic_energy(part: Part, u: Array, response: Response, time: float) -> float:
-    """Return the elastic energy of a part [N mm]; without points, from its condensed stiffness."""
+    """Return the elastic energy of a part [N mm], from stress or from its condensed stiffness."""
     if part.meshed:
         return float(part.law(time).energy_density(response.stress) @ part.volumes)
     return part.stiffness_along(u, without_points(part.n, response))[1] / 2

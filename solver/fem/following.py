@@ -1,4 +1,4 @@
-"""Shift a change of displacements along with a moving load, for the prediction of increments."""
+"""Shift of a displacement change along with a moving load, for the prediction of increments."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from solver.typing import Array
 class Following:
     """The shift of a part's displacement changes by a distance along x.
 
-    An unknown without another one at this distance behind it, at the ends of the mesh and where it
-    is graded, follows elastically; if it stayed at rest, the elements beside it would be distorted.
+    At the ends of the mesh, and where the mesh is graded, an unknown has none at this distance
+    behind it. It then follows elastically; at rest it would distort the elements next to it.
 
     Parameters
     ----------
@@ -22,14 +22,14 @@ class Following:
 
     Attributes
     ----------
-    source : (n,) for each unknown the one at the distance ``way`` behind it, -1 if there is none
+    source : (n,) unknown at the distance ``way`` behind each unknown, -1 if there is none
     """
 
     def __init__(self, part: Part, way: float) -> None:
         self.source = part.sources(way)
         free = np.zeros(part.n, dtype=bool)
         free[part.free] = True
-        # a support stays where it is; a prescribed motion goes on by itself
+        # held unknowns are not shifted: supports stay at rest, prescribed motions are known
         own = self.source == np.arange(part.n)
         self._known = (self.source >= 0) & (free | own)
         self._others = np.flatnonzero(free & (self.source < 0))

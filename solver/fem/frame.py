@@ -1,8 +1,7 @@
 """A moving frame: the finite motion of rigid bodies and of wheels.
 
-Its three unknowns q are the displacement c = (x, y) of its centre and the arc w that rotation makes
-at a radius R. A point at X before loading, displaced by d in the frame, is at
-``c0 + c + Q(w / R) (X - c0 + d)``.
+Its three unknowns q are the displacement c = (x, y) of its centre and the arc w = R x rotation. A
+point at X before loading, displaced by d in the frame, is at ``c0 + c + Q(w / R) (X - c0 + d)``.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ class RigidMotion(NamedTuple):
 
 
 def turning(angle: float) -> Array:
-    """Return the matrix (2, 2) that turns vectors by an angle [rad]."""
+    """Return the matrix (2, 2) that rotates vectors by an angle [rad]."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s], [s, c]])
 
@@ -35,8 +34,8 @@ class MovingFrame:
 
     Attributes
     ----------
-    centre : (2,) c0, about which it turns [mm]
-    radius : R, at which rotation is an arc [mm]
+    centre : (2,) c0, the centre of rotation before loading [mm]
+    radius : R, arc over rotation [mm]
     """
 
     centre: Array
@@ -48,7 +47,7 @@ class MovingFrame:
         return RigidMotion(x, y, arc / self.radius)
 
     def turned(self, q: Array) -> Array:
-        """Return the matrix Q (2, 2) from vectors in the frame to those at rest."""
+        """Return the matrix Q (2, 2) from vectors in the frame to vectors in space."""
         return turning(self.motion(q).rotation)
 
     def displacements(self, q: Array, X: Array, d: Array | float = 0.0) -> Array:

@@ -1,4 +1,4 @@
-"""From nodal displacements to strain: operators, B-bar, rigid motions.
+"""Strain operators, B-bar and rigid motions of elements.
 
 The number of dimensions is that of the arrays. Mandel components are xx, yy, zz, sqrt(2) xy, and in
 three dimensions sqrt(2) yz and sqrt(2) zx.
@@ -21,7 +21,7 @@ def strain_operator(
     radius: Array,
     kinematics: str,
 ) -> Array:
-    """Return B, which gives Mandel strain at the points of elements for nodal displacements.
+    """Return B: Mandel strain at the points of elements per nodal displacement [1/mm].
 
     Parameters
     ----------
@@ -52,8 +52,8 @@ def strain_operator(
 def mean_dilatation(B: Array, weights: Array) -> Array:
     """Return B with its volumetric part averaged over each element (B-bar).
 
-    T.J.R. Hughes, The Finite Element Method (1987), section 4.5: removes the locking of
-    fully integrated linear elements in isochoric plastic flow.
+    It removes the locking of fully integrated linear elements in isochoric plastic flow: T.J.R.
+    Hughes, The Finite Element Method (1987), section 4.5.
     """
     trace = B[:, :, :3].sum(axis=2)
     mean = (weights[..., None] * trace).sum(axis=1) / weights.sum(axis=1)[:, None]
@@ -65,9 +65,9 @@ def mean_dilatation(B: Array, weights: Array) -> Array:
 def rigid_motions(x: Array, kinematics: str) -> Array:
     """Return the rigid motions of nodes ``x`` (dim, n_nodes) as columns (dim n_nodes, n_rigid).
 
-    Translations along the axes, then the rotations about the centroid (scaled to unit size): in
-    the plane of x and y, in three dimensions also of y and z and of z and x. With axisymmetry only
-    the translation along the axis is rigid.
+    Translations along the axes, then rotations about the centroid, scaled to unit size: in the
+    plane xy, in three dimensions also in yz and zx. An axisymmetric body has only the translation
+    along its axis.
     """
     dim, n = x.shape
     planes = _SHEARS[: 1 if dim == 2 else 3]

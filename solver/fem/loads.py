@@ -23,21 +23,21 @@ Push = Callable[[Array, Array], Array | None]
 
 
 _ACCURATE, _HALVINGS, _MOST = 1e-9, 40, 100_000
-"""Error of the nodal force of a part of an edge, over the largest nodal force, above which the part
-is halved: tractions may bend and jump; how often at most, and up to which number of parts. Values
-that are rounding everywhere are smooth nowhere."""
+"""Error of the nodal force of a part of an edge, over the largest nodal force: a part with a larger
+one is halved, because tractions may have kinks and jumps. Most halvings in a row. Most parts:
+values that are mere rounding would be halved without end."""
 _SAME = 1e-9
-"""Ratio of a difference to the larger of two prescribed values; below it they are equal."""
+"""Difference of two prescribed values over the larger one: they are equal up to this ratio."""
 
 
 @dataclass(frozen=True)
 class Superposed:
-    """A sum of fields, each times the factor of its load at a time.
+    """A sum of fields, each multiplied by the factor of its load at a time.
 
     Attributes
     ----------
     cases : the loads
-    fields : (n, n_cases) the field of each load at load factor 1
+    fields : (n, n_cases) field of each load at load factor 1
     """
 
     cases: tuple[Load, ...]
@@ -81,7 +81,7 @@ def nodal_forces(part: Nodes) -> Superposed:
 def _body_forces(part: Nodes, load: Load) -> Array | None:
     """Return the nodal forces (n,) of a load's force per volume [N]; None if it has none.
 
-    They are integrated by Gauss's rule on cells on which they are smooth.
+    Gauss's rule integrates them on cells on which they are smooth.
     """
     if load.body_force(part.X[:, :0]) is None:
         return None
@@ -102,10 +102,10 @@ def _body_forces(part: Nodes, load: Load) -> Array | None:
 
 
 def prescribed(part: Nodes) -> tuple[Superposed, Bools]:
-    """Return the displacements (n,) that loads prescribe [mm], and the unknowns that are held (n,).
+    """Return the prescribed displacements (n,) [mm], and whether an unknown is held (n,).
 
-    Loads on one boundary add up; a support prescribes zero. Where boundaries share a node, all must
-    prescribe the same displacement at all times, else `ModelError` is raised.
+    Loads on one boundary add up; a support prescribes zero. Raises `ModelError` if boundaries that
+    share a node prescribe different displacements at any time.
     """
     loads = [load for load in part.body.every_load if load.components]
     each, held = [(load, np.zeros(part.n)) for load in loads], np.zeros(part.n, dtype=bool)
@@ -145,7 +145,7 @@ def _prescriptions(part: Nodes, loads: Sequence[Load], axis: int) -> list[_Presc
 
 @dataclass(frozen=True)
 class _Prescription:
-    """Prescribed displacement over time of a boundary along one axis: a sum of loads, or a support.
+    """Prescribed displacement of a boundary along one axis, by a sum of loads or by a support.
 
     ``name`` is the field of the body that prescribes it.
     """
@@ -162,7 +162,7 @@ class _Prescription:
         return sum(each, np.zeros(len(times)))
 
     def check(self, other: _Prescription, part: Nodes) -> None:
-        """Raise `ModelError` where the two differ on unknowns that they share."""
+        """Raise `ModelError` if the two differ on a shared unknown."""
         shared = np.intersect1d(self.dofs, other.dofs)
         if not len(shared):
             return
@@ -175,16 +175,16 @@ class _Prescription:
         at = ", ".join(f"{x:g}" for x in part.X[:, shared[0] // part.dim])
         raise ModelError(
             f"{self.name}.{AXES[self.axis]}", float(f"{mine[worst]:g}"),
-            f"must be {others[worst]:g} mm at time {times[worst]:g}, as {other.name} of body "
-            f"{part.body.name!r} has it, because both boundaries have the node at "
-            f"({at}) mm; or shorten one of the boundaries by an element",
+            f"must be {others[worst]:g} mm at time {times[worst]:g}, the value of {other.name} of "
+            f"body {part.body.name!r}, because both boundaries have the node at ({at}) mm; or "
+            "shorten one of the boundaries by an element",
         )  # fmt: skip
 
 
 def comparing(loads: Sequence[Load]) -> Array:
-    """Return times (n,) such that sums of amplitudes equal at these are equal at all times.
+    """Return times (n,) at which sums of amplitudes must be equal to be equal at all times.
 
-    Amplitudes are linear between knots and may jump at knots: two times in between are enough.
+    Amplitudes are linear between knots and may jump at knots: two times between knots are enough.
     """
     knots = [load.amplitude.time for load in loads if load.amplitude is not None]
     at = np.unique(np.concatenate([[0.0], *knots]))
@@ -193,9 +193,9 @@ def comparing(loads: Sequence[Load]) -> Array:
 
 
 def eigenstrains(part: Nodes) -> Superposed:
-    """Return the eigenstrain (4 n_points,) of the loads, Mandel: strain that causes no stress.
+    """Return the eigenstrain (components x n_points,) of the loads, Mandel.
 
-    An initial stress s has the eigenstrain ``-C^-1 s``, which gives s in the undeformed body.
+    An initial stress s is the eigenstrain ``-C^-1 s``, which causes s in the undeformed body.
     """
     x = part.positions
     shape = (part.components, x.shape[1])
@@ -222,7 +222,10 @@ def _check_plane(stress: Array) -> None:
 
 
 def check_removed(part: Nodes, loads: Superposed) -> None:
-    """Raise `ModelError` if a load acts on nodes of removed elements alone [N]."""
+    """Raise `ModelError` if a load acts on nodes that only removed elements have.
+
+    ``loads`` are nodal forces [N].
+    """
     for removal in (load for load in part.body.every_load if load.removes):
         gone = np.zeros(part.basis.element_dofs.shape[1], dtype=bool)
         gone[part.body.region(removal.removes)] = True
@@ -251,9 +254,9 @@ def _tractions(part: Nodes, boundary: str, push: Push, points: int = 0) -> Array
 
     Parameters
     ----------
-    push : takes positions (2, n) and tangents (2, n), which have the body on their left, and
-        returns the force per area times the length of the tangent (2, n)
-    points : Gauss points of each edge; 0 for four of each of as many parts as are needed
+    push : (positions (2, n), tangents (2, n) with the body on their left) -> force per area times
+        length of the tangent (2, n)
+    points : Gauss points of each edge; 0 for four in each of as many parts as are needed
     """
     edges = edges_of(part, boundary)
     X = part.X[:, edges]
@@ -274,10 +277,10 @@ def _tractions(part: Nodes, boundary: str, push: Push, points: int = 0) -> Array
     row, start, width = np.arange(len(edges)), np.full(len(edges), -1.0), 2.0
     gauss = np.polynomial.legendre.leggauss(points or 4)
     force, largest = np.zeros((part.X.shape[1], 2)), 0.0
-    for left in reversed(range(1 if points else _HALVINGS)):
+    for further in reversed(range(1 if points else _HALVINGS)):
         found = pushed(row, start, width, *gauss)
         halved = np.zeros(len(row), dtype=bool)
-        if left and len(row) < _MOST:
+        if further and len(row) < _MOST:
             off = np.abs(found - pushed(row, start, width, *LOBATTO))
             largest = largest or np.abs(found).max(initial=0.0)
             halved = off.max(axis=(0, 2)) > _ACCURATE * largest

@@ -11,13 +11,13 @@ from solver.typing import Array, Ints
 
 
 class Nodes:
-    """The unknowns and the integration points of one body, and their positions.
+    """The nodes, the unknowns and the integration points of one body.
 
     Unknowns are numbered node by node (`Dofs`), points element by element.
 
     Attributes
     ----------
-    basis : elements and quadrature, of scikit-fem
+    basis : elements and quadrature in scikit-fem
     X : (dim, n_nodes) node positions [mm]
     dim : number of axes
     n : number of unknowns

@@ -1,4 +1,4 @@
-"""The inverse stiffness of the parts of a model: factors, compliances, blended tangents."""
+"""Inverse stiffness of the parts: factors, compliances, blended tangents."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Operator(Protocol):
     """The inverse of a part's stiffness, with its pins held."""
 
     def begin(self, force: Array) -> Begun:
-        """Return the displacements for nodal forces (n,); contact forces may still change.
+        """Return the displacements for nodal forces (n,), whose contact forces may still change.
 
         ``kept`` and the argument of ``finish`` are (n,); only entries on contact surfaces count.
         """
@@ -50,13 +50,13 @@ class Stiff(Protocol):
 
 
 class Analysed:
-    """The stiffness pattern of a part, and its unknowns on contact surfaces.
+    """The analysed stiffness pattern of a part, with its unknowns on contact surfaces.
 
     Attributes
     ----------
     part : the body
-    contact : active unknowns on its contact surfaces, kept
-    kept : (n,) position of each unknown among those kept, -1 for the others
+    contact : active unknowns on its contact surfaces, the kept ones
+    kept : (n,) position of each unknown among the kept ones, -1 for the others
     solver : linear solver of the active unknowns
     """
 
@@ -117,7 +117,7 @@ class Operators:
     Parameters
     ----------
     contact : unknowns of its contact surfaces
-    elastic : its elastic operator, where it is known
+    elastic : its elastic operator, if known
     """
 
     def __init__(
@@ -171,7 +171,7 @@ class Dense:
 
 
 class Restricted:
-    """The operator of a body of which only the unknowns ``kept`` (m,) are left, all forces on them.
+    """The operator of a body on the unknowns ``kept`` (m,) only, where all forces act.
 
     Parameters
     ----------

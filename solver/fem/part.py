@@ -1,4 +1,4 @@
-"""Interface of a body to the increments: unknowns, forces, motion of surfaces."""
+"""Interface between bodies and increments: unknowns, forces, motion of surfaces."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from functools import cached_property
 
 import numpy as np
-import scipy  # loads spatial when it is used: few models look for places
+import scipy  # loads scipy.spatial at its first use: few models need it
 from scipy import sparse
 
 from solver.fem.deformation import PartResponse
@@ -24,7 +24,7 @@ from solver.typing import Array, Ints
 
 _ROUNDING = float(np.finfo(float).eps)
 _SAME = 1e-6
-"""Ratio of a distance to the size of a body; below it two places are the same."""
+"""Distance of two places over the size of the body: they are the same below this ratio."""
 
 
 def same_unknowns(nodes: Array, places: Array) -> Ints:
@@ -36,7 +36,7 @@ def same_unknowns(nodes: Array, places: Array) -> Ints:
 
 
 class Part(ABC):
-    """A body as the increments use it; methods that are not abstract suit a meshed body at rest.
+    """A body as the increments use it; the methods here are those of a meshed body at rest.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Part(ABC):
     loads : nodal forces (n,) of the body's loads [N]
     driven : prescribed motions (n,) [mm]
     free : unknowns that no support holds
-    active : those of them that are not pinned to hold its rigid motions
+    active : free unknowns without the pins that hold its rigid motions
     rigid : (n, n_rigid) rigid motions that the supports leave free
     moves : whether its load moves along a body
     meshed : whether all nodes of its mesh have unknowns
@@ -102,7 +102,7 @@ class Part(ABC):
         return surface
 
     def during(self, time: float, u: Array) -> Part:
-        """Return the part in an increment that begins at a time with unknowns u, some locked."""
+        """Return the part for an increment from a time and unknowns u, which may be locked."""
         del time, u
         return self
 
@@ -140,10 +140,7 @@ class Part(ABC):
         return float(np.linalg.norm(self.external(time)))
 
     def clamped(self, time: float) -> tuple[float, float]:
-        """Return the force [N] and energy [N mm] of heat and prescribed motion on clamped elements.
-
-        Forces and pressures do not count.
-        """
+        """Return force [N] and energy [N mm] of heat, initial stress and motion, as if clamped."""
         del time
         return 0.0, 0.0
 
@@ -153,18 +150,18 @@ class Part(ABC):
         return self.body.law
 
     def hot(self, surface: Surface) -> Softening | None:
-        """Return how heat lowers the yield stress at a surface's nodes; None if it does not."""
+        """Return the softening at a surface's nodes; None if the yield stress is constant."""
         del surface
         return None
 
     def eigenstrain(self, time: float) -> Array:
-        """Return the eigenstrain (4, n_points, Mandel): thermal, or that of an initial stress."""
+        """Return the eigenstrain (4, n_points, Mandel) of heat or initial stress."""
         del time
         return np.zeros((4, len(self.volumes)))
 
     @property
     def travels(self) -> bool:
-        """Whether it may move as a whole: only contact holds it, or its motion is prescribed."""
+        """Whether it may move as a whole: contact alone holds it, or a motion is prescribed."""
         return self.rigid.shape[1] > 0
 
     def grows(self, before: float, after: float) -> bool:
@@ -179,18 +176,18 @@ class Part(ABC):
     def rounding(self, u: Array) -> float:
         """Return the out-of-balance force that rounding can cause at displacements u [N].
 
-        Internal forces are differences of stiffness times displacement. Both may be large where
-        forces are small: in long thin elements, and in a stiff body on a soft one.
+        Internal forces are differences of stiffness times displacement, which may be large although
+        the forces are small: in long thin elements, and in a stiff body on a soft one.
         """
         return _ROUNDING * float(np.linalg.norm(self.diagonal * u))
 
     def moved(self, u: Array, time: float) -> Array:
-        """Return the unknowns with prescribed motions at their values for a time."""
+        """Return the unknowns with prescribed motions at their values at a time."""
         del time
         return u
 
     def way(self, before: float, after: float) -> float:
-        """Return how far a wheel rolls along x between two times [mm]."""
+        """Return the motion of a wheel along x between two times [mm]."""
         del before, after
         return 0.0
 
@@ -200,7 +197,7 @@ class Part(ABC):
         return 0.0
 
     def passed(self, before: Array, after: Array, way: float) -> float:
-        """Return how far a load that moves by ``way`` goes over this part's material [mm].
+        """Return the motion over this part's material of a load that moves by ``way`` [mm].
 
         ``before`` and ``after`` are the unknowns (n,) of the part.
         """
@@ -208,7 +205,7 @@ class Part(ABC):
         return way
 
     def sources(self, way: float) -> Ints:
-        """Return for each unknown (n,) the one a distance ``way`` [mm] behind along x, or -1."""
+        """Return for each unknown (n,) the one at ``way`` [mm] behind it along x, or -1."""
         return same_unknowns(self.nodes, self.nodes - np.array([[way], [0.0]]))
 
     def place(self, point: int) -> tuple[float, ...]:
@@ -224,7 +221,7 @@ class Part(ABC):
         """Return unknowns (m,) of this part and derivative rows (n_rows, m) on these.
 
         ``block`` (n_rows, 2 n_nodes) has the derivatives by the displacements of a surface; its
-        first ``gaps`` rows are those of gaps, the others of slips.
+        first ``gaps`` rows are gaps, the others slips.
         """
         del u, gaps
         return surface.dofs, block

@@ -1,7 +1,7 @@
 """A rigid body as the increments use it: three unknowns, finite rotation.
 
 Its unknowns are those of a `MovingFrame`, whose radius is the distance of the farthest point. A
-motion with a force (`Pushed`) is free, the others are prescribed.
+motion with a force (`Pushed`) is free, a motion with a value (`Moved`) is prescribed.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class RigidPart(Part):
         return self.frame.motion(u)
 
     def linear(self, X: Array) -> Array:
-        """Return the displacements (2 n, 3) of places X (2, n) by its unknowns, small rotations."""
+        """Return the displacements (2 n, 3) of places X (2, n) per unknown, for small rotations."""
         x, y = (X - self.frame.centre[:, None]) / self.frame.radius
         one, zero = np.ones_like(x), np.zeros_like(x)
         each = np.array([[one, zero, -y], [zero, one, x]])
@@ -130,17 +130,17 @@ class RigidPart(Part):
         return np.arange(3), self.frame.rows(u, block, self.frame.passing(surface.X))
 
     def moved(self, u: Array, time: float) -> Array:
-        """Return ``u`` with prescribed motions at their values for a time."""
+        """Return ``u`` with prescribed motions at their values at a time."""
         u = np.where(np.isnan(self._locked), u, self._locked)
         return np.where(self._held, self.driven.at(time), u)
 
     @property
     def travels(self) -> bool:
-        """Whether it is pushed or moved."""
+        """Whether a motion is free or prescribed."""
         return super().travels or bool(self.driven.fields.any())
 
     def turn(self, before: float, after: float) -> float:
-        """Return the prescribed rotation between two times [rad]; 0 if it is free to turn."""
+        """Return the prescribed rotation between two times [rad]; 0 if rotation is free."""
         if not self._held[2]:
             return 0.0
         return float(abs(self.driven.at(after)[2] - self.driven.at(before)[2])) / self.frame.radius
@@ -185,7 +185,7 @@ class RigidPart(Part):
         return sparse.csr_array((3, 3))
 
     def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
-        """Return zero: it stores no energy."""
+        """Return zero: a rigid body stores no energy."""
         del step, response
         return 0.0, 0.0
 

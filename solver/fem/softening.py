@@ -1,9 +1,9 @@
-"""Loss of stiffness and strength: by heat, and of elements that are removed.
+"""Loss of stiffness and strength, by heat and by removal of elements.
 
-An element that is removed loses its stiffness in proportion to the share of it that is gone. So the
-forces by which it holds its neighbours go to zero along a path that has an equilibrium everywhere,
-and its work is known. `_GHOST` of the stiffness is left: its nodes follow, and the equations keep
-their form. Its yield stress stays, so that it does not yield on the way.
+The removal of an element lowers its stiffness gradually. The forces on its neighbours so decrease
+to zero along a path with an equilibrium at every point, and their work is known. The share `_GHOST`
+of the stiffness remains: the nodes follow, and the equations keep their form. The yield stress is
+constant, so that the element does not yield meanwhile.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from solver.materials.heated import Heated
 from solver.typing import Array, Bools, Ints
 
 _LEAST = 0.05
-"""Least permitted ratio of Young's modulus, and of the yield stress, to its value when cold."""
+"""Young's modulus, and yield stress, over its cold value: least permitted ratio."""
 _GHOST = 1e-7
-"""Ratio of the stiffness that elements keep when they are removed."""
+"""Stiffness of a removed element over its value before."""
 
 
 @dataclass(frozen=True, slots=True)
 class Softening:
-    """Relative losses (n,) of Young's modulus and yield stress at places, and removal, times loads.
+    """Relative losses (n,) of Young's modulus and yield stress at places, by load.
 
     ``removed`` is 1 in the elements that a load removes.
     """
@@ -38,9 +38,9 @@ class Softening:
 
     @classmethod
     def of(cls, part: Nodes, x: Array, elements: Ints | None = None) -> Softening | None:
-        """Return the losses that the loads of a body cause at places x (2, n); None if none.
+        """Return the losses that the loads of a body cause at places x (2, n); None without any.
 
-        ``elements`` (n,) are those that the places belong to; without them nothing is removed.
+        ``elements`` (n,) are the elements of the places; without them nothing is removed.
         """
         body, n = part.body, x.shape[1]
         both = [(load, load.softening(x)) for load in body.every_load]
@@ -60,8 +60,8 @@ class Softening:
 
     def law(self, cold: Law, time: float) -> Law:
         """Return the law at a time; the cold law itself while nothing has changed."""
-        left = 1 - (1 - _GHOST) * np.minimum(self.removed.at(time), 1.0)
-        stiff = left * _left(self.modulus, "modulus_drop", time)
+        present = 1 - (1 - _GHOST) * np.minimum(self.removed.at(time), 1.0)
+        stiff = present * _remaining(self.modulus, "modulus_drop", time)
         strong = self.strong(time)
         unchanged = (stiff == 1).all() and (strong == 1).all()
         return cold if unchanged else Heated(law=cold, stiff=stiff, strong=strong)
@@ -71,12 +71,12 @@ class Softening:
         return np.asarray(self.removed.at(time) >= 1)
 
     def strong(self, time: float) -> Array:
-        """Return the ratio (n,) of the yield stress at a time to its value when cold."""
-        return _left(self.strength, "yield_drop", time)
+        """Return the ratio (n,) of the yield stress at a time to its cold value."""
+        return _remaining(self.strength, "yield_drop", time)
 
 
-def _left(lost: Superposed, name: str, time: float) -> Array:
-    """Return the remaining ratios at a time, or raise `ModelError` if one is below `_LEAST`."""
+def _remaining(lost: Superposed, name: str, time: float) -> Array:
+    """Return the remaining ratios at a time; raise `ModelError` if one is below `_LEAST`."""
     share = 1 - lost.at(time)
     if not share.min() >= _LEAST:
         allowed = f"must be at least {_LEAST:g} at every temperature (time {time:.6g})"

@@ -1,8 +1,8 @@
 """An elastic body reduced to its contact surfaces and its rigid motion, exactly.
 
 Its stiffness is the Schur complement S on the unknowns of these surfaces. Supports of kept nodes
-stay supports; rigid motions stay rigid motions (``S R = 0``), so a body held by contact alone is
-treated like any other.
+remain supports, and rigid motions remain rigid motions (``S R = 0``): a body held by contact alone
+needs no special treatment.
 """
 
 from __future__ import annotations
@@ -46,15 +46,15 @@ class _CondensedBody:
         return self._schur.begin(force)
 
     def expand(self, u: Array, factors: Array) -> Array:
-        """Return all displacements (n,) from those kept, at the factors of the loads."""
+        """Return all displacements (n,) for the kept ones and the factors of the loads."""
         return self.begin(self._loads @ factors).finish(u)
 
 
 def _without_motions(S: Array, rigid: Array) -> Array:
     """Return a symmetric stiffness projected so that rigid motions (n, n_rigid) cause no force.
 
-    Rounding of the elimination leaves a small force, in proportion to the largest entries of the
-    whole stiffness. Only contact forces balance a rigid motion; nothing would balance this rest.
+    Rounding in the elimination causes a small force, in proportion to the largest entries of the
+    whole stiffness. Nothing would balance it: only contact forces act on rigid motions.
     """
     S = 0.5 * (S + S.T)
     Q = np.linalg.qr(rigid)[0]
@@ -63,11 +63,11 @@ def _without_motions(S: Array, rigid: Array) -> Array:
 
 
 class Substructure(Part):
-    """A part with the unknowns of its contact surfaces alone.
+    """A part with the unknowns of its contact surfaces only.
 
-    An increment uses it like a `Discretisation`; ``whole`` is the meshed body. ``elastic`` are
-    the unknowns on which the condensed stiffness acts. The body is condensed when its stiffness is
-    first needed: to check a model, or to count its unknowns, needs none.
+    ``whole`` is the meshed body, ``elastic`` are the unknowns on which the condensed stiffness
+    acts. The body is condensed when its stiffness is first needed; a check of the model, or a count
+    of its unknowns, does not need it.
     """
 
     meshed = False
@@ -92,7 +92,7 @@ class Substructure(Part):
 
     @cached_property
     def loads(self) -> Superposed:  # type: ignore[override]  # a cached property can be written
-        """Nodal forces of the body's loads, those on inner nodes condensed [N]."""
+        """Nodal forces of the body's loads, condensed to the kept nodes [N]."""
         return Superposed(self.whole.condensable.cases, self._condensed.forces)
 
     def surface(self, surface: Surface) -> Surface:
@@ -111,7 +111,7 @@ class Substructure(Part):
         return Fixed(Dense(S, self.active, self.n))
 
     def virgin(self) -> PlasticState:
-        """Return the law's state for zero points: nothing here can yield."""
+        """Return the internal variables of zero points: the part cannot yield."""
         return self.body.law.initial(0, self.whole.components)
 
     def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
@@ -164,7 +164,7 @@ class Substructure(Part):
 
 
 def _key(part: Discretisation, kept: Ints, linear_solver: str) -> str:
-    """Return a key made from the content: equal bodies share their condensation."""
+    """Return a hash of the content: equal bodies share their condensation."""
     digest, body = sha256(), part.body
     elastic = body.law.stiffness(part.components)
     for array in (body.mesh.doflocs, body.mesh.t, kept, elastic, part.condensable.fields):

@@ -25,7 +25,7 @@ class Surface:
     nodes : (n_nodes,) node numbers in the body
     edges : (n_edges, 2 or 3) positions in ``nodes``: start, end (, middle)
     X : (2, n_nodes) reference positions [mm]
-    thickness : across the plane [mm]; None of an axisymmetric body
+    thickness : thickness across the plane [mm]; None for an axisymmetric body
     goes_on : whether the boundary of the body continues smoothly beyond the start and the end
     """
 
@@ -90,7 +90,7 @@ class Surface:
 
     @cached_property
     def normals(self) -> Array:
-        """Outward unit normals (2, n_nodes): means over the shape function of each node."""
+        """Outward unit normals (2, n_nodes): means weighted with the shape function of the node."""
         xi, weights = np.polynomial.legendre.leggauss(4)
         count = self.edges.shape[1]
         along = self.X[:, self.edges] @ shape_derivatives(xi, count).T
@@ -117,8 +117,8 @@ def shortest(X: Array, edges: Ints) -> float:
 def edges_of(part: Nodes, boundary: str) -> Ints:
     """Return the edges (n_edges, 2 or 3) of a boundary: start, end (, middle) node.
 
-    Each has the body on its left. Facet bases of scikit-fem are not used here: they invert the
-    element mapping with an absolute tolerance, too coarse for elements of 1e-5 of the body's size.
+    Each has the body on its left. Facet bases of scikit-fem would invert the element mapping with
+    an absolute tolerance, too coarse for elements of 1e-5 of the body's size.
     """
     mesh, basis = part.body.mesh, part.basis
     facets = part.body.facets(boundary)
@@ -137,7 +137,7 @@ def edges_of(part: Nodes, boundary: str) -> Ints:
 
 
 def gathered(part: Nodes, boundary: str) -> Surface:
-    """Return the surface of a named boundary of any shape, its edges in no order."""
+    """Return the surface of a named boundary of any shape; its edges have no order."""
     edges = edges_of(part, boundary)
     nodes, local = np.unique(edges, return_inverse=True)
     return Surface(nodes, local.reshape(edges.shape), part.X[:, nodes], _thickness(part))
@@ -173,8 +173,8 @@ def extract(part: Nodes, boundary: str) -> Surface:
 def _goes_on(part: Nodes, edge: Ints, at: int) -> bool:
     """Return whether a boundary continues smoothly beyond the start (0) or end (1) of an edge.
 
-    A change of direction by more than `_CORNER` is a corner. Tangents are compared, not chords,
-    whose direction changes on a coarse mesh although the curve is smooth.
+    A change of direction by more than 30 degrees is a corner. Tangents are compared: chords change
+    direction on a coarse mesh although the curve is smooth.
     """
     mesh, basis = part.body.mesh, part.basis
     outside = mesh.boundary_facets()
@@ -193,7 +193,7 @@ def _goes_on(part: Nodes, edge: Ints, at: int) -> bool:
 
 
 def _leaving(X: Array, end: int, other: int, middle: int | None) -> Array:
-    """Return the direction (2,) in which an edge leaves its end."""
+    """Return the tangent (2,) of an edge at its ``end``, pointing away from it."""
     if middle is None:
         return np.asarray(X[:, other] - X[:, end])
     return np.asarray(4 * X[:, middle] - 3 * X[:, end] - X[:, other])

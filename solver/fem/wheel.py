@@ -1,10 +1,10 @@
 """An elastic wheel, condensed to its rim, with finite rotation.
 
 Unknowns are the elastic displacements d of the rim's nodes in the frame of the rigid hub, and the
-three unknowns of this `MovingFrame`. The condensed stiffness acts on d alone and never changes;
-rotation enters only through the derivatives of gap and slip. The advance of the axle is prescribed;
-its height is free and balances the vertical force; rotation is free and balances the moment, or
-is prescribed.
+three unknowns of this `MovingFrame`. The condensed stiffness acts on d only and is constant;
+rotation enters through the derivatives of gap and slip. The advance of the axle is prescribed. Its
+height is free and balances the vertical force. Rotation is free and balances the moment, or is
+prescribed.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Wheel(Substructure):
         self.free = np.concatenate([self.free, self._hub + np.array(free)])
 
     def external(self, time: float) -> Array:
-        """Return the force and moment on the hub at a time."""
+        """Return the external nodal forces (n,) at a time [N]: force and moment on the hub."""
         force = np.zeros(self.n)
         force[self._hub + _Y] = -self.axle.force.at(time)
         if self.axle.rotation is None:
@@ -62,7 +62,7 @@ class Wheel(Substructure):
     # -- kinematics ----------------------------------------------------------------------------
 
     def passing(self, surface: Surface, d: Array) -> Array:
-        """Return the derivative (2, n_nodes) of positions by the arc, for a fixed shape of the rim.
+        """Return the derivative (2, n_nodes) of positions by the arc while the rim keeps its shape.
 
         ``d`` (2, n_nodes) are the displacements of its nodes in the frame of the hub [mm].
         """
@@ -81,12 +81,12 @@ class Wheel(Substructure):
     def pull_back(self, surface: Surface, u: Array, block: Array, gaps: int) -> tuple[Ints, Array]:
         """Return the unknowns of rim, hub and rotation, and derivative rows on them.
 
-        Rotation moves material along the rim, whose shape stays (`passing`). In a round elastic
-        wheel this takes no work and changes no gap: only friction has a moment, and its lever arm
-        is the speed of the material along the rim per angle. If the displacements turned with the
-        wheel, gaps would change too, and pressure would have a moment. In the continuum that moment
-        compensates the difference of the lever arms; on a mesh with ten points in contact its error
-        is 1e-4 of force times radius, enough to turn a wheel that is held by less friction.
+        Rotation moves material along the rim, which keeps its shape (`passing`). In a round elastic
+        wheel this needs no work and changes no gap: only friction has a moment, and its lever arm
+        is the motion of the material along the rim per angle. If the displacements rotated with the
+        wheel, gaps would change too, and pressure would have a moment. In the continuum this moment
+        compensates the different lever arm of friction; on a mesh with ten points in contact its
+        error is 1e-4 of force times radius, enough to turn a wheel that little friction holds.
         """
         d, q = vectors(u[surface.dofs], 2), u[self._hub :]
         hub = self.frame.rows(q, block, self.passing(surface, d))
@@ -96,9 +96,9 @@ class Wheel(Substructure):
         return np.append(surface.dofs, self._hub + np.arange(3)), rows
 
     def moved(self, u: Array, time: float) -> Array:
-        """Return ``u`` with the hub at its position for a time.
+        """Return ``u`` with the hub at its position at a time.
 
-        A wheel free to turn rolls there; a prescribed rotation takes its value at that time.
+        If rotation is free, the wheel rolls there; a prescribed rotation takes its value.
         """
         out = u.copy()
         x, turn = self._hub + _X, self._hub + _TURN
@@ -110,11 +110,11 @@ class Wheel(Substructure):
         return out
 
     def way(self, before: float, after: float) -> float:
-        """Return how far the axle moves along x between two times [mm]."""
+        """Return the motion of the axle along x between two times [mm]."""
         return self.axle.position.at(after) - self.axle.position.at(before)
 
     def passed(self, before: Array, after: Array, way: float) -> float:
-        """Return how far the contact moves along the rim [mm]: 0 if the wheel is locked."""
+        """Return the motion of the contact along the rim [mm]: 0 if the wheel is locked."""
         del way
         turn = self._hub + _TURN
         return float(before[turn] - after[turn])
@@ -122,8 +122,8 @@ class Wheel(Substructure):
     def sources(self, way: float) -> Ints:
         """Return for each unknown the one at the arc ``way`` [mm] behind it along the rim, or -1.
 
-        Unknowns of the hub are their own. Directions of displacements are not turned: over one
-        element side the frame turns by less than the error of a prediction.
+        The source of an unknown of the hub is itself. Displacement vectors are not rotated: over an
+        element side the rotation is less than the error of a prediction.
         """
         centre = self.frame.centre[:, None]
         places = turning(-way / self.frame.radius) @ (self.nodes - centre) + centre
@@ -131,19 +131,19 @@ class Wheel(Substructure):
         return np.concatenate([rim, self._hub + np.arange(3)])
 
     def lowered(self, u: Array, by: float) -> Array:
-        """Return ``u`` with the hub lowered [mm]."""
+        """Return ``u`` with the hub lowered by a distance [mm]."""
         out = u.copy()
         out[self._hub + _Y] -= by
         return out
 
     def start(self) -> Array:
-        """Return the undeformed wheel at the time its motion begins."""
+        """Return the unknowns of the undeformed wheel at the beginning of its motion."""
         return self.placed(float(self.axle.position.time[0]))
 
     def placed(self, time: float) -> Array:
-        """Return the unknowns of the undeformed wheel at its position for a time.
+        """Return the unknowns of the undeformed wheel at its position at a time.
 
-        A wheel free to turn has rolled there from the position at which it was meshed.
+        If rotation is free, the wheel has rolled there from its position in the mesh.
         """
         u = np.zeros(self.n)
         u[self._hub + _TURN] = self.frame.radius * self.axle.turned

@@ -1,12 +1,12 @@
-"""A body of which only a window is meshed; the rest is elastic and condensed, exactly.
+"""A body that is meshed only in a window; the rest is elastic and condensed, exactly.
 
-Outside the window, displacements follow those of its boundary b linearly. With r the out-of-balance
-forces of all elements outside at displacements u0, i the unknowns inside the rest and K the
-stiffness of the rest, the rest exerts on the nodes of the window
+Displacements outside the window depend linearly on those of its boundary b. With the out-of-balance
+forces r of all elements outside at displacements u0, the unknowns i inside the rest and its
+stiffness K, the rest exerts these forces on the nodes of the window:
 
     r_b - K_bi K_ii^-1 r_i - S (u - u0)_b,      S = K_bb - K_bi K_ii^-1 K_ib
 
-An iteration then costs as much as its window: stress, tangent, factor and solves.
+The cost of an iteration (stress, tangent, factor and solves) is then that of the window.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from solver.typing import Array, Bools, Ints
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Region:
-    """Where a body may yield and touch.
+    """The region in which a body may yield and touch.
 
     Attributes
     ----------
-    elements : (n_elements,) which of its elements may yield
-    contact : (n,) on which of its unknowns contact forces may act
+    elements : (n_elements,) whether an element may yield
+    contact : (n,) whether contact forces may act on an unknown
     """
 
     elements: Bools
@@ -49,9 +49,9 @@ class Region:
     def around(
         cls, whole: Discretisation, surfaces: Sequence[Surface], inner: Region, layers: int
     ) -> Region:
-        """Return a region of a body and its surfaces with layers of elements around another.
+        """Return the region ``inner`` extended by layers of elements.
 
-        Where nothing yields it has the elements that touch.
+        Without yielding elements it is extended from the touching ones.
         """
         touched = np.asarray(inner.contact[whole.dofs].any(axis=1))
         near = np.zeros(whole.n, dtype=bool)
@@ -63,7 +63,7 @@ class Region:
         return cls(_layered(whole, yields, layers), contact)
 
     def has(self, other: Region) -> bool:
-        """Whether it has all of another region."""
+        """Whether it contains another region."""
         yields, touches = other.elements & ~self.elements, other.contact & ~self.contact
         return not (yields.any() or touches.any())
 
@@ -74,7 +74,7 @@ class Region:
 
 
 def _layered(whole: Discretisation, elements: Bools, layers: int) -> Bools:
-    """Return some elements (n_elements,) with layers of neighbours around them."""
+    """Return the elements (n_elements,) extended by layers of neighbours."""
     for _ in range(layers):
         within = np.zeros(whole.n, dtype=bool)
         within[whole.dofs[elements]] = True
@@ -83,16 +83,16 @@ def _layered(whole: Discretisation, elements: Bools, layers: int) -> Bools:
 
 
 class Windowed(Discretisation):
-    """A body whose unknowns are those of a region.
+    """A body with the unknowns of a region only.
 
-    An increment uses it like a `Discretisation`, after `at` has given it the beginning of the
-    increment. The rest of a contact surface stays where it is then.
+    `at` sets the beginning of an increment, which then uses the window as a `Discretisation`. The
+    rest of a contact surface keeps its position in the increment.
 
     Attributes
     ----------
     whole : the meshed body
-    elements : (n_elements,) which of its elements the window has; at least those of the region
-    kept : (n,) unknowns of the whole body
+    elements : (n_elements,) whether the window has an element; it has at least those of the region
+    kept : (n,) its unknowns in the whole body
     """
 
     _begin: Array
@@ -120,7 +120,7 @@ class Windowed(Discretisation):
         self._touches = region.contact[kept]
 
     def _mesh(self, whole: Discretisation, number: Ints) -> None:
-        """Take the elements of the window, and what belongs to their points."""
+        """Set the elements of the window, and the quantities at their points."""
         self.dofs = number[whole.dofs[self.elements]]
         self.weights = whole.weights[self.elements]
         self._strain_by(whole.undeformed.B[self.elements])
@@ -145,12 +145,12 @@ class Windowed(Discretisation):
         every = self.kept[edge]
         own = self.elastic_matrix()[edge][:, edge]
         self._rest = (K[every][:, every] - own).toarray()
-        # not on the boundary of what is condensed: nodes whose elements outside are held elsewhere
+        # the boundary of the condensed rest has no nodes whose outer elements are held elsewhere
         at = np.searchsorted(edge, self._schur.boundary)
         self._rest[np.ix_(at, at)] -= self._schur.taken
 
     def at(self, u: Array, plastic: PlasticState, time: float) -> Windowed:
-        """Return the window for an increment from displacements and a state of the whole body."""
+        """Return the window for an increment from displacements and state of the whole body."""
         here = copy(self)
         response = self.whole.respond(u, plastic, time)
         out = self.whole.residual(time, u, response)
@@ -187,12 +187,12 @@ class Windowed(Discretisation):
     # -- the window as a body ------------------------------------------------------------------
 
     def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
-        """Return the response from the beginning of the increment, whose state is known."""
+        """Return the response, from the internal variables that `at` has set."""
         del state
         return super().respond(u, self._plastic, time)
 
     def residual(self, time: float, u: Array, response: PartResponse) -> Array:
-        """Return external minus internal forces (n,), those of the rest condensed [N]."""
+        """Return external minus internal forces (n,), including the condensed rest [N]."""
         del time
         inner = response.deformation.internal_force(response.law.stress)
         force = self._outer.condensed - inner
@@ -200,7 +200,7 @@ class Windowed(Discretisation):
         return force
 
     def external(self, time: float) -> Array:
-        """Return the external nodal forces (n,) at a time, those on the rest condensed [N]."""
+        """Return the external nodal forces (n,) at a time, including the condensed rest [N]."""
         return self._schur.begin(self.whole.external(time)).condensed
 
     def force_level(self, time: float) -> float:

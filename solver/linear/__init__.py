@@ -1,1 +1,1 @@
-"""Sparse symmetric systems: analysed once, factorised and solved many times."""
+"""Linear systems: sparse symmetric factors, Schur complements, dense and iterative solution."""

@@ -1,4 +1,4 @@
-"""Dense equations, factorised in single precision and refined to double.
+"""Dense linear systems, factorised in single precision and refined to double.
 
 N.J. Higham, Accuracy and Stability of Numerical Algorithms (2nd edition, 2002), section 12.1.
 """
@@ -11,15 +11,15 @@ from scipy.linalg import lapack
 from solver.typing import Array
 
 _REFINED = 1e-12
-"""Largest norm of the residual over that of the right-hand side."""
+"""Norm of the residual over that of the right-hand side, at most."""
 _STEPS = 4
-"""Most solutions in single precision; if they are too few, the matrix is factorised in double."""
+"""Most solutions in single precision; then the matrix is factorised in double."""
 
 
 class RefinedLU:
-    """The factors of a matrix (n, n), at half the cost of those in double precision.
+    """LU factors of a matrix (n, n) in single precision, half as expensive as in double.
 
-    If single precision is too coarse for the matrix, it is factorised once more, in double.
+    If single precision is too coarse for the matrix, it is factorised again in double.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class RefinedLU:
         self._factorise(np.float32)
 
     def _factorise(self, kind: type[np.floating]) -> None:
-        # LAPACK reads columns: it gets the transposed matrix, without a copy
+        # LAPACK stores by columns: the transpose needs no further copy
         own = self._matrix.astype(kind, order="C").T
         self._single = kind is np.float32
         factorise = lapack.sgetrf if self._single else lapack.dgetrf
@@ -56,12 +56,12 @@ class RefinedLU:
         ZeroDivisionError
             if the matrix is singular
         """
-        found, left = np.zeros_like(right), right
+        found, residual = np.zeros_like(right), right
         size = float(np.linalg.norm(right))
         for _ in range(_STEPS if self._single else 0):
-            found = found + self._once(left)
-            left = right - self._matrix @ found
-            if np.linalg.norm(left) <= _REFINED * size:
+            found = found + self._once(residual)
+            residual = right - self._matrix @ found
+            if np.linalg.norm(residual) <= _REFINED * size:
                 return found
         if self._single:
             self._factorise(np.float64)

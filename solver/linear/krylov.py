@@ -1,4 +1,4 @@
-"""Linear equations of which only products with vectors are known."""
+"""Linear systems given by matrix-vector products."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from scipy.linalg.blas import daxpy, ddot
 
 from solver.typing import Array
 
-_NEW = 1e-14
-"""Length of what a product adds to the directions so far, over its own; below it adds nothing."""
+_BREAKDOWN = 1e-14
+"""Breakdown tolerance: norm of a Krylov vector after orthogonalisation over its norm before."""
 
 
 def gmres(
     product: Callable[[Array], Array], b: Array, tolerance: float, most: int
 ) -> tuple[Array, bool]:
-    """Return a solution x (n,) of A x = b, and whether its residual is small enough.
+    """Return a solution x (n,) of A x = b, and whether its residual is within the tolerance.
 
-    It begins with x = 0, does not restart, and ends before a product that is not finite.
-    `scipy.sparse.linalg.gmres` takes one product more, to check the residual; for a solution to one
-    digit that is a fifth of the work.
+    It begins with x = 0, does not restart, and stops at a product that is not finite.
+    `scipy.sparse.linalg.gmres` needs one more product, to check the residual: a fifth of the work
+    for a solution to one digit.
 
     Parameters
     ----------
@@ -39,8 +39,8 @@ def gmres(
     y, small = np.zeros(0), False
     for k in range(most):
         w = np.array(product(basis[k]), dtype=float)
-        longest = float(np.linalg.norm(w))
-        if not np.isfinite(longest):
+        before = float(np.linalg.norm(w))
+        if not np.isfinite(before):
             break
         for i, v in enumerate(basis):
             H[i, k] = ddot(v, w)
@@ -48,9 +48,9 @@ def gmres(
         H[k + 1, k] = np.linalg.norm(w)
         right = np.append(size, np.zeros(k + 1))
         y = np.linalg.lstsq(H[: k + 2, : k + 1], right)[0]
-        missed = float(np.linalg.norm(H[: k + 2, : k + 1] @ y - right))
-        small = missed <= tolerance * size
-        if small or not H[k + 1, k] > _NEW * longest:
+        residual = float(np.linalg.norm(H[: k + 2, : k + 1] @ y - right))
+        small = residual <= tolerance * size
+        if small or not H[k + 1, k] > _BREAKDOWN * before:
             break
         basis.append(w / H[k + 1, k])
     x = np.zeros_like(b)

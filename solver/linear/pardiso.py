@@ -1,8 +1,7 @@
 """MKL PARDISO through its documented C interface, phase by phase.
 
-The `mkl` wheel ships the library. Its phases are called one by one (analysis once per pattern, a
-factorisation per matrix, elimination down to a Schur complement), which ready-made wrappers do
-not offer.
+The wheel `mkl` contains the library. Existing wrappers do not offer its phases one by one: analysis
+once per pattern, one factorisation per matrix, elimination down to a Schur complement.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ MINIMUM_DEGREE, DISSECTION = 0, 2
 
 @cache
 def library() -> ctypes.CDLL | None:
-    """Return MKL, set to one thread per process, or None where it is not installed."""
+    """Return MKL, limited to one thread per process; None if it is not installed."""
     try:
         files = metadata.distribution("mkl").files or []
     except metadata.PackageNotFoundError:
@@ -43,7 +42,7 @@ def library() -> ctypes.CDLL | None:
 
 
 class PardisoError(RuntimeError):
-    """An error of PARDISO with its ``code``; `NOT_POSITIVE` is a zero or negative pivot."""
+    """An error of PARDISO with its ``code``: `NOT_POSITIVE` for a zero or negative pivot."""
 
     def __init__(self, phase: int, code: int) -> None:
         super().__init__(f"PARDISO phase {phase} failed with error {code}")
@@ -51,19 +50,19 @@ class PardisoError(RuntimeError):
 
 
 class Pardiso:
-    """One analysed pattern and the factor of the last matrix, or those of several matrices.
+    """An analysed pattern and the factors of one or several matrices.
 
-    All unknowns except those ``kept`` are eliminated. The Schur complement on the kept ones is
-    factorised densely, so that their compliances cost no sparse solves.
+    All unknowns except the ``kept`` ones are eliminated. The Schur complement on these is
+    factorised densely, so that their compliances need no sparse solves.
 
     Parameters
     ----------
     upper : upper triangle of a symmetric matrix in CSR, diagonal present
-    kept : (m,) increasing, unknowns eliminated last, of a positive definite matrix; none by
-        default
+    kept : (m,) increasing, unknowns eliminated last, of a positive definite matrix; by default none
     kind : `POSITIVE_DEFINITE` or `INDEFINITE`
     ordering : `DISSECTION` (nested) or `MINIMUM_DEGREE`
-    count : number of matrices whose factors are held at the same time, none kept of more than one
+    count : number of matrices whose factors are held at the same time; with more than one there are
+        no kept unknowns
     single : whether factors, right-hand sides and solutions are in single precision
     """
 
@@ -98,7 +97,7 @@ class Pardiso:
         weakref.finalize(self, _release, self._handle, kind, self._iparm, count)
 
     def factorise(self, data: Array, which: int = 0) -> None:
-        """Factorise the matrix with these values on the analysed pattern, as number ``which``."""
+        """Factorise the matrix with these values on the pattern, as matrix number ``which``."""
         schur = self.eliminate(data, which)
         if len(self._kept):
             try:
@@ -107,7 +106,7 @@ class Pardiso:
                 raise PardisoError(_FACTORISE, NOT_POSITIVE) from failure
 
     def eliminate(self, data: Array, which: int = 0) -> Array:
-        """Eliminate all unknowns but those kept; return the Schur complement (m, m) on these."""
+        """Eliminate all unknowns but the kept ones; return the Schur complement (m, m) on these."""
         self._data = np.ascontiguousarray(data, dtype=self._precision)
         m = len(self._kept)
         schur = np.zeros((m, m) if m else 1, self._precision)
@@ -116,7 +115,7 @@ class Pardiso:
 
     def solve(self, b: Array, which: int = 0) -> Array:
         """Return the solution for ``b`` (n,) or (n, k) with the matrix number ``which``."""
-        # PARDISO reads right-hand sides column by column
+        # PARDISO stores right-hand sides by columns
         b = np.asfortranarray(b, dtype=self._precision)
         x = np.zeros_like(b)
         if b.size == 0:
@@ -128,7 +127,7 @@ class Pardiso:
         return self.backward(half, self.on_kept(half[self._kept]))
 
     def forward(self, b: Array) -> Array:
-        """Return the right-hand side (n,) or (n, k) after the unknowns not kept are eliminated.
+        """Return a right-hand side (n,) or (n, k) after elimination down to the kept unknowns.
 
         Its values on the kept unknowns are the right-hand side of the Schur complement.
         """
@@ -139,7 +138,7 @@ class Pardiso:
         return half
 
     def on_kept(self, right: Array) -> Array:
-        """Return the kept unknowns (m,) for the right-hand side of the Schur complement."""
+        """Return the kept unknowns (m,) for a right-hand side of the Schur complement."""
         return np.asarray(cho_solve(self._schur, right, check_finite=False))
 
     def backward(self, half: Array, kept: Array) -> Array:
@@ -151,12 +150,12 @@ class Pardiso:
         return x
 
     def compliance(self, rows: Array) -> Array:
-        """Return ``rows F rows'``, F (m, m) the inverse matrix's part on the kept unknowns."""
+        """Return ``rows F rows'`` with the part F (m, m) of the inverse on the kept unknowns."""
         half = solve_triangular(self._schur[0], rows.T, lower=True, check_finite=False)
         return np.asarray(half.T @ half)
 
     def __sizeof__(self) -> int:
-        """Return the bytes of the analysis and the factors, which are not on Python's heap."""
+        """Return the bytes including analysis and factors, which are not on Python's heap."""
         highest, analysis, factors = self._iparm[14:17]
         return object.__sizeof__(self) + 1024 * int(max(highest, analysis + factors))
 

@@ -1,11 +1,10 @@
-"""The Schur complement of a symmetric matrix: inner unknowns are eliminated once, exactly.
+"""The Schur complement of a symmetric matrix: exact elimination of inner unknowns.
 
 With k the kept and i the inner unknowns, ``K_ii u_i = f_i - K_ik u_k`` and
 
     S u_k = f_k - K_ki K_ii^-1 f_i,   S = K_kk - K_ki K_ii^-1 K_ik
 
-S differs from K_kk in a dense block, on the kept unknowns that are coupled to inner ones: the
-boundary b.
+S differs from K_kk in a dense block on the boundary b: the kept unknowns coupled to inner ones.
 """
 
 from __future__ import annotations
@@ -22,12 +21,12 @@ from solver.linear.pardiso import Pardiso
 from solver.typing import Array, Ints
 
 _COLUMNS = 64
-"""Number of right-hand sides that are solved at once."""
+"""Number of right-hand sides solved at once."""
 
 
 @dataclass(frozen=True, slots=True)
 class Eliminated:
-    """A right-hand side whose inner unknowns are eliminated.
+    """A right-hand side with its inner unknowns eliminated.
 
     Attributes
     ----------
@@ -40,12 +39,12 @@ class Eliminated:
 
 
 class _Method(Protocol):
-    """How the first k unknowns of a matrix (k + b, k + b) are eliminated."""
+    """Elimination of the first k unknowns of a matrix (k + b, k + b)."""
 
     def eliminate(self, data: Array) -> Array:
-        """Return the Schur complement (b, b) of the matrix with these values; its upper triangle.
+        """Return the Schur complement (b, b) of the matrix with these values.
 
-        What is below the diagonal is undefined.
+        Only its upper triangle is defined.
         """
 
     def forward(self, right: Array) -> Array:
@@ -56,7 +55,7 @@ class _Method(Protocol):
 
 
 class _ByColumns:
-    """The elimination by a solve for each of the last unknowns, with any linear solver.
+    """Elimination by one solve for each of the last unknowns, with any linear solver.
 
     Parameters
     ----------
@@ -97,7 +96,7 @@ class _ByColumns:
 
 
 class Elimination:
-    """The first k unknowns of symmetric matrices eliminated; their pattern is analysed once.
+    """Elimination of the first k unknowns of symmetric matrices of one pattern.
 
     Parameters
     ----------
@@ -117,8 +116,8 @@ class Elimination:
             self._method = _ByColumns(upper, size, linear_solver)
 
     def taken(self, data: Array) -> Array:
-        """Eliminate, with these values; return ``K_bi K_ii^-1 K_ib`` (b, b)."""
-        # twice the diagonal of the rest: also a body that moves freely is positive definite
+        """Eliminate with these values, and return ``K_bi K_ii^-1 K_ib`` (b, b)."""
+        # twice the diagonal of the last unknowns makes the matrix of a free body positive definite
         self._upper.data = data.copy()
         self._upper.data[self._diagonal] *= 2
         schur = np.triu(self._method.eliminate(self._upper.data))
@@ -135,7 +134,7 @@ class Elimination:
 
 
 class SchurComplement:
-    """A matrix (n, n) reduced to the unknowns ``kept``; those neither kept nor inside are zero.
+    """A matrix (n, n) reduced to the kept unknowns; those neither kept nor inside are zero.
 
     Parameters
     ----------
@@ -144,8 +143,8 @@ class SchurComplement:
 
     Attributes
     ----------
-    boundary : (b,) positions among the kept unknowns that are coupled to inner ones
-    taken : (b, b) the block K_ki K_ii^-1 K_ik, subtracted from K_kk there
+    boundary : (b,) positions, among the kept unknowns, of those coupled to inner ones
+    taken : (b, b) block K_ki K_ii^-1 K_ik on the boundary, subtracted from K_kk
     """
 
     def __init__(
@@ -188,8 +187,8 @@ def with_block(
 
     Returns
     -------
-    The upper triangle, and positions in its values: of the entries (n,), and of the upper triangle
-    of the block in the order of `numpy.triu_indices`.
+    The upper triangle; the positions in its values of the entries (n,); and those of the upper
+    triangle of the block, in the order of `numpy.triu_indices`.
     """
     first, second = np.triu_indices(len(block))
     rows = np.concatenate([row, block[first]])

@@ -1,9 +1,8 @@
 """Symmetric sparse systems behind one interface: analyse once, factorise, solve many.
 
-A matrix is given by its upper triangle in CSR form. ``kept`` are the unknowns for which
-`LinearSolver.compliance` will be called. `analyse` chooses MKL PARDISO if it is installed, else
-SuperLU; the environment variable ``RESIDUA_LINEAR_SOLVER`` (``pardiso`` or ``superlu``) overrides
-this choice.
+A matrix is given by its upper triangle in CSR form. `LinearSolver.compliance` is available on the
+``kept`` unknowns. `analyse` chooses MKL PARDISO if it is installed, else SuperLU; the environment
+variable ``RESIDUA_LINEAR_SOLVER`` (``pardiso`` or ``superlu``) overrides this choice.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ class LinearSolver(Protocol):
         """Return the solution for ``b`` (n,) or (n, k)."""
 
     def begin(self, b: Array) -> Begun:
-        """Begin the solution for ``b`` (n,): compute its kept unknowns only."""
+        """Return the solution for ``b`` (n,) on the kept unknowns, to be finished later."""
 
     def compliance(self, rows: Array) -> Array:
         """Return ``rows A^-1 rows'`` (k, k) for ``rows`` (k, m) on the m kept unknowns."""
@@ -67,17 +66,17 @@ class SuperLU:
         self._kept = kept
 
     def __sizeof__(self) -> int:
-        """Return the bytes of the factor, which is not on Python's heap."""
+        """Return the bytes including the factor, which is not on Python's heap."""
         entries = self._factor.nnz if hasattr(self, "_factor") else 0
         return object.__sizeof__(self) + 12 * entries
 
     def factorise(self, data: Array) -> None:
         """See `LinearSolver`."""
         self._upper.data = np.asarray(data, dtype=float)
-        full = self._upper + sparse.triu(self._upper, 1, format="csr").T
+        matrix = self._upper + sparse.triu(self._upper, 1, format="csr").T
         try:
             self._factor = splu(
-                full.tocsc(),
+                matrix.tocsc(),
                 permc_spec="MMD_AT_PLUS_A",
                 diag_pivot_thresh=0.0,
                 options={"SymmetricMode": True},
@@ -99,7 +98,7 @@ class SuperLU:
 
 
 class PardisoSolver:
-    """MKL PARDISO: Cholesky, and LDL' when a pivot is not positive."""
+    """MKL PARDISO: Cholesky, or LDL' if a pivot is not positive."""
 
     def __init__(
         self,
@@ -186,9 +185,9 @@ class _SuperLUFactors:
 
 
 class _PardisoFactors:
-    """See `Factors`: one analysis for all of a precision, by minimum degree.
+    """See `Factors`: one analysis per precision, ordered by minimum degree.
 
-    A matrix that is not positive definite in single precision has factors in double alone.
+    A matrix that is not positive definite in single precision has factors only in double.
     """
 
     def __init__(self, upper: sparse.csr_array, count: int) -> None:
@@ -218,7 +217,7 @@ class _PardisoFactors:
 
 
 def _twice(solver: LinearSolver, b: Array, kept: Ints) -> Begun:
-    """Return a solution that a second full solve finishes, if the right-hand side changes."""
+    """Return a solution that needs a second solve if the right-hand side changes."""
     first = solver.solve(b)
 
     def finish(change: Array) -> Array:
@@ -266,9 +265,9 @@ def analyse(
 
     Parameters
     ----------
-    kept : (m,) increasing, unknowns that `LinearSolver.compliance` will be called for
-    coupled : whether part of the unknowns are densely coupled, and none kept: PARDISO orders by
-        minimum degree then. In a window of 13 600 unknowns of a half-plane that halves the time of
+    kept : (m,) increasing, unknowns of `LinearSolver.compliance`
+    coupled : whether part of the unknowns are densely coupled and none kept: PARDISO then orders by
+        minimum degree. In a window of 13 600 unknowns of a half-plane this halves the time of
         analysis and solves
 
     Raises
@@ -283,10 +282,10 @@ def analyse(
 
 
 def analyse_several(upper: sparse.csr_array, count: int, name: str = "auto") -> Factors:
-    """Return a place for the factors of ``count`` positive definite matrices of one pattern.
+    """Return a solver for ``count`` positive definite matrices of one pattern.
 
-    It suits some thousand unknowns, part of them densely coupled: PARDISO orders by minimum degree
-    then, which leaves a fifth fewer entries than nested dissection.
+    It suits some thousand unknowns, part of them densely coupled: PARDISO orders by minimum degree,
+    which gives a fifth fewer entries than nested dissection.
 
     Raises
     ------

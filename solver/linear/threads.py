@@ -1,7 +1,7 @@
 """Limit BLAS to one thread: the dense blocks of an increment are small, and runs are parallel.
 
-With several threads the library spends its time on synchronisation: on two busy cores a run took
-seven times as long.
+Several threads spend their time on synchronisation: on two busy cores a run took seven times as
+long.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""A loading history, solved in increments; an increment that fails is halved."""
+"""Solve a loading history in increments; halve an increment that fails."""

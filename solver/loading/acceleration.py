@@ -2,8 +2,8 @@
 
 The tangent lacks the derivatives of contact normals and of the friction bound along a surface, and
 may be blended with the elastic stiffness. Newton's method then converges like a geometric series,
-at times with a ratio of 0.9. Anderson's mixing combines the last iterates so that the remaining
-step is least. If the missing part of the tangent is constant, this restores Newton's method.
+sometimes with a ratio of 0.9. Anderson's mixing combines the last iterates so that the remaining
+step is smallest. If the missing part of the tangent is constant, this restores Newton's method.
 
 D.G. Anderson, J. ACM 12 (1965) 547-560; H.F. Walker, P. Ni, SIAM J. Numer. Anal. 49 (2011)
 1715-1735, algorithm 2.
@@ -23,13 +23,13 @@ Vectors = tuple[Array, ...]
 
 
 _SLOW = 0.6
-"""Ratio |step_k| / |step_k-1|; above it convergence counts as slow."""
+"""|step_k| / |step_k-1|: convergence is slow above this ratio."""
 _PATIENCE = 5
-"""Number of slow steps in a row that make a series; a change of contact status causes a few."""
+"""Number of slow steps in a row before acceleration; a change of contact status causes a few."""
 _WINDING = 3.0
-"""Ratio |step_k| / |step_k-1|; above it the step does not continue the series."""
+"""|step_k| / |step_k-1|: a step above this ratio begins a new series."""
 _ALONG = 0.7
-"""Cosine of the angle between two steps; above it they have the same direction."""
+"""Cosine of the angle between two steps: above it they have the same direction."""
 _DEPTH = 5
 
 
@@ -37,9 +37,9 @@ _DEPTH = 5
 class Series:
     """Successive whole steps that hardly decrease, with the same contact status.
 
-    They may alternate or circle about the solution. Steps that grow in one direction may mean that
-    a body flows plastically, and are not accelerated. After a partial step points have changed
-    between elastic and plastic, and with them what the tangent lacks: it ends the series.
+    They may alternate or circle about the solution. Steps that grow in one direction may be plastic
+    flow of a body and are not accelerated. A partial step ends the series: points have changed
+    between elastic and plastic, so the missing part of the tangent has changed too.
     """
 
     _key: bytes = b""
@@ -52,7 +52,7 @@ class Series:
     ) -> tuple[Vectors, Array] | None:
         """Return accelerated displacements and contact forces after a step.
 
-        None if convergence is fast, as it nearly always is: the step itself is then used.
+        None if convergence is fast, as nearly always: the step itself is then used.
         """
         if share < 1:
             self._slow, self._places, self._steps = 0, [], []

@@ -12,8 +12,8 @@ from solver.materials.law import Law
 def excess_shear(system: System) -> LimitLoad | None:
     """Return the error if a prescribed shear exceeds the shear yield stress, else None.
 
-    The traction equals the stress at the surface. Without hardening the stress stays inside the
-    yield surface, so no equilibrium exists for a larger shear.
+    The traction equals the stress at the surface. Without hardening the stress cannot leave the
+    yield surface, so a larger shear has no equilibrium.
     """
     for body in system.model.bodies:
         travelling = body.travelling

@@ -1,4 +1,4 @@
-"""When an increment has converged, and how a load is divided into increments."""
+"""Tolerances of an increment, and the division of a load into increments."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from solver.kinds import check_kinds
 from solver.loading.program import Program, load_and_release
 
 INCREMENT_ERROR = 0.006
-"""Largest error of stress, over the yield stress, that the length of an increment may add: the sum
-over the increments of a load is then one or two percent. The number of increments grows
-as 1 / sqrt(error)."""
+"""Error of stress by the length of an increment, over the yield stress, at most: the errors of all
+increments of a load then sum to one or two percent. The number of increments grows as
+1 / sqrt(error)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,8 +22,8 @@ class Tolerances:
     ----------
     residual : largest out-of-balance force over the largest force level so far
     contact : largest violation of the contact conditions, as a force, over the same level
-    iterations : largest number of Newton iterations of an increment; half as many more in windows
-        of the bodies, where an iteration costs a fraction, and in the last attempt
+    iterations : largest number of Newton iterations of an increment. 1.5 times as many are allowed
+        in windows of the bodies, where an iteration is cheap, and in the last attempt
     """
 
     residual: float = 1e-8
@@ -32,7 +32,7 @@ class Tolerances:
 
     @property
     def patient(self) -> Tolerances:
-        """The same with half as many more iterations."""
+        """The same with 1.5 times as many iterations."""
         return replace(self, iterations=3 * self.iterations // 2)
 
 
@@ -64,7 +64,7 @@ class PathControl(Control):
 
     Attributes
     ----------
-    load_step : increments of loading end at its multiples, in load factor
+    load_step : step of the load factor; increments of loading end at its multiples
     unload_steps : number of equal increments from full load to zero; the last separates the bodies
     max_cuts : how often an increment may be halved before the run ends with an error
     increment_error : see `Control`

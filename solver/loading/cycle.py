@@ -1,4 +1,4 @@
-"""What a cycle of repeated stages adds: plastic strain and dissipated work."""
+"""Plastic strain and dissipated work of a cycle of repeated stages."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ class Cycle:
 
     Attributes
     ----------
-    points : (n,) numbers of the points of all parts, part after part, that flow in it
-    accumulated : (n,) equivalent plastic strain that they accumulate
-    net : (n,) equivalent of the signed plastic strain that is left
-    dissipated : plastic work and work of friction, which are the areas of all loops of force over
-        displacement when a cycle closes [N mm]
-    before : largest plastic strain accumulated before it
+    points : (n,) numbers of the points that flow in the cycle, counted over all parts
+    accumulated : (n,) equivalent plastic strain accumulated in the cycle
+    net : (n,) equivalent of the change of the signed plastic strain
+    dissipated : plastic work and work of friction [N mm]; for a closed cycle the area of all loops
+        of force over displacement
+    before : largest plastic strain accumulated before the cycle
     """
 
     points: Ints

@@ -43,7 +43,7 @@ def worked(system: System, before: Converged, now: Converged) -> Energy:
 def _released(system: System, before: Converged, now: Converged) -> float:
     """Return the work on contact forces that vanish because the bodies are separated [N mm].
 
-    Those of links stay.
+    The forces of links do not vanish.
     """
     if not now.separated:
         return 0.0
@@ -57,7 +57,7 @@ def _released(system: System, before: Converged, now: Converged) -> float:
 def _heat(parts: Sequence[Part], before: Converged, now: Converged) -> float:
     """Return the work of stress on the change of eigenstrain and of the elastic constants [N mm].
 
-    With the elastic strains e0, e1 and stresses s0, s1 of both ends, energy grows by exactly
+    With elastic strains e0, e1 and stresses s0, s1 at both ends, the energy grows by exactly
     (s0 + s1) (e1 - e0) / 2 + (s1 e0 - s0 e1) / 2. The second term is zero for constant stiffness.
     """
     times = before.state.time, now.state.time
@@ -90,7 +90,7 @@ def _turned(system: System, before: Converged, now: Converged) -> float:
     """Return the work on rotating rigid bodies minus the work of the mean moments [N mm].
 
     Under small sliding contact forces keep their directions while a body rotates. Their work is the
-    mean force times the motion of the surface; mean moment times rotation misses some of it.
+    mean force times the motion of the surface, which mean moment times rotation does not equal.
     """
     work = 0.0
     for k, interface in enumerate(system.interfaces):

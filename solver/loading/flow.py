@@ -1,4 +1,4 @@
-"""The proof of a limit load: a mechanism on which the load does more work than can be resisted."""
+"""Proof of a limit load: a mechanism on which the load does more work than can be dissipated."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ Vectors = Sequence[Array]
 
 
 _ELSE = 0.01
-"""Largest work of what a mechanism does not do, change volume, overlap, violate links, over its
-dissipation: the forces that resist it are not known, only that this motion hardly needs them."""
+"""Work of a motion on change of volume, overlap and violation of links, over its dissipation, at
+most. The forces that resist them are unknown; the motion is a proof only if they hardly matter."""
 _SINGULAR = 1e-7
-"""Ratio of the tangent to the elastic stiffness along a step; below it the tangent is singular."""
+"""Tangent over elastic stiffness along a step: the tangent is singular below this ratio."""
 _MECHANISM = 1e-2
-"""The same for bodies without load."""
+"""The same ratio for bodies without load."""
 _MOVES = 1e-3
-"""Ratio of the elastic energy of a part in a step to that of all; above it the part moves."""
+"""Elastic energy of a part in a step over that of all parts: the part moves above this ratio."""
 
 
 def mechanism(
@@ -40,21 +40,22 @@ def mechanism(
     candidates: Candidates,
     level: float,
 ) -> Mechanism:
-    """Return a motion of all parts as a mechanism.
+    """Return a motion of all parts as a mechanism, with its ratio of powers.
 
-    This is the kinematic theorem of limit analysis: if the load does more work on a motion than any
-    stress inside the yield surfaces, no equilibrium exists. It also holds at corners of the
-    surface. With s the present deviator of stress and r the out-of-balance forces without contact:
+    By the kinematic theorem of limit analysis no equilibrium exists if the load does more work on a
+    motion than any stress inside the yield surfaces. This also holds at corners of the surface.
+    With s the present deviator of stress and r the out-of-balance forces without contact:
 
-    1. A part whose stress has no bound only moves as a rigid body: the rest of its motion is left
-       out, so that it is found as a gap or overlap in step 4.
+    1. A part with unbounded stress moves as a rigid body only: the rest of its motion is left out,
+       and appears as a gap or overlap in step 4.
     2. Power of the load on each part: r v + the integral of s e, with e the strain of the motion v.
-       It is that of the external forces, without the mean stress if the motion keeps the volume.
-    3. Power of plastic flow: the integral of the largest work of a stress on e. A mean stress that
-       differs from the present one by the tensile strength is admitted too.
-    4. Power of contact and links: no pressure acts where surfaces part. Against an overlap, and
-       against the violation of a link, a vertex resists with all of the force level. Friction
-       resists by its bound under the present normal forces.
+       This is the power of the external forces; the mean stress does no work if the volume is
+       constant.
+    3. Power of plastic flow: the integral of the largest work of a stress on e. The mean stress may
+       differ from the present one by up to the tensile strength.
+    4. Power of contact and links: no pressure acts where surfaces part. An overlap and the
+       violation of a link are resisted by the whole force level at each vertex, slip by the
+       friction bound under the present normal forces.
 
     Parameters
     ----------
@@ -87,10 +88,8 @@ def mechanism(
     apart, normal = rates[: candidates.n], candidates.forces[: candidates.n]
     held = np.abs(np.minimum(apart, 0.0)).sum() + np.abs(rates[candidates.linked]).sum()
     bound = candidates.lines.least(normal)[: rates[candidates.along].size]
-    friction, besides = (
-        float(bound @ np.abs(rates[candidates.along])),
-        swelling + level * float(held),
-    )
+    friction = float(bound @ np.abs(rates[candidates.along]))
+    besides = swelling + level * float(held)
     if not load > 0 or besides >= _ELSE * (sum(flow) + friction):
         return Mechanism()
     weakest = int(np.argmax(flow))
@@ -106,8 +105,8 @@ def is_singular(
 ) -> bool:
     """Whether a part has so little stiffness along a step that rounding determines the step.
 
-    Under no load overlapping bodies push each other apart by a given distance. Without stiffness
-    the plastic strain that achieves this is not unique.
+    Bodies without load get a coarser limit: overlapping bodies push each other apart by a given
+    distance, and without stiffness the plastic strain that achieves this is not unique.
     """
     loaded = any(part.external(time).any() for part in parts)
     each = zip(parts, step, responses, strict=True)

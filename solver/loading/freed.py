@@ -1,7 +1,7 @@
 """Refuse loads on bodies that nothing holds, before anything is computed.
 
-Where all contact pairs of a body are absent, or the bodies are separated, and neither supports nor
-links hold it, a load may not move it: no equilibrium exists.
+If neither supports nor links hold a body, and its contact pairs are absent or the bodies separated,
+a load that moves it has no equilibrium.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from solver.model.contact_pair import ContactPair
 from solver.typing import Array
 
 _LITTLE = 1e-6
-"""Ratio of a resultant to the largest load on its body; below it the resultant is rounding."""
+"""Resultant over the largest load on its body: a smaller ratio is rounding."""
 _ALONG = 0.1
-"""Ratio of the motion in one direction to the largest, above which the direction is named."""
+"""Motion in one direction over the largest: messages name directions above this ratio."""
 
 
 def check_freed(system: System, program: Program) -> None:
@@ -32,7 +32,7 @@ def check_freed(system: System, program: Program) -> None:
             continue
         name = part.body.name
         if name in system.names and not isinstance(part, Wheel):
-            part = system.full(name)  # nothing needs to be condensed
+            part = system.full(name)  # saves the condensation
         pairs = [i.declared for i in system.interfaces if number in (i.slave, i.master)]
         targets, least = program.targets, None
         times = [program.laps[0].start, *(target.time for target in targets)]
@@ -47,9 +47,10 @@ def check_freed(system: System, program: Program) -> None:
                 raise ModelError(
                     "supports", getattr(part.body, "supports", {}),
                     f"body {name!r} is free to move {_ways(part, pushed)} at "
-                    f"{program.place(target.time)}, where its load pushes it: no support or link "
-                    f"holds it, and {'bodies are separated' if target.apart else _gone(pairs)}. "
-                    "Let the load end by then, or hold the body",
+                    f"{program.place(target.time)}, but its load acts in this direction: no "
+                    "support or link holds it, and "
+                    f"{'bodies are separated' if target.apart else _gone(pairs)}. "
+                    "End the load before, or hold the body",
                 )  # fmt: skip
 
 
@@ -60,7 +61,7 @@ def _gone(pairs: list[ContactPair]) -> str:
 
 def _ways(part: Part, pushed: Array) -> str:
     """Return the directions in which a body would move, in words."""
-    sizes = np.abs(pushed[-3:])  # of a rigid body or a hub
+    sizes = np.abs(pushed[-3:])  # motion of a rigid body or a hub
     if part.meshed:
         each = vectors(pushed, len(part.nodes))
         sizes = np.append(np.abs(each.mean(axis=1)), np.ptp(each, axis=1).max() / 2)

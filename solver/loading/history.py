@@ -8,19 +8,19 @@ from solver.contact.state import Converged
 from solver.contact.system import System
 
 _APART = 1e-4
-"""Ratio of the gap of a vertex without force to the edge length; above it the vertex is open."""
+"""Gap of a vertex without force over the edge length: the vertex is open above this ratio."""
 
 
 def lost(system: System, before: Converged, now: Converged) -> float:
-    """Return how much the state at the beginning of ``now`` differs from the end of ``before``.
+    """Return the difference between the beginning of ``now`` and the end of ``before``.
 
-    It is the largest of
+    It is the larger of
 
-    - the excess of the stress at the end of ``before`` over the yield surface of the internal
-      variables at the beginning of ``now``, over the yield stress: above zero if plastic strain,
-      hardening or back stress was lost
-    - the gap of an open vertex that is marked as touching, over the mean edge length, if it is
-      above `_APART`
+    - the yield value, over the yield stress, of the stress at the end of ``before`` with the
+      internal variables at the beginning of ``now``: positive if plastic strain, hardening or back
+      stress was lost
+    - the gap, over the mean edge length, of an open vertex that is marked as touching, if above
+      `_APART`
     """
     worst = 0.0
     both = zip(system.parts, before.responses, now.start.plastic, strict=True)

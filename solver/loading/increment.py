@@ -2,20 +2,20 @@
 
 From the last converged state, at the current displacements:
 
-1. constitutive update: internal force and consistent tangent K of every part; friction is not
-   in K, which stays symmetric
+1. constitutive update: internal force and consistent tangent K of every part; K is symmetric,
+   friction is not part of it
 2. contact geometry: gap, slip and their derivative rows H at the candidate vertices
 3. compliance of the contact points ``W = H K^-1 H'``
 4. the frictional contact problem on W, exactly; the free rigid motions of parts held by contact
    alone are extra unknowns with exact balance equations, as in FETI. If the problem has no
    solution, or steps are far too long, the tangent is blended with the elastic stiffness
-5. the whole step if it lessens the out-of-balance forces much; else a line search on the plastic
-   residual, contact forces interpolated
-6. converged when the residual with contact forces, and the violation of the contact conditions, are
+5. the whole step if it reduces the out-of-balance forces enough; else a line search on the plastic
+   residual, with interpolated contact forces
+6. convergence if the residual with contact forces, and the violation of the contact conditions, are
    within the tolerances
 
-Without a prediction the first iteration uses the elastic operator: after a reversal of load the
-plastic tangent of the previous step would make Newton's method diverge.
+Without a prediction the first iteration uses the elastic operator: after a reversal of load
+Newton's method would diverge with the plastic tangent of the previous step.
 """
 
 from __future__ import annotations
@@ -56,26 +56,27 @@ Vectors = tuple[Array, ...]
 
 
 _BLENDS = (0.0, 1e-3, 0.02, 0.1, 0.3, 1.0)
+"""Shares of the elastic stiffness in the tangent, tried in this order."""
 _SHORT = 0.1
-"""Line search share below which a step is short. Each after the first asks for the next blend, the
-last of which, the elastic stiffness, stays in reserve."""
+"""Share of a step that the line search takes: a step is short below it. Each short step after the
+first one moves to the next blend, but not to the last one, the elastic stiffness."""
 _PATIENCE = 15
-"""Number of iterations without a smaller residual after which an increment has failed."""
+"""Number of iterations without a smaller residual: an increment fails after more."""
 _DIVERGED = 1e4
 _LESS = 0.8
-"""Ratio of the out-of-balance forces after a whole step to those before; below it the step is taken
-without a line search. Close to a limit load the energy rises along many a step that leads on."""
+"""Out-of-balance forces after a whole step over those before: a step with a smaller ratio needs no
+line search. Close to a limit load the energy rises along many steps that approach the solution."""
 _UNBALANCED = 100.0
 _ROUNDED = 10.0
-"""Factor between the force level of bodies without load and the level at which rounding errors
-alone would exceed the tolerance."""
+"""Force level of bodies without load, over the level at which rounding errors alone would exceed
+the tolerance."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Balanced:
     """The last iterate of an increment, in equilibrium.
 
-    ``scale`` is the force level [N]; ``iterations``, ``pivoted`` and ``blended`` as in `Converged`.
+    ``scale`` is the force level [N]; see `Converged` for ``iterations``, ``pivoted``, ``blended``.
     """
 
     u: Vectors
@@ -95,15 +96,14 @@ class Increment:
 
     Parameters
     ----------
-    guess : state to iterate from, ``start`` when absent; its prescribed motions are those at
-        ``time``
-    contact : False separates the bodies
-    friction : False leaves friction out
+    guess : first iterate, by default ``start``; its prescribed motions are those at ``time``
+    contact : false separates the bodies
+    friction : false leaves friction out
     elastic_first : use the elastic operator in the first iteration
     elastic_only : raise `Yielded` as soon as a point yields
     patient : use all iterations if every body hardens, so that an equilibrium exists: with little
         hardening the residual rises and falls while the energy falls
-    compliance : elastic compliance of contact points by their vertices, as far as known [mm/N]
+    compliance : elastic compliances of contact points known so far, by their vertices [mm/N]
     """
 
     def __init__(
@@ -145,7 +145,7 @@ class Increment:
             return self._commit(self._iterate())
 
     def closed(self, found: Balanced) -> Converged | None:
-        """Return the increment that ends in an iterate, or None if that is out of balance."""
+        """Return the increment that ends in an iterate; None if it is outside the tolerances."""
         with one_thread():
             scale, error, violation = self._errors(found.residuals, found.candidates)
             if not self._ends(found.u, found.candidates, scale, error, violation):
@@ -153,7 +153,7 @@ class Increment:
             return self._commit(replace(found, scale=scale))
 
     def approach(self) -> Balanced:
-        """Return where the iterations of an increment end, or raise `IncrementFailed`."""
+        """Return the last iterate of the increment, or raise `IncrementFailed`."""
         with one_thread():
             return self._iterate()
 
@@ -223,7 +223,7 @@ class Increment:
         )
 
     def _guessed(self) -> State:
-        """Return the state to iterate from: parts that nothing holds stay where they are."""
+        """Return the first iterate, in which parts that nothing holds keep their positions."""
         if self.guess is None:
             return self.start
         system, u = self.system, list(self.guess.u)
@@ -234,9 +234,9 @@ class Increment:
         return replace(self.guess, u=tuple(u))
 
     def _slide(self, *places: tuple[Vectors, Candidates]) -> Slide | None:
-        """Return how a body slides, at the given iterates or at the beginning of the increment.
+        """Return the slide of a body in one of the iterates ``places``, or in the first one.
 
-        The beginning counts too, because a step may have lost the contacts of the body.
+        The first iterate is examined because a later one may have lost the contacts of the body.
         """
         places = (*places, self._began) if self._began else places
         found = (slide(self.system, residuals, candidates) for residuals, candidates in places)
@@ -251,8 +251,8 @@ class Increment:
     ) -> Mechanism:
         """Return the motion that proves a limit load, or the one that comes closest to a proof.
 
-        Motions are the ways from each iterate to the next and to the last one: the iterates of a
-        body that flows wander about its mechanism, and the longer the way the less they do. In
+        Motions lead from each iterate to the last one and to the next one. Iterates of a flowing
+        body scatter about its mechanism; in a long motion the scatter is relatively small. In
         windows of bodies nothing is proven: the rest of a body could flow too.
         """
         system, best, path = self.system, Mechanism(), self._path
@@ -292,14 +292,14 @@ class Increment:
         inner = on_parts(self.system, candidates, candidates.forces)
         external = float(np.hypot.reduce([part.force_level(self.time) for part in parts]))
         level = external + norm(inner)
-        if external == 0:  # only the overlap of bodies causes forces: stress gives the level
+        if external == 0:  # overlap alone causes forces: the internal forces are the level
             level += norm(residuals)
         if external == 0 and self.start.force_scale == 0:  # bodies without contact and force
             level += _ROUNDED * rounding(self.system, self.start.u) / self.tolerances.residual
         scale = max(self.start.force_scale, level, self._least)
         if scale == 0:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
-            off = overlap < -self.system.touching or candidates.motion[candidates.linked].any()
+            off = overlap < -self.system.gap_tolerance or candidates.motion[candidates.linked].any()
             return 0.0, float(off), 0.0
         error = self._unbalanced(residuals, candidates, candidates.forces) / scale
         stiffness = 1 / np.diag(self._compliance(candidates))
@@ -307,15 +307,19 @@ class Increment:
 
     def _unbalanced(self, residuals: Vectors, candidates: Candidates, forces: Array) -> float:
         """Return the norm of the out-of-balance forces of all parts under contact forces [N]."""
-        left = out_of_balance(self.system, residuals, candidates, forces)
-        return norm([r[part.free] for part, r in zip(self.system.parts, left, strict=True)])
+        each = zip(
+            self.system.parts,
+            out_of_balance(self.system, residuals, candidates, forces),
+            strict=True,
+        )
+        return norm([r[part.free] for part, r in each])
 
     def _ends(
         self, u: Vectors, candidates: Candidates, scale: float, error: float, violation: float
     ) -> bool:
-        """Whether an iterate meets the tolerances."""
+        """Whether an iterate is within the tolerances, or within rounding if slightly outside."""
         limit = self.tolerances.residual
-        # a body that flows moves far: an out-of-balance force may then be more than rounding
+        # a flowing body moves far: rounding of its displacements may exceed the tolerance
         balanced = error < limit
         little = 0 < error < _UNBALANCED * limit
         balanced |= little and error * scale <= rounding(self.system, u)
@@ -327,7 +331,7 @@ class Increment:
         return balanced and met and candidates.beyond >= 0
 
     def _compliance(self, candidates: Candidates) -> Array:
-        """Return the elastic compliance of the contact points [mm/N], a scale; computed once."""
+        """Return the elastic compliance of the contact points [mm/N], computed once."""
         key = tuple(vertices.tobytes() for vertices in candidates.vertices)
         if key not in self.compliance:
             W = candidates.compliance([o.elastic for o in self.system.operators])
@@ -346,9 +350,9 @@ class Increment:
         candidates: Candidates,
         blends: Sequence[float],
     ) -> NewtonStep:
-        """Return the step with the first of the ``blends`` for which the problem has a solution.
+        """Return the step with the first of the ``blends`` that has a solution.
 
-        Raises `IncrementFailed` if none has.
+        Raises `IncrementFailed` if no blend has one.
         """
         for blend in blends:
             try:
@@ -376,24 +380,23 @@ class Increment:
     ) -> tuple[float, Vectors, tuple[PartResponse, ...], Vectors]:
         """Return a share of the step, and displacements, responses and residuals after it.
 
-        ``out`` is the norm of the out-of-balance forces before the step, or what is allowed over
-        `_LESS` if that is more [N]: a step to what is allowed needs no line search.
+        ``out`` is the norm of the out-of-balance forces before the step, at least the tolerance
+        over `_LESS` [N]: a step that ends within the tolerance needs no line search.
         """
         trial: tuple[Vectors, tuple[PartResponse, ...], Vectors]
 
-        def left(share: float) -> Vectors:
-            """Return the residuals after a share of the step."""
+        def residuals_at(share: float) -> Vectors:
             nonlocal trial
             moved = tuple(ui + share * du for ui, du in zip(u, step.u, strict=True))
             responses = self._respond(moved)
             trial = moved, responses, self._residuals(moved, responses)
             return trial[-1]
 
-        whole = left(1.0)
+        whole = residuals_at(1.0)
         if self._unbalanced(whole, candidates, step.forces) < _LESS * out:
             return 1.0, *trial
         # if vertices change status, the slope with the contact forces before the step may be
-        # negative; with those after the step it is the quadratic form of the tangent
+        # negative; with those after it the slope is the quadratic form of the tangent, positive
         before = candidates.forces
         if step.slope(self.system, residuals, candidates, before) <= 0:
             before = step.forces
@@ -402,7 +405,8 @@ class Increment:
             forces = (1 - share) * before + share * step.forces
             return step.slope(self.system, residual, candidates, forces)
 
-        share = search(lambda s: along(s, left(s)), along(0.0, residuals), along(1.0, whole))
+        start, end = along(0.0, residuals), along(1.0, whole)
+        share = search(lambda s: along(s, residuals_at(s)), start, end)
         return share, *trial
 
     # -- 6: the converged state ----------------------------------------------------------------

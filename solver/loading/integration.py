@@ -1,9 +1,9 @@
-"""The error of stress that an increment adds because plastic flow turns within it.
+"""Error of stress in an increment: backward Euler gives plastic flow one direction.
 
-Flow has one direction in an increment. Parts of the increment, along the same straight path of
-strain, let it turn, and have as much less of the error as they are shorter: the difference of their
-stress estimates it. It is of second order in the length of an increment; what all increments of a
-path leave is of first order.
+The strain of the increment is applied again in `_PARTS` equal parts along the same straight path,
+in which the direction of flow changes. Their error is smaller by this number, so the difference
+between the two stresses estimates the error. It is of second order in the length of an increment;
+the sum over a path is of first order.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from solver.fem.discretisation import Discretisation
 from solver.typing import Array, Bools
 
 _PARTS = 4
-"""Number of parts; two would not see the turn of a flow that begins in the second half."""
+"""Number of parts of an increment; with two, flow that begins in the second half could not turn."""
 
 
 def integrated(system: System, before: Converged, now: Converged) -> Converged:
-    """Return an increment with the error that it adds, and what those of the path so far leave."""
+    """Return the increment ``now`` with its error, and the remaining sum of errors of the path."""
     sums, added = list(before.missed or (None,) * len(system.parts)), 0.0
     for k, part in enumerate(system.parts):
         grown = now.responses[k].state.accumulated - now.start.plastic[k].accumulated
@@ -48,7 +48,10 @@ def missed(system: System, now: Converged) -> float:
 
 
 def _missed(part: Discretisation, now: Converged, number: int, flows: Bools) -> Array:
-    """Return what ever shorter parts would add to stress (n_components, n_points) [MPa]."""
+    """Return the exact stress minus that of the increment (n_components, n_points) [MPa].
+
+    The exact stress is extrapolated to infinitely many parts.
+    """
     within = np.asarray(flows.reshape(part.weights.shape).any(axis=1))
     points = np.flatnonzero(np.repeat(within, part.weights.shape[1]))
     ends = (now.start.time, now.start.u[number]), (now.state.time, now.state.u[number])
@@ -63,20 +66,20 @@ def _missed(part: Discretisation, now: Converged, number: int, flows: Bools) -> 
 
 
 def _carried(part: Discretisation, now: Converged, number: int, error: Array) -> Array:
-    """Return what an increment leaves of an error of stress at its beginning [MPa].
+    """Return the remainder, after an increment, of an error of stress at its beginning [MPa].
 
-    Along a given strain it acts as a change of strain: flow, which brings stress to the yield
-    surface, lessens it.
+    For a given total strain the error acts as a change of strain. Flow reduces it, because it
+    returns the stress to the yield surface.
     """
     response = now.responses[number]
     points = np.flatnonzero(response.yielding)
     strain = part.law(now.state.time).at(points).elastic_strain(error[:, points])
-    left = error.copy()
-    left[:, points] = np.einsum("ijp,jp->ip", response.tangent[:, :, points], strain)
-    return left
+    carried = error.copy()
+    carried[:, points] = np.einsum("ijp,jp->ip", response.tangent[:, :, points], strain)
+    return carried
 
 
 def _mean(part: Discretisation, error: Array, flows: Bools) -> float:
-    """Return the root mean square over the volume that flows, over the yield stress."""
+    """Return the root mean square of an error over the flowing volume, over the yield stress."""
     square = 1.5 * (error**2).sum(axis=0) @ part.volumes / part.volumes[flows].sum()
     return float(np.sqrt(square)) / part.body.law.yield_stress

@@ -11,14 +11,15 @@ _SLACK = 0.2
 def search(slope: Callable[[float], float], start: float, end: float) -> float:
     """Return the share of a step, in (0, 1], at which the energy stops falling.
 
-    In an increment of associated plasticity the energy is convex, and its slope along the step
-    rises through zero. A share is accepted if the slope there is at most a fifth of ``start`` in
-    magnitude, or if the energy still falls at the end of the step. This is tighter than usual: in a
+    In an increment of associated plasticity the energy is convex, and ``slope`` falls through zero
+    along the step. A share is accepted if its slope is at most a fifth of ``start`` in magnitude,
+    or at the end of the step if the energy still falls there. This is tighter than usual: in a
     perfectly plastic body close to its limit, a loose search makes Newton's method very slow.
+    The search is an Illinois iteration.
 
     Parameters
     ----------
-    slope : (share) -> minus the derivative of the energy along the step (Illinois iteration)
+    slope : (share) -> minus the derivative of the energy along the step
     start, end : its values at share zero and one; the whole step is taken if the first is not
         positive
     """

@@ -1,9 +1,9 @@
-"""Iterate an increment in windows of its bodies, outside of which nothing yields.
+"""Solve an increment in windows of its bodies, outside of which nothing yields.
 
-Few elements of a body yield, so most of an iteration is spent on what does not change. An increment
-is therefore first solved in windows around the yielding elements, the rest condensed
+Few elements of a body yield; iterations on the whole body would mostly repeat elastic work. An
+increment is therefore first solved in windows around the yielding elements, the rest condensed
 (`solver.fem.window`), and then checked on the whole bodies. If elements outside have yielded, the
-windows grow. A window is kept from increment to increment until elements outside yield.
+windows grow. A window serves all increments until elements outside yield.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ Yields = list[Bools | None]
 
 
 _LAYERS = 5
-"""Number of layers of elements around those that yield, in a new window."""
+"""Number of layers of elements around the yielding ones, in a new window."""
 _LARGE = 0.5
-"""Ratio of the elements of a window to those of the body; above it a window saves too little."""
+"""Elements of a window over those of the body: a window above this ratio saves too little."""
 _ROUNDS = 4
-"""Number of times windows may grow in an increment."""
+"""Most attempts in windows per increment; windows grow between them."""
 
 
 class FailedInWindows(IncrementFailed):
-    """The increment failed in windows; that proves no limit load, and whole bodies may converge."""
+    """The increment failed in windows. This proves no limit load: whole bodies may converge."""
 
 
 def narrowed(
@@ -53,8 +53,8 @@ def narrowed(
 ) -> Converged | None:
     """Return an increment from ``start`` to ``time`` that was solved in windows.
 
-    None if windows do not serve: nothing yields, they would be large or grow too often, a body
-    comes loose, links act outside of them, or whole bodies are not in balance. Raises
+    None if windows are unsuitable: there are links, nothing yields, windows would be large or grow
+    too often, a body loses its contacts, or the whole bodies are not in balance. Raises
     `FailedInWindows` if the increment fails in them.
 
     Parameters
@@ -74,7 +74,7 @@ def narrowed(
     yields: Yields = [now if now is None or was is None else now | was for now, was in both]
     if not before.windows and not any(own is not None and own.any() for own in yields):
         return None
-    touched: Candidates | None = None  # contact that leaves the windows so far is told by them
+    touched: Candidates | None = None  # unknown until contact leaves the windows (`Singular`)
     needed = _needed(system, touched, yields)
     compliance: dict[tuple[bytes, ...], Array] = {}
     for _ in range(_ROUNDS):
@@ -127,7 +127,7 @@ def narrowed(
 
 
 def _loose(system: System, found: Balanced) -> bool:
-    """Whether nothing holds a body any more: it stays where it is with whole bodies alone."""
+    """Whether a body held by contact has lost it; only whole bodies then keep its position."""
     pairs = zip(system.interfaces, found.contacts, strict=True)
     return any(interface.floating and not state.normal.any() for interface, state in pairs)
 
@@ -135,7 +135,7 @@ def _loose(system: System, found: Balanced) -> bool:
 def _expanded(
     system: System, start: State, time: float, parts: tuple[Part, ...], found: Balanced
 ) -> Balanced:
-    """Return an iterate of windows as one of the whole bodies, with the contact of these."""
+    """Return an iterate of windows as one of the whole bodies, with their contact candidates."""
     expanded = zip(parts, found.u, strict=True)
     u = tuple(p.expand(v, time) if isinstance(p, Windowed) else v for p, v in expanded)
     each = zip(system.parts, u, start.plastic, strict=True)
@@ -153,7 +153,7 @@ def _expanded(
 
 
 def _yields(system: System, responses: Sequence[Response]) -> Yields:
-    """Return the elements (n_elements,) of each meshed part that yield, None of the others."""
+    """Return for each meshed part which elements (n_elements,) yield; None for other parts."""
     each = zip(system.parts, responses, strict=True)
     return [
         np.asarray(response.yielding.reshape(part.weights.shape).any(axis=1))
@@ -164,13 +164,13 @@ def _yields(system: System, responses: Sequence[Response]) -> Yields:
 
 
 def _hold(windows: Sequence[Region | None], needed: Sequence[Region | None]) -> bool:
-    """Whether windows have all that is needed."""
+    """Whether the windows contain the regions ``needed``."""
     both = zip(windows, needed, strict=True)
     return all(need is None or (own is not None and own.has(need)) for own, need in both)
 
 
 def _needed(system: System, touched: Candidates | None, yields: Yields) -> list[Region | None]:
-    """Return where each meshed part yields and, if it is known, touches."""
+    """Return the region in which each meshed part yields and, if known, touches."""
     needed: list[Region | None] = []
     for number, elements in enumerate(yields):
         if elements is None:
@@ -186,7 +186,7 @@ def _needed(system: System, touched: Candidates | None, yields: Yields) -> list[
 def _around(
     system: System, number: int, window: Region | None, need: Region | None
 ) -> Region | None:
-    """Return the window so far if it has all that is needed, else a new one, if small."""
+    """Return the present window if it contains ``need``, else a new one; None if it is large."""
     part = system.parts[number]
     if need is None or not isinstance(part, Discretisation):
         return None

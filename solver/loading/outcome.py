@@ -15,7 +15,8 @@ from solver.loading.slide import Slide
 from solver.tensors import AXES
 
 _CLOSE = 1e-3
-"""Relative distance of a load below one that is excluded; up to it the load is at the limit."""
+"""Relative distance between a load and the excluded load above it: a closer load is at the
+limit."""
 
 
 class Yielded(SolverError):
@@ -34,7 +35,7 @@ class Mechanism:
     place: tuple[float, ...] = (0.0, 0.0)
 
     def __lt__(self, other: Mechanism) -> bool:
-        """Whether the other proves more."""
+        """Whether the other mechanism is closer to a proof."""
         return self.ratio < other.ratio
 
     @property
@@ -44,7 +45,7 @@ class Mechanism:
 
     @property
     def excludes(self) -> bool:
-        """The same: no state before allows for a larger load."""
+        """Whether equilibrium is excluded from any other state: as `limit`, for any history."""
         return self.limit
 
     def __str__(self) -> str:
@@ -56,7 +57,7 @@ class Mechanism:
 
 
 class IncrementFailed(SolverError):
-    """The increment did not converge; ``why`` is the mechanism that proves most, or a slide."""
+    """The increment did not converge; ``why`` is the mechanism closest to a proof, or a slide."""
 
     def __init__(self, message: str, why: Mechanism | Slide | None = None) -> None:
         super().__init__(message)
@@ -67,9 +68,15 @@ class IncrementFailed(SolverError):
 class Tally:
     """Cost and plastic work so far.
 
-    Newton iterations of each increment, cuts, iterations whose contact problem needed pivoting or
-    whose tangent was blended, CPU seconds, plastic work [N mm], least plastic dissipation at a
-    point in an increment [N mm/mm3], largest loss of state between two increments (`history.lost`).
+    Attributes
+    ----------
+    iterations : Newton iterations of each increment
+    cuts : number of increments that failed and were halved
+    pivoted, blended : as in `Converged`
+    seconds : CPU time
+    plastic_work : [N mm]
+    dissipation : least plastic dissipation at a point in an increment [N mm/mm3]
+    lost : largest loss of state between two increments (`history.lost`)
     """
 
     iterations: tuple[int, ...] = ()
@@ -98,7 +105,7 @@ class Tally:
 class Point:
     """A converged state, the states before it (for predictions), and the cost so far.
 
-    ``history`` has the values that ``watch`` returned for every increment; ``met`` are the numbers
+    ``history`` are the values that ``watch`` returned for the increments; ``met`` are the numbers
     of the contact pairs whose surfaces have faced each other.
     """
 
@@ -124,9 +131,9 @@ class Settled:
 
     Attributes
     ----------
-    times : number of increments in place of one of the program
+    times : number of increments per increment of the program
     error : estimated remaining error, in the unit of `StepRefinement.measure`; NaN if unknown
-    failed : number of increments in place of one in the attempt that failed, 0 if none did
+    failed : the same number in the attempt that failed; 0 if none failed
     """
 
     times: int = 1
@@ -141,13 +148,13 @@ class Outcome:
     Attributes
     ----------
     tally : its cost
-    last : the last state reached
+    last : last state reached
     points : states at the ends of the stages of the last lap, by name
     traces : values that the walker's ``trace`` returned, one for each complete lap
-    cycles : the cycles of repeated stages
+    cycles : cycles of repeated stages
     history : values that its ``watch`` returned, for the first state and after each increment
-    error : why the program did not reach its end; None if it did
-    settled : the refinement of its increments
+    error : reason why the program did not reach its end; None if it did
+    settled : refinement of its increments
     """
 
     tally: Tally

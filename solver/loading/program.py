@@ -1,7 +1,7 @@
 """A loading history as data: laps, their stages, and the increments of the stages.
 
-Loads and motions follow amplitudes over time, declared with the bodies. For loads without amplitude
-time is the load factor, which returns to zero when they are released.
+Loads and motions follow amplitudes over time, declared with the bodies. Without an amplitude the
+time is the load factor, which returns to zero when the load is released.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from solver.errors import ModelError
 from solver.kinds import check_kinds
 
 ROUNDING = 1e-9
-"""Relative difference below which two times are the same."""
+"""Relative difference of two times: times that differ by less are equal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,10 +31,10 @@ class Stage:
     apart : whether the last increment separates the bodies
     turns : whether another motion begins: previous rates of gap and slip are then not used
     refined : whether `Program.refined` divides its increments
-    stops : times between, in order, at which an increment ends too, as where an amplitude bends.
-        ``steps`` are shared out between them, at least one each
-    cycle : for a stage that is repeated, which time it is, from 1; 0 for another one. Its state is
-        kept under its name, and that of the time before as ``NAME_before``
+    stops : times between start and target, in order, at which increments end too, for example where
+        an amplitude bends. ``steps`` are distributed over the intervals, at least one each
+    cycle : number of the repetition, from 1, of a repeated stage; 0 for another stage. The state at
+        its end is kept under its name, that of the repetition before as ``NAME_before``
     """
 
     name: str
@@ -86,13 +86,13 @@ class Stage:
         return [*times, self.target]
 
     def refine(self, times: int) -> Stage:
-        """Return the stage with ``times`` increments in place of one."""
+        """Return the stage with ``times`` as many increments."""
         return replace(self, steps=self.steps * times, step=self.step / times)
 
 
 @dataclass(frozen=True, slots=True)
 class Lap:
-    """A group of stages from a time on. At its beginning wheels are set down at their position."""
+    """A group of stages from a time on. It begins with wheels set down at their positions."""
 
     stages: tuple[Stage, ...]
     start: float = 0.0
@@ -147,9 +147,13 @@ class Lap:
 class Target:
     """The end of an increment of a program.
 
-    ``begins`` is the time at which a later lap begins with this increment, ``keeps`` the name of
-    the stage that ends with it, ``closes`` says whether the lap ends with it. ``cycle`` is that of
-    its stage, and ``repeats`` says whether the cycle ends with it.
+    Attributes
+    ----------
+    time : time at its end
+    begins : time at which a lap after the first one begins with this increment; None otherwise
+    turns, apart, cycle : as in `Stage`
+    keeps : name of the stage that ends with it; empty otherwise
+    closes, repeats : whether the lap, or a cycle, ends with it
     """
 
     time: float
@@ -171,8 +175,8 @@ class Program:
     laps : the laps, in their order
     cycle : number of laps after which the loading repeats; 0 if it does not. If nothing yields in a
         whole cycle, later laps repeat its states and are not computed
-    retraces : whether it is one lap of two stages whose loads grow in the first and decrease in the
-        second: elastic bodies then need one increment, and return to their first state
+    retraces : whether the program is one lap of two stages, loading and unloading: elastic bodies
+        then need one increment, and return to their first state
     place : (time) -> text for this time in messages
     """
 
@@ -201,7 +205,7 @@ class Program:
         return sum(lap.count for lap in self.laps)
 
     def refined(self, times: int) -> Program:
-        """Return the program with ``times`` increments in place of one, in `refined` stages."""
+        """Return the program with ``times`` as many increments in its `refined` stages."""
 
         def cut(lap: Lap) -> Lap:
             stages = (stage.refine(times) if stage.refined else stage for stage in lap.stages)
@@ -211,7 +215,7 @@ class Program:
 
 
 def shared(one: Program, other: Program) -> int:
-    """Return how many increments two programs have in common, from the first one on."""
+    """Return the number of increments that two programs have in common at their beginning."""
     count = 0
     for k, (mine, its) in enumerate(zip(one.laps, other.laps, strict=False)):
         if mine == its:
@@ -225,15 +229,15 @@ def shared(one: Program, other: Program) -> int:
 
 
 def walked(programs: Sequence[Program]) -> int:
-    """Return the number of increments of programs; those that two in a row share count once."""
+    """Return the number of increments of programs; successive ones share their common beginning."""
     before = (shared(one, other) for one, other in pairwise(programs))
     return sum(program.count for program in programs) - sum(before)
 
 
 def load_cycles(load: float, step: float, unload_steps: int, cycles: int) -> Program:
-    """Return the program that puts a load factor on and takes it away, as many times as asked.
+    """Return the program that applies and removes a load factor ``cycles`` times.
 
-    Each way is a motion of its own, and each lap ends with the bodies apart.
+    Unloading begins a new motion, and each lap ends with the bodies separated.
     """
     loaded = Stage(name="loaded", target=load, step=step)
     unloaded = Stage(name="unloaded", target=0.0, steps=unload_steps, apart=True, turns=True)

@@ -1,4 +1,4 @@
-"""Halve the increments until the result of the first lap no longer changes."""
+"""Criterion of step refinement: increments are halved until the first lap's result converges."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Any
 from solver.typing import Array
 
 HALVINGS = 6
-"""How often `StepRefinement` halves the increments at most."""
+"""Most halvings of the increments by `StepRefinement`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepRefinement:
-    """The criterion by which increments are halved: the change of the first lap's result.
+    """Increments are halved while this changes the result of the first lap.
 
     Backward Euler in the plastic strain is of first order in the increment, so the change by the
     last halving estimates the remaining error.
 
     Attributes
     ----------
-    measure : (trace of a lap) -> numbers that must not change
-    tolerance : largest change that is accepted
+    measure : (trace of a lap) -> numbers that must converge
+    tolerance : largest change accepted
     """
 
     measure: Callable[[Any], Array]

@@ -1,4 +1,4 @@
-"""Sliding of a whole body: its load exceeds the friction of all its contacts."""
+"""Sliding of a whole body, whose load exceeds the friction of all its contacts."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from solver.contact.system import System
 from solver.typing import Array
 
 _SPENT = 0.95
-"""Ratio of the tangential force of a pair to its friction bound; above it a hint is given."""
+"""Tangential force of a pair over its friction bound: a message gives a hint above this ratio."""
 _ALONG = 0.05
-"""Largest ratio of normal motion to all motion of the contact points in a slide: deformed surfaces
-are not quite straight."""
+"""Normal motion over all motion of the contact points in a slide, at most: deformed surfaces are
+not quite straight."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,18 +37,18 @@ class Slide:
 
     @property
     def limit(self) -> bool:
-        """Whether no equilibrium exists: always, by the upper-bound theorem."""
+        """Whether no equilibrium exists: yes, by the upper-bound theorem."""
         return True
 
     def __str__(self) -> str:
         return (
             f"body {self.body!r} slides on all its contacts: its load is {self.ratio:.4g} times "
-            "what friction can carry"
+            "the largest friction"
         )
 
 
 def spent(system: System, state: State) -> str:
-    """Return a hint on pairs that were close to their friction bound in the last equilibrium."""
+    """Return a hint on pairs that are close to their friction bound in a state; else empty."""
     found = []
     for k, (interface, contact) in enumerate(zip(system.interfaces, state.contacts, strict=True)):
         pairing = system.pairing(state, k)
@@ -62,10 +62,10 @@ def spent(system: System, state: State) -> str:
 
 
 def slide(system: System, residuals: Sequence[Array], candidates: Candidates) -> Slide | None:
-    """Return how a floating body slides under the normal forces of the candidates, if it does.
+    """Return the slide of a floating body under the normal forces of the candidates, if any.
 
-    Only motions along all closed contacts are considered, which leave normal forces unchanged.
-    Deformed surfaces are not quite straight, so the power of normal forces counts too.
+    Motions go along all closed contacts, so that they do not change normal forces. Deformed
+    surfaces are not quite straight, so the power of normal forces counts too.
 
     Parameters
     ----------

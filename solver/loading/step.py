@@ -1,4 +1,4 @@
-"""One Newton step of all parts: condensed to the contact points, and solved there."""
+"""One Newton step of all parts, condensed to the contact points and solved there."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class NewtonStep:
         forces: Array,
     ) -> float:
         """Return minus the derivative of the energy along the step under given contact forces."""
-        left = out_of_balance(system, residual, candidates, forces)
-        return sum(float(du @ r) for du, r in zip(self.u, left, strict=True))
+        out = out_of_balance(system, residual, candidates, forces)
+        return sum(float(du @ r) for du, r in zip(self.u, out, strict=True))
 
 
 def on_parts(system: System, candidates: Candidates, forces: Array) -> Vectors:
@@ -49,7 +49,7 @@ def out_of_balance(
 ) -> Vectors:
     """Return the out-of-balance forces of all parts under contact forces [N].
 
-    A part that nothing holds stays where it is: what would move it does not count.
+    A part that nothing holds keeps its position: forces on its rigid motions are left out.
     """
     inner = on_parts(system, candidates, forces)
     each = zip(system.parts, residuals, inner, candidates.stays, strict=True)
@@ -57,7 +57,7 @@ def out_of_balance(
 
 
 def moving(part: Part, force: Array) -> Array:
-    """Return the share (n,) of nodal forces that works on the rigid motions of a part [N]."""
+    """Return the part (n,) of nodal forces that works on the rigid motions of a part [N]."""
     Q, _ = np.linalg.qr(part.rigid[part.free])
     out = np.zeros(part.n)
     out[part.free] = Q @ (Q.T @ force[part.free])
@@ -70,17 +70,17 @@ def newton_step(
     operators: Sequence[Operator],
     candidates: Candidates,
 ) -> NewtonStep | None:
-    """Return the step for given tangents, or None if no contact forces balance the load.
+    """Return the step for given tangents; None if no contact forces balance the load.
+
+    Bodies without supports, links and pairs keep their positions.
 
     Parameters
     ----------
     residuals : external minus internal forces of each part, without contact forces [N]
     operators : inverse tangent of each part
-
-    Bodies that only contact would hold stay where they are if there is none.
     """
-    # sum all large forces before solving: the rest is small, and the rounding of the factor, about
-    # 1e-16 (size of the body / smallest element)^2, is relative to this rest
+    # sum the large forces before solving: their sum is small, and the rounding of the factor, about
+    # 1e-16 (size of the body / smallest element)^2, is relative to it
     balanced = out_of_balance(system, residuals, candidates, candidates.forces)
     W = candidates.compliance(operators)
     motion = candidates.motion - W @ candidates.forces
@@ -132,15 +132,16 @@ def rounding(system: System, u: Vectors) -> float:
 
 
 def unheld(system: System, candidates: Candidates) -> str:
-    """Return a hint on bodies that only contact holds, and no contact force does; else empty."""
+    """Return a hint on bodies that only contact can hold, without contact forces; else empty."""
     each = zip(system.parts, candidates.holds, strict=True)
     floating = [repr(part.body.name) for part, held in each if held and part.rigid.shape[1]]
     if not floating or candidates.forces.any():
         return ""
     gap = min(candidates.motion[: candidates.n].min(initial=np.inf), candidates.beyond)
     stands = (
-        f"has a gap of {gap:.3g} mm: the load must push it towards the body that is to hold it"
-        if gap > system.touching
-        else "touches: the load must press it on, and push it along by less than friction carries"
+        f"has a gap of {gap:.3g} mm: the load must push it towards the other body"
+        if gap > system.gap_tolerance
+        else "touches: the load must press it against the other body, with less tangential force "
+        "than friction carries"
     )
     return f"; body {' and '.join(floating)} is held by contact alone and {stands}"

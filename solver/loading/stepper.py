@@ -1,4 +1,4 @@
-"""Go from a converged state to a given time in increments; halve an increment that fails."""
+"""Advance a converged state to a given time in increments; halve an increment that fails."""
 
 from __future__ import annotations
 
@@ -29,33 +29,33 @@ from solver.loading.program import ROUNDING
 from solver.loading.slide import Slide, spent
 
 Attempt = tuple[float, Mechanism | Slide | None]
-"""Time of an increment that failed, and why; None if it failed in windows alone."""
+"""Time of an increment that failed, and the reason; None if it failed only in windows."""
 Report = Callable[[], None]
 Watch = Callable[[Converged], Any]
 
 
 _NEAR = 8
-"""Ratio of (excluded load - load reached) to the last increment that failed; up to it the failure
-is at the limit load."""
+"""(Excluded load - load reached) over the last increment that failed: the failure is at the limit
+load up to this ratio."""
 _TURN = 0.1
 """Largest rotation of a rigid body in an increment [rad]."""
 _UNTIMED = 0.02
-"""Ratio of the uncertain friction to the largest friction; above it an increment is divided."""
+"""Uncertain friction over the largest friction: an increment above this ratio is divided."""
 _PASSAGE = 0.5
-"""Ratio of a contact's motion in an increment to its width; above it an increment is divided."""
+"""Motion of a contact in an increment over its width: an increment above this ratio is divided."""
 _SHORTEST = 2.0**-6
-"""Shortest fraction into which an increment is divided for these reasons, or for its error."""
+"""Shortest fraction of an increment that is divided for these two reasons, or for its error."""
 _FURTHER = 4
-"""Into so many parts an increment that was divided for these reasons may still be, if it fails."""
+"""Number of parts into which such a fraction may still be cut if it fails."""
 
 
 class Stepper:
-    """Takes a system from one time to another.
+    """Advances a system from one time to another.
 
     Parameters
     ----------
     report : called after every increment
-    watch : (converged increment) -> value that is kept of it
+    watch : (converged increment) -> value kept in `Point.history`
 
     Attributes
     ----------
@@ -90,10 +90,9 @@ class Stepper:
     def begin(self, state: State, time: float, tally: Tally | None = None) -> Point:
         """Return the first point of a lap: wheels are set down, overlapping bodies pushed apart.
 
-        Before that, the initial stress of each body is brought to equilibrium separately. All this
-        is done before any load acts, so that its failure is not mistaken for a limit load. Raises
-        `PathEnded` if overlapping bodies have no equilibrium, and `ModelError` if an initial stress
-        has none.
+        The initial stress of each body is brought to equilibrium first. No load acts yet, so that a
+        failure is not mistaken for a limit load. Raises `PathEnded` if overlapping bodies have no
+        equilibrium, and `ModelError` if an initial stress has none.
         """
         state = self.system.set_down(self.balanced(state), time)
         if self.system.overlaps(state):
@@ -113,9 +112,10 @@ class Stepper:
         return self._after(point, self._worked(point.now, pushed), ())
 
     def _pushed_apart(self, state: State, time: float) -> Converged:
-        """Return the increment that removes an overlap, without friction: no slip has a history.
+        """Return the increment that removes an overlap.
 
-        Friction is used only if the load at the beginning has no equilibrium without it.
+        It has no friction, because its slip is not a history of loading, unless the load at the
+        beginning has no equilibrium without friction.
         """
         try:
             return Increment(
@@ -138,13 +138,13 @@ class Stepper:
         return self.system.at_rest(balanced.state)
 
     def again(self, point: Point, time: float) -> Point:
-        """Return the first point of a further lap: wheels are set down, other bodies unchanged."""
+        """Return the first point of a later lap: wheels are set down, other bodies unchanged."""
         state = point.now.state
         if self.system.moves:
             begun = self.begin(state, time, point.tally)
             history, met = (*point.history, *begun.history), point.met | begun.met
             timing = point.now.timing.then(begun.now.timing)
-            # bodies under moving loads are never pushed apart: setting down adds no error
+            # bodies under moving loads do not overlap at rest: setting down adds no error
             now = replace(begun.now, timing=timing, missed=point.now.missed)
             return replace(begun, now=now, history=history, met=met)
         now = replace(point.now, state=replace(state, time=time), added=0.0)
@@ -154,12 +154,12 @@ class Stepper:
         """Return the point at time ``target`` or raise `PathEnded`.
 
         An increment in which a rigid body rotates too far is divided, because friction forces
-        rotate with its surface. An increment that fails is halved. One that resolves contact or the
-        turn of plastic flow too coarsely is divided too, but kept if its parts fail; later
-        increments grow again.
+        rotate with its surface. An increment that fails is halved. One that is too coarse for
+        contact or plastic flow is divided too, but accepted if its parts fail; later increments
+        grow again.
 
-        Where windows of the bodies fail, whole bodies follow only in the shortest increment, and in
-        the halves of a coarse one: the half of another one mostly converges in windows.
+        If windows of the bodies fail, whole bodies are tried only in the shortest increment and in
+        parts of a coarse one: the half of another increment mostly converges in windows.
         """
         size, most = self._step_size(point, target), self.control.increment_error
         known, coarse = point.now.timing, None
@@ -194,15 +194,15 @@ class Stepper:
                 size.resumed(converged.state.time - now)
             else:
                 converged = integrated(self.system, point.now, converged)
-                # the forces of the coarse increment show how large they become
+                # shares of uncertain friction refer to the larger forces of the coarse increment
                 known = converged.timing.beside(known)
                 halvings = max(int(_coarse(known)), _halvings(converged.added, most))
                 if size.divided(time - now, halvings):
                     coarse = converged
                     continue
             size.converged(converged.state.time - now, grows=4 * converged.added <= most)
-            left = abs(target - converged.state.time)
-            failed = [each for each in failed if abs(target - each[0]) < left]
+            remaining = abs(target - converged.state.time)
+            failed = [each for each in failed if abs(target - each[0]) < remaining]
             past = (*point.past[1 - MEMORY :], point.now.state)
             point, coarse = self._after(point, self._worked(point.now, converged), past), None
             if converged.beyond_end:
@@ -215,8 +215,8 @@ class Stepper:
     def _step_size(self, point: Point, target: float) -> _StepSize:
         """Return the step of the increments to a time.
 
-        It is smaller where a rigid body rotates far, or where the last increment has an error that
-        one of this length would exceed.
+        It is a part of the way if a rigid body rotates far, or if the error of the last increment
+        predicts a too large one.
         """
         before, expected = point.now, 0.0
         begin = before.state.time
@@ -230,11 +230,11 @@ class Stepper:
     def _longer(
         self, point: Point, failed: Sequence[Attempt]
     ) -> Converged | tuple[float, Mechanism | Slide]:
-        """Return what longer increments say of the shortest one, which has failed too.
+        """Return a longer increment that converges, or the time and reason of the failure.
 
-        It may have failed so close to a limit load that nothing proves it. A longer one, to an
-        excluded load close ahead, then does. Those that failed in windows alone are solved again,
-        with whole bodies: the path goes on with one that converges.
+        The shortest increment has failed. Close to a limit load its failure may prove nothing, but
+        a longer one to a load just above the limit does. Longer increments that failed only in
+        windows are solved again with whole bodies; the path continues with one that converges.
         """
         now = point.now.state.time
         *longer, (time, last) = failed
@@ -252,7 +252,7 @@ class Stepper:
         return time, why
 
     def _with_whole_bodies(self, point: Point, time: float) -> Converged | Mechanism | Slide:
-        """Return the increment to a time, or why it fails also with whole bodies."""
+        """Return the increment to a time with whole bodies, or the reason why it fails."""
         try:
             return self._increment(point, time, contact=True, patient=False, whole=True)
         except IncrementFailed as failure:
@@ -263,11 +263,11 @@ class Stepper:
     ) -> Converged:
         """Return the increment to a time or raise `IncrementFailed`.
 
-        It is solved in windows of the bodies; with whole bodies, if windows do not serve, or if
+        It is solved in windows of the bodies; with whole bodies if windows are unsuitable, or if
         they fail and ``whole`` is set.
 
-        If straight surfaces have moved too far for small sliding in it, it is repeated with finite
-        sliding; the first solution is kept if that does not converge.
+        If straight surfaces have moved too far for small sliding, the increment is repeated with
+        finite sliding; if this does not converge, the first solution is kept.
         """
         state = self.system.joined(point.now.state, time)
         guess = self._predict(point.past, state, time) if contact else None
@@ -314,10 +314,9 @@ class Stepper:
             return converged
 
     def elastic(self, point: Point, target: float) -> Point | None:
-        """Return the point at time ``target`` in one increment, or None if a point yields.
+        """Return the point at time ``target`` in one increment; None if a point yields.
 
-        One increment is exact if the history of friction does not matter: without friction, or with
-        surfaces in full contact before loading, where everything is proportional to the load.
+        One increment is exact if the state is independent of the history: `System.proportional`.
         """
         if not self.system.proportional:
             return None
@@ -331,7 +330,7 @@ class Stepper:
             ).solve()
         except (Yielded, IncrementFailed):
             return None
-        # walking in increments finds at which load this happens
+        # increments find the load at which this happens
         if converged.beyond_end or followed(self.system, point.now.state, converged.state):
             return None
         converged = self._worked(point.now, converged)
@@ -339,10 +338,10 @@ class Stepper:
         return self._after(point, converged, ())
 
     def _predict(self, past: Sequence[State], now: State, time: float) -> State | None:
-        """Return the state that is predicted for a time, or None.
+        """Return the state predicted for a time, or None.
 
-        Under a load that moves along a body extrapolation would be wrong: an earlier increment is
-        shifted along with the load, or, if none corresponds, there is no prediction.
+        Under a load that moves along a body extrapolation would be wrong: the prediction is an
+        earlier increment, shifted along with the load, if one corresponds.
         """
         if not self.system.moves:
             return extrapolate(past, now, time)
@@ -384,7 +383,7 @@ class Stepper:
 
 
 class _StepSize:
-    """The step of increments to a target: halved on failure, or divided and growing again.
+    """The step of increments to a target: halved after a failure, or divided and growing again.
 
     Attributes
     ----------
@@ -403,7 +402,7 @@ class _StepSize:
     def failed(self, step: float) -> bool:
         """Halve a step after a failure; return whether the half is permitted.
 
-        One that was divided only because the last increment had an error gives way to the whole.
+        If the step was divided only for an expected error, the whole step is tried instead.
         """
         if self._expected:
             self.step, self._grows, self._expected = self._whole, False, False
@@ -412,7 +411,7 @@ class _StepSize:
         return abs(self.step) >= self._least * (1 - ROUNDING)
 
     def divided(self, step: float, halvings: int) -> bool:
-        """Halve a step that may grow again, as often as is permitted; return whether any is."""
+        """Halve a step, as often as permitted; it may grow again. Return whether it is halved."""
         while halvings and abs(step) / 2**halvings < _SHORTEST * abs(self._whole) * (1 - ROUNDING):
             halvings -= 1
         if not halvings:
@@ -422,7 +421,7 @@ class _StepSize:
         return True
 
     def resumed(self, step: float) -> None:
-        """Go on with a step that converged, after shorter ones had failed."""
+        """Continue with a step that converged, after shorter ones had failed."""
         self.step = step
 
     def converged(self, step: float, *, grows: bool) -> None:
@@ -433,12 +432,12 @@ class _StepSize:
 
 
 def _halvings(error: float, most: float) -> int:
-    """Return how often to halve an increment whose error is of second order in its length."""
+    """Return how often to halve an increment; its error is of second order in its length."""
     return math.ceil(math.log(error / most, 4) - ROUNDING) if error > most else 0
 
 
 def _coarse(timing: Timing) -> bool:
-    """Whether an increment resolves contact too coarsely in time."""
+    """Whether an increment is too long to resolve contact in time."""
     return timing.unknown > _UNTIMED or timing.passage > _PASSAGE
 
 
@@ -449,9 +448,9 @@ def _facing(state: State) -> frozenset[int]:
 
 
 def extrapolate(past: Sequence[State], now: State, time: float) -> State | None:
-    """Return the state at ``time`` extrapolated from the last two, or None at a reversal.
+    """Return the state at ``time`` extrapolated from the last two; None at a reversal.
 
-    None too if bodies have lost contact: a body that only contact held would move without limit.
+    None also after a loss of contact: a body that only contact held would move without limit.
     """
     if not past or now.time == past[-1].time:
         return None

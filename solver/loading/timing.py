@@ -1,9 +1,9 @@
-"""How well one increment resolves contact in time.
+"""Resolution of contact in time by one increment.
 
 Friction depends on the slip since a vertex touched. If the rates of gap and slip are known, the
-time of touch is that at which the gap closes. In the first increment of a contact it is not known,
-and slip counts from the beginning of the increment. Also, a contact that moves by more than its
-width has passed over vertices that never carried force. Smaller increments reduce both errors.
+vertex touches when the gap closes. In the first increment of a contact this time is unknown, and
+slip counts from the beginning of the increment. Also, a contact that moves by more than its width
+passes vertices without loading them. Smaller increments reduce both errors.
 """
 
 from __future__ import annotations
@@ -19,18 +19,17 @@ from solver.contact.system import System
 from solver.typing import Array, Ints
 
 _SHARE = 0.25
-"""Error of the slip before touch, over its change by the last term of its series (measured)."""
+"""Error of the slip before contact, over the last term of its series (measured)."""
 
 
 def timing(system: System, start: State, candidates: Candidates, compliance: Array) -> Timing:
     """Return the timing of an increment from ``start``.
 
-    ``compliance`` (n or 2n, and links, square) is that of the contact points, elastic [mm/N]. It
-    bounds the uncertain friction of vertices. If the time of touch is not known, that is the
-    elastic stiffness times the slip without friction; a vertex that sticks from the beginning of
-    the increment has no slip, and its tangential force is added instead. If it is known, it is the
-    change of friction by the possible error of the slip before, at vertices that stick, or might
-    without that error.
+    ``compliance`` (m, m) is the elastic compliance of the contact points [mm/N]. It bounds the
+    uncertain friction of a vertex. If the time of first contact is unknown, the bound is the
+    tangential force plus elastic stiffness times slip. If it is known, the bound is the change of
+    friction by the possible error of the slip before contact, at vertices that stick or would stick
+    without this error.
     """
     n = candidates.n
     N = np.maximum(candidates.forces[:n], 0.0)
@@ -65,13 +64,13 @@ def _passed(
 ) -> float:
     """Return the force of a contact times (its motion along a surface / its width) [N].
 
-    Along the slave that is the force that moved from some vertices to others; it is zero if contact
-    only grows or shrinks. Along the master the motion is the slip.
+    Along the slave it is the force that moved from some vertices to others, zero if contact only
+    grows or shrinks. Along the master the motion is the slip. The larger value counts.
     """
     after = np.zeros_like(before.normal)
     after[at] = normal
     if not (after.any() and before.normal.any()):
         return 0.0
-    came, left = after @ (before.normal == 0), before.normal @ (after == 0)
+    gained, lost = after @ (before.normal == 0), before.normal @ (after == 0)
     width = interface.slave_surface.tributary @ (after > 0)
-    return float(np.max([min(came, left), np.abs(slip) @ after / width]))
+    return float(np.max([min(gained, lost), np.abs(slip) @ after / width]))

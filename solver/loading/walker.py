@@ -1,8 +1,8 @@
-"""Walk programs on one system, which means to solve them lap by lap, stage by stage.
+"""Walk programs on one system: solve them lap by lap, stage by stage.
 
-Programs that begin with the same increments share these: a **branch** starts from the state after
-the last increment that two programs have in common. The result of a program does not depend on the
-others that are walked with it: it equals, bit for bit, that of the program walked alone.
+Programs that begin with the same increments share them: a **branch** starts from the state after
+the last common increment. The result of a program does not depend on the other programs: it equals,
+bit for bit, that of the program walked alone.
 """
 
 from __future__ import annotations
@@ -30,16 +30,17 @@ Points = Mapping[str, Converged]
 
 
 _NOTHING = 1e-6
-"""Ratio of the plastic work of a lap to the plastic work so far; below it the lap is elastic."""
+"""Plastic work of a lap over the plastic work so far: the lap is elastic up to this ratio."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Walk:
     """A walk so far.
 
-    ``points`` are those of the present lap, ``work`` is the plastic work before it [N mm]; ``past``
-    has the points of earlier laps, and whether anything yielded in them; ``cycles`` are those of
-    repeated stages, and ``cycle`` is the state in which the present one began.
+    ``points`` are the states at the ends of stages of the present lap, ``work`` is the plastic work
+    before it [N mm]; ``past`` has the points of earlier laps, and whether anything yielded in them;
+    ``cycles`` are the cycles of repeated stages, ``cycle`` is the state at the beginning of the
+    present one.
     """
 
     point: Point
@@ -58,8 +59,8 @@ class Walker:
     Parameters
     ----------
     trace : (states at the ends of a lap's stages, by name) -> value kept in `Outcome.traces`
-    refinement : criterion by which increments are halved; without it the program's own are used
-    until : (cycles of repeated stages so far) -> whether the others may be left out
+    refinement : criterion by which increments are halved; without it those of the program are used
+    until : (cycles of repeated stages so far) -> whether the other cycles may be left out
     watch : (converged increment) -> value kept in `Outcome.history`
     report : called after every increment
     """
@@ -88,10 +89,10 @@ class Walker:
         The cost is least if each program shares as many increments as possible with the previous
         one, as programs of increasing loads do.
 
-        With `largest` the next program is asked for after the outcome of the one before it, on
-        which it may depend. Any two programs then share with each other no more increments than one
-        of them shares with `largest`. Where a program left it the state is kept, for the two that
-        went furthest: one that lies between others goes on from there.
+        With ``largest`` a program may depend on the outcome of the one before it, and is requested
+        only then. Two programs must share no more increments with each other than one of them
+        shares with ``largest``. The states at which programs left ``largest`` are kept, for the two
+        furthest ones, so that a program between others can start there.
 
         Raises
         ------
@@ -152,8 +153,8 @@ class Walker:
                 slave, master = (".".join(side) for side in (contact.slave, contact.master))
                 time = point.now.state.time
                 return NotConverged(
-                    f"{slave} and {master} were at no time opposite each other, so that they could "
-                    "not touch; check the boundaries, the positions of the bodies and their motion",
+                    f"{slave} and {master} never faced each other, so they could not touch; check "
+                    "the boundaries, the positions of the bodies and their motion",
                     time, time,
                 )  # fmt: skip
         return None
@@ -185,7 +186,7 @@ class Walker:
         return self._closed(replace(start, point=back, points=points), program)
 
     def _along(self, walk: _Walk, program: Program, first: int, end: int) -> _Walk:
-        """Return the walk over the targets of a program from one number to another."""
+        """Return the walk over the targets of a program from number ``first`` to ``end``."""
         at = first
         targets = program.targets
         while at < end and walk.error is None:
@@ -203,7 +204,7 @@ class Walker:
             if targets[at].repeats and self._until and self._until(walk.cycles):
                 rest = range(at + 1, len(targets))
                 after = next((k for k in rest if not targets[k].cycle), len(targets))
-                if after <= end:  # the loads are those at the end of the last cycle
+                if after <= end:  # continue with the loads at the end of the last cycle
                     point = self._stepper.again(walk.point, targets[after - 1].time)
                     walk, at = replace(walk, point=point), after - 1
             at += 1
@@ -228,7 +229,7 @@ class Walker:
         return replace(walk, point=point, points=points, cycles=cycles, cycle=begun)
 
     def _closed(self, walk: _Walk, program: Program) -> _Walk:
-        """Return the walk with the results of its lap, which is complete."""
+        """Return the walk with the results of its complete lap."""
         work = walk.point.tally.plastic_work
         yielded = work - walk.work > _NOTHING * work
         past = (*walk.past, (walk.points, yielded))[-program.cycle :] if program.cycle else ()
@@ -236,7 +237,7 @@ class Walker:
         return replace(walk, past=past, traces=traces)
 
     def _settle(self, program: Program) -> tuple[Settled, _Walk]:
-        """Walk the first lap with smaller and smaller increments, until its result is constant.
+        """Walk the first lap with ever smaller increments until its result converges.
 
         If smaller increments fail, the result of the larger ones is kept.
         """
@@ -248,20 +249,20 @@ class Walker:
         settled, taken, coarse, tally = Settled(), None, None, Tally()
         for halved in range(HALVINGS + 1 if tolerance else 1):
             times = 2**halved
-            fine = program.refined(times)
-            walk = self._along(self._start(fine, tally), fine, 0, fine.laps[0].count)
+            refined = program.refined(times)
+            walk = self._along(self._start(refined, tally), refined, 0, refined.laps[0].count)
             failed = walk.error is not None and not isinstance(walk.error, LimitLoad)
             if failed and coarse is not None:
                 settled = replace(settled, failed=times)
                 break
             taken, settled = walk, replace(settled, times=times)
             if walk.error is None:
-                left = self._refinement.measure(walk.traces[0])
+                fine = self._refinement.measure(walk.traces[0])
                 if coarse is not None:
-                    settled = replace(settled, error=float(np.abs(left - coarse).max()))
+                    settled = replace(settled, error=float(np.abs(fine - coarse).max()))
                 if settled.error <= tolerance:
                     break
-                coarse = left
+                coarse = fine
             elif not failed:
                 break
             # the tally keeps the time that the larger increments took
@@ -273,7 +274,7 @@ class Walker:
 def _with_next(
     programs: Iterator[Program], largest: Program | None
 ) -> Iterator[tuple[Program, Program | None]]:
-    """Yield each program with the one that follows; or with `largest`, and none in advance."""
+    """Yield each program with the next one, or with ``largest`` without requesting the next."""
     program = next(programs, None)
     while program is not None:
         if largest is not None:
@@ -286,7 +287,7 @@ def _with_next(
 
 
 def _repeated(walk: _Walk, cycle: int) -> _Walk:
-    """Return the walk after a lap that repeats the one a cycle before it."""
+    """Return the walk after a lap that repeats the one a cycle before."""
     points, _ = walk.past[0]
     return replace(
         walk,

@@ -1,10 +1,9 @@
 """Checks of a mesh: elements must not be folded or overlap, and the mesh must be one piece.
 
-A mesh in space must have no folded element and be one piece; cracks are not looked for there.
-
-The Jacobian of an element keeps one sign, and neighbours lie on opposite sides of their common
-edge. The mesh is connected through edges, without cracks and hinges. Lengths are compared with
-nearby edges and with the rounding of coordinates, so that unit, grading and origin do not matter.
+The Jacobian of an element must keep one sign, and neighbours must lie on opposite sides of their
+common edge. The mesh must be connected through edges, without cracks and hinges. Lengths are
+compared with nearby edges and with the rounding of coordinates, so that unit, grading and origin do
+not matter. A mesh in space is not checked for overlaps, cracks and hinges.
 """
 
 from __future__ import annotations
@@ -22,14 +21,15 @@ from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.mesh.elements import ElementType
 from solver.typing import Array, Ints
 
-# Ratio of least to greatest Jacobian below which an element is folded, and sine of the angle
-# between shortest and longest side below which it is flat. Rectangles and right triangles pass.
 _FOLDED = 1e-6
-# Ratio of the distance of nodes to the shortest edge; below it they count as coincident. Duplicate
-# nodes are far closer. A narrower notch would close under load without contact in the model.
+"""Least over greatest Jacobian: an element with a smaller ratio is folded. Also the sine of the
+angle between shortest and longest side: an element with a smaller one is flat."""
 _CLOSED = 1e-3
+"""Distance of two nodes over the shortest edge: they are coincident below this ratio. Duplicate
+nodes are far closer. A narrower notch would close under load without contact in the model."""
 _DIRECTION = np.array([0.8, 0.6])
-_ROUNDING = 8 * np.finfo(float).eps  # of coordinates, a few operations deep
+_ROUNDING = 8 * np.finfo(float).eps
+"""Relative rounding error of coordinates after a few operations."""
 
 
 def check_mesh(mesh: Mesh, name: str, kind: ElementType) -> None:
@@ -134,7 +134,7 @@ def _check_cracks(mesh: Mesh, where: str) -> None:
     start, end = mesh.p[:, mesh.facets[0]], mesh.p[:, mesh.facets[1]]
     length = np.hypot(*(end - start))
     shortest = np.full(mesh.p.shape[1], length.max())
-    for ends in mesh.facets:  # one by one: numpy 2.4 gives a needless warning when it broadcasts
+    for ends in mesh.facets:  # one by one: when it broadcasts, numpy 2.4 gives a false warning
         np.minimum.at(shortest, ends, length)
     nodes = np.unique(mesh.facets[:, mesh.boundary_facets()])
     apart = "; surfaces meant to touch need two bodies and a contact pair"
@@ -152,15 +152,15 @@ def _check_cracks(mesh: Mesh, where: str) -> None:
 
 
 def _close(mesh: Mesh, nodes: Ints, edges: Array) -> Array:
-    """Return the distance below which nodes with edges of these lengths count as coincident."""
+    """Return the distance (n,) below which nodes with these edge lengths are coincident."""
     return np.asarray(_CLOSED * edges + _ROUNDING * np.abs(mesh.p[:, nodes]).max(axis=0))
 
 
 def _within(centres: Array, places: Array, radii: Array) -> tuple[Ints, Ints]:
     """Return pairs of a centre (2, n) and a place (2, m) within its radius (n,), by centres.
 
-    Places are sorted along a direction in which sides of bodies seldom lie. A tree of `scipy` would
-    take as long to load as all else that checks a mesh takes.
+    Places are sorted along a direction that sides of bodies seldom have. To import `scipy.spatial`
+    would take as long as the rest of the check.
     """
     at, along = _DIRECTION @ centres, _DIRECTION @ places
     order = np.argsort(along, kind="stable")
@@ -173,7 +173,7 @@ def _within(centres: Array, places: Array, radii: Array) -> tuple[Ints, Ints]:
 
 
 def _hanging(mesh: Mesh, nodes: Ints, shortest: Array) -> Ints:
-    """Return (n, 2): boundary nodes on a boundary facet between its ends, and that facet."""
+    """Return (n, 2): boundary nodes between the ends of a boundary facet, and this facet."""
     facets = mesh.boundary_facets()
     X = mesh.p[:, mesh.facets[:, facets]]
     centre, half = X.mean(axis=1), np.hypot(*(X[:, 1] - X[:, 0])) / 2
@@ -185,7 +185,7 @@ def _hanging(mesh: Mesh, nodes: Ints, shortest: Array) -> Ints:
     edge, node = edge[inner], node[inner]
     X = np.concatenate([X, middle[:, None]], axis=1)[:, :, edge]
     xi = np.zeros(len(edge))
-    for _ in range(8):  # Gauss-Newton for the nearest point: at once where the edge is straight
+    for _ in range(8):  # Gauss-Newton for the nearest point; one step on a straight edge
         t = (X * shape_derivatives(xi, 3).T).sum(axis=1)
         miss = mesh.p[:, node] - (X * shape_functions(xi, 3).T).sum(axis=1)
         xi = np.clip(xi + (miss * t).sum(axis=0) / (t**2).sum(axis=0), -1, 1)

@@ -22,7 +22,7 @@ def shape_derivatives(xi: Array, count: int) -> Array:
 
 
 def _side_by_side(xi: Array, *each: Array | float) -> Array:
-    """Return the values at each of ``xi`` (..., n) in a last axis; `numpy.stack` is slower."""
+    """Return the values at ``xi`` (...) along a new last axis; `numpy.stack` is slower."""
     out = np.empty((*xi.shape, len(each)))
     for k, values in enumerate(each):
         out[..., k] = values

@@ -1,4 +1,4 @@
-"""Element types by name, and how a new one is added."""
+"""Element types by name; new ones can be added."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from solver.parts import load_own_parts
 
 _CELLS = {RefTri: "tri", RefQuad: "quad", RefTet: "tet", RefHex: "hex"}
 _NODES = {"tri": (3, 6), "quad": (4, 8, 9), "tet": (4, 10), "hex": (8, 20)}
-"""Permitted numbers of nodes of an element: at corners, on sides, in the middle."""
+"""Permitted numbers of nodes: corners only, with sides, with the middle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ElementType:
-    """A displacement element and how it is integrated.
+    """A displacement element and its integration.
 
     Attributes
     ----------
     element : scalar scikit-fem element whose unknowns are values at its nodes: 3 or 6 of a
         triangle, 4, 8 or 9 of a quadrilateral, 4 or 10 of a tetrahedron, 8 or 20 of a hexahedron
-    order : polynomial degree that the default integration integrates exactly
-    full_order : the same of full integration
+    order : polynomial degree up to which the default integration is exact
+    full_order : the same for full integration
     mean_dilatation : whether the volumetric strain is averaged over the element (B-bar)
     """
 
@@ -88,7 +88,7 @@ def add_element(name: str, kind: ElementType) -> None:
     Raises
     ------
     ModelError
-        when another element has the name
+        if another element has this name
     """
     before = ELEMENTS.setdefault(name, kind)
     same = type(before.element) is type(kind.element)
@@ -97,7 +97,7 @@ def add_element(name: str, kind: ElementType) -> None:
 
 
 def known_elements(dim: int | None = None) -> Mapping[str, ElementType]:
-    """Return the elements by name, also those of the user's own files; of ``dim`` axes, or all."""
+    """Return the elements of ``dim`` axes, or all, by name, with those of the user's own files."""
     load_own_parts()
     return {name: kind for name, kind in ELEMENTS.items() if dim in (None, kind.dim)}
 

@@ -17,7 +17,7 @@ from solver.mesh.rounding import ROUNDED, in_box
 from solver.typing import Array, Ints
 
 _SAME = 1e-9
-"""Ratio of a distance to the size of a mesh; below it two places are the same."""
+"""Distance of two places over the size of the mesh: they are the same below this ratio."""
 
 
 def grid(x: Array, y: Array, cells: str = "quad") -> Mesh:
@@ -46,7 +46,7 @@ def within(
     x: tuple[float, float] | None = None,
     y: tuple[float, float] | None = None,
 ) -> Mesh:
-    """Return a mesh with a new boundary ``name``: facets of other boundaries that lie in a box.
+    """Return a mesh with a new boundary ``name``: the facets of other boundaries in a box.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def marked(
 
 
 def renamed(mesh: Mesh, names: Mapping[str, str]) -> Mesh:
-    """Return a mesh that keeps only some of its boundaries, with new names: new -> old."""
+    """Return a mesh with only some of its boundaries, renamed; ``names`` is new -> old."""
     known = mesh.boundaries or {}
     return replace(mesh, _boundaries={new: known[old] for new, old in names.items()})
 
@@ -109,8 +109,8 @@ def renamed(mesh: Mesh, names: Mapping[str, str]) -> Mesh:
 def without(mesh: Mesh, name: str, x: tuple[float, float], y: tuple[float, float]) -> Mesh:
     """Return a mesh without the cells in a rectangle; the new boundary is called ``name``.
 
-    Other boundaries keep their remaining facets. A rectangle at the side of a body makes a notch,
-    one inside makes a hole.
+    Other boundaries keep their remaining facets. A rectangle at the side of a body makes a notch, a
+    rectangle inside makes a hole.
 
     Parameters
     ----------
@@ -140,10 +140,9 @@ def without(mesh: Mesh, name: str, x: tuple[float, float], y: tuple[float, float
 
 
 def mapped(mesh: Mesh, function: Callable[[Array], Array]) -> Mesh:
-    """Return a quadrilateral mesh with curved quadratic edges, its points moved by ``function``.
+    """Return a mesh of curved quadrilaterals, with points moved by ``function``, (2, n) -> (2, n).
 
-    ``function`` takes and returns coordinates (2, n); boundary names are kept. It must keep
-    orientation.
+    The function must preserve orientation. Boundary names are kept.
     """
     curved = MeshQuad2.from_mesh(mesh)
     moved = MeshQuad2(
@@ -155,7 +154,7 @@ def mapped(mesh: Mesh, function: Callable[[Array], Array]) -> Mesh:
 def merged(mesh: MeshQuad2) -> MeshQuad2:
     """Return the mesh with coincident corners merged; boundary names are kept.
 
-    A grid bent until its ends coincide becomes a closed ring, whose ends are no longer a boundary.
+    A grid bent until its ends coincide becomes a closed ring: its ends are no longer boundaries.
     """
     corners = mesh.p[:, : mesh.nvertices]
     tolerance = _SAME * float(np.ptp(corners, axis=1).max())
@@ -179,7 +178,7 @@ def merged(mesh: MeshQuad2) -> MeshQuad2:
 
 
 def joined(blocks: Sequence[MeshQuad2]) -> MeshQuad2:
-    """Return quadratic meshes joined to one, without boundaries; coincident nodes are merged."""
+    """Return one mesh of several, without boundaries; coincident nodes are merged."""
     corners = [block.p[:, : block.nvertices] for block in blocks]
     first = np.cumsum([0, *(c.shape[1] for c in corners)])
     cells = np.hstack([block.t + k for block, k in zip(blocks, first, strict=False)])

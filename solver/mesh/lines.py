@@ -14,16 +14,15 @@ from solver.typing import Array
 _MOST = 1_000_000
 """Largest number of elements along a line."""
 _SLIVER = 0.5
-"""Least length of elements that grow from a point, over their first side; below it there are none:
-those from the other point go on to this one."""
+"""Length of the elements that grow from a point, over their first side. If the ratio is smaller,
+the elements from the other point fill the whole length."""
 
 
 def graded(length: float, smallest: float, ratio: float, largest: float) -> Array:
     """Return node positions from 0 to ``length``, growing geometrically from ``smallest``.
 
-    Element sizes are smallest, smallest * ratio, ... up to ``largest``. All are then scaled by one
-    factor, at most 1, so that they fill ``length`` exactly; the first one is never larger than
-    requested.
+    Element sizes are smallest, smallest * ratio, ... up to ``largest``. One factor, at most 1, then
+    scales them all to fill ``length`` exactly.
     """
     if not 0 < smallest <= length:
         raise ModelError("smallest", smallest, f"must be in (0, {length:g}] [mm]")
@@ -31,7 +30,7 @@ def graded(length: float, smallest: float, ratio: float, largest: float) -> Arra
         raise ModelError("ratio", ratio, "must be at least 1")
     sizes: list[float] = []
     total, size, most = 0.0, smallest, max(largest, smallest)
-    too_long = length > 2 * _MOST * most  # known without adding a million
+    too_long = length > 2 * _MOST * most  # saves the loop
     while total < length * (1 - 1e-9):
         if too_long or len(sizes) == _MOST:
             allowed = f"must make at most {_MOST} elements along {length:g} mm"
@@ -62,7 +61,7 @@ def continued(
 
 
 def cells(length: float, smallest: float, ratio: float, largest: float) -> Array:
-    """Return the midpoints of the elements of `graded`: positions on no element boundary [mm]."""
+    """Return the midpoints of the elements of `graded` [mm]."""
     nodes = graded(length, smallest, ratio, largest)
     return (nodes[1:] + nodes[:-1]) / 2
 
@@ -70,8 +69,8 @@ def cells(length: float, smallest: float, ratio: float, largest: float) -> Array
 def closer(start: float, stop: float, num: int, near: float, size: float) -> Array:
     """Return points from ``start`` to ``stop`` with spacing ``size`` at ``near``, wider elsewhere.
 
-    Positions follow a hyperbolic sine: the spacing is equal close to ``near``, then grows in a
-    constant ratio. If equal spacing is at most ``size``, the points have equal spacing.
+    Positions follow a hyperbolic sine: the spacing is nearly constant close to ``near``, then grows
+    by a constant ratio. If equal spacing is at most ``size``, the points are equally spaced.
 
     Parameters
     ----------
@@ -82,14 +81,14 @@ def closer(start: float, stop: float, num: int, near: float, size: float) -> Arr
     Raises
     ------
     ModelError
-        for ``size``, if neighbouring spacings would differ by more than a factor of two
+        if neighbouring spacings would differ by more than a factor of two
     """
     if (stop - start) / (num - 1) <= size:
         return np.linspace(start, stop, num)
     sides = np.array([start - near, stop - near])
 
     def needed(growth: float) -> float:
-        """Return the number of spacings that fill the length; growth is the log of their ratio."""
+        """Return the number of spacings that fill the length; growth is the log of the ratio."""
         return float(np.ptp(np.arcsinh(sides * growth / size))) / growth
 
     low, high = 0.0, math.log(2)
@@ -115,16 +114,16 @@ def refined(
 ) -> Array:
     """Return node positions through ``points``; elements grow away from each point by ``ratio``.
 
-    Between two points elements grow from both, up to the position where both are equally large.
+    Between two points elements grow from both, up to the position where they are equally large.
 
     Parameters
     ----------
     points : (n,) increasing positions, each a node [mm]
-    sizes : (n,) largest element beside each point; inf sets no limit [mm]
+    sizes : (n,) largest element next to each point; inf sets no limit [mm]
     ratio : ratio of neighbouring element sides, above 1
-    largest : (n - 1,) largest element between neighbours [mm]
-    parts : (n - 1,) number of equal elements between neighbours in place of those that grow; None
-        where they grow, and empty where they do everywhere
+    largest : (n - 1,) largest element between neighbouring points [mm]
+    parts : (n - 1,) number of equal elements between neighbouring points; None if they grow, by
+        default everywhere
     """
     if not ratio > 1:
         raise ModelError("ratio", ratio, "must be above 1")
@@ -152,7 +151,7 @@ def refined(
 def _meeting(length: float, first: float, last: float, ratio: float) -> float:
     """Return the distance from the first end at which elements from both ends are equally large.
 
-    A side that grows by ``ratio`` from element to element grows by ``ratio - 1`` per length.
+    Sides that grow by ``ratio`` from element to element grow by ``ratio - 1`` per length.
     """
     if math.isinf(last):
         return length if math.isfinite(first) else 0.0

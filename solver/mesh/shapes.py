@@ -1,7 +1,7 @@
 """Meshes of shapes: rectangle, half-plane, pad, ring, fillet, disc and ball.
 
 All have named boundaries. ``size`` is the largest element side. A `Near` sets a smaller side around
-a point; from there elements grow by ``growth``, the ratio of neighbouring sides. Lengths are in mm.
+a point, from which elements grow by ``growth``, the ratio of neighbouring sides. Lengths are in mm.
 """
 
 from __future__ import annotations
@@ -25,11 +25,13 @@ Pair = tuple[float, float]
 _MOST_ELEMENTS = 200_000
 """Largest number of elements of a shape."""
 _SAME = 1e-9
-_CORE, _BULGE = 0.45, 0.15  # of a disc's middle square: half side / radius, and roundness
+_CORE, _BULGE = 0.45, 0.15
+"""Middle square of a disc: half side over radius, and roundness."""
 _EXTENT = 6.0
-"""Ratio of the side of the grid that is mapped onto the ball to the radius. The map leaves out a
-cap on the far side."""
-_FINE = 3.0  # largest ratio of the fine extent of a ball to its radius
+"""Side of the grid that is mapped onto a ball, over its radius. The map leaves out a cap on the far
+side."""
+_FINE = 3.0
+"""Fine extent of a ball over its radius, at most."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,9 +80,9 @@ def half_plane(
     symmetric: bool = False,
     cells: str = "quad",
 ) -> Mesh:
-    """Return a rectangle below y = 0, as deep as half its width; or its half x >= 0.
+    """Return a rectangle below y = 0 of depth ``extent`` and twice this width.
 
-    Its boundaries are left, right, bottom and top.
+    If ``symmetric``, it is the half x >= 0. Its boundaries are left, right, bottom and top.
     """
     _positive(extent=extent)
     x = (0.0 if symmetric else -extent, extent)
@@ -96,9 +98,9 @@ def pad(
     growth: float = 1.3,
     near: Sequence[Near] = (),
 ) -> Mesh:
-    """Return a block on y = 0, its bottom an arc of ``radius`` that touches x = 0.
+    """Return a block above y = 0 whose bottom is an arc of ``radius`` that touches the origin.
 
-    It is as high at its sides as in its middle. Its boundaries are left, right, bottom and top.
+    Its top is at y = ``height``. Its boundaries are left, right, bottom and top.
     """
     _positive(width=width, height=height, radius=radius)
     half, R = width / 2, radius
@@ -140,9 +142,9 @@ def ring(
         if not r:
             raise ModelError("near", each.at, "must not be the centre of the ring")
         angle = start + (math.atan2(y, x) - start) % (2 * np.pi)
-        side = each.size / (r + each.radius)  # the side is reached where the fine part is widest
+        side = each.size / (r + each.radius)  # elements are widest at the outer end of the part
         across.append((r, each.size, each.radius))
-        turns = (angle, angle - 2 * np.pi, angle + 2 * np.pi)  # of a closed ring, both ends
+        turns = (angle, angle - 2 * np.pi, angle + 2 * np.pi)  # both ends of a closed ring
         along += [(turn, side, each.radius / r) for turn in turns]
     out = _Spread(size, growth).lines("radii", (inner, outer), across)
     turn = _Spread(size / outer, growth).lines("angles", (start, end), along)
@@ -168,11 +170,11 @@ def fillet(
     growth: float = 1.3,
     near: Sequence[Near] = (),
 ) -> Mesh:
-    """Return a bar that narrows from ``wide`` to ``narrow`` over a fillet at y = 0.
+    """Return the half x >= 0 of a bar that narrows from ``wide`` to ``narrow`` over a fillet.
 
-    Its axis is x = 0, its widths are counted from there, and it reaches ``lengths`` below and
-    above. Where something is near, the whole fillet is fine. Its boundaries are left (the axis),
-    bottom, right (the end of the wide part), surface, fillet and top.
+    The fillet begins at y = 0; the bar extends by ``lengths`` below and above. Widths are those of
+    the half. A `Near` refines the whole fillet. Its boundaries are left (the axis), bottom, right
+    (the side of the wide part), surface, fillet and top.
     """
     below, above = lengths
     _positive(wide=wide, narrow=narrow, radius=radius, lengths=min(lengths))
@@ -187,7 +189,7 @@ def fillet(
     middle, half = float(marks[1] + bends[1] / 2), float(bends[1] / 2)
     along = [(middle, n.size, max(n.radius, half)) for n in near]
     depth = [(0.0, n.size, n.radius) for n in near]
-    across = math.hypot(narrow + r, below + r)  # the longest line across
+    across = math.hypot(narrow + r, below + r)  # length of the longest line across
     spread = _Spread(size, growth)
     along_it = spread.lines("near", (0.0, float(marks[-1])), along, marks[1:3].tolist())
     across_it = spread.lines("near", (0.0, across), depth)
@@ -218,9 +220,9 @@ def fillet(
 
 
 def disc(radius: float, centre: Pair = (0.0, 0.0), *, size: float) -> Mesh:
-    """Return a whole disc, meshed evenly: its boundaries are rim, east, north, west and south.
+    """Return a whole disc of nearly equal elements.
 
-    The last four are quarters of the rim.
+    Its boundaries are the rim and its quarters east, north, west and south.
     """
     _positive(radius=radius, size=size)
     R = radius
@@ -265,18 +267,18 @@ def ball(
     above: bool = True,
     symmetric: bool = False,
 ) -> Mesh:
-    """Return a disc that touches the line y = ``at[1]`` at ``at``, with finer elements there.
+    """Return a disc, the section of a ball or a cylinder, that touches the line y = ``at[1]``.
 
-    It lies above or below the line, as a section through a ball or a cylinder. If ``symmetric`` it
-    is the half x >= ``at[0]``, and ``left`` is its axis. A cap is left out on its far side, from
-    1.5 radii away on the axis to 1.8 at the surface: its boundaries are ``cap`` and ``right``, and
-    for a whole disc ``left``. The boundary that touches the line is ``surface``.
+    It touches the line at ``at`` from above or below, with its boundary ``surface``. If
+    ``symmetric``, it is the half x >= ``at[0]``, and ``left`` is its axis. A cap is left out on the
+    far side, from 1.5 radii away on the axis to 1.8 at the surface, with the boundaries ``cap`` and
+    ``right``, and for a whole disc ``left``.
 
     Parameters
     ----------
     size : side of the elements at ``at`` [mm]
     fine : distance from ``at`` up to which elements have this side [mm]
-    growth : ratio of neighbouring sides beyond
+    growth : ratio of neighbouring sides farther away
     """
     lines = ball_lines(radius, fine, size, growth)
     along = lines if symmetric else np.concatenate([-lines[:0:-1], lines])
@@ -287,15 +289,15 @@ def ball(
 
 
 def ball_sides(*, above: bool) -> dict[str, str]:
-    """Return the boundaries of a ball: name -> side of the grid that is bent into it."""
+    """Return the boundaries of a ball: name -> side of the grid that is mapped onto it."""
     surface, cap = ("bottom", "top") if above else ("top", "bottom")
     return {"surface": surface, "cap": cap, "left": "left", "right": "right"}
 
 
 def ball_lines(radius: float, fine: float, size: float, growth: float) -> Array:
-    """Return the lines from 0 on of the grid that is bent into a ball [mm].
+    """Return the lines, from 0 on, of the grid that is mapped onto a ball [mm].
 
-    They are ``size`` apart as far as ``fine``, then their distances grow.
+    Their spacing is ``size`` up to ``fine``, then it grows.
     """
     _positive(radius=radius, size=size)
     if not size <= fine <= _FINE * radius:
@@ -309,7 +311,7 @@ def _onto_disc(x: Array, radius: float) -> Array:
     """Map points (2, n) of a half-plane onto a disc in the same half-plane that touches y = 0.
 
     The Moebius map ``w = z / (1 - i z / 2 R)`` hardly moves points near the origin, and maps the
-    line y = 0 to the circle. It keeps angles, so that squares stay nearly square.
+    line y = 0 to the circle. It preserves angles, so that squares remain nearly square.
     """
     side = np.where(x[1].mean() < 0, -1.0, 1.0)
     z = x[0] + 1j * side * x[1]
@@ -336,9 +338,9 @@ class _Spread:
         near: Sequence[tuple[float, float, float]],
         through: Sequence[float] = (),
     ) -> Array:
-        """Return node positions over a span; ``near`` has (position, side, radius) of fine parts.
+        """Return node positions over a span, with nodes at the positions ``through``.
 
-        Each position in ``through`` becomes a node.
+        ``near`` are the fine parts: position, side, radius.
         """
         start, end = span
         if not -math.inf < start < end < math.inf:
@@ -350,7 +352,7 @@ class _Spread:
         for at, side, radius in near:
             low, high = max(at - radius, start), min(at + radius, end)
             if low > high:
-                continue  # outside of this span: it has no effect
+                continue
             for mark in (low, high):
                 marks[mark] = min(marks.get(mark, np.inf), side)
             fine.append((low, high, side))
@@ -371,7 +373,7 @@ def few(count: int) -> None:
 
 
 def _positive(**lengths: float) -> None:
-    """Refuse lengths that are not positive numbers."""
+    """Raise `ModelError` for lengths that are not positive and finite."""
     for name, length in lengths.items():
         if not 0 < length < math.inf:
             raise ModelError(name, length, "must be positive [mm]")

@@ -1,1 +1,1 @@
-"""What the user declares: bodies, their loads and motions, contact pairs, and the model."""
+"""Declarations of the user: bodies, loads, motions, contact pairs, links, and the model."""

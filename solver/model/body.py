@@ -1,4 +1,4 @@
-"""A deformable body as the user declares it: mesh, element, material, supports, loads."""
+"""Declaration of a deformable body: mesh, element, material, supports, loads."""
 
 from __future__ import annotations
 
@@ -32,22 +32,23 @@ class Body:
     Attributes
     ----------
     name : unique in its model
-    mesh : scikit-fem mesh of quadrilaterals or triangles, or of bodies in space of hexahedra or
-        tetrahedra, with named boundaries [mm]
+    mesh : scikit-fem mesh with named boundaries [mm], of quadrilaterals or triangles, or in space
+        of hexahedra or tetrahedra
     material : material law, a `Material` or a law of your own (`solver.materials.Law`)
     kinematics : ``plane_strain``, ``plane_stress`` or ``axisymmetric`` (x is the radius); left out
         for bodies in space
     element : ``quad8`` (default), ``quad9``, ``quad4``, ``tri6``, ``tri3``, in space ``hex8`` or
         ``tet10``, or one of your own
-    full_integration : integrate by the element's ``full_order``: ``quad8`` with 3x3 points, not 2x2
+    full_integration : whether to integrate by the element's ``full_order``: ``quad8`` with 3x3
+        points instead of 2x2
     thickness : thickness of plane bodies [mm]
     supports : boundary name -> supported displacement components, ``x``, ``y`` or ``xy``; in space
         also with ``z``
     pressure : boundary name -> pressure at load factor one, positive when it pushes [MPa]
-    amplitude : load factor of the pressures over time; when absent, time is the load factor
+    amplitude : load factor of the pressures over time; by default the time itself
     loads : further loads, each with an amplitude of its own (`solver.model.loads`)
-    condense : reduce the body to its contact surfaces if its material is elastic
-    axle : makes an elastic body a wheel; its supports then hold it to the hub
+    condense : whether to reduce the body to its contact surfaces if its material is elastic
+    axle : makes an elastic body a wheel, which its supports connect to the hub
     travelling : a pressure that moves along a boundary
     """
 
@@ -154,7 +155,7 @@ class Body:
         return (*pushing, *self.loads)
 
     def region(self, name: str, field: str = "region") -> np.ndarray:
-        """Return the element numbers of a named set of elements, which is a part of the body.
+        """Return the element numbers of a named part of the body.
 
         ``field`` is the input that an error names.
         """

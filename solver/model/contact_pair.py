@@ -22,7 +22,7 @@ class ContactPair:
     ----------
     slave, master : ``(body name, boundary name)``. Gap, slip, pressure and shear are defined at the
         vertices of the slave: the mean gap around each vertex must not be negative. Choose as slave
-        the surface that ends at a corner, else the finer one or the one that yields. They are
+        the surface that ends at a corner, else the finer one or the one that yields. The two are
         exchanged if the slave is unsuitable (`solver.contact.slave`)
     friction : Coulomb coefficient; zero, or a value that counts as zero (`effective_friction`),
         leaves out the tangential unknowns. Or a law of friction (`FrictionLaw`)
@@ -34,20 +34,20 @@ class ContactPair:
         permits more shear than the material, the surface layer flows instead of slipping, and its
         strain grows as the mesh is refined
     sliding : which point of the master belongs to a point of the slave, and along which normal.
-        ``small``: always the point it faces before loading; consistent with small strains, and
-        exactly linear between changes of status. ``finite``: the point it faces in the current
-        positions, paired again in every iteration. ``auto`` (default): ``finite`` if either surface
-        is curved or bent before loading, else ``small`` until the surfaces have moved too far for
-        it (`solver.contact.drift`). Small sliding is wrong if surfaces move along each other by
-        more than an element, which the audit calls outside small-strain theory, or curved ones by
-        more than a hundredth of the contact's length, of which it warns
-    gap : gap added to the distance of the surfaces as meshed [mm]
+        ``small``: the point that it faces before loading; consistent with small strains, and
+        exactly linear between changes of status. ``finite``: the point that it faces in the current
+        positions, found in every iteration. ``auto`` (default): ``finite`` if either surface is
+        curved or bent before loading, else ``small`` until the surfaces have moved too far for it
+        (`solver.contact.drift`). Small sliding is wrong if surfaces move along each other by more
+        than an element (the audit reports this as outside small-strain theory), or curved surfaces
+        by more than a hundredth of the contact's length (the audit warns)
+    gap : gap added to the distance of the surfaces in the mesh [mm]
     interference : overlap at load factor 1, in addition to that of the mesh [mm]: a load, which
         pushes the bodies apart with friction
-    amplitude : load factor of the interference; when absent, time is the load factor
-    presence : whether the pair is there over time: its surfaces may touch while it is above 0 and
-        does not decrease. While it decreases its forces decrease with it, wherever the surfaces
-        are; at 0 there is no pair, and bodies pass through each other. When absent, always 1
+    amplitude : load factor of the interference over time; by default the time itself
+    presence : presence of the pair over time, always 1 by default. The surfaces may touch while it
+        is positive and does not decrease. While it decreases, the forces decrease in proportion,
+        whatever the gap; at 0 there is no pair, and the bodies pass through each other
     """
 
     slave: tuple[str, str]
@@ -86,16 +86,19 @@ class ContactPair:
         return Coulomb(friction=self.friction, cohesion=self.cohesion, shear_limit=self.shear_limit)
 
     def offset(self, time: float) -> float:
-        """Return the gap added at a time to the distance of the surfaces as meshed [mm]."""
+        """Return the gap added at a time to the distance of the surfaces in the mesh [mm]."""
         factor = time if self.amplitude is None else self.amplitude.at(time)
         return self.gap - factor * self.interference
 
     def absent(self, time: float) -> bool:
-        """Return whether there is no pair at a time."""
+        """Whether there is no pair at a time."""
         return self.presence is not None and self.presence.at(time) == 0
 
     def left(self, before: float, time: float) -> float | None:
-        """Return the ratio of its forces at a time to those before; None if contact finds them."""
+        """Return its forces at ``time`` over those ``before`` while it is being removed, else None.
+
+        Otherwise the contact conditions determine the forces.
+        """
         if self.presence is None:
             return None
         was, now = self.presence.at(before), self.presence.at(time)

@@ -1,9 +1,9 @@
 """Friction laws: the largest contact shear as a function of the contact pressure.
 
-A law gives lines ``slope * pressure + stress``; the least of them is the bound. This bound must be
-zero without pressure, concave, and must not decrease; it is piecewise linear. The contact problem,
-which is solved exactly, needs nothing else of friction. `Coulomb` is the law of the package; your
-own law is a class in a file of your own.
+A law gives lines ``slope * pressure + stress``; the least of them is the bound. This piecewise
+linear bound must be zero without pressure, concave, and must not decrease. The contact problem,
+which is solved exactly, needs only these lines. `Coulomb` is the law of the package; your own law
+is a class in a file of your own.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ class PatchStatus(IntEnum):
 
 
 LEAST_FRICTION = 1e-10
-"""A coefficient of friction up to this value counts as zero. Its forces are below the tolerance of
+"""Coefficient of friction up to which it counts as zero. Its forces are below the tolerance of
 normal forces in the contact problem: a hundredth of the out-of-balance force, and a thousandth of
 the contact violation, that an increment permits."""
 _CONCAVE = 1e-12
-"""Tolerance of slopes for rounding, relative to the steepest."""
+"""Increase of slope that counts as rounding, over the steepest slope."""
 
 
 class BoundLines(NamedTuple):
@@ -152,7 +152,7 @@ class FrictionLaw(ABC):
         return False
 
     def check_bodies(self, *, elastic: bool) -> None:
-        """Raise `ModelError` if it does not suit the bodies; ``elastic`` says that both are."""
+        """Raise `ModelError` if the law does not suit the bodies; ``elastic``: both are elastic."""
         del elastic
 
 

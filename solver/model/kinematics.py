@@ -1,4 +1,4 @@
-"""Kinematics of a two-dimensional body: what is assumed in the third direction."""
+"""Kinematics of a two-dimensional body: the assumption on the third direction."""
 
 from __future__ import annotations
 

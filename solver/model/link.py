@@ -1,4 +1,4 @@
-"""Links: boundaries that are tied, kept rigid, held by springs, or moved by a rigid body."""
+"""Links: boundaries that are tied, rigid, held by springs, or moved by a rigid body."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ Side = tuple[str, str]
 class Link:
     """Linear conditions on the displacements of a boundary, the slave.
 
-    Without ``rigid`` and ``master`` the slave moves as one: its components are the same at all its
-    nodes. With a stiffness it is held by springs to the ground instead.
+    Without ``rigid`` and ``master`` all nodes of the slave have the same displacement; with a
+    stiffness, springs hold the slave to the ground instead.
 
     Attributes
     ----------
@@ -29,12 +29,14 @@ class Link:
     master : body and boundary to which the slave is tied; their nodes need not match
     rigid : the rigid body whose motion the slave follows; with a master, the motion of the slave
         relative to the master, such as the shortening of a bolt. Rotations are small
-    components : of the displacement that it holds: along the axes, or along the normal or the
-        tangent of the slave at each node. At a corner the normal is the mean of both sides
-    stiffness : of springs between the two, force per area and displacement [N/mm3]; inf is rigid
-    distributed : whether only the mean motion of the slave is that of ``rigid``: its force and
-        moment act on the slave by a linear traction, and it may deform. In axisymmetric bodies
-        it is the mean motion along y alone, and the traction is constant
+    components : components of the displacement in the conditions: along the axes, or along the
+        normal or the tangent of the slave at each node. At a corner the normal is the mean of both
+        sides
+    stiffness : stiffness of springs between the two, force per area and displacement [N/mm3]; inf
+        is rigid
+    distributed : whether only the mean motion of the slave equals that of ``rigid``: force and
+        moment act on the slave by a linear traction, and the slave may deform. In axisymmetric
+        bodies it is the mean motion along y, and the traction is constant
     """
 
     slave: Side
@@ -62,20 +64,20 @@ class Link:
 
     @property
     def axes(self) -> tuple[int, ...]:
-        """Its components along axes: 0 (x), 1 (y); none of a `local` link."""
+        """Its components along axes: 0 (x), 1 (y); empty for a `local` link."""
         return () if self.local else tuple("xy".index(axis) for axis in self.components)
 
     @property
     def local(self) -> bool:
-        """Whether it holds the component along the normal, or the tangent, of the slave."""
+        """Whether its component is along the normal or the tangent of the slave."""
         return self.components in ("normal", "tangential")
 
     @property
     def grounded(self) -> bool:
-        """Whether springs hold it to the ground."""
+        """Whether springs hold the slave to the ground."""
         return self.rigid is None and self.master is None and math.isfinite(self.stiffness)
 
     @property
     def sides(self) -> tuple[Side, ...]:
-        """The boundaries that it joins."""
+        """The slave, and the master if there is one."""
         return (self.slave,) if self.master is None else (self.slave, self.master)

@@ -2,10 +2,11 @@
 
 A kind of load is a subclass of `Load` that overrides some of its methods: a force on a boundary, a
 force per volume, an eigenstrain, a stress present before loading, a prescribed displacement, a loss
-of stiffness and strength, or the removal of elements. The solver uses only these methods; no other
-code knows the kinds.
-Values are those at load factor 1. The load factor at a time is that of the amplitude; without an
-amplitude it is the time itself. A `Value` may vary in space.
+of stiffness and strength, or the removal of elements. The solver knows only these methods, not the
+kinds.
+
+Values are those at load factor 1. The load factor follows the amplitude; without an amplitude it is
+the time itself. A `Value` may vary in space.
 """
 
 from __future__ import annotations
@@ -39,13 +40,13 @@ _VECTOR, _TENSOR = ("x", "y"), ("xx", "yy", "zz", "xy")
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Load:
-    """Base class of loads. A kind of load overrides the methods for what it applies.
+    """Base class of loads; a kind of load overrides the methods of the quantities that it applies.
 
-    Positions x are (2, n) [mm]. Methods that a kind does not override return None.
+    Positions x are (2, n) [mm]. The other methods return None.
 
     Attributes
     ----------
-    amplitude : load factor over time; when absent, time is the load factor
+    amplitude : load factor over time; by default the time itself
     varies : whether loads of this kind change with time, and have an amplitude
     outside : whether the boundaries of this kind must lie on the outside of the body
     """
@@ -78,8 +79,8 @@ class Load:
         Parameters
         ----------
         x : positions of the pieces
-        along : (2, n) from start to end of the pieces, the body on their left [mm]: their outward
-            normal times their length is ``(along[1], -along[0])``
+        along : (2, n) vectors along the pieces, with the body on their left [mm]: outward normal
+            times length is ``(along[1], -along[0])``
         """
         del x, along
         return None
@@ -90,7 +91,7 @@ class Load:
         return None
 
     def eigenstrain(self, x: Array) -> Array | None:
-        """Return the eigenstrain, which causes no stress, xx, yy, zz, xy (4, n), at positions x."""
+        """Return the eigenstrain xx, yy, zz, xy (4, n) at positions x: strain without stress."""
         del x
         return None
 
@@ -111,7 +112,7 @@ class Load:
 
     @property
     def removes(self) -> str:
-        """The region of the body whose elements it takes away; empty if it takes none."""
+        """The region of the body that it removes; empty for other kinds."""
         return ""
 
 
@@ -227,9 +228,9 @@ class Centrifugal(Load):
     Attributes
     ----------
     density : mass per volume [t/mm3]; steel has 7.85e-9
-    speed : angular speed at load factor 1 [rad/s]; half the force is there at 0.707 of the speed
-    axis : the direction of the axis of rotation, ``y`` or ``z``, normal to the plane; an
-        axisymmetric body rotates about its own axis
+    speed : angular speed at load factor 1 [rad/s]; load factor 0.5 corresponds to 0.707 of it
+    axis : direction of the axis of rotation, ``y`` or ``z`` (normal to the plane); an axisymmetric
+        body rotates about its own axis
     centre : a point of the axis [mm]
     """
 
@@ -265,9 +266,9 @@ class Centrifugal(Load):
 @LOADS.word("displacement")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Displacement(BoundaryLoad):
-    """A prescribed displacement of a boundary: ``x``, ``y`` and, of a body in space, ``z`` [mm].
+    """A prescribed displacement of a boundary: ``x``, ``y``, and ``z`` of a body in space [mm].
 
-    None leaves it free.
+    A component that is None remains free.
     """
 
     x: Coordinate | None = None
@@ -297,7 +298,7 @@ class Temperature(Load):
 
     Attributes
     ----------
-    rise : the rise of temperature [K]
+    rise : rise of temperature [K]
     expansion : coefficient of linear thermal expansion [1/K]
     modulus_drop, yield_drop : relative loss of Young's modulus and of the yield stress per kelvin
         [1/K]. Every slope of the tension curve decreases with Young's modulus
@@ -335,15 +336,15 @@ class Temperature(Load):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Removal(Load):
-    """The removal of the elements of a region of the body, such as by machining.
+    """The removal of the elements of a region of the body, for example by machining.
 
-    The load factor is the share that is removed: the stiffness of the elements is lost in this
-    share, and with it the forces by which they hold the others, which are so released. At 1 they
-    are gone, with a stiffness of rounding left. It has an amplitude, which does not decrease.
+    The load factor is the removed share of their stiffness, and of their forces on other elements.
+    At 1 a negligible stiffness remains (`solver.fem.softening`). The amplitude is required and must
+    not decrease.
 
     Attributes
     ----------
-    region : name of a set of elements, ``subdomains`` of the mesh
+    region : name of a set of elements in the ``subdomains`` of the mesh
     """
 
     region: str
@@ -362,22 +363,22 @@ class Removal(Load):
 
     @property
     def removes(self) -> str:
-        """The region that it takes away."""
+        """The region that it removes."""
         return self.region
 
 
 @LOADS.word("initial_stress")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InitialStress(Load):
-    """Stress present before any load, for instance from manufacture.
+    """Stress present before any load, for example from manufacture.
 
-    It is brought to equilibrium before any load acts; a field that is not in balance deforms the
+    It is brought to equilibrium before any load acts: a field that is not in balance deforms the
     body and changes. It has no amplitude.
 
     Attributes
     ----------
     xx, yy, zz, xy : components [MPa]
-    stress : in place of them, a function (positions (2, n) [mm]) -> xx, yy, zz, xy (4, n) [MPa]
+    stress : instead of these, a function (positions (2, n) [mm]) -> xx, yy, zz, xy (4, n) [MPa]
     """
 
     xx: StressValue = 0.0
@@ -390,7 +391,7 @@ class InitialStress(Load):
 
     @classmethod
     def on_grid(cls, x: Array, y: Array, stress: Array) -> InitialStress:
-        """Return a stress given on a grid, for instance measured; it is interpolated linearly.
+        """Return a stress given on a grid, for example measured, and interpolated linearly.
 
         Parameters
         ----------
@@ -424,7 +425,8 @@ class InitialStress(Load):
         if self.stress is not None and not callable(self.stress):
             raise ModelError("initial_stress.stress", self.stress, "must be a function of position")
         if self.stress is not None and any(each.values()):
-            raise ModelError("initial_stress", each, "must not be given beside a function, stress")
+            allowed = "must be left out if stress, a function of position, is given"
+            raise ModelError("initial_stress", each, allowed)
         if self.amplitude is not _ALWAYS:
             raise ModelError("initial_stress.amplitude", self.amplitude, "must not be given")
 
@@ -458,12 +460,12 @@ def _density(load: str, value: float) -> None:
 
 
 def _components(field: str, load: Load, names: tuple[str, ...], x: Array, unit: str) -> Array:
-    """Return the values of some entries of a load (n_names, n) at positions x."""
+    """Return the values (n_names, n) of fields of a load at positions x."""
     return np.stack([_values(f"{field}.{name}", getattr(load, name), x, unit) for name in names])
 
 
 def _values(field: str, value: Value, x: Array, unit: str) -> Array:
-    """Return a number or a function of position at positions x (n,), or raise `ModelError`."""
+    """Return a `Value` (n,) at positions x, or raise `ModelError`."""
     try:
         found = value(x) if callable(value) else value
     except ModelError as error:  # of a table
@@ -472,7 +474,7 @@ def _values(field: str, value: Value, x: Array, unit: str) -> Array:
 
 
 def checked(field: str, value: object, shape: tuple[int, ...], unit: str) -> Array:
-    """Return the value of a load's method as an array of this shape, or raise `ModelError`."""
+    """Return a value as a finite array of this shape, or raise `ModelError`."""
     found = np.asarray(value, dtype=float)
     try:
         found = np.broadcast_to(found, shape)

@@ -24,9 +24,9 @@ class Model:
     ----------
     bodies : bodies with different names and the same kinematics
     rigid : rigid bodies, with names of their own
-    contacts : pairs of boundaries that may touch, of bodies of one thickness
-    links : boundaries that are tied, kept rigid, or held by springs
-    singular : points around which large strain is not judged: it depends on the mesh
+    contacts : pairs of boundaries that may touch, on bodies of the same thickness
+    links : boundaries that are tied, rigid, held by springs, or moved by a rigid body
+    singular : points around which the audit ignores large strain, because it depends on the mesh
     """
 
     bodies: tuple[Body, ...]
@@ -66,7 +66,7 @@ class Model:
                 raise ModelError(f"rigid.{body.name}.surfaces", {}, allowed)
 
     def _check_solids(self) -> None:
-        """Refuse what models of bodies in space have not yet: contact, links, rigid bodies."""
+        """Raise `ModelError` for contact, links and rigid bodies in a model of bodies in space."""
         kinds = {body.element for body in self.bodies if body.dim == 3}
         for name in ("rigid", "contacts", "links", "singular") if kinds else ():
             if len(getattr(self, name)):
@@ -77,7 +77,7 @@ class Model:
             raise ModelError("bodies.element", every, "must be all in the plane or all in space")
 
     def _check_link(self, name: str, link: Link) -> None:
-        """Refuse bodies that a link cannot join, and surfaces that something else holds too."""
+        """Raise `ModelError` for bodies and surfaces that a link cannot join."""
         sides = zip(("slave", "master"), link.sides, strict=False)
         for side, (of, boundary) in sides:
             body = self.body(of, f"{name}.{side}")
@@ -101,7 +101,7 @@ class Model:
             raise ModelError(f"{name}.rigid", link.rigid, "must be a rigid body")
 
     def _check_pairs(self) -> None:
-        """Refuse two thicknesses, a surface paired with itself, and two surfaces paired twice."""
+        """Raise `ModelError` for unequal thickness, self-contact, and a pair given twice."""
         pairs = [(contact.slave, contact.master) for contact in self.contacts]
         plane = self.bodies[0].kinematics != "axisymmetric"
         for i, (slave, master) in enumerate(pairs):

@@ -13,17 +13,17 @@ from solver.typing import Array
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Axle:
-    """Makes an elastic body a wheel that turns about ``centre``.
+    """Makes an elastic body a wheel that rotates about ``centre``.
 
     Attributes
     ----------
-    centre : (x, y) of the hub where the body is meshed [mm]
-    radius : radius of the rim [mm]; a moment counts as a force at this radius
-    force : vertical force on the axle, positive when pressing down [N]
+    centre : (x, y) of the hub in the mesh [mm]
+    radius : radius of the rim [mm]
+    force : vertical force on the axle, positive downwards [N]
     moment : moment on the axle, positive counter-clockwise [N mm]
-    position : position of the axle along x from where it was meshed [mm]
-    rotation : prescribed rotation of the hub, in place of the moment [rad]
-    turned : rotation before the start, so that the fine part of the rim reaches the track [rad]
+    position : displacement of the axle along x from its place in the mesh [mm]
+    rotation : prescribed rotation of the hub, instead of the moment [rad]
+    turned : rotation at the start, so that the fine part of the rim reaches the track [rad]
     """
 
     centre: tuple[float, float]
@@ -37,11 +37,11 @@ class Axle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TravellingPressure:
-    """A Hertz pressure with proportional shear, translated along a boundary facing up.
+    """A Hertz pressure with proportional shear that moves along a boundary facing upwards.
 
     Attributes
     ----------
-    boundary : name of the boundary on which it acts
+    boundary : name of the boundary
     half_width, peak : a [mm] and p0 [MPa]
     amplitude : factor of the pressure
     position : position of its centre along x [mm]
@@ -56,7 +56,7 @@ class TravellingPressure:
     shear_ratio: Amplitude
 
     def now(self, time: float) -> tuple[float, float, float]:
-        """Return the factor of the pressure, its centre [mm] and the ratio of shear to it."""
+        """Return the factor of the pressure, its centre [mm] and the shear ratio at a time."""
         return self.amplitude.at(time), self.position.at(time), self.shear_ratio.at(time)
 
     def at(self, time: float, x: Array) -> tuple[Array, float]:

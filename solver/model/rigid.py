@@ -16,7 +16,7 @@ from solver.typing import Array, Ints
 
 _RIGID = Rigid()
 _TURN = 0.1
-"""Largest angle of one edge of an arc [rad]: its curvature then has an error of 0.1 %."""
+"""Largest angle of an edge of an arc [rad]: the error of its curvature is then 0.1 %."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,8 +32,8 @@ class Pushed(Load):
 
     Attributes
     ----------
-    locked : time from which the motion stays as it is then, as that of a tightened bolt: in all
-        increments that begin at or after it
+    locked : time of locking, as of a tightened bolt: the motion is constant in all increments that
+        begin at or after it
     """
 
     value: float = 0.0
@@ -82,10 +82,10 @@ def arc(
     edges: int,
     goes_on: tuple[bool, bool] = (True, True),
 ) -> RigidSurface:
-    """Return an arc of a circle from one angle to another [rad], a part of a larger surface.
+    """Return an arc from one angle to another [rad], by default a part of a larger surface.
 
-    If the angles increase, the body is inside the circle. More than ``edges`` edges are used if
-    each would span more than `_TURN`.
+    If the angles increase, the body is inside the circle. There are more than ``edges`` edges if
+    each would span more than 0.1 rad.
     """
     least = int(np.ceil(abs(angles[1] - angles[0]) / _TURN))
     angle = np.linspace(*angles, 2 * max(edges, least) + 1)
@@ -100,8 +100,8 @@ class RigidBody:
     Attributes
     ----------
     name : unique in its model
-    surfaces : contact surfaces by name; none where it only moves boundaries by links
-    centre : the point (x, y) to which displacements and moments refer [mm]
+    surfaces : contact surfaces by name; empty if it only moves boundaries by links
+    centre : point (x, y) to which displacements and moments refer [mm]
     x, y, rotation : the three motions, each prescribed (`Moved`; zero by default) or free with a
         force or moment on it (`Pushed`); rotation is positive counter-clockwise
     thickness : thickness of plane bodies [mm]
@@ -137,7 +137,7 @@ class RigidBody:
 
     @property
     def material(self) -> Law:
-        """The law of a rigid material, which does not deform."""
+        """The law of a rigid material."""
         return _RIGID
 
     law = material
@@ -153,5 +153,5 @@ class RigidBody:
 
     @property
     def box(self) -> Array:
-        """Sides (2,) of the bounding box: infinite, as only the surface of the body is known."""
+        """Sides (2,) of the bounding box: infinite, because only surfaces of the body are known."""
         return np.full(2, np.inf)

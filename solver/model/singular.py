@@ -15,14 +15,14 @@ from solver.typing import Array, Bools
 class SingularPoint:
     """A point at which strain grows without bound as the mesh is refined.
 
-    Strain within its radius, in any body, depends on the mesh. The audit judges small-strain theory
+    Strain within its radius, in any body, depends on the mesh. The audit checks small-strain theory
     by the strain outside of it.
 
     Attributes
     ----------
     at : position (x, y) before loading [mm]
-    radius : radius within which no result is used [mm]; at least 1.5 sides of the elements that
-        share the point
+    radius : radius within which no result is used [mm]; at least 1.5 sides of the elements at the
+        point
     """
 
     at: tuple[float, float]

@@ -1,4 +1,4 @@
-"""Values given at positions, as a function of position that a load may have."""
+"""Tables of values at positions, for loads that vary in space."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from solver.typing import Array
 
 
 def columns_of(text: str, names: Sequence[str]) -> dict[str, Array]:
-    """Return columns (n,) of a CSV text whose header names them, and others perhaps.
+    """Return the named columns (n,) of a CSV text with a header; it may have others.
 
     Raises
     ------
     ModelError
-        if a column is absent or there twice, or an entry is no finite number
+        if a column is absent or occurs twice, or an entry is not a finite number
     """
     listed = ", ".join(names)
     allowed = f"must be numbers under a header with {listed}"
@@ -56,8 +56,8 @@ def columns_of(text: str, names: Sequence[str]) -> dict[str, Array]:
 class Tabulated:
     """A function of position, linear between the positions of a table: a `Value` of a load.
 
-    With x and y it is linear in the triangles between the positions (Delaunay's), with one of them
-    along that axis. Outside of the table it has no value.
+    With x and y it is linear in the Delaunay triangles of the positions, with one of them linear
+    along this axis. Outside of the table it has no value.
 
     Attributes
     ----------
@@ -90,12 +90,12 @@ class Tabulated:
 
     @classmethod
     def of(cls, text: str, column: str = "value") -> Tabulated:
-        """Return the table of a CSV text, whose header names x, y, or both, and the column.
+        """Return the table of a CSV text with the columns x, y, or both, and ``column``.
 
         Raises
         ------
         ModelError
-            if a column is absent, or an entry is no number
+            if a column is absent, or an entry is not a number
         """
         first = text.lstrip().partition("\n")[0]
         header = [name.strip(' \r"') for name in first.split(",")]
@@ -121,7 +121,7 @@ class Tabulated:
         Raises
         ------
         ModelError
-            if a position is outside of the table
+            if a position is outside the table
         """
         found = self._between(x)
         outside = np.isnan(found)
@@ -138,7 +138,7 @@ class Tabulated:
 
     @cached_property
     def _between(self) -> Callable[[Array], Array]:
-        """The function (2, n) -> (n,), NaN outside."""
+        """The interpolation (2, n) -> (n,), NaN outside."""
         values = np.asarray(self.value, dtype=float)
         if self.x is not None and self.y is not None:
             return self._triangulated(np.array([self.x, self.y], dtype=float), values)
@@ -156,7 +156,7 @@ class Tabulated:
 
     @staticmethod
     def _scaled(places: Array) -> Array:
-        """Return positions (2, n) from their mean, over their extent."""
+        """Return positions (2, n) relative to their mean, over their extent."""
         return np.asarray(places - places.mean(axis=1, keepdims=True)) / np.ptp(places)
 
     @staticmethod
@@ -168,7 +168,7 @@ class Tabulated:
         def between(x: Array) -> Array:
             found = np.asarray(linear(x.T))
             near = np.isnan(found)
-            if near.any():  # rounding may put a position on the rim outside
+            if near.any():  # rounding may put a position on the rim outside: move it inwards
                 found[near] = linear((x + ROUNDED * (middle - x)).T[near])
             return found
 

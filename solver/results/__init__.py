@@ -1,1 +1,1 @@
-"""Results of a run: fields, figures, the audit."""
+"""Results of a run: fields, numbers, records, files."""

@@ -19,8 +19,8 @@ def mesh_fields(
 
     Parameters
     ----------
-    states : the state at each stage
-    beside : returns fields of other bodies at the same stages
+    states : state at each stage
+    beside : function that returns the fields of further bodies at the same stages
     """
     wholes = {name: fields.system.full(name) for name in fields.system.names}
     bodies, first = {}, 0

@@ -1,7 +1,7 @@
 """The fields of a body: name, meaning and unit of each, declared once for all results.
 
-What stores, requests, exports or draws a field reads `BODY_FIELDS`: lines, points, maps, requested
-numbers, fields at nodes, pictures.
+Lines, points, maps, requested numbers, fields at nodes, exported files and pictures read
+`BODY_FIELDS`.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ class BodyValues(NamedTuple):
     ----------
     displacement : (n_axes, n) with two or three axes [mm]
     stress : (n_components, n) recovered, components xx, yy, zz, xy (, yz, zx) [MPa]
-    mises : (n,) von Mises stress, recovered from its values at the integration points: computed
+    mises : (n,) von Mises stress, recovered from its values at the integration points; computed
         from the recovered stress it would exceed the strength [MPa]
     plastic_strain : (n,) equivalent plastic strain, recovered
-    plastic_tensor : (n_components, n) plastic strain, recovered, components as of stress
-    strain : (n_components, n) strain, recovered: that of the displacements, elastic, plastic and of
-        heat together; in plane stress zz is the strain of the thickness
+    plastic_tensor : (n_components, n) plastic strain, recovered, components as those of stress
+    strain : (n_components, n) total strain (elastic, plastic, thermal), recovered; in plane stress
+        zz is the strain of the thickness
     """
 
     displacement: Array
@@ -41,8 +41,8 @@ class BodyField(NamedTuple):
     Attributes
     ----------
     long_name : meaning in words
-    units : as the CF conventions write them
-    stem : its name in requests and in fields at nodes, before that of a component
+    units : units in the notation of the CF conventions
+    stem : its name in requests and in fields at nodes, without the component
     over : ``axis`` of a vector, ``component`` of a tensor, empty for a scalar
     """
 
@@ -52,11 +52,11 @@ class BodyField(NamedTuple):
     over: Literal["", "axis", "component"] = ""
 
     def parts(self, axes: int) -> tuple[str, ...]:
-        """Return the names of its components in a body with this many axes; none of a scalar."""
+        """Return the names of its components in a body with ``axes`` axes; empty for a scalar."""
         return {"": (), "axis": AXES[:axes], "component": components(2 * axes)}[self.over]
 
     def numbers(self, axes: int) -> tuple[str, ...]:
-        """Return its name at nodes, as ``mises``, or those of its components, as ``stress_xx``."""
+        """Return the names at nodes: ``mises``, or of each component, as ``stress_xx``."""
         return tuple(f"{self.stem}_{part}" for part in self.parts(axes)) or (self.stem,)
 
 
@@ -70,4 +70,4 @@ BODY_FIELDS = {
 }
 """Fields by their names in `BodyValues`."""
 STORED = tuple(name for name in BODY_FIELDS if name != "displacement")
-"""Fields that are stored on maps and along lines."""
+"""Fields stored on maps and along lines."""

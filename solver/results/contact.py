@@ -1,4 +1,4 @@
-"""Pressure, shear, gap and slip of contact: along a scene's view, and of contact pairs by name."""
+"""Pressure, shear, gap and slip of contact, along a scene's view and for contact pairs by name."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def contacts(
 
     Parameters
     ----------
-    results : for each pair, the result at each stage
+    results : for each pair, its result at each stage
     names : names of the pairs
     samples : number of positions along each slave
     """

@@ -24,13 +24,13 @@ class ContactResult:
     X : (2, n) positions before loading [mm]
     pressure : (n,) force per area before loading, as the stress of the body [MPa]
     shear : (n,) shear of the slave on the master along s, per area before loading [MPa]. Between a
-        lower and an upper body it acts on the lower one along x, whichever is the slave
-    pressure_deformed : (n,) force per deformed area, which both surfaces share: it does not depend
-        on the choice of the slave. With small sliding it equals ``pressure`` [MPa]
+        lower and an upper body this is the shear on the lower one along x, whichever is the slave
+    pressure_deformed : (n,) force per deformed area, which is the same for both surfaces and does
+        not depend on the choice of the slave. With small sliding it equals ``pressure`` [MPa]
     gap : (n,) distance of the surfaces; NaN where no master faces the slave [mm]
     slip : (n,) slip of the slave on the master along s [mm]
-    area : (n,) integral of the hat of each vertex, whether a master faces it or not: the sum of
-        pressure times area is the normal force [mm2]
+    area : (n,) integral of the whole hat of each vertex: the sum of pressure times area is the
+        normal force [mm2]
     closed : (n,) whether the bodies touch
     sticking : (n,) whether they touch without slip; nowhere without friction
     """
@@ -57,7 +57,7 @@ class ContactResult:
         return sum(end - start for start, end in self.patches)
 
     def along(self, axis: Axis) -> ContactResult:
-        """Return the result in the order of a straight axis, with ``s`` from its middle [mm].
+        """Return the result along a straight axis, with ``s`` from its middle [mm].
 
         Shear acts on the lower body along the axis.
         """
@@ -93,11 +93,11 @@ def contact_result(system: System, at: Converged, pair: int = 0) -> ContactResul
 
 
 def contact_patches(s: Array, gap: Array, closed: Bools) -> list[tuple[float, float]]:
-    """Return start and end [mm] of each patch of contact, from the gaps beside its closed points.
+    """Return start and end [mm] of each patch of contact, from the gaps next to its closed points.
 
-    Outside a smooth contact the gap grows as the distance from its edge to the power 3/2, also if
-    the bodies yield inside. So a straight line through (gap)^(2/3) at two points is zero at the
-    edge. Where the surface ends, or no master faces it, the edge is the last closed point.
+    Outside a smooth contact the gap is proportional to the distance from its edge to the power 3/2,
+    also if the bodies yield. A straight line through (gap)^(2/3) at two points is thus zero at the
+    edge. If the surface ends there, or no master faces it, the edge is the last closed point.
 
     Parameters
     ----------
@@ -113,11 +113,11 @@ def contact_patches(s: Array, gap: Array, closed: Bools) -> list[tuple[float, fl
 
 
 def _edge(s: Array, gap: Array, closed: Bools, last: int, way: int) -> float:
-    """Return the edge of contact beyond its last closed point in one direction (``way``) [mm]."""
-    beyond, near, far = last + way * np.array([1, 2, 3])  # the hat of the first is partly closed
+    """Return the edge of contact [mm] beyond its ``last`` closed point in the direction ``way``."""
+    beyond, near, far = last + way * np.array([1, 2, 3])  # the hat of ``beyond`` is partly closed
     if not 0 <= far < len(s) or closed[[beyond, near, far]].any():
         return float(s[last])
-    if not 0 < gap[near] < gap[far]:  # NaN too
+    if not 0 < gap[near] < gap[far]:  # also if NaN
         return float(s[last])
     low, high = gap[[near, far]] ** (2 / 3)
     edge = s[near] - low * (s[far] - s[near]) / (high - low)

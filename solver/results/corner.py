@@ -23,12 +23,12 @@ from solver.results.singularity import (
 _NEAREST, _FARTHEST = 10.0, 0.03
 """Range of the fit: lower end in elements at the corner, upper end in half-widths."""
 _GRADED = 0.9
-"""Largest ratio of the upper end of the fit to the distance within which elements grow."""
+"""Upper end of the fit over the distance within which elements grow, at most."""
 _SHARE = 0.25
-"""Largest ratio of the upper end of the fit to the distance of another feature or end of slip."""
+"""Upper end of the fit over the distance of another feature or end of slip, at most."""
 _NOTCH, _NOTCH_SHEAR = 0.364, 0.543
-"""A corner that sticks is a notch of 270 degrees (Williams): difference of its first two powers,
-and ratio of outward shear to pressure in the first term. In the second term signs are free."""
+"""Difference of the first two powers, and outward shear over pressure in the first term, of a
+corner that sticks: a notch of 270 degrees (Williams). The second term may have any signs."""
 _SEEN = (0.01, 0.1)
 """Range of the apparent power, in half-widths."""
 
@@ -41,13 +41,13 @@ class Corner:
     Contact pressure is fitted from a distance of ten elements from the corner up to the least of
 
     - 0.03 half-widths
-    - 0.9 of the distance within which elements grow in proportion to it: there their error is the
-      same share of the pressure everywhere, and does not change its power
+    - 0.9 of the distance within which element sides grow in proportion to it: their error is then a
+      constant share of the pressure, and does not change its power
     - a quarter of the distance to another feature or to the end of slip
 
     The result is NaN if the corner has lifted off, or if it sticks and the first term of the notch
-    is not the largest in that range. Stress in the half-plane is a worse measure: a uniform stress
-    along its surface, which does not change the pressure, is a term only 1 - p above the first.
+    is not the largest in this range. Stress in the half-plane is less suitable: it may contain a
+    uniform stress along its surface, a term whose power is only 1 - p above the first.
     """
 
     half_width: Length = described(MISSING, "distance of the corner from the middle of the contact")
@@ -89,7 +89,7 @@ class Corner:
         }
 
     def warnings(self, run: FinishedRun) -> tuple[str, ...]:
-        """Return a warning where the corner has lifted off."""
+        """Return a warning if the corner has lifted off."""
         width, _ = run.tractions.extent(run.loaded)
         if width >= self.half_width * (1 - 1e-9):
             return ()

@@ -1,4 +1,4 @@
-"""Repeated stages: what each cycle adds, and the shakedown state that the cycles tend to."""
+"""Repeated stages: plastic strain and work of each cycle, and the shakedown state."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ STEADY_NET_INCREMENT = declare(
 )
 
 LEAST = 2
-"""Number of cycles before which cycles do not end: the last is compared with the one before."""
+"""Least number of cycles: the last is compared with the one before."""
 
 
 def over_cycles(cycles: Sequence[Cycle], laws: Sequence[Law]) -> Values:
-    """Return the variables over cycles, and the state that they tend to; none without cycles."""
+    """Return the variables over cycles, and the shakedown state; empty without cycles."""
     if not cycles:
         return {}
     found = shakedown_of(cycles, laws)
@@ -60,7 +60,7 @@ def over_cycles(cycles: Sequence[Cycle], laws: Sequence[Law]) -> Values:
 
 
 def shakedown_of(cycles: Sequence[Cycle], laws: Sequence[Law]) -> Shakedown:
-    """Return the shakedown state that cycles of bodies with given material laws tend to."""
+    """Return the shakedown state to which cycles of bodies with these material laws tend."""
     yielding = [law for law in laws if not law.elastic]
     if not any(len(cycle.points) for cycle in cycles):
         elastic = not cycles[0].before
@@ -76,7 +76,7 @@ def shakedown_of(cycles: Sequence[Cycle], laws: Sequence[Law]) -> Shakedown:
 
 
 def decided(cycles: Sequence[Cycle], laws: Sequence[Law]) -> bool:
-    """Return whether the cycles so far decide the shakedown state and its plastic strain."""
+    """Whether the cycles so far decide the shakedown state and its plastic strain."""
     if len(cycles) < LEAST:
         return False
     found = shakedown_of(cycles, laws)
@@ -84,11 +84,8 @@ def decided(cycles: Sequence[Cycle], laws: Sequence[Law]) -> bool:
     return found.state is not ShakedownState.UNDECIDED and bool(np.isfinite(rate))
 
 
-def _table(
-    points: Ints,
-    each: Sequence[tuple[Ints, Array]],
-) -> Array:
-    """Return the values (n_cycles, n_points) of some points; they are zero where not given."""
+def _table(points: Ints, each: Sequence[tuple[Ints, Array]]) -> Array:
+    """Return the values (n_cycles, n_points) at ``points``, zero where a cycle has none."""
     table = np.zeros((len(each), len(points)))
     for row, (own, values) in zip(table, each, strict=True):
         row[np.searchsorted(points, own)] = values

@@ -19,7 +19,7 @@ from solver.typing import Array
 _CELLS = {
     3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9", 20: "hexahedron20",
 }  # fmt: skip
-"""Cell type of meshio by the number of nodes of an element. The nodes have the same order: corners,
+"""Cell type of meshio by number of nodes of an element. The order of nodes is the same: corners,
 mid-sides, middle."""
 _PVD, _FORMAT = "stages.pvd", "vtu"
 
@@ -36,7 +36,7 @@ def write_vtu(fields: MeshFields, folder: Path) -> Path:
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     stages = ElementTree.SubElement(root, "Collection")
     path, before = folder / _PVD, _listed(folder / _PVD)
-    with ExitStack() as written:  # all appear when all are complete, the list last
+    with ExitStack() as written:  # all files appear when all are complete, the list last
         listed = written.enter_context(appearing(path))
         for number, name in enumerate(fields.stages):
             file = f"{number}-{''.join(c if c.isalnum() else '-' for c in name)}.vtu"

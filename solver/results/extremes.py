@@ -14,12 +14,12 @@ from solver.typing import Array
 
 _OVER = ("body", "component")
 _ROUNDING, _SAME = 1e-9, 1e-6
-"""Ratio of stress to the least yield stress; up to it stress is rounding and has no position.
-Relative difference up to which stresses count as equal."""
+"""Stress over the least yield stress, up to which it is rounding and has no position. Relative
+difference up to which stresses are equal."""
 
 
 class Extreme(NamedTuple):
-    """Extreme residual stress in a body with its place, and at its contact surface with its s."""
+    """Extreme residual stress in a body, and at its contact surface, with its positions."""
 
     inside: Quantity
     place: tuple[Quantity, ...]
@@ -65,8 +65,8 @@ SMALLEST = Extreme(
 def residual_extremes(run: FinishedRun) -> Values:
     """Return the extreme residual stresses at the nodes of each body and of its contact surface.
 
-    If several nodes have the same stress, as along x on a track after a pass, the node nearest to
-    the middle of the contact counts. The position is NaN if there is no stress.
+    If several nodes have the same stress, as along a track after a pass, the position is that of
+    the node nearest to the middle of the contact. It is NaN if there is no stress.
     """
     laws = [run.system.full(name).body.material for name in run.system.names]
     least = [min(law.yield_stress, law.elasticity.youngs_modulus) for law in laws]
@@ -93,7 +93,7 @@ def residual_extremes(run: FinishedRun) -> Values:
 
 
 def _most(stress: Array, none: float, X: Array, away: Array) -> tuple[Array, Array]:
-    """Return the largest value of each component (n,), and its place (n_axes, n).
+    """Return the largest value of each component (n,), and its position (n_axes, n).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Fields of bodies at their nodes, at integration points and at places, each computed once."""
+"""Fields of bodies at their nodes, at integration points and at places."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from solver.tensors import not_below_zero, to_tensor, von_mises
 from solver.typing import Array, Bools
 
 _MOST = 8
-"""Number of values that `Remembered` keeps."""
+"""Number of values in a `Remembered` cache."""
 T = TypeVar("T")
 
 
@@ -33,7 +33,7 @@ class Solved(Protocol):
 
 
 class Interpolation(Protocol):
-    """Interpolates nodal fields of a body at n positions, as `Sampler` does.
+    """Interpolates nodal fields of a body at n positions, such as a `Sampler`.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Interpolation(Protocol):
 
 
 class Bodies(Protocol):
-    """Bodies with converged states, each body with its whole mesh, as in `System`."""
+    """Discretised bodies with converged states, such as a `System`."""
 
     @property
     def names(self) -> Sequence[str]:
@@ -86,7 +86,7 @@ _POSITIVE = ("mises", "plastic_strain")
 
 
 class SystemFields:
-    """Fields of a system's bodies; the fields of the last states are cached."""
+    """Fields of the bodies of a system; those of the last states are cached."""
 
     def __init__(self, system: Bodies) -> None:
         self.system = system
@@ -96,7 +96,7 @@ class SystemFields:
     def recovered(self, body: str, points: Array) -> Array:
         """Return nodal values (..., n_nodes) of point values (..., n_points).
 
-        Of a body from which elements are removed, NaN are the values in these: they do not count.
+        Point values are NaN in removed elements; these are left out.
         """
         matrix = self.recovery(body)
         if any(load.removes for load in self.system.full(body).body.every_load):
@@ -121,9 +121,11 @@ class SystemFields:
         )
 
     def at_points(self, at: Solved, body: str) -> tuple[Array, Array, Array]:
-        """Return positions (n_axes, n) [mm], von Mises stress (n,) [MPa] and plastic strain (n,).
+        """Return values at the integration points of a body.
 
-        They belong to the integration points.
+        Returns
+        -------
+        positions (n_axes, n) [mm], von Mises stress (n,) [MPa] and equivalent plastic strain (n,)
         """
         found = self.system.response(body, at)
         return self.system.positions(body), von_mises(found.stress), found.state.accumulated
@@ -138,7 +140,7 @@ class SystemFields:
 
 
 def interpolated(sampler: Interpolation, values: BodyValues, name: str) -> Array:
-    """Return a field (..., n) interpolated between nodes; fields without sign stay not negative."""
+    """Return a field (..., n) interpolated between nodes; non-negative fields stay so."""
     found = sampler(getattr(values, name))
     return not_below_zero(found) if name in _POSITIVE else found
 
@@ -155,6 +157,6 @@ class Remembered(Generic[T]):
         if key not in self._known:
             while len(self._known) >= _MOST:
                 del self._known[next(iter(self._known))]
-            # keep the state, so that its id is not used again; tangents would need much memory
+            # the state is kept so that its id is not reused; `at` with its tangents is too large
             self._known[key] = at.state, make()
         return self._known[key][1]

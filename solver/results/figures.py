@@ -1,4 +1,4 @@
-"""Numbers of every run: extreme values, and the cost of the run."""
+"""Numbers of every run: extreme values and cost."""
 
 from __future__ import annotations
 

@@ -24,12 +24,11 @@ class Observed:
     ----------
     time : time of the program; the load factor if loads have no amplitude
     motions : motion of each rigid body
-    reactions : forces x, y [N] and moment [N mm] by body. On a body with a mesh: the forces of
-        supports and prescribed displacements, in space also z, moment NaN. On a rigid body: all
-        forces except contact, both given ones and those that its motion needs, and their moment
-        about its centre
+    reactions : forces x, y (in space also z) [N] and moment [N mm] by body. Meshed body: forces of
+        supports and prescribed displacements, moment NaN. Rigid body: all forces except contact,
+        given ones and those of prescribed motions, and their moment about its centre
     contact : sums of normal and of tangential forces on the slave of each pair [N]
-    watched : numbers that outputs watch, over the dimension ``increment``
+    watched : numbers of outputs after every increment
     """
 
     time: float
@@ -52,7 +51,7 @@ def observe(system: System, converged: Converged) -> Observed:
             x, y, turning = forces
             reactions[name] = (float(x), float(y), float(turning) * part.frame.radius)
         elif part.body.axle is None:  # type: ignore[union-attr]
-            # by equilibrium, also for a condensed body, whose supported nodes are eliminated
+            # from equilibrium: the supported nodes of a condensed body are eliminated
             whole = system.full(name)
             loads = vectors(whole.external(state.time), whole.dim).sum(axis=1)
             held = -loads - vectors(touch, whole.dim).sum(axis=1)

@@ -42,25 +42,24 @@ TANGENTIAL_FORCE = declare(
 def over_increments(
     history: Sequence[Observed], times: Sequence[float], parts: Sequence[str], pairs: Sequence[str]
 ) -> Values:
-    """Return what is kept of the ends of the program's increments.
-
-    These are reactions, motions, contact forces, and the numbers that outputs watch.
+    """Return the numbers at the ends of the program's increments.
 
     Parameters
     ----------
     history : all increments, including the parts of increments that were cut
-    times : times at which the increments of the program end, after the initial time
-    parts, pairs : names of all bodies, also those without a mesh, and of the contact pairs
+    times : initial time, and the times at which the increments of the program end
+    parts, pairs : names of all bodies, also of rigid ones, and of the contact pairs
 
     Returns
     -------
-    reactions [N] and, where there are rigid bodies, motions [mm, rad] (n_parts, n_times), contact
-    forces (n_pairs, n_times) [N]; NaN for increments that were not computed
+    reactions (n_parts, n_times) [N], with rigid bodies also motions (n_parts, n_times) [mm, rad],
+    contact forces (n_pairs, n_times) [N], and the numbers that outputs watch (n_times,); NaN for
+    increments that were not computed
     """
     kept = _in_order(history, times)
-    lost = (np.nan, np.nan, np.nan)
-    reactions = np.array([[o.reactions.get(p, lost) if o else lost for o in kept] for p in parts])
-    motions = np.array([[o.motions.get(p, lost) if o else lost for o in kept] for p in parts])
+    none = (np.nan, np.nan, np.nan)
+    reactions = np.array([[o.reactions.get(p, none) if o else none for o in kept] for p in parts])
+    motions = np.array([[o.motions.get(p, none) if o else none for o in kept] for p in parts])
     out: dict[Quantity, Any] = {
         PART: np.array(list(parts)),
         INCREMENT: np.arange(len(times)),
@@ -68,12 +67,11 @@ def over_increments(
         REACTION[0]: reactions[..., 0],
         REACTION[1]: reactions[..., 1],
     }
-    if any(observed.motions for observed in history):  # of rigid bodies alone
+    if any(observed.motions for observed in history):
         for k, motion in enumerate((*MOTION, ROTATION)):
             out[motion] = motions[..., k]
     if pairs:
-        none = [lost[:2]] * len(pairs)
-        forces = np.array([o.contact if o else none for o in kept])
+        forces = np.array([o.contact if o else [none[:2]] * len(pairs) for o in kept])
         out |= {
             CONTACT: np.array(list(pairs)),
             NORMAL_FORCE: forces[..., 0].T,
@@ -84,7 +82,7 @@ def over_increments(
 
 
 def _in_order(history: Sequence[Observed], times: Sequence[float]) -> list[Observed | None]:
-    """Return the increment that ends at each of the times, or None if it was not computed."""
+    """Return the increment that ends at each time; None if it was not computed."""
     found: list[Observed | None] = []
     at = 0
     for time in times:

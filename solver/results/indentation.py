@@ -1,4 +1,4 @@
-"""Indentation by a ball: force, approach, and the crater that remains."""
+"""Indentation by a ball: force, approach, and residual crater."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ INCREMENT_RADIUS = declare(
 class Indentation:
     """Force, approach, mean pressure under load, and the displacement of the profile's surface.
 
-    The ball touches the origin, and its axis is x = 0. Force, approach and radius of the contact
-    are those of every increment too.
+    The ball touches the origin, and its axis is x = 0. Force, approach and contact radius are also
+    stored after every increment.
     """
 
     body: str = described(MISSING, "name of the ball")
@@ -72,16 +72,16 @@ class Indentation:
         """Return the quantities of a run."""
         force, approach, radius = self.watch(run.system, run.loaded).values()
         mean = force / (np.pi * radius**2) if radius else np.nan
-        s, left = run.view.s, self._moved(run, run.unloaded)
-        highest = int(left.argmax())
+        s, residual = run.view.s, self._moved(run, run.unloaded)
+        highest = int(residual.argmax())
         return {
             FORCE: force,
             APPROACH: approach,
             MEAN_CONTACT_PRESSURE: mean,
-            SURFACE_DISPLACEMENT: np.stack([self._moved(run, run.loaded), left]),
-            CRATER_DEPTH: -float(left[0]),
-            PILE_UP: float(left[highest]),
-            PILE_UP_RADIUS: float(s[highest]) if left[highest] > 0 else np.nan,
+            SURFACE_DISPLACEMENT: np.stack([self._moved(run, run.loaded), residual]),
+            CRATER_DEPTH: -float(residual[0]),
+            PILE_UP: float(residual[highest]),
+            PILE_UP_RADIUS: float(s[highest]) if residual[highest] > 0 else np.nan,
         }
 
     def _moved(self, run: FinishedRun, converged: Solved) -> Array:

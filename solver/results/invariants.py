@@ -1,7 +1,6 @@
-"""Components of stored tensors, and the invariants that are derived from them.
+"""Components of stored tensors, and the invariants derived from them.
 
-Results keep tensor components only; whatever shows or requests a component calls `component`, which
-derives an invariant of this name when it is asked for.
+Results store tensor components only; `component` computes an invariant when it is requested.
 """
 
 from __future__ import annotations
@@ -15,11 +14,11 @@ from solver.typing import Array
 PRINCIPAL = ("principal_1", "principal_2", "principal_3")
 """Principal values, the largest first."""
 INVARIANTS = (*PRINCIPAL, "tresca", "hydrostatic")
-"""Beside the principal values: the largest less the smallest, and their mean."""
+"""Principal values, largest minus smallest principal value, and their mean."""
 
 
 def known_components(count: int) -> tuple[str, ...]:
-    """Return the names of the ``count`` components of a tensor, then those of its invariants."""
+    """Return the names of the ``count`` components of a tensor, and of its invariants."""
     return (*components(count), *INVARIANTS)
 
 
@@ -46,7 +45,8 @@ def component(tensor: Array, name: str) -> Array:
 def principal_of(tensor: Array) -> tuple[Array, Array]:
     """Return principal values (3, ...), the largest first, and their directions (3, 3, ...).
 
-    The first axis of the directions is the component of the unit vector, the second its number.
+    The first axis of the directions is the component of the unit vector, the second the number of
+    the principal value.
 
     Parameters
     ----------

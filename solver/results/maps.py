@@ -53,7 +53,10 @@ HOOP_STRESS = declare(
 
 @output("maps", "map")
 def maps(run: FinishedRun) -> Values:
-    """Return maps around the contact: all stages if the bodies are not unloaded at the end."""
+    """Return maps of residual stress, plastic strain and, in every stage, von Mises stress.
+
+    If the bodies are not unloaded at the end, stress and plastic strain are those of every stage.
+    """
     if not run.view.unloaded:
         return _staged(run, "stress", "mises", "plastic_strain")
     samples = run.samples
@@ -87,7 +90,7 @@ def isochromatics(run: FinishedRun) -> Values:
 
 
 def _on_map(run: FinishedRun, values: Values) -> dict[Quantity, Any]:
-    """Return values on the map, with the axes of the view as the last two dimensions."""
+    """Return the values with the map axes of the view as their last two dimensions."""
     across, up = run.view.map_axes
     return {each.at(*each.dims[:-2], up, across): value for each, value in values.items()}
 
@@ -113,6 +116,6 @@ def surfaces(run: FinishedRun) -> Values:
 
 @output("hoop_stress", "s", "surfaces")
 def hoop_stress(run: FinishedRun) -> Values:
-    """Return the hoop stress along the contact surfaces, on either side."""
+    """Return the hoop stress along the contact surface of each body."""
     sides = [run.samples.on_surface("stress", body, run.loaded)[2] for body in run.view.surfaces]
     return {HOOP_STRESS: np.stack(sides)}

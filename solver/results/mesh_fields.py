@@ -11,11 +11,11 @@ from solver.results.body_fields import BODY_FIELDS
 from solver.typing import Array, Ints
 
 NO_NODE = -1
-"""Fills the rows of faces and cells with fewer nodes than others."""
+"""Node number that fills the rows of faces and cells with fewer nodes."""
 
 _QUAD8 = (0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6, 7)
 _ENDS = (0, 1, 2, 3, 8, 9, 10, 11), (4, 5, 6, 7, 12, 13, 14, 15)
-"""Nodes of two opposite faces of a hexahedron, as of a quadrilateral; four are between them."""
+"""Nodes of two opposite faces of a hexahedron, in the order of a quadrilateral."""
 _FACES: Mapping[int, tuple[tuple[int, ...], ...]] = {
     3: ((0, 1, 2),),
     4: ((0, 1, 2, 3),),
@@ -35,7 +35,7 @@ class MeshFields:
     ----------
     X : (n_axes, n_nodes) positions of the nodes before loading
     bodies : for each body its element and the nodes (n_cells, k) of its cells: corners, mid-sides,
-        middle; in two dimensions counterclockwise; of a hexahedron as VTK orders them
+        middle; in two dimensions counterclockwise, for hexahedra in the order of VTK
     stages : for each stage the fields of `BodyValues` by name
     """
 
@@ -45,7 +45,7 @@ class MeshFields:
 
     @property
     def faces(self) -> tuple[Ints, Ints]:
-        """Triangles and quadrilaterals through all nodes, and the number of the body of each.
+        """Triangles and quadrilaterals through all nodes, and the number of their body.
 
         Elements with mid-side nodes are divided. The last node of a triangle is `NO_NODE`.
 
@@ -69,7 +69,7 @@ class MeshFields:
             yield from zip(field.numbers(len(self.X)), values, strict=True)
 
     def joined(self, other: MeshFields) -> MeshFields:
-        """Return the bodies of both, which have the same axes and stages."""
+        """Return the bodies of both; axes and stages must be the same."""
         first = self.X.shape[1]
         moved = {name: (element, first + cells) for name, (element, cells) in other.bodies.items()}
         stages = {

@@ -1,4 +1,4 @@
-"""Named places and the values stored at them: lines, points, contacts, requested numbers."""
+"""Named places and the values stored there: lines, points, contacts, requested numbers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from solver.results.view import Places
 
 
 class NamedPlaces(NamedTuple):
-    """Named places, in addition to the view of a scene, and the numbers requested of a run.
+    """Named places in addition to the view of a scene, and requested numbers.
 
     Attributes
     ----------
@@ -37,8 +37,8 @@ def at_named_places(run: FinishedRun, places: NamedPlaces, times: Sequence[float
 
     Parameters
     ----------
-    times : times at which the increments of the program end, after the initial time; empty if a
-        run has no increments
+    times : initial time, and the times at which the increments of the program end; empty for a run
+        without increments
     """
     system: Any = run.system
     fields = run.samples.fields

@@ -1,4 +1,4 @@
-"""The outlines of the bodies on the map: closed curves, for pictures with exact borders."""
+"""The outlines of the bodies on the map, closed curves for pictures with exact borders."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ OUTLINE_AT = declare_along(
     "mm", dims=("outline",),
 )  # fmt: skip
 _STRAIGHT = 1e-9
-"""Sine of the angle between two edges below which their common point is left out."""
+"""Sine of the angle between two edges: their common point is left out at a smaller angle."""
 
 
 def outlines(run: FinishedRun) -> Values:
-    """Return the outlines of all bodies in the plane of the map; none without a map.
+    """Return the outlines of all bodies in the plane of the map; empty without a map.
 
-    A curve ends where it begins, and has its body on the left. NaN is between two curves.
+    A curve ends at its first point, and has its body on the left. NaN separates two curves.
     """
     if not all(axis.size for axis in run.view.map_grid):
         return {}
@@ -70,7 +70,7 @@ def closed_curves(X: Array, cells: Ints) -> Iterator[Array]:
 
 
 def _without_straight(curve: Array) -> Array:
-    """Return a closed curve (2, n) without the points at which it does not turn."""
+    """Return a closed curve (2, n) without points on its straight pieces."""
     ahead = np.diff(curve, axis=1)
     before = np.roll(ahead, 1, axis=1)
     turn = ahead[0] * before[1] - ahead[1] * before[0]

@@ -1,9 +1,9 @@
 """Outputs that scene files request by a word.
 
-The definition of an output states its word and what a scene must have for it. An output is a
-function of a run, or a frozen dataclass that is called with a run; its fields are its parameters,
-and a field ``body`` is the name of a body. Such a class may have ``watch(system, converged)``,
-which returns numbers of every increment (quantities over the dimension ``increment``), and
+The definition of an output states its word and its requirements on a scene. An output is a
+function of a run, or a frozen dataclass that is called with a run: its fields are parameters, and a
+field ``body`` is the name of a body. Such a class may have ``watch(system, converged)``, which
+returns numbers of every increment (quantities over the dimension ``increment``), and
 ``warnings(run)``, which returns texts for the user.
 """
 
@@ -18,13 +18,13 @@ from solver.errors import ModelError
 from solver.parts import load_own_parts, run_again
 
 Need = Literal["map", "profile", "s", "surfaces", "contact", "release"]
-"""Needs of an output: a map grid, depth profiles, positions s along a surface, a contact surface of
-every body, a contact pair, a last stage that releases the bodies."""
+"""Requirements of an output: a map grid, depth profiles, positions s along a surface, a contact
+surface of every body, a contact pair, a last stage that releases the bodies."""
 T = TypeVar("T", bound=Callable[..., Any])
 
 
 class NamedOutput(NamedTuple):
-    """The function or class of an output, and what a scene must have for it."""
+    """The function or class of an output, and its requirements on a scene."""
 
     make: Callable[..., Any]
     needs: tuple[Need, ...]
@@ -43,7 +43,7 @@ MODULES = tuple(
         "pressure_error", "stick",
     )
 )  # fmt: skip
-"""Modules with outputs that scene files request, or with what these declare."""
+"""Modules that define outputs of scene files, or quantities of these."""
 
 
 def output(word: str, *needs: Need) -> Callable[[T], T]:
@@ -66,10 +66,7 @@ def output(word: str, *needs: Need) -> Callable[[T], T]:
 
 
 def outputs() -> Mapping[str, NamedOutput]:
-    """Return the outputs by word, including those of the user's files.
-
-    The modules of the package that have some are imported first.
-    """
+    """Return the outputs by word, including those of the user's files."""
     for module in MODULES:
         import_module(module)
     load_own_parts()

@@ -1,7 +1,7 @@
 """Values along named lines and at named points.
 
-Lines are sampled at equal fractions of their length, so that runs with lines of different lengths
-share one index; the positions are stored too.
+Lines are sampled at equal fractions of their length, so that runs with lines of different length
+have the same index. The positions are stored too.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def at_points(
 def _states(
     fields: SystemFields, places: Mapping[str, Places], states: Sequence[Solved]
 ) -> dict[str, Array]:
-    """Return each field as an array over places, states, its components and points."""
+    """Return each field as an array (n_places, n_states, components ..., n_points)."""
     every = [fields.at_places(each, states) for each in places.values()]
     names = every[0][0]._fields
     return {

@@ -1,4 +1,4 @@
-"""Contact pressure under a rigid flat punch, against its closed form.
+"""Error of contact pressure under a rigid flat punch, from the closed form.
 
 K.L. Johnson, Contact Mechanics (1985), section 2.8.
 """
@@ -19,7 +19,8 @@ PRESSURE_ERROR = declare(
     "relative error of contact pressure without friction against the closed form, in the mean "
     "square over nine tenths of the contact",
 )
-_AWAY = 0.9  # end of the range of the error, in half-widths: the pressure is infinite at 1
+_AWAY = 0.9
+"""End of the range of the error, in half-widths; the pressure is infinite at 1."""
 
 
 @output("pressure_error", "contact")
@@ -27,7 +28,7 @@ _AWAY = 0.9  # end of the range of the error, in half-widths: the pressure is in
 class PressureError:
     """The error against p(x) / p0 = 2 / (pi sqrt(1 - (x/a)^2)), with p0 the mean pressure.
 
-    It is NaN with friction, because there is no closed form.
+    It is NaN with friction: there is no closed form.
     """
 
     half_width: Length = described(MISSING, "half-width a of the punch")

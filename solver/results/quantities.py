@@ -1,8 +1,8 @@
-"""The name, meaning and unit of each number in a record, declared in the module that computes it.
+"""Declarations of the variables in a record: name, meaning, unit, dimensions.
 
-The data set, the captions of pictures and the pages read these declarations. Other
-modules declare, when they are imported; `solver.shipped` names them, and they are imported when a
-name is asked for that is not known.
+The module that computes a variable declares it when it is imported. The data set, the captions of
+pictures and the pages read the declarations. `solver.shipped` lists the declaring modules; they are
+imported when an unknown name is requested.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ class Quantity:
 
     Attributes
     ----------
-    name : name of the variable; the only dimension of a coordinate has the same name
+    name : name of the variable; a coordinate is a variable over the dimension of its name
     long_name : meaning in words
-    units : unit as the CF conventions write it
+    units : unit in the notation of the CF conventions
     dims : names of the dimensions; empty for one number per run
     standard_name : standard name of the CF conventions, if there is one
     count : whether it is a whole number
     flags : enumeration of its values, if they stand for words
-    beside : more attributes of the CF conventions
+    beside : further attributes of the CF conventions
     """
 
     name: str
@@ -78,7 +78,7 @@ class Quantities(Mapping[str, Quantity]):
         self.known: dict[str, Quantity] = {}
 
     def __getitem__(self, name: str) -> Quantity:
-        """Return a quantity; if it is not known, first import all modules that declare some."""
+        """Return a quantity; if it is unknown, import all declaring modules first."""
         return (self.known if name in self.known else self._all)[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -100,8 +100,8 @@ DECLARING: list[str] = []
 """Modules that declare quantities when they are imported."""
 QUANTITIES = Quantities()
 IN_SPACE = Quantities()
-"""Quantities along the third axis, which only runs in three dimensions have: other scenes may use
-these names for parameters, axes of a sweep and requested numbers."""
+"""Quantities along the third axis, of runs in three dimensions. Other scenes may use their names
+for parameters, axes of a sweep and requested numbers."""
 
 
 def declare(
@@ -145,7 +145,7 @@ def declare_along(
 
     Parameters
     ----------
-    name, long_name : with ``{}`` in place of the name of the axis
+    name, long_name : templates with ``{}`` for the name of the axis
     """
     *plane, third = ((name.format(axis), long_name.format(axis)) for axis in AXES)
     return *(declare(*each, units, dims=dims) for each in plane), in_space(*third, units, dims=dims)
@@ -158,10 +158,10 @@ def in_space(name: str, long_name: str, units: str, **more: Any) -> Quantity:
 
 
 def placed(prefix: str, *names: str) -> dict[str, str]:
-    """Return the attribute of a variable whose positions are ``PREFIX_NAME``: its coordinates."""
+    """Return the attribute ``coordinates`` of a variable with the positions ``PREFIX_NAME``."""
     return {"coordinates": " ".join(f"{prefix}_{name}" for name in names)}
 
 
 def along_axes(quantities: tuple[Quantity, ...], values: Any) -> dict[Quantity, Any]:
-    """Return the values (n_axes, ...) by the quantities of `declare_along` for their axes."""
+    """Return the values (n_axes, ...) by the quantities of `declare_along`, axis by axis."""
     return dict(zip(quantities, values, strict=False))

@@ -33,8 +33,8 @@ class Record:
 
     Attributes
     ----------
-    parameters : the scene's parameter object of exactly this run
-    status, message : outcome; if it is not ``OK``, the reason and what to do
+    parameters : the scene's parameter object of this run
+    status, message : outcome; if it is not ``OK``, the reason and advice
     coordinates : values by name of dimension: floats (``x``, ``y``, ``depth``, ``s``, ``station``)
         or labels (``component``, ``stage``, ``body``)
     fields : names of dimensions and values by name of variable; NaN outside the bodies

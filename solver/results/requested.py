@@ -1,4 +1,4 @@
-"""Numbers that a user requests: of a field its extreme value, integral or extent; of a course."""
+"""Requested numbers: extreme value, integral or extent of a field, or a value of a history."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ _COURSES = {
     "normal_force": ("contact_normal_force", "N"),
     "tangential_force": ("contact_tangential_force", "N"),
 }  # fmt: skip
-"""Variable over increments and unit."""
+"""Variables over increments, with units, by the names in requests."""
 _UNITS = {name: field.units for name, field in BODY_FIELDS.items()} | _OF_PAIR
 EXTREME = ("maximum", "minimum")
 FORCES = ("pressure", "shear")
-"""Fields of a contact whose integral is a force: over the area, not along the surface."""
+"""Fields of a contact whose integral is a force, over the area instead of along the surface."""
 OF_CONTACT = tuple(_OF_PAIR)
-"""Fields of a contact of which a number can be requested."""
+"""Fields of a contact that numbers may be requested of."""
 OF_PART = tuple(name for name in _COURSES if "." in name)
-"""What is taken of a part, which is a body or a rigid body, at the end of a stage."""
+"""Values of a part, a body or rigid body, at the end of a stage."""
 FORCES_OF_CONTACT = tuple(name for name in _COURSES if "." not in name)
-"""What is taken of a whole contact at the end of a stage."""
+"""Values of a whole contact at the end of a stage."""
 
 
 def of_body(axes: int) -> tuple[str, ...]:
-    """Return the fields of a body with this many axes of which a number can be requested."""
+    """Return the fields that numbers may be requested of, in a body with ``axes`` axes."""
     return tuple(
         name
         for own, field in BODY_FIELDS.items()
@@ -64,18 +64,17 @@ class RequestedNumber:
 
     Attributes
     ----------
-    name : name of the variable; the position adds ``_x``, ``_y`` (and ``_z``)
-    of : the field, one of `of_body` or `OF_CONTACT`. In a body ``mises`` and ``plastic_strain`` are
-        taken at integration points, other fields at nodes. Or one of `OF_PART` or
-        `FORCES_OF_CONTACT`, whose number is the value at the end of the stage
-    take : ``maximum``, ``minimum``, ``integral`` along a line or contact, of ``pressure`` and
-        ``shear`` over its area, which is a force [N]; or ``extent``, the length
-        along which the value is above zero; for ``pressure`` it is the length of contact. No choice
-        where the number is a value at the end of the stage
+    name : name of the variable; that of the position has a suffix ``_x``, ``_y`` (or ``_z``)
+    of : field, one of `of_body` or `OF_CONTACT`; or one of `OF_PART` or `FORCES_OF_CONTACT`, a
+        value at the end of the stage. In a body ``mises`` and ``plastic_strain`` are those at
+        integration points, other fields those at nodes
+    take : ``maximum`` or ``minimum``; ``integral`` along a line or contact, for ``pressure`` and
+        ``shear`` over the area, a force [N]; or ``extent``, the length along which the value is
+        positive, for ``pressure`` the length of contact. Ignored for values at the end of a stage
     stage : name of the state
-    minus : name of a state whose values are taken off; empty for none. Not of a field of a contact
+    minus : name of a state whose values are subtracted; empty for none. Not for fields of a contact
     body, line, contact, part : name of the place; exactly one of the four
-    x, y, z : ranges of a box in the body to which the number is restricted [mm]
+    x, y, z : ranges of a box in the body that limits the number [mm]
     description : meaning in words
     """
 
@@ -95,7 +94,7 @@ class RequestedNumber:
 
     @property
     def course(self) -> str:
-        """The variable over increments of which it is a value; empty if it is of a field."""
+        """The variable over increments that it is a value of; empty for a field."""
         return _COURSES[self.of][0] if self.of in _COURSES else ""
 
     @property
@@ -110,7 +109,7 @@ class RequestedNumber:
 
     @property
     def words(self) -> str:
-        """What it is, of which place and when."""
+        """Its meaning in words, with place and stage."""
         places = {"body": self.body, "line": self.line, "contact": self.contact, "part": self.part}
         where = next(f"{kind} {name}" for kind, name in places.items() if name is not None)
         what = self.of.replace(".", " ").replace("_", " ")
@@ -121,7 +120,7 @@ class RequestedNumber:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """The number and, for an extreme value, its position along all axes; a run may have two."""
+        """The number and, for an extreme value, its position along all three axes."""
         if self.course:
             units = _COURSES[self.of][1]
             words = self.description or self.words
@@ -151,10 +150,10 @@ class RequestedNumber:
 
         Parameters
         ----------
-        at : the state at its stage
+        at : state at its stage
         lines : lines by name
-        contacts : results of the contact pairs in that state, by name
-        before : the state whose values are taken off, if any
+        contacts : results of the contact pairs in this state, by name
+        before : state whose values are subtracted, if any
 
         Raises
         ------
@@ -164,9 +163,9 @@ class RequestedNumber:
         if self.contact is not None and (self.of, self.take) == ("pressure", "extent"):
             found: tuple[float, ...] = (contacts[self.contact].length,)
         else:
-            values, X = self._sought(fields, at, lines, contacts)
+            values, X = self._field(fields, at, lines, contacts)
             if before is not None:
-                values = values - self._sought(fields, before, lines, contacts)[0]
+                values = values - self._field(fields, before, lines, contacts)[0]
             if self.is_resultant:
                 found = (float(values @ contacts[str(self.contact)].area),)
             else:
@@ -174,13 +173,13 @@ class RequestedNumber:
         return dict(zip(self.quantities, found, strict=False))
 
     def at_increments(self, courses: Values, at: float, before: float | None = None) -> Values:
-        """Return the number as a value of a course, at the last increment that ends at a time.
+        """Return the number from a variable over increments, at the end of its stage.
 
         Parameters
         ----------
-        courses : what is stored after each increment
+        courses : variables over increments
         at : time at the end of its stage
-        before : time at the end of the stage whose value is taken off, if any
+        before : time at the end of the stage whose value is subtracted, if any
         """
         known = {quantity.name: values for quantity, values in courses.items()}
         names, name = ("part", self.part) if self.contact is None else ("contact", self.contact)
@@ -194,7 +193,7 @@ class RequestedNumber:
         return {self.quantities[0]: found}
 
     def _found(self, values: Array, X: Array) -> tuple[float, ...]:
-        """Return the number from values (n,) at places (n_axes, n), with its position if any."""
+        """Return the number, with its position if any, from values (n,) at X (n_axes, n)."""
         known = np.isfinite(values)
         if not known.any():
             return (np.nan,) * (1 + len(X) if self.take in EXTREME else 1)
@@ -207,7 +206,7 @@ class RequestedNumber:
             return (float(np.trapezoid(values, s)),)
         return (_positive_length(values, s),)
 
-    def _sought(
+    def _field(
         self,
         fields: SystemFields,
         at: Solved,
@@ -255,7 +254,7 @@ class RequestedNumber:
 
 
 def _positive_length(values: Array, s: Array) -> float:
-    """Return the length along which values, linear between points, are above zero."""
+    """Return the length along which values, linear between points, are positive."""
     low, high = np.minimum(values[:-1], values[1:]), np.maximum(values[:-1], values[1:])
     rise = np.where(high > low, high - low, 1.0)
     share = np.where(low > 0, 1.0, np.clip(high, 0.0, None) / rise)

@@ -30,7 +30,7 @@ class FinishedRun:
     check : function that returns the audit of a complete run
     notes : messages to the user about the computation
     singular : singular points, near which numbers depend on the mesh
-    beside : returns fields of further bodies at the same stages, for `mesh_fields`
+    beside : function that returns the fields of further bodies at the same stages
     """
 
     parameters: Any
@@ -49,12 +49,12 @@ class FinishedRun:
 
     @property
     def view(self) -> View:
-        """The positions at which results are taken."""
+        """The positions of the results."""
         return self.samples.view
 
     @property
     def complete(self) -> bool:
-        """Whether the program was run to its end."""
+        """Whether the program reached its end."""
         return self.outcome.error is None
 
     @property
@@ -69,14 +69,14 @@ class FinishedRun:
 
     @property
     def stages(self) -> list[tuple[Solved, float]]:
-        """Stored states of contact, each with the x at which s is zero [mm]."""
+        """The stored states, each with the position x of s = 0 [mm]."""
         states = [(name, self.outcome.points[name]) for name in self.view.stages]
         following = self.view.following
         return [(c, self.tractions.centre(c) if name in following else 0.0) for name, c in states]
 
 
 Values = Mapping[Quantity, Any]
-"""Result of an output: a number, or an array over its dimensions, for each quantity."""
+"""Result of an output: a number or an array over its dimensions, by quantity."""
 
 Output = Callable[[FinishedRun], Values]
-"""Computes some quantities of a run."""
+"""Function that computes some quantities of a run."""

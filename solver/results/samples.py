@@ -12,7 +12,7 @@ from solver.typing import Array
 
 
 class Samples:
-    """Samples one system at the positions of a view; interpolation is set up once for all runs.
+    """Samples a system at the positions of a view; the interpolation serves all its runs.
 
     Raises
     ------
@@ -64,7 +64,7 @@ class Samples:
         return values.reshape(*values.shape[:-1], len(self.view.station), len(self.view.depth))
 
     def flow(self, at: Solved) -> Array:
-        """Return signed plastic strain (n_components, station, depth), tensor components."""
+        """Return signed plastic strain (n_components, station, depth) in tensor components."""
         body = self.view.profile_body
         points = self.system.response(body, at).state.plastic_strain
         return to_tensor(self.along_depth(self.fields.recovered(body, points)))
@@ -72,7 +72,7 @@ class Samples:
     def surface_mises(self, at: Solved, centre: float) -> Array:
         """Return von Mises stress along s at the surface of the profile body [MPa].
 
-        It is limited to the largest value at an integration point.
+        It is at most the largest value at an integration point.
         """
         name = self.view.profile_body
         body = self.system.full(name)

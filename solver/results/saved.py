@@ -1,4 +1,4 @@
-"""Save a solution to a file: its model and states, from which all else is computed again."""
+"""Files of solutions: model and states, from which all results are computed again."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from solver.files import appearing, opened
 from solver.version import __version__
 
 _HEAD = b"residua solution "
-"""Start of the file; the version of the solver and the end of the line follow."""
+"""Start of the first line; the version of the solver follows."""
 _LONGEST = 100
-"""Largest length of this line [bytes]."""
+"""Largest length of the first line [bytes]."""
 
 
 def write(path: Path, content: Mapping[str, Any]) -> None:
@@ -45,7 +45,7 @@ def read(path: Path) -> dict[str, Any]:
     Raises
     ------
     ModelError
-        if the file cannot be read, is not of this kind, or was written by another version
+        if the file cannot be read, is no saved solution, or was written by another version
     """
     try:
         with opened(path) as file:

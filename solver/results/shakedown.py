@@ -9,8 +9,8 @@ undecided                     the cycles have not become steady
 ============================  ===============================================================
 
 The *signed* plastic strain distinguishes a closed cycle from an open one; the accumulated strain
-shows whether there is flow. For both the bounds of the limit over many cycles are computed. A state
-is decided only if it is the same for all values within the bounds.
+shows whether there is flow. Both have bounds for their limits over many cycles. A state is decided
+only if it is the same for all values within the bounds.
 
 K.L. Johnson, Contact Mechanics (1985), section 9.2.
 """
@@ -25,24 +25,24 @@ import numpy as np
 from solver.typing import Array
 
 QUIET = 1e-3
-"""Ratio of plastic strain accumulated in a cycle to the yield strain; up to it nothing flows."""
+"""Plastic strain accumulated in a cycle over the yield strain: up to this ratio nothing flows."""
 CLOSED = 0.05
-"""Ratio of the plastic strain left by a cycle to the strain accumulated in it; up to it the cycle
-is closed. Also ratio of the accumulated strain at a depth to the largest; up to it the depth is
-left out, as the strain there may be an interpolation error."""
+"""Change of signed plastic strain in a cycle over the strain accumulated in it: the cycle is closed
+up to this ratio. Also the strain accumulated at a depth over the largest one: up to this ratio the
+depth is left out, because its strain may be an interpolation error."""
 STEADY = 0.02
-"""Relative change from cycle to cycle; up to it a sequence has reached its limit. Over the second
-half of the sequence twice this change is permitted."""
+"""Relative change from cycle to cycle, up to which a sequence has reached its limit. Twice this
+change is permitted over the second half of the sequence."""
 AT_REST = 2e-3
-"""Relative change from cycle to cycle; up to it earlier values do not matter."""
+"""Relative change from cycle to cycle, up to which earlier values do not matter."""
 KEPT = 0.8
-"""Ratio of the last value of a sequence to its value half-way; below it the limit may be zero. A
-decay as 1 / n^p has the ratio 1 / 2^p, however long it has lasted."""
+"""Last value of a sequence over its value half-way: the limit may be zero below this ratio. A decay
+as 1 / n^p has the ratio 1 / 2^p, however long it has lasted."""
 SLOWEST = 0.95
-"""Ratio of successive changes; above it no limit can be extrapolated."""
+"""Ratio of successive changes: no limit can be extrapolated above it."""
 KNOWN = 0.1
-"""Ratio of the distance between the bounds of a limit to the upper bound; up to it their mean is
-the limit."""
+"""Distance between the bounds of a limit over the upper bound: up to this ratio their mean is the
+limit."""
 
 
 class ShakedownState(IntEnum):
@@ -57,7 +57,7 @@ class ShakedownState(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Shakedown:
-    """The state, and the limits of the plastic strain a cycle accumulates and leaves (or NaN)."""
+    """The state, and the limits of accumulated and net plastic strain in a cycle (or NaN)."""
 
     state: ShakedownState
     accumulated: float
@@ -75,10 +75,10 @@ class Limit:
     def of(cls, sequence: Array) -> Limit:
         """Return the bounds of the limit of a sequence (n,) from its last four or three values.
 
-        A steady sequence has reached its limit. Otherwise each of the last two triples of values
-        gives bounds, and the limit is between the outermost: a geometric change is extrapolated
-        (Aitken's process), values that alternate stay within their range, others may grow without
-        bound or fall to zero. A sequence that has fallen much since half-way may also fall to zero.
+        A steady sequence has reached its limit. Otherwise the bounds are the outermost ones of the
+        last two triples of values: a geometric change is extrapolated (Aitken's process),
+        alternating values stay within their range, others may grow without bound or fall to zero. A
+        sequence that has fallen much since half-way may also fall to zero.
         """
         if len(sequence) < 3:
             return cls(0.0, np.inf)
@@ -119,10 +119,10 @@ def classify(
     Parameters
     ----------
     accumulated : (n_cycles, n_depths) equivalent plastic strain accumulated in a cycle
-    net : (n_cycles, n_depths) equivalent of the signed plastic strain that a cycle leaves
-    yield_strain : ratio of yield stress to Young's modulus
+    net : (n_cycles, n_depths) equivalent of the change of signed plastic strain in a cycle
+    yield_strain : yield stress over Young's modulus
     hardens : whether linear hardening bounds plastic strain: ratchetting must then end, and cycles
-        that still add plastic strain, however little, are undecided
+        that still add plastic strain are undecided
     """
     if not accumulated.any():
         return Shakedown(ShakedownState.ELASTIC, 0.0, 0.0)
@@ -133,11 +133,11 @@ def classify(
     flows = accumulated[-1] > CLOSED * accumulated[-1].max()
     depth = np.where(flows, net[-1] - CLOSED * accumulated[-1], -np.inf).argmax()
     net, turnover = net[:, depth], accumulated[:, depth]
-    left = Limit.of(net)
+    change = Limit.of(net)
     opening = Limit.of(np.divide(net, turnover, out=np.zeros_like(net), where=turnover > 0))
     state = ShakedownState.UNDECIDED
     if flow.low > quiet and opening.high <= CLOSED:
         state = ShakedownState.PLASTIC_SHAKEDOWN
-    elif left.low > quiet and opening.low > CLOSED and not hardens:
+    elif change.low > quiet and opening.low > CLOSED and not hardens:
         state = ShakedownState.RATCHETTING
-    return Shakedown(state, flow.value, left.value)
+    return Shakedown(state, flow.value, change.value)

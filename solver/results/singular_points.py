@@ -1,4 +1,4 @@
-"""The singular points of a model, stored with a run: near them numbers depend on the mesh."""
+"""The singular points of a model, near which numbers depend on the mesh."""
 
 from __future__ import annotations
 

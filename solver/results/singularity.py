@@ -1,10 +1,10 @@
-"""Fit the power of a singular stress to values near a corner.
+"""Fit of the power of a singular stress to values near a corner.
 
 Near a corner stress is a series of powers of the distance r from it. The first term is unbounded:
 stress ~ r^(p-1) with the power p below 1. A straight line through logarithms of values at finite
-distances has another slope, as the next term of the series is not small. This term is therefore
-fitted too, with an exponent about 1 above the first: between 0.8 and 1.1 at the square corner of
-equal materials, without friction and with friction up to 0.4.
+distances has another slope, because the next term of the series is not small. The fit includes this
+term, whose exponent is about 1 larger: between 0.8 and 1.1 at the square corner of equal materials,
+without friction and with friction up to 0.4.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ APPARENT_POWER = declare(
 )
 
 _OTHERS = (0.5, 1.5)
-"""Factors of the given exponent of the next term, tried to estimate the error."""
+"""Factors on the exponent of the next term, for the estimate of the error."""
 _FEWEST = 5
 """Least number of points for the three unknowns."""
 
@@ -53,14 +53,14 @@ def fit_singularity(
 ) -> Singularity:
     """Return the singular term of stress sampled near a corner.
 
-    1. Points at ``low <= r <= high`` count. ``low`` should be ten elements or more, as elements
+    1. Use points at ``low <= r <= high``. ``low`` should be ten elements or more, because elements
        at the corner do not resolve the stress; ``high`` should be small compared with the distance
        of any other feature: an edge, a groove, the end of a zone of slip.
-    2. ``ln stress = ln C + (p - 1) ln r + b r^q`` with q = ``above`` is fitted by least squares.
-       The weight of a point is its share of the axis of ln r.
+    2. Fit ``ln stress = ln C + (p - 1) ln r + b r^q`` with q = ``above`` by least squares. The
+       weight of a point is its share of the axis of ln r.
     3. The error is the largest change of p if q is half as large or 1.5 times as large, or if the
-       inner or the outer third of the range, in ln r, is left out; or the standard error of the
-       fit, if larger. It does not include an error of elements over the whole range.
+       inner or the outer third of the range in ln r is left out; or the standard error of the fit,
+       if larger. It does not include an error of elements over the whole range.
 
     Parameters
     ----------
@@ -95,8 +95,8 @@ def fit_singularity(
 def apparent_power(r: Array, stress: Array, low: float, high: float) -> float:
     """Return the power of a straight line through logarithms, without a next term.
 
-    It is what a measurement between ``low`` and ``high`` alone would give. NaN if that range has
-    fewer than five points, or stress of both signs.
+    A measurement between ``low`` and ``high`` would give this power. NaN if the range has fewer
+    than five points, or stress of both signs.
     """
     points = _logarithms(r, stress, low, high)
     return float("nan") if points is None else float(1 + _fit(points, high)[0][1])

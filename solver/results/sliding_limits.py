@@ -17,7 +17,7 @@ def sliding_contact(x: Array, depth: float, friction: float) -> tuple[Array, Arr
     """Return sigma_x, sigma_y and tau (n,) over p0 under a Hertz pressure that slides along +x.
 
     ``x`` (n,) and ``depth`` are in half-widths; tension is positive. The shear traction on the
-    half-space is ``friction`` times the pressure along +x (y and depth point down).
+    half-space acts along +x and is ``friction`` times the pressure; y and depth point down.
     E. McEwen, Phil. Mag. 40 (1949) 454-459; Johnson, eqs. (4.49), (7.8).
     """
     s = 1 - x**2 + depth**2
@@ -45,9 +45,9 @@ def largest_shear(friction: float) -> tuple[float, float]:
 def johnson_limit(friction: float) -> float:
     """Return the largest p0 / k at which a sliding Hertz line contact shakes down elastically.
 
-    Residual stress can remove the difference of normal stresses at the place of largest shear, but
-    not the shear itself, which sets the limit: below the surface, or at the surface if friction
-    exceeds about 0.37. Johnson, section 9.2 (maximum shear stress criterion).
+    The largest shear sets the limit, below the surface, or at the surface if friction exceeds about
+    0.37: residual stress can remove the difference of normal stresses there, but not the shear.
+    Johnson, section 9.2 (maximum shear stress criterion).
     """
     return 1 / max(largest_shear(friction)[0], friction)
 
@@ -57,7 +57,7 @@ def melan_limit(friction: float, poisson_ratio: float) -> float:
 
     At each depth one residual stress (sigma_x, sigma_z) must bring all stresses of the pass inside
     the yield surface (Melan). Below the surface both criteria agree. At the surface von Mises'
-    limit is lower because of the out-of-plane stress, which depends on the two others.
+    limit is lower because of the out-of-plane stress, which depends on the other two stresses.
     """
 
     def least(depth: float) -> float:

@@ -1,4 +1,4 @@
-"""Solve a model and read its states."""
+"""Solution of a model, and access to its states."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ class Solution:
 
     Attributes
     ----------
-    system : the model's parts and interfaces
-    stages : the converged states at the ends of the stages, by name
+    system : parts and interfaces of the model
+    stages : converged states at the ends of the stages, by name
     tally : cost of the run
     history : a few numbers of the initial state and of every increment
-    cycles : the cycles of stages that are repeated
+    cycles : cycles of repeated stages
     """
 
     system: System
@@ -110,10 +110,14 @@ class Solution:
         return self._at_nodes(body, stage).stress
 
     def initial_stress(self, body: str) -> tuple[Array, ...]:
-        """Return positions (2, n) [mm], initial stress as given and in equilibrium (4, n) [MPa].
+        """Return the initial stress at the integration points, as given and in equilibrium.
 
-        They belong to the integration points; components are xx, yy, zz, xy. The difference is the
-        stress that brings the body into equilibrium before any load.
+        Their difference is the stress that brings the body into equilibrium before any load.
+
+        Returns
+        -------
+        positions (2, n) [mm], stress as given and stress in equilibrium (4, n), components xx, yy,
+        zz, xy [MPa]
         """
         system, body = self.system, self._known(body)
         begun = Stepper(system, Control())
@@ -132,8 +136,8 @@ class Solution:
     def strain(self, body: str, stage: str = "unloaded") -> Array:
         """Return the recovered nodal strain (4, n_nodes), components xx, yy, zz, xy.
 
-        It is that of the displacements: elastic, plastic and of heat together. In plane stress zz
-        is the strain of the thickness.
+        It is the total strain: elastic, plastic and thermal. In plane stress zz is the strain of
+        the thickness.
         """
         return self._at_nodes(body, stage).strain
 
@@ -142,12 +146,12 @@ class Solution:
         return self._at_nodes(body, stage).plastic_tensor
 
     def at(self, body: str, places: ArrayLike, stage: str = "unloaded") -> dict[str, Array]:
-        """Return fields at places (2, n) [mm] of a body; NaN outside the body.
+        """Return the fields of `BodyValues` at places (2, n) [mm] of a body; NaN outside the body.
 
-        They are ``displacement`` (2, n) [mm], ``stress`` (4, n) [MPa], components xx, yy, zz, xy,
-        ``strain`` and ``plastic_tensor`` (4, n), plastic strain, ``mises`` (n,) [MPa] and
-        ``plastic_strain`` (n,), its equivalent. Raises `ModelError` for an unknown body or
-        stage, or places of another shape.
+        They are ``displacement`` (2, n) [mm], ``stress`` (4, n) [MPa] with components xx, yy, zz,
+        xy, ``mises`` (n,) [MPa], ``strain`` (4, n), ``plastic_tensor`` (4, n), the plastic strain,
+        and ``plastic_strain`` (n,), its accumulated equivalent. Raises `ModelError` for an unknown
+        body or stage, or places of another shape.
         """
         X, dim = np.asarray(places, dtype=float), self.system.full(self._known(body)).dim
         if X.ndim != 2 or len(X) != dim:
@@ -156,12 +160,7 @@ class Solution:
         return found._asdict()
 
     def contact(self, pair: int = 0, stage: str = "loaded") -> ContactResult:
-        """Return pressure, shear, gap and slip at the vertices of the slave of a pair.
-
-        Its attributes are ``s``, ``X``, ``pressure``, ``shear``, ``pressure_deformed``, ``gap``,
-        ``slip``, ``closed`` and ``sticking``, see `ContactResult`; ``length`` is the length of
-        contact.
-        """
+        """Return pressure, shear, gap and slip at the vertices of the slave of a pair."""
         count = len(self.system.interfaces)
         if not isinstance(pair, int | np.integer) or pair not in range(-count, count):
             allowed = f"must be from 0 to {count - 1}" if count else "the model has no contacts"
@@ -187,8 +186,8 @@ class Solution:
     def to_vtu(self, folder: str | Path) -> Path:
         """Write fields at the nodes as one .vtu per stage into a folder, for ParaView.
 
-        Returns the path of the .pvd file that lists them; see `solver.results.export.to_meshio` for
-        the names of the fields.
+        Returns the path of the .pvd file that lists them. `solver.results.export.to_meshio` has the
+        names of the fields.
         """
         return write_vtu(self.mesh_fields(), Path(folder))
 
@@ -211,7 +210,7 @@ class Solution:
         return cls(system=System(content.pop("model")), **content)
 
     def shakedown(self) -> Shakedown:
-        """Return the shakedown state that the cycles tend to, and the plastic strain of a cycle.
+        """Return the shakedown state to which the cycles tend, and the plastic strain of a cycle.
 
         Raises
         ------
@@ -245,23 +244,23 @@ def solve(
     linear_solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> Solution:
-    """Load a model to a multiple of its loads, separate the bodies, and return both states.
+    """Load a model to a multiple of its loads, unload and separate the bodies; return both states.
+
+    The logger ``solver`` reports each increment at level INFO, and numbers of the model that look
+    like mistakes (`Model.doubts`) as warnings.
 
     Parameters
     ----------
-    load : load factor: multiple of all loads of the model; by default 1
-    stages : stages to solve instead of ``load``, for loads with amplitudes, which are functions of
-        time; the solution then has the states at their ends. Those of one `Stage.cycle` follow one
-        another, and have the same names in the next
-    until : ``shaken_down`` leaves out cycles after the shakedown state is decided: loads must be
-        the same at the end of each
+    load : load factor, the multiple of all loads of the model; by default 1
+    stages : stages to solve instead of ``load``, for loads with amplitudes; the solution has the
+        states at their ends. The stages of a cycle (`Stage.cycle`) follow one another, and those of
+        the next cycle have the same names
+    until : ``shaken_down`` leaves out the cycles after the shakedown state is decided; loads must
+        be the same at the ends of all cycles
     control : increments and tolerances; by default twenty increments of loading
     linear_solver : ``auto``, ``pardiso`` or ``superlu``
-    progress : called after each increment with the completed fraction of the increments, up to 1;
-        an exception that it raises stops the computation. The logger ``solver`` reports each
-        increment at level INFO
-
-    Numbers of the model that look like mistakes (`Model.doubts`) are warnings of the same logger.
+    progress : function that is called after each increment with the completed fraction of the
+        increments, at most 1; an exception that it raises stops the computation
 
     Raises
     ------
@@ -277,7 +276,7 @@ def solve(
         require(name, value, kind)
     stages = tuple(stages)
     if load is not None and stages:
-        raise ModelError("load", load, "must not be given beside stages")
+        raise ModelError("load", load, "must be left out if stages are given")
     load = 1.0 if load is None else load
     if not (np.isfinite(load) and load > 0):
         raise ModelError("load", load, "must be positive and finite")
@@ -318,7 +317,7 @@ def solve(
 
 
 def _check_ends(model: Model, times: Sequence[float]) -> None:
-    """Refuse loads that differ at the ends of cycles: after the last one others are left out."""
+    """Raise `ModelError` if loads differ at the ends of cycles, some of which may be left out."""
     bodies: list[Body | RigidBody] = [*model.bodies, *model.rigid]
     of: list[tuple[str, Callable[[float], float]]] = [
         (f"{load.name} of {body.name}", load.factor)
@@ -335,13 +334,13 @@ def _check_ends(model: Model, times: Sequence[float]) -> None:
     of += [(f"axle of {body.name}", float) for body in model.bodies if body.axle]
     for name, value in of:
         ends = [value(time) for time in times]
-        if np.ptp(ends) > ROUNDING * max(1.0, *np.abs(ends)):  # a sine ends at rounding
+        if np.ptp(ends) > ROUNDING * max(1.0, *np.abs(ends)):
             allowed = f"must be the same at the ends of all cycles: {name}"
             raise ModelError("until", [float(f"{end:.6g}") for end in ends], allowed)
 
 
 class _IncrementCount:
-    """Counts increments and reports the completed share of the planned ones; cuts add to it."""
+    """Counts increments, with parts of cut ones, and reports their share of the planned ones."""
 
     def __init__(self, program: Program, progress: Callable[[float], None] | None) -> None:
         self._planned, self._done = program.count, 0

@@ -31,8 +31,8 @@ def stick(run: FinishedRun) -> Values:
 def stick_half_width(points: ContactResult, *, symmetric: bool) -> float:
     """Return the half-width of the stick zone [mm].
 
-    Its ends are half-way between the last point that sticks and the first that slips, so they are
-    accurate to half an element. If no point sticks, the zone is narrower than an element: 0.
+    Each end is half-way between the last point that sticks and the first that slips, accurate to
+    half an element. If no point sticks, the zone is narrower than an element, and the result is 0.
     """
     stuck = np.flatnonzero(points.sticking)
     if not len(stuck):

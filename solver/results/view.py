@@ -1,4 +1,4 @@
-"""The positions at which the results of a scene are taken."""
+"""The positions of the results of a scene."""
 
 from __future__ import annotations
 
@@ -44,9 +44,8 @@ class Places(NamedTuple):
 class Axis(NamedTuple):
     """The straight line along a contact surface before loading.
 
-    ``origin`` is its middle [mm], ``along`` the unit vector in which s grows. Both have the number
-    of coordinates of the bodies: with two the lower body is to the right of the line, with three it
-    is below the line (-y).
+    ``origin`` is its middle [mm], ``along`` the unit vector of increasing s, in the plane or in
+    space. In the plane the lower body is to the right of the line, in space below it (-y).
     """
 
     origin: tuple[float, ...] = (0.0, 0.0)
@@ -70,30 +69,30 @@ class Axis(NamedTuple):
 
 
 ALONG_X = Axis()
-"""The axis of a horizontal surface at y = 0, the lower body below it."""
+"""The axis of a horizontal surface at y = 0, with the lower body below it."""
 ACROSS_TRACK = Axis((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-"""The axis along z, at x = 0, across a horizontal track along x: that of a section in z and y."""
+"""The axis along z of a section at x = 0 across a track along x."""
 NOWHERE = np.zeros(0)
-"""Positions of a grid that a view does not have."""
+"""Empty positions, of a grid that a view does not have."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """The positions of the results of a scene; they do not depend on its mesh, so runs compare.
+    """The positions of the results of a scene, independent of its mesh.
 
     Attributes
     ----------
-    x, y : map grid, along the contact surface from its middle and above it [mm]
+    x, y : map grid, along the contact surface from its middle, and above it [mm]
     z : map grid instead of x for a section across the track, with ``axis`` `ACROSS_TRACK` [mm]
-    depth, station : profiles are at s = ``station``, at each ``depth`` below the surface [mm]
+    depth, station : positions of profiles: ``depth`` below the surface at each s = ``station`` [mm]
     s : positions along the contact surface from its centre [mm]
-    axis : the line of s and x
-    profile_body : the body of the profiles
+    axis : line of s and x
+    profile_body : body of the profiles
     surfaces : boundary that is the contact surface of each body, in the order of the dimension
     stages : names of the program's stages whose states are stored
-    loaded, unloaded : the stages taken as the states under load and after release; ``unloaded`` is
-        empty if the bodies are not released
-    following : the stages in which ``s`` is zero at the load, not at x = 0
+    loaded, unloaded : stages of the states under load and after release; ``unloaded`` is empty if
+        the bodies are not released
+    following : stages in which ``s`` is zero at the load instead of x = 0
     symmetric : whether the bodies are one half of a model symmetric about s = 0
     """
 

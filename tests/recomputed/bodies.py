@@ -174,7 +174,7 @@ def of_state(plain: PlainBody, u: Array, plastic: Any, time: float) -> Fields:
     stress = plain.shares(time)[0] * hooke(elasticity, elastic)
     if plane_stress:
         stress[2] = 0.0
-    gone = (plain.left(time) <= GHOST).reshape(plain.volume.shape)[:, 0]
+    gone = (plain.remaining(time) <= GHOST).reshape(plain.volume.shape)[:, 0]
     return Fields(
         plain, stress, nothing[0] if plastic is None else plastic.accumulated,
         strain=elastic + inelastic, plastic=flow,

@@ -41,7 +41,7 @@ class Tractions:
     def touching(self) -> PairState:
         """Gaps and motions on the deformed bodies."""
         surfaces, state, start = self._measured
-        return surfaces.touching(state, start, self._contact.normal, self._contact.tangential)
+        return surfaces.measured(state, start, self._contact.normal, self._contact.tangential)
 
     @property
     def gap(self) -> Array:

@@ -78,7 +78,7 @@ def test_a_field_of_another_kind_is_refused(
         ({"load": "2"}, "load", "must be a number or None"),
         ({"stages": Stage(**STAGE)}, "stages", "must be a tuple of Stage"),
         ({"control": "fine"}, "control", "must be PathControl or None"),
-        ({"load": 3.0, "stages": [Stage(**STAGE)]}, "load", "must not be given beside stages"),
+        ({"load": 3.0, "stages": [Stage(**STAGE)]}, "load", "must be left out if stages are given"),
     ],
 )
 def test_what_solve_cannot_use_is_refused(given: dict[str, Any], field: str, allowed: str) -> None:

@@ -119,13 +119,13 @@ RISE = Amplitude([0, 1], [0, 1])
         (
             {"left": "x"},
             (Displacement(boundary="right", y=0.01), Displacement(boundary="top", y=0.02)),
-            r"displacement\.top\.y = 0.02: must be 0.01 mm at time 1, as displacement\.right",
+            r"displacement\.top\.y = 0.02: must be 0.01 mm .* the value of displacement\.right",
         ),
         (
             {"left": "x"},
             (Displacement(boundary="right", y=0.01),
              Displacement(boundary="top", y=0.01, amplitude=RISE)),
-            r"displacement\.top\.y = .* as displacement\.right of body 'bar' has it",
+            r"displacement\.top\.y = .* the value of displacement\.right of body 'bar'",
         ),
         (
             {"bottom": "xy"},
@@ -135,7 +135,7 @@ RISE = Amplitude([0, 1], [0, 1])
         (
             {"left": "x", "bottom": "y", "top": "y"},
             (Displacement(boundary="top", y=0.01),),
-            r"displacement\.top\.y = .*: must be 0 mm at time 1, as supports\.top",
+            r"displacement\.top\.y = .*: must be 0 mm at time 1, the value of supports\.top",
         ),
     ],
     ids=["values", "courses", "support", "support of the same boundary"],

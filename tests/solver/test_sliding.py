@@ -96,7 +96,7 @@ def test_surfaces_that_slide_by_more_than_an_element_are_outside_small_sliding()
     (text,) = audit.outside
     assert text.startswith("block.top moved 0.8 mm along plate.base, mostly at (")
     assert ": 1.6 sides of an element" in text
-    assert text.endswith('in a scene file or a model, give it sliding = "finite"')
+    assert text.endswith('in a scene file or a model, set sliding = "finite"')
     assert audit.figures["audit_small_sliding"] == pytest.approx(1.6, rel=0.05)
     assert audit.passed
     within = slid(0.1, "small").audit(), slid(0.8, "finite").audit()

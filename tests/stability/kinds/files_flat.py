@@ -119,7 +119,7 @@ def oblique(number: int, rng: Rng) -> Draw:
         return {"force": Figure(N, tilt), "stuck": Figure(T, tilt), "reaction": Figure(R, EXACT)}
 
     # where it slides from the first there is no load that it bears
-    excused = ("NOT_CONVERGED.*less than friction carries",) if share > 1 and along is on else ()
+    excused = ("NOT_CONVERGED.*than friction carries",) if share > 1 and along is on else ()
     what = f"oblique {share} of mu {mu}, {state}, {law}, {'at once' if along is on else 'after'}"
     return Draw(what, (tables,), check, excused, limit=share > 1)
 

@@ -561,7 +561,7 @@ def test_a_block_pushed_along_by_more_than_friction_bears_is_told_so(share: floa
         assert record.status is Status.OK, record.message
     else:
         assert record.status is Status.NOT_CONVERGED
-        assert record.message.endswith("push it along by less than friction carries")
+        assert record.message.endswith("with less tangential force than friction carries")
 
 
 @pytest.mark.solves
