@@ -7,9 +7,9 @@ thesis, on elements of 2 mm; with ``size = spacing = 1.0`` its figures settle.
 import numpy as np
 
 from solver import Material
+from solver.rolling.load import RollingLoad
 from solver.rolling.passing import passing
 from solver.rolling.rail.patch import RollingPatch
-from solver.rolling.rail.patch_passing import PatchPassing
 from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from solver.rolling.rail.profiles.rail import rail_60e1
 from solver.rolling.rail.profiles.wheel_profile import s1002
@@ -39,8 +39,11 @@ track = PrismTrack(
 wheel = ProfiledWheel(
     profile=lambda z: s1002().height(z + 4.0), radius=460.0, elasticity=steel.elasticity
 )
-load = RollingPatch(track.grid, track.compliance, wheel, friction=0.17, force=150e3, drive=0.0)
-found = passing(track, steel, PatchPassing(load), track.virgin(steel))
+load = RollingPatch(
+    grid=track.grid, compliance=track.compliance, wheel=wheel, friction=0.17,
+    load=RollingLoad(force=150e3, drive=0.0),
+)  # fmt: skip
+found = passing(track, steel, load, track.virgin(steel))
 
 contact, left = found.loading.contact, found.after
 strain = left.strain - left.plastic_strain

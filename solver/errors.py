@@ -67,4 +67,4 @@ class LimitLoad(NotConverged):
 
 
 class Spins(LimitLoad):
-    """The driving moment of a wheel exceeds the friction of its whole contact, which slips."""
+    """Moment or lateral force of a wheel exceed the friction of its whole contact, which slips."""

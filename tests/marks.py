@@ -24,7 +24,7 @@ FOLDERS = {
 """Marks of all tests of a folder."""
 
 EXPENSIVE = {
-    "solves": ("solver.loading.increment.Increment.solve", "solver.rolling.plane.search.passing"),
+    "solves": ("solver.loading.increment.Increment.solve", "solver.rolling.search.passing"),
     "processes": (
         "subprocess.Popen.__init__",
         "multiprocessing.process.BaseProcess.start",

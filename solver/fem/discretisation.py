@@ -46,7 +46,6 @@ class Discretisation(Nodes, Part):
     Attributes
     ----------
     dofs : (n_elements, dim n_element_nodes) unknowns of the elements
-    weights : (n_elements, n_points) volume of the points, with thickness or 2 pi r [mm3]
     kinematics : how strain follows from displacements
     loads : nodal forces (n,) of pressures and tractions [N]
     condensable : ``loads`` plus the nodal forces of the eigenstrain in an elastic body [N]
@@ -66,7 +65,6 @@ class Discretisation(Nodes, Part):
         values = np.array([np.broadcast_to(np.asarray(b[0]), self.basis.dx.shape)
                            for b in self.basis.basis])  # fmt: skip
         gradients = np.array([b[0].grad for b in self.basis.basis]).swapaxes(0, 1)
-        self.weights = self.basis.dx * self.measure(self.points)
         B = kinematics.strain_operator(values, gradients, self.points[0], body.kinematics)
         if kind.mean_dilatation and body.kinematics != "plane_stress":
             B = kinematics.mean_dilatation(B, self.weights)

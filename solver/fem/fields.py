@@ -7,7 +7,7 @@ from scipy import sparse
 
 from solver.errors import ModelError
 from solver.fem.deformation import without_points
-from solver.fem.discretisation import Discretisation
+from solver.fem.nodes import Nodes
 from solver.fem.part import Part
 from solver.materials.state import Response
 from solver.mesh.rounding import ROUNDED
@@ -25,14 +25,14 @@ def _monomials(x: Array, count: int) -> Array:
     return np.stack([np.ones_like(x[0]), x[0], x[1], x[0] * x[1]][:count], axis=-1)
 
 
-def _check_plane(part: Discretisation) -> None:
+def _check_plane(part: Nodes) -> None:
     """Refuse a body in space: it has values at its points alone."""
     if part.basis.mesh.dim() == 3:
         allowed = "has no fields at nodes and places yet, and so no maps and files: take those at "
         raise ModelError("element", part.body.element, allowed + "points, System.response")
 
 
-def recovery(part: Discretisation) -> sparse.csr_array:
+def recovery(part: Nodes) -> sparse.csr_array:
     """Return the operator (n_nodes, n_points) that recovers nodal values from point values.
 
     In each element a (bi)linear field is fitted to the points by least squares and evaluated at the
@@ -80,7 +80,7 @@ class Sampler:
     x : (2, n) positions before deformation [mm]
     """
 
-    def __init__(self, part: Discretisation, x: Array) -> None:
+    def __init__(self, part: Nodes, x: Array) -> None:
         _check_plane(part)
         element, point, local = _locate(part, np.asarray(x, dtype=float))
         shape = part.basis.elem.lbasis
@@ -104,7 +104,7 @@ class Sampler:
         return np.asarray(out.reshape(*nodal.shape[:-1], len(self.inside)))
 
 
-def _locate(part: Discretisation, x: Array) -> tuple[Ints, Ints, Array]:
+def _locate(part: Nodes, x: Array) -> tuple[Ints, Ints, Array]:
     """Return element, point number and reference coordinates of the points inside the body."""
     corners = part.X[:, part.basis.element_dofs]
     extent = np.ptp(corners, axis=1)
@@ -138,7 +138,7 @@ def _within(low: Array, high: Array, x: Array) -> tuple[Ints, Ints]:
     return box[inside], point[inside]
 
 
-def _reference(part: Discretisation, element: Ints, x: Array) -> Array:
+def _reference(part: Nodes, element: Ints, x: Array) -> Array:
     """Return reference coordinates (2, n) of points in given elements by Newton's method."""
     mapping = part.basis.mapping
     local = np.full((2, len(element), 1), 0.5 if part.basis.mesh.t.shape[0] == 4 else 1 / 3)

@@ -22,6 +22,7 @@ class Nodes:
     dim : number of axes
     n : number of unknowns
     points : (dim, n_elements, n_points) positions of the points [mm]
+    weights : (n_elements, n_points) volume of the points, with thickness or 2 pi r [mm3]
     """
 
     def __init__(self, body: Body) -> None:
@@ -35,6 +36,7 @@ class Nodes:
         self.X = self.basis.doflocs
         self.dim, self.n = len(self.X), self.X.size
         self.points = np.asarray(self.basis.global_coordinates())
+        self.weights = np.asarray(self.basis.dx * self.measure(self.points))
 
     @property
     def components(self) -> int:

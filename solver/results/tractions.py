@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -16,30 +16,36 @@ from solver.results.view import ALONG_X, Axis
 from solver.typing import Array
 
 
-class SurfaceTractions(Protocol):
-    """Pressure and shear on the lower body, whose surface runs along x."""
+class SurfaceTractions:
+    """Pressure and shear on the lower body, whose surface runs along x; here there are none."""
 
     def along(self, converged: Any, x: Array) -> tuple[Array, Array, Array]:
         """Return pressure, shear along +x [MPa] and gap [mm], each (n,), at positions x (n,) [mm].
 
-        They are NaN beyond the surface. The gap is also NaN for separated bodies and for a
-        prescribed pressure.
+        They are NaN beyond the surface, and without contact along a line. The gap is also NaN for
+        separated bodies and for a prescribed pressure.
         """
+        nowhere = np.full_like(x, np.nan)
+        return nowhere, nowhere, nowhere
 
     def extent(self, converged: Any) -> tuple[float, float]:
         """Return the half-width of the contact [mm] and the peak pressure [MPa]."""
+        return np.nan, np.nan
 
     def force(self, converged: Any) -> float:
         """Return the tangential force along +x [N]."""
+        return np.nan
 
     def centre(self, converged: Any) -> float:
         """Return the position of the load along x [mm]."""
+        return 0.0
 
     def points(self, converged: Any) -> ContactResult | None:
         """Return the result at the vertices of a contact along x; None without contact."""
+        return None
 
 
-class PairTractions:
+class PairTractions(SurfaceTractions):
     """Tractions of the first contact pair of a system along ``axis``.
 
     ``symmetric`` means that only one half of the contact is computed.
@@ -101,7 +107,7 @@ class PairTractions:
         )
 
 
-class PrescribedTractions:
+class PrescribedTractions(SurfaceTractions):
     """A travelling pressure."""
 
     def __init__(self, travelling: TravellingPressure) -> None:
@@ -128,39 +134,6 @@ class PrescribedTractions:
         _, centre, _ = self._travelling.now(converged.state.time)
         return centre
 
-    def points(self, converged: Solved) -> None:
-        """See `SurfaceTractions`."""
-        del converged
-
-
-class NoTractions:
-    """Neither contact nor travelling pressure: such a scene has no outputs of contact."""
-
-    def along(self, converged: Solved, x: Array) -> tuple[Array, Array, Array]:
-        """See `SurfaceTractions`."""
-        del converged
-        nowhere = np.full_like(x, np.nan)
-        return nowhere, nowhere, nowhere
-
-    def extent(self, converged: Solved) -> tuple[float, float]:
-        """See `SurfaceTractions`."""
-        del converged
-        return np.nan, np.nan
-
-    def force(self, converged: Solved) -> float:
-        """See `SurfaceTractions`."""
-        del converged
-        return np.nan
-
-    def centre(self, converged: Solved) -> float:
-        """See `SurfaceTractions`."""
-        del converged
-        return 0.0
-
-    def points(self, converged: Solved) -> None:
-        """See `SurfaceTractions`."""
-        del converged
-
 
 def tractions_of(system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> SurfaceTractions:
     """Return the tractions between the bodies of a system, or on one of them."""
@@ -169,4 +142,4 @@ def tractions_of(system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> Su
     for body in system.model.bodies:
         if body.travelling is not None:
             return PrescribedTractions(body.travelling)
-    return NoTractions()
+    return SurfaceTractions()

@@ -2,56 +2,89 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, Self, TypeVar
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, Self, TypeVar
+
+import numpy as np
 
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
+from solver.rolling.flow import Sweep
 from solver.typing import Array
 
 
-class LeftState(Protocol):
-    """The state of a body before and after a pass, constant along x."""
+@dataclass(frozen=True, slots=True)
+class LeftState(ABC):
+    """The state of a body before and after a pass, constant along x; never changed, only replaced.
+
+    Attributes
+    ----------
+    state : internal variables of the law at n points across
+    """
+
+    state: PlasticState
+
+    @property
+    def plastic_strain(self) -> Array:
+        """Plastic strain (n, n_components), Mandel."""
+        return np.ascontiguousarray(self.state.plastic_strain.T)
 
     @property
     def accumulated(self) -> Array:
-        """Accumulated plastic strain (n_rows,)."""
+        """Accumulated plastic strain (n,)."""
+        return self.state.accumulated
 
     @property
+    @abstractmethod
     def mirrored(self) -> Self:
         """The same state, seen along -x."""
 
 
 S = TypeVar("S", bound=LeftState)
-S_co = TypeVar("S_co", bound=LeftState, covariant=True)
 
 
-class FlowPast(Protocol[S_co]):
-    """Material that flows past a load with given strains; see `solver.rolling.flow.RowFlow`."""
+class FlowPast(ABC, Generic[S]):
+    """Material that flows past a load along rows of points with given strains.
 
-    @property
-    def force(self) -> Array:
-        """What balances the plastic strain that the pass adds, as the body solves for it."""
+    Attributes
+    ----------
+    states : internal variables (..., n_rows, n_columns)
+    force : what balances the plastic strain that the pass adds, as the body solves for it
+    """
 
-    @property
-    def states(self) -> PlasticState:
-        """Internal variables (..., n_rows, n_columns)."""
+    force: Array
+
+    def __init__(self, law: Law, begin: S, sweep: Sweep) -> None:
+        self._law, self._begin, self._sweep = law, begin, sweep
+        self.states = sweep.states
 
     @property
     def ago(self) -> PlasticState:
         """Internal variables at the beginning of the last increment before each column."""
+        return self._sweep.ago
+
+    @property
+    def added(self) -> Array:
+        """Accumulated plastic strain (n_rows, n_columns) added since the beginning of the rows."""
+        return np.asarray(self.states.accumulated - self._begin.accumulated[:, None])
 
     @property
     def most_added(self) -> float:
         """Largest accumulated plastic strain that the pass adds at a point."""
+        return float(self.added.max())
 
     @property
     def beyond(self) -> str:
-        """Where the window is too small; empty if nowhere."""
+        """Where the window is too small, as points yield at its edge; empty if nowhere."""
+        return ""
 
+    @abstractmethod
     def along(self, added: Array) -> Array:
         """Return the change of ``force`` for a change of the strains."""
 
-    def left(self) -> tuple[PlasticState, S_co]:
+    @abstractmethod
+    def left(self) -> tuple[PlasticState, S]:
         """Return internal variables (..., n, n_columns) at the surface, and the state behind."""
 
 

@@ -1,17 +1,12 @@
-"""Plastic strain of material that flows along the rows of a window, and its derivative."""
+"""Sweeps of a material along rows of points: compiled where the law allows it."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Protocol
-
-import numpy as np
 
 from solver.materials.law import Law
 from solver.materials.material import Material
 from solver.materials.state import PlasticState
-from solver.rolling.layers import Layers
-from solver.rolling.plane.rows import FlowRows
 from solver.rolling.stepped import SteppedFlow, SteppedSweep
 from solver.rolling.sweep import CompiledFlow, CompiledSweep
 from solver.typing import Array
@@ -95,61 +90,3 @@ def flow_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Flow:
     if isinstance(law, Material):
         return CompiledFlow(law, strain, start, parts)
     return SteppedFlow(law, strain, start, parts)
-
-
-class RowFlow:
-    """Plastic strain along all rows of a window for given strains, and its derivative."""
-
-    def __init__(self, rows: FlowRows, law: Law, before: Layers, added: Array, parts: int) -> None:
-        self._rows, self._law, self._before, self._added = rows, law, before, added
-        self._parts = parts
-        self._flow = self._of(before, added)
-        self.states, self.after = self._flow.states, replace(before, state=self._flow.after)
-        plastic = np.moveaxis(self.states.plastic_strain, 0, 2)
-        self.force = rows.force(
-            plastic - before.plastic_strain[:, None],
-            self.after.plastic_strain - before.plastic_strain,
-        )
-
-    def left(self) -> tuple[PlasticState, Layers]:
-        """Return the internal variables (..., n, n_columns) at the surface, and the layers behind.
-
-        The strain at the surface is extrapolated from the uppermost rows. Plastic strain changes
-        too abruptly in depth for that; it follows from the strain, as on any row.
-        """
-        top = self._before.top
-        flow = self._of(top, self._rows.onto_surface(self._added))
-        return flow.states, replace(self.after, surface=replace(top, state=flow.after))
-
-    def _of(self, before: Layers, added: Array) -> Flow:
-        """Return the flow along rows with these states before and these added strains."""
-        at_rest = before.strain(self._law.elasticity)[:, None]
-        strain = np.concatenate([at_rest, at_rest + added], axis=1)
-        return flow_of(self._law, strain, before.state, self._parts)
-
-    @property
-    def most_added(self) -> float:
-        """Largest accumulated plastic strain that the pass adds at a point."""
-        return float((self.states.accumulated - self._before.accumulated[:, None]).max())
-
-    @property
-    def beyond(self) -> str:
-        """Where the window is too small, because points yield at its edge; empty if nowhere.
-
-        Points that an earlier pass left on the yield surface may flow a little there.
-        """
-        before = self._before.accumulated
-        ahead = (self.states.accumulated[:, 0] - before).max()
-        below = self.after.accumulated[-1] - before[-1]
-        if ahead > allowed_inflow(self._law, self.most_added):
-            return "ahead"
-        return "below" if below > allowed_inflow(self._law, 0.0) else ""
-
-    @property
-    def ago(self) -> PlasticState:
-        """Internal variables at the beginning of the last increment before each column."""
-        return self._flow.ago
-
-    def along(self, added: Array) -> Array:
-        """Return the nodal forces (m,) for a change of the strains."""
-        return self._rows.force(*self._flow.along(added))

@@ -1,15 +1,55 @@
-"""Loads of a steady pass: forces and displacements that may depend on the surface's shape."""
+"""What passes over a body along +x: its force and motion, and how it acts on the body."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
 
 from solver.typing import Array
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RollingLoad:
+    """What a wheel carries, and how it moves; a moment or force that is None is not prescribed.
+
+    Attributes
+    ----------
+    force : vertical force on the body [N]
+    drive : moment on the axle over radius, positive when braking [N]; None if ``creepage`` is given
+    lateral_force : force on the body along z [N]; None if ``lateral_creepage`` is given
+    creepage, lateral_creepage, spin : prescribed motion, see the wheel [1, 1, 1/mm]
+    """
+
+    force: float
+    drive: float | None = None
+    lateral_force: float | None = None
+    creepage: float = 0.0
+    lateral_creepage: float = 0.0
+    spin: float = 0.0
+
+    def scaled(self, share: float) -> RollingLoad:
+        """Return the load with its forces and its moment times ``share``."""
+        drive = None if self.drive is None else share * self.drive
+        lateral = None if self.lateral_force is None else share * self.lateral_force
+        return replace(self, force=share * self.force, drive=drive, lateral_force=lateral)
+
+    def driven(self, share: float) -> RollingLoad:
+        """Return the load with its driving or braking moment times ``share``."""
+        return replace(self, drive=None if self.drive is None else share * self.drive)
+
+    @property
+    def slipping(self) -> RollingLoad:
+        """The load with a creepage at which all of the contact slips, if it has a moment."""
+        if not self.drive:
+            return self
+        return replace(self, drive=None, creepage=self.creepage + float(np.sign(self.drive)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class AppliedLoad:
     """A load on a body, which has its own kind of field.
 
@@ -18,59 +58,62 @@ class AppliedLoad:
     force : forces of the load on the body [N]; on a track (n,), at all nodes
     u : field with the load; on a track displacements (m,) of the kept unknowns [mm]
     along : (change of the field without the load) -> change of ``u``
+    moment : moment on the axle over radius, positive when braking [N]
     """
 
     force: Array
     u: Any
     along: Callable[[Any], Any]
-
-
-class PassingLoad(Protocol):
-    """A load that passes over a body along +x."""
-
-    def on(self, u: Any) -> AppliedLoad:
-        """Return the applied load, given the field of the body without it."""
-
-    def scaled(self, share: float) -> PassingLoad:
-        """Return the same load with its forces times ``share``."""
-
-    def driven(self, share: float) -> PassingLoad:
-        """Return the same load with its driving or braking moment times ``share``."""
+    moment: float = 0.0
 
     @property
-    def moment(self) -> float:
-        """Prescribed moment over radius [N], positive when braking; 0 if none is prescribed."""
-
-    @property
-    def slipping(self) -> PassingLoad:
-        """The same load with the moment at which all of its contact slips, if it has a moment."""
+    def start(self) -> Self:
+        """What the contact of another pass begins with."""
+        return self
 
 
-@dataclass(frozen=True, slots=True)
-class Given:
-    """Constant nodal forces (n,) [N], and the displacements (m,) that they cause [mm]."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PassingLoad(ABC):
+    """What passes over a body; never changed, only replaced.
+
+    Attributes
+    ----------
+    load : its force and motion
+    """
+
+    load: RollingLoad
+
+    @abstractmethod
+    def on(self, u: Any, before: Any, start: Any = None) -> AppliedLoad:
+        """Return how it acts.
+
+        Parameters
+        ----------
+        u : field of the body without the load
+        before : state of the body before the pass
+        start : an `AppliedLoad` to begin with, of this pass, or ``start`` of that of another one
+        """
+
+    def changed(self, **changes: Any) -> Self:
+        """Return the same with other fields, above all with another load."""
+        return replace(self, **changes)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Given(PassingLoad):
+    """Constant nodal forces (n,) [N], and the displacements (m,) that they cause [mm].
+
+    Both are those of a ``load`` of 1, which is their factor.
+    """
 
     force: Array
     u: Array
+    load: RollingLoad = RollingLoad(force=1.0)
 
-    def on(self, u: Array) -> AppliedLoad:
-        """See `PassingLoad`."""
-        return AppliedLoad(self.force, u + self.u, lambda change: change)
-
-    def scaled(self, share: float) -> Given:
-        """See `PassingLoad`."""
-        return Given(share * self.force, share * self.u)
-
-    def driven(self, share: float) -> Given:
-        """See `PassingLoad`; a given shear is not changed."""
-        return self
-
-    @property
-    def moment(self) -> float:
-        """See `PassingLoad`."""
-        return 0.0
-
-    @property
-    def slipping(self) -> Given:
-        """See `PassingLoad`."""
-        return self
+    def on(self, u: Array, before: Any, start: Any = None) -> AppliedLoad:
+        """See `PassingLoad`; it depends on nothing."""
+        del before, start
+        factor = self.load.force
+        return AppliedLoad(
+            force=factor * self.force, u=u + factor * self.u, along=lambda change: change
+        )

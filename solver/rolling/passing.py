@@ -137,6 +137,7 @@ def passing(
     before: S,
     guess: Array | None = None,
     *,
+    start: AppliedLoad | None = None,
     parts: int | None = None,
     tolerance: float = TOLERANCE,
     budget: SolveBudget | None = None,
@@ -150,6 +151,7 @@ def passing(
     load : load that passes along +x
     before : state by depth before the pass
     guess : strains (n_rows, n_columns, n_components) to start from, for instance of a similar pass
+    start : what the first contact begins with, for instance that of the pass before
     parts : number of increments between two points of a row, `usual_parts` if None
     tolerance : largest deviatoric strain of the residual, times 2 G / yield stress
     budget : counts the solves, those of earlier attempts included
@@ -169,23 +171,24 @@ def passing(
     scale, rough = np.sqrt(track.weights)[..., None], track.rough
     double_shear = 2 * material.elasticity.shear_modulus
     budget, krylov = budget or SolveBudget(), _KRYLOV
-    before_it = budget.solves
+    before_it, last = budget.solves, start
 
     def at(added: Array, elastic: AppliedLoad | None = None) -> _At[S]:
+        nonlocal last
         budget.solve()
         flow = track.flow(material, before, added, parts)
         if elastic is not None and not flow.force.any():  # nothing yields
             return _At(added, flow, elastic, np.zeros_like(added), 0.0)
-        loading = load.on(track.solve(flow.force))
+        last = loading = load.on(track.solve(flow.force), before, last)
         residual = track.strain(loading.u) - added
         return _At(added, flow, loading, residual, float(np.linalg.norm(scale * residual)))
 
     if guess is None:
-        elastic = load.on(track.at_rest)
+        last = elastic = load.on(track.at_rest, before, last)
         here = at(track.strain(elastic.u), elastic)
     else:
         here = at(guess)
-    start, sizes, shape = here.size, [here.size], here.added.shape
+    first, sizes, shape = here.size, [here.size], here.added.shape
     for step in range(_STEPS):
         left_over, flow = deviation(here.residual), here.flow
         level = material.yield_stress
@@ -226,7 +229,7 @@ def passing(
         there = searched(moved, here.size)
         most_added = there.flow.most_added
         stalled = krylov == _MOST_KRYLOV and not solved and there.size > _STALLED * here.size
-        unsolved = here.size > _FAR_FROM * start
+        unsolved = here.size > _FAR_FROM * first
         if most_added > _RUNS or (stalled and unsolved and most_added > _FLOWS):
             raise _diverged(material, most_added)
         if not solved:

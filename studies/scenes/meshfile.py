@@ -11,9 +11,14 @@ from solver.errors import ModelError
 from solver.memory import kept
 from solver.mesh.rounding import ROUNDED, with_zeros
 from solver.model.tabulated import Tabulated, columns_of
-from solver.rolling.rail.profiles.cells import collapsed, facets_of, mesh_of_cells, triangles_of
-from solver.rolling.rail.profiles.meshed_rail import section_of
-from solver.rolling.rail.profiles.section_mesh import FOOT, RUNNING, SectionMesh
+from solver.rolling.rail.profiles.meshed_rail import (
+    collapsed,
+    facets_of,
+    mesh_of_cells,
+    section_of,
+    triangles_of,
+)
+from solver.rolling.rail.profiles.points import FOOT, RUNNING, SectionMesh
 from studies.scenes.formats import read_mesh
 from studies.scenes.meshdata import MeshData
 

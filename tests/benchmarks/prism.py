@@ -18,15 +18,15 @@ from scipy.interpolate import LinearNDInterpolator
 
 from solver.linear.threads import one_thread
 from solver.materials import Material
+from solver.rolling.load import RollingLoad
 from solver.rolling.passing import Pass, passing
+from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.patch import RollingPatch
-from solver.rolling.rail.patch_passing import PatchPassing
 from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from solver.rolling.rail.profiles.rail import rail_60e1
 from solver.rolling.rail.profiles.wheel_profile import s1002
 from solver.rolling.rail.profiles.zone import Zone, rail_mesh
 from solver.rolling.rail.section import Section
-from solver.rolling.rail.state import PrismState
 from solver.rolling.rail.track import PrismTrack
 from tests.benchmarks.measure import Point, Timed, timed
 from tests.verification.prism_blocks import (
@@ -168,16 +168,15 @@ def _track(case: Case, section: Section, zone: NDArray[np.bool_], reach: float) 
     )  # fmt: skip
 
 
-def _wheel(track: PrismTrack) -> PatchPassing:
+def _wheel(track: PrismTrack) -> RollingPatch:
     """Return the wheel of the published test, rolling freely."""
     profile = s1002()
     wheel = ProfiledWheel(
         profile=lambda z: profile.height(z + 4.0), radius=460.0, elasticity=HARDENS.elasticity
     )
-    return PatchPassing(
-        RollingPatch(
-            track.grid, track.compliance, wheel, friction=0.17, force=150e3, drive=0.0
-        )
+    return RollingPatch(
+        grid=track.grid, compliance=track.compliance, wheel=wheel, friction=0.17,
+        load=RollingLoad(force=150e3, drive=0.0),
     )  # fmt: skip
 
 

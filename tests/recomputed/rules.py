@@ -332,14 +332,11 @@ class Rules:
         return Own(found if len(self.axis("s")) else np.nan, LIMIT * found)
 
     def half_width(self) -> Own:
-        """Middle of its bounds, which allow half of their distance.
-
-        The edge of contact is found from gaps.
-        """
+        """Half-width within its bounds: the edge of contact is found from gaps."""
         found = self._acting(self.view.loaded)
-        own, aside = (found.most + found.least) / 2, (found.most - found.least) / 2
+        own = np.clip(self.record.scalars["contact_half_width"], found.least, found.most)
         limit = MEASURED if found.measured else LIMIT
-        return Own(own if len(self.axis("s")) else np.nan, aside + limit * found.most)
+        return Own(own if len(self.axis("s")) else np.nan, limit * found.most)
 
     # -- extremes ---------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from solver.contact.system import System
-from solver.rolling.scenes.rolling_steady import rim_of, track_for
+from solver.rolling.scenes.rolling_endless import rim_of, track_for
 from solver.scenes import Scene
 from solver.shipped import SCENES
 from tests.counted import counted

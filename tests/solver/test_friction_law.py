@@ -32,11 +32,12 @@ from solver.model.friction import (
     through,
 )
 from solver.model.rigid import line
+from solver.rolling.load import RollingLoad
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.track import track_of
 from solver.rolling.plane.wheel import RollingWheel
+from solver.rolling.scenes.rolling_endless import rim_of
 from solver.rolling.scenes.rolling_parameters import RollingParameters
-from solver.rolling.scenes.rolling_steady import rim_of
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 WEAK = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
@@ -229,8 +230,8 @@ def endless(law: FrictionLaw) -> Any:
     material = p.material()
     track = track_of(p.mesh_width, p.element_size, 1.15, material.elasticity)
     wheel = RollingWheel(
-        track, rim_of(p), friction=law, force=p.force, strength=material.shear_yield_stress,
-        drive=0.5 * 0.3 * p.force,
+        track=track, rim=rim_of(p), friction=law, strength=material.shear_yield_stress,
+        load=RollingLoad(force=p.force, drive=0.5 * 0.3 * p.force),
     )  # fmt: skip
     return next(iter(rolling(track, material, [wheel], [1])))
 

@@ -9,9 +9,9 @@ import pytest
 
 from solver import ModelError
 from solver.results.record import Status
-from solver.rolling.scenes.rolling_grids import recorded_step
+from solver.rolling.plane.lines import recorded_step
 from solver.rolling.scenes.rolling_parameters import RollingParameters
-from solver.rolling.scenes.rolling_view import view
+from solver.rolling.scenes.rolling_setup import view
 from solver.shipped import SCENES
 
 ROLLING = SCENES["rolling"]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
 from solver.materials import Elasticity
+from solver.rolling.load import RollingLoad
 from solver.rolling.rail.half_space import half_space
 from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.patch_grid import PatchGrid
@@ -16,6 +19,19 @@ from tests.verification.closed_forms import HertzEllipse
 Array = NDArray[np.float64]
 
 STEEL = Elasticity(youngs_modulus=2e5, poisson_ratio=0.25)
+
+
+Patch = TypeVar("Patch", bound=RollingPatch)
+
+
+def wheel_on(
+    grid: PatchGrid, compliance: Array, wheel: ProfiledWheel, *, friction: float,
+    drive: float | None = None, kind: type[Patch] = RollingPatch, force: float, **rolls: float,
+) -> Patch:  # fmt: skip
+    """Return a wheel on a surface; ``drive`` is its moment over that of full slip."""
+    moment = None if drive is None else drive * friction * force
+    load = RollingLoad(force=force, drive=moment, **rolls)
+    return kind(grid=grid, compliance=compliance, wheel=wheel, friction=friction, load=load)
 
 
 def ellipse(a: float, b: float, peak: float = 1e-3) -> HertzEllipse:
@@ -51,9 +67,7 @@ def pressed(
         stations=2 * round(ahead / along) + 1,
     )  # fmt: skip
     wheel = ProfiledWheel(profile=np.zeros_like, radius=rolling, elasticity=STEEL)
-    return RollingPatch(
-        grid, surface_of(grid), wheel, force=hertz.force, **{"friction": 0.0, **given}
-    )
+    return wheel_on(grid, surface_of(grid), wheel, force=hertz.force, **{"friction": 0.0, **given})
 
 
 def flat(patch: RollingPatch) -> Array:

@@ -34,8 +34,8 @@ import solver.results.shakedown
 import solver.results.singularity
 import solver.results.tractions
 import solver.rolling.results.plane
+import solver.rolling.scenes.rolling_endless
 import solver.rolling.scenes.rolling_setup
-import solver.rolling.scenes.rolling_steady
 from solver.contact.candidates import Candidates
 from solver.contact.interface import Interface
 from solver.fem.fields import Sampler
@@ -51,7 +51,7 @@ from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
 from solver.results.tractions import PairTractions
 from solver.results.view import Axis, Places, View
-from solver.rolling.layers import Layers
+from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.track import Track
 from solver.rolling.results.plane import SteadyTractions
 from solver.scenes.scene import Scene
@@ -519,7 +519,7 @@ MUTATIONS: dict[str, Mutation] = {
         instead(Layers, "mirrored", lambda old: property(lambda self: self)), "history"
     ),
     "a pass back taken forward": _passed(
-        instead(solver.rolling.scenes.rolling_steady, "rolling", always_ahead), "history"
+        instead(solver.rolling.scenes.rolling_endless, "rolling", always_ahead), "history"
     ),
     "a pass back shown as if it went forward": _passed(
         instead(Track, "mirror", lambda old: property(not_turned)), STORED

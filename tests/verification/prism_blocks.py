@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from solver.materials import Material
 from solver.materials.law import Law
 from solver.mesh import grid, within
-from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.load import RollingLoad
+from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from solver.rolling.rail.section import Section
-from solver.rolling.rail.state import PrismState
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.initial_stress import SectionStress
 from solver.rolling.scenes.wheel_rail_track import settled
@@ -92,10 +92,10 @@ def residual(law: Law, state: PrismState) -> Array:
     return law.stiffness(6) @ (state.strain - state.plastic_strain).T
 
 
-def ellipse(track: PrismTrack, peak: float, **shear: tuple[float, float]) -> PatchPassing:
+def ellipse(track: PrismTrack, peak: float, **shear: tuple[float, float]) -> SteppedEllipse:
     """The pressure of the wheel on the rail of the thesis, of another peak [MPa]."""
-    return PatchPassing(
-        SteppedEllipse(grid=track.grid, force=2 * np.pi * A * B * peak / 3, a=A, b=B, **shear)
+    return SteppedEllipse(
+        grid=track.grid, load=RollingLoad(force=2 * np.pi * A * B * peak / 3), a=A, b=B, **shear
     )
 
 

@@ -12,7 +12,7 @@ from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from tests.verification.closed_forms import HertzEllipse
-from tests.verification.hertz_ellipse import surface_of
+from tests.verification.hertz_ellipse import surface_of, wheel_on
 
 Array = NDArray[np.float64]
 MODULI = {"same": 2e5, "softer": 2e4, "stiffer": 2e6, "rigid": np.inf}
@@ -69,7 +69,7 @@ def random_case(seed: int) -> tuple[RollingPatch, Array, ProfiledWheel, dict[str
     if "lateral_force" in given:
         given["spin"] = 0.0
     compliance = surface_of(grid, soft)
-    return RollingPatch(grid, compliance, wheel, **given), compliance, wheel, given
+    return wheel_on(grid, compliance, wheel, **given), compliance, wheel, given
 
 
 def moved(contact: PatchContact, compliance: Array, wheel: ProfiledWheel) -> tuple[Array, Array]:

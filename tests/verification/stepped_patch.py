@@ -16,7 +16,6 @@ lateral force is given, the motion of the wheel in the increment is unknown, as 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -40,15 +39,19 @@ class SteppedPatch(RollingPatch):
 
     def following(self, before: Sequence[SteppedContact], stations: int) -> SteppedPatch:
         """See `SteppedLoad`; of a wheel that is set down, slip counts from the surface as it is."""
-        other, weights = copy(self), UPSTREAM if len(before) > 1 else (1.0, -1.0)
-        other._weight = weights[0]
-        other._given = stations * self._given
-        other._rest, other._motions = self._rest.copy(), self._motions.copy()
-        other._rest[..., TANGENTS] *= stations / weights[0]
-        other._motions[..., TANGENTS] /= weights[0]
+        load, weights = self.load, UPSTREAM if len(before) > 1 else (1.0, -1.0)
+        load = replace(
+            load, creepage=stations * load.creepage,
+            lateral_creepage=stations * load.lateral_creepage, spin=stations * load.spin,
+        )  # fmt: skip
+        rest, motions = (each.copy() for each in self._rolling)
+        rest[..., TANGENTS] *= stations / weights[0]
+        motions[..., TANGENTS] /= weights[0]
         for count, (own, weight) in enumerate(zip(before, weights[1:], strict=True), start=1):
             ago = _upstream(self._motion(own), count * stations)
-            other._rest[..., TANGENTS] += weight / weights[0] * ago
+            rest[..., TANGENTS] += weight / weights[0] * ago
+        other = self.changed(load=load)
+        vars(other).update(_weight=weights[0], _rolling=(rest, motions), _sums=self._sums)
         return other
 
     def _motion(self, of: SteppedContact) -> Array:
@@ -59,7 +62,8 @@ class SteppedPatch(RollingPatch):
         left = self._offset(of.displacement)[..., TANGENTS]
         around = np.stack([2 * left[0] - left[1], *left, 2 * left[-1] - left[-2]])
         if of.contact is not None:
-            around += self._influence.around(self._known(of.contact)[0])[..., TANGENTS]
+            everywhere = self._influence.everywhere(self._known(of.contact)[0])
+            around += everywhere[np.arange(-1, len(left) + 1)][..., TANGENTS]
         return around
 
     def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:

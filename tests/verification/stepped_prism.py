@@ -37,9 +37,8 @@ from solver.materials.state import PlasticState
 from solver.rolling.flow import allowed_inflow, sweep_of, usual_parts
 from solver.rolling.passing import TOLERANCE, deviation, searched
 from solver.rolling.rail.friction_cone import OPEN
-from solver.rolling.rail.given_patch import EllipticPatch
 from solver.rolling.rail.modes import Modes
-from solver.rolling.rail.patch_contact import PatchContact
+from solver.rolling.rail.patch_contact import EllipticPatch, PatchContact
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.rolling.rail.track import PrismTrack
 from solver.typing import Array

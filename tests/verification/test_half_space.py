@@ -7,7 +7,7 @@ import pytest
 
 from solver.materials import Elasticity
 from solver.rolling.rail.half_space import half_space
-from solver.rolling.rail.hats import SHARES, Hats
+from solver.rolling.rail.patch_grid import SHARES, Hats
 
 NU = 0.3
 STEEL = Elasticity(youngs_modulus=2e5, poisson_ratio=NU)

@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 
 from solver.errors import ModelError
 from solver.rolling.rail.friction_cone import OPEN
-from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from solver.rolling.rail.profiles.wheel_profile import s1002
-from tests.verification.hertz_ellipse import STEEL, ellipse, flat, pressed, surface_of
+from tests.verification.hertz_ellipse import STEEL, ellipse, flat, pressed, surface_of, wheel_on
 
 Array = NDArray[np.float64]
 
@@ -21,7 +20,7 @@ Array = NDArray[np.float64]
 def solved(
     grid: PatchGrid, wheel: ProfiledWheel, force: float, friction: float = 0.0
 ) -> PatchContact:
-    patch = RollingPatch(grid, surface_of(grid), wheel, friction=friction, force=force)
+    patch = wheel_on(grid, surface_of(grid), wheel, friction=friction, force=force)
     return patch.solve(flat(patch))
 
 
@@ -103,7 +102,7 @@ def test_the_gap_is_the_distance_along_the_normal() -> None:
         return centre[1] + np.sqrt(wheel_crown**2 - (z - centre[0]) ** 2)
 
     wheel = ProfiledWheel(profile=profile, radius=460.0, elasticity=STEEL)
-    gap = wheel.gap(grid)[1]
+    gap = wheel.rolling(grid)[0][1, :, 1]
     normal = np.stack([-np.sin(grid.angle), np.cos(grid.angle)])
     away = np.stack([grid.z, grid.y]) - centre[:, None]
     along = (away * normal).sum(axis=0)
@@ -196,7 +195,7 @@ def test_yaw_of_a_cylinder_is_a_lateral_creepage() -> None:
     creeping = pressed(hertz, 1 / 6, 1 / 5, friction=0.3, lateral_creepage=np.tan(yaw), drive=0.0)
     wheel = ProfiledWheel(profile=np.zeros_like, radius=hertz.radii[0], elasticity=STEEL, yaw=yaw)
     grid = creeping.grid
-    yawed = RollingPatch(grid, surface_of(grid), wheel, friction=0.3, force=hertz.force, drive=0.0)
+    yawed = wheel_on(grid, surface_of(grid), wheel, friction=0.3, force=hertz.force, drive=0.0)
     forces = [each.solve(flat(each)).force for each in (creeping, yawed)]
     assert forces[1] == pytest.approx(forces[0], abs=1e-3 * abs(forces[0][2]))
     assert 0.1 < forces[0][2] / (0.3 * hertz.force) < 0.95
@@ -214,9 +213,7 @@ def test_spin_turns_about_the_axis_of_the_wheel() -> None:
     wheel = ProfiledWheel(
         profile=np.zeros_like, radius=hertz.radii[0], elasticity=STEEL, middle=40.0
     )
-    moved = RollingPatch(
-        aside, surface_of(aside), wheel, friction=0.3, force=hertz.force, spin=spin
-    )
+    moved = wheel_on(aside, surface_of(aside), wheel, friction=0.3, force=hertz.force, spin=spin)
     one, other = (each.solve(flat(each)) for each in (at_zero, moved))
     assert other.traction == pytest.approx(one.traction, abs=1e-6 * hertz.peak_pressure)
     assert abs(one.shear).max() > 0.01 * hertz.peak_pressure
@@ -230,4 +227,4 @@ def test_wheels_that_do_not_fit_are_refused() -> None:
         profile=lambda z: np.where(z < 0.1, 0.0, np.inf), radius=460.0, elasticity=STEEL
     )
     with pytest.raises(ModelError, match="must be finite at every vertex"):
-        ends.gap(grid)
+        ends.rolling(grid)

@@ -14,7 +14,7 @@ from solver.errors import LimitLoad, ModelError, Spins, WindowTooSmall
 from solver.materials import Elasticity
 from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.profiled_wheel import ProfiledWheel
-from tests.verification.hertz_ellipse import STEEL, ellipse, flat, pressed, surface_of
+from tests.verification.hertz_ellipse import STEEL, ellipse, flat, pressed, surface_of, wheel_on
 from tests.verification.rolling_cases import moved, random_case, worst
 
 FRICTION = 0.3
@@ -45,7 +45,7 @@ def test_a_surface_that_repeats_itself_has_every_distance_once() -> None:
     distances = np.fft.ifftshift(np.arange(-n, n))
     folded = np.zeros((length, *compliance.shape[1:]))
     np.add.at(folded, distances % length, compliance)
-    repeated = RollingPatch(patch.grid, folded, wheel, **given)
+    repeated = wheel_on(patch.grid, folded, wheel, **given)
     contact = repeated.solve(flat(repeated))
     gap, slip = moved(contact, folded, wheel)
     assert contact.gap == pytest.approx(gap, abs=1e-10)
@@ -149,7 +149,7 @@ def test_bad_input_is_named() -> None:
     )  # fmt: skip
     for change, message in cases:
         with pytest.raises(ModelError, match=re.escape(message)):
-            RollingPatch(**{**usual, **change})
+            wheel_on(**{**usual, **change}).solve(np.zeros((grid.stations, len(grid.z), 3)))
     for name, value, message in (
         ("z", grid.z[::-1], "must increase, 3 positions or more"),
         ("y", grid.y[1:], "must have 15 values, as z"),
@@ -170,9 +170,9 @@ def test_more_than_friction_is_a_clear_error() -> None:
         share = f"{1 / abs(drive):.1%}"[:3]
         with pytest.raises(Spins, match=rf"spins: all of its contact slips at {share}"):
             patch.solve(flat(patch))
-        below = patch.driven(0.99 / abs(drive))
+        below = patch.changed(load=patch.load.driven(0.99 / abs(drive)))
         assert abs(below.solve(flat(patch)).force[0]) < FRICTION * hertz.force
-        slipping = patch.slipping.solve(flat(patch))
+        slipping = patch.changed(load=patch.load.slipping).solve(flat(patch))
         assert slipping.force[0] == pytest.approx(np.sign(drive) * FRICTION * hertz.force, rel=1e-4)
     patch = pressed(hertz, 1 / 6, 1 / 5, friction=FRICTION, lateral_force=0.31 * hertz.force)
     most = rf"is {FRICTION * hertz.force:.0f} N, not {0.31 * hertz.force:.0f}:"

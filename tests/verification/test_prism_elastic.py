@@ -15,9 +15,8 @@ from solver.fem.surface import edges_of
 from solver.materials.elasticity import Elasticity
 from solver.mesh import graded, grid, mapped
 from solver.mesh.edges import shape_derivatives, shape_functions
-from solver.rolling.rail.far_field import FarField
+from solver.rolling.rail.far_field import FarField, sampled_answers
 from solver.rolling.rail.modes import Modes
-from solver.rolling.rail.sampled import sampled_answers
 from solver.rolling.rail.section import Section
 from solver.tensors import SQRT2
 from tests.verification.closed_forms import HertzEllipse

@@ -24,8 +24,8 @@ from scipy.spatial import cKDTree
 from solver.linear.threads import one_thread
 from solver.materials.law import Law
 from solver.rolling.passing import Pass, passing
+from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.patch_contact import PatchContact
-from solver.rolling.rail.state import PrismState
 from solver.rolling.rail.track import PrismTrack
 from tests.verification.bricks import Bricks, BrickState
 from tests.verification.prism_blocks import AHEAD, HARDENS, PERFECT, block, ellipse

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.rolling.rail.given_patch import EllipticPatch
+from solver.rolling.load import RollingLoad
+from solver.rolling.rail.patch_contact import EllipticPatch
 from solver.rolling.rail.track import PrismField, PrismTrack
 from solver.tensors import to_tensor, von_mises
 from tests.verification.closed_forms import HertzEllipse
@@ -21,7 +22,9 @@ def body() -> PrismTrack:
 
 def stress(track: PrismTrack, ellipse: HertzEllipse) -> Array:
     """Return Mandel stress (n_points, window, 6) under an ellipse, over its largest pressure."""
-    load = EllipticPatch(grid=track.grid, force=ellipse.force, a=ellipse.a, b=ellipse.b)
+    load = EllipticPatch(
+        grid=track.grid, load=RollingLoad(force=ellipse.force), a=ellipse.a, b=ellipse.b
+    )
     nothing = np.zeros((track.grid.stations, len(track.grid.z), 3))
     field = PrismField(track, traction=load.solve(nothing).traction)
     return track.strain(field) @ PERFECT.stiffness(6) / ellipse.peak_pressure

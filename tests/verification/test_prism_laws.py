@@ -15,8 +15,8 @@ from solver.materials.law import Law
 from solver.results.shakedown import ShakedownState, classify
 from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.audit.rail import audit_prism
+from solver.rolling.load import RollingLoad
 from solver.rolling.passing import Pass, passing
-from solver.rolling.rail.patch_passing import PatchPassing
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.initial_stress import OverHeight
 from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
@@ -68,12 +68,14 @@ def plain(of: PrismTrack) -> PlainPrism:
 
 def pressure(peak: float, a: float = A, b: float = 4.0) -> SteppedEllipse:
     """The pressure of an ellipse, as wide as the coarse block allows."""
-    return SteppedEllipse(grid=track().grid, force=2 * np.pi * a * b * peak / 3, a=a, b=b)
+    return SteppedEllipse(
+        grid=track().grid, load=RollingLoad(force=2 * np.pi * a * b * peak / 3), a=a, b=b
+    )
 
 
 def compared(own: PrismTrack, material: Law) -> None:
     """Assert that increments leave the state of a steady pass, and that the next one is sound."""
-    load = PatchPassing(pressure(1360.0))
+    load = pressure(1360.0)
     body = SteppedPrism(own, material, parts=1)
     with one_thread():
         found = passing(own, material, load, own.virgin(material), parts=1)
@@ -119,7 +121,7 @@ def test_a_surface_that_grows_without_bound_ends_the_flow(
 
     The largest pressures fit the coarse block: nothing may yield at the rim of its zone.
     """
-    own, material, load = track(), LAWS[word], PatchPassing(pressure(peak, 5.0, b))
+    own, material, load = track(), LAWS[word], pressure(peak, 5.0, b)
     found: Pass[Any] | None = None
     accumulated, plastic = [], []
     with one_thread():

@@ -21,11 +21,10 @@ from solver.rolling.passing import Pass, passing
 from solver.rolling.rail import far_field as far_fields
 from solver.rolling.rail import flow as flows
 from solver.rolling.rail import patch as patches
+from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.modes import Modes
 from solver.rolling.rail.patch import RollingPatch
-from solver.rolling.rail.patch_passing import PatchPassing
 from solver.rolling.rail.section import Section
-from solver.rolling.rail.state import PrismState
 from solver.rolling.rail.track import PrismTrack
 from tests.verification.test_prism_passes import HARDENS, PERFECT, block, ellipse, lines, wheel
 
@@ -63,7 +62,6 @@ def audits(track: PrismTrack, law: Material = HARDENS, count: int = 1) -> list[A
             given = passing(track, law, load, state, guess)
             found.append(audit_prism(track, law, given, previous, plain))
             previous, state, guess = given, given.after, given.strain
-            load = PatchPassing(load._load, state.displacement)
     return found
 
 
@@ -143,7 +141,7 @@ def no_far_field(patch: Patch) -> None:
 
 def no_release(patch: Patch) -> None:
     def left(self: Any) -> Any:
-        return self.states, self._last(self._before.displacement)
+        return self.states, self._last(self._begin.displacement)
 
     patch.setattr(flows.PrismFlow, "left", left)
 
@@ -164,13 +162,12 @@ def slip_of_the_next_station(patch: Patch) -> None:
 
 
 def profile_not_moved(patch: Patch) -> None:
-    own = PatchPassing.on
+    own = RollingPatch.on
 
-    def on(self: PatchPassing, u: Any) -> Any:
-        self._moved = None
-        return own(self, u)
+    def on(self: RollingPatch, u: Any, before: Any, start: Any = None) -> Any:
+        return own(self, u, replace(before, displacement=0.0 * before.displacement), start)
 
-    patch.setattr(PatchPassing, "on", on)
+    patch.setattr(RollingPatch, "on", on)
 
 
 def more_friction(patch: Patch) -> None:
@@ -274,7 +271,7 @@ def test_a_fault_is_noticed(mutation: Mutation, monkeypatch: Patch) -> None:
 def elastic_stress(track: PrismTrack) -> Array:
     """Stress (n_points, window, 6) by the pressure alone [MPa]."""
     with one_thread():
-        strain = track.strain(ellipse(track, 1360.0).on(track.at_rest).u)
+        strain = track.strain(ellipse(track, 1360.0).on(track.at_rest, track.virgin(HARDENS)).u)
     return np.asarray(strain @ HARDENS.stiffness(6))
 
 

@@ -31,7 +31,7 @@ def test_strain_outside_a_zone_is_that_of_a_deeper_zone(
     left = np.random.default_rng(1).normal(size=(len(points), 1, 6)) * near[:, None] * 200.0
     eigenstress = np.zeros((len(large.modes.points), window, 6))
     eigenstress[at] = left
-    traction = ellipse(large, PEAK).on(large.at_rest).contact.traction
+    traction = ellipse(large, PEAK).on(large.at_rest, large.virgin(PERFECT)).contact.traction
     one, other = PlainPrism(small), PlainPrism(large)
     whole = other.strain(other.waves(eigenstress, traction))[:, large.before]
     found = one.beside(one.waves(left, traction))

@@ -19,15 +19,16 @@ from solver.materials import (
 )  # fmt: skip
 from solver.materials.law import Law
 from solver.mesh import grid
+from solver.rolling.load import RollingLoad
 from solver.rolling.passing import Pass, passing
 from solver.rolling.plane.track import track_of
+from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.patch import RollingPatch
-from solver.rolling.rail.patch_contact import PatchContact
-from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.rail.patch_contact import PatchContact, PatchLoad
 from solver.rolling.rail.section import Section
-from solver.rolling.rail.state import PrismState
 from solver.rolling.rail.track import PrismTrack
 from solver.tensors import SQRT2, von_mises
+from tests.verification.hertz_ellipse import wheel_on
 from tests.verification.prism_blocks import (
     HARDENS,
     PERFECT,
@@ -43,7 +44,7 @@ from tests.verification.prism_blocks import (
 Array = NDArray[np.float64]
 
 
-def rolled(track: PrismTrack, law: Law, load: PatchPassing, count: int = 1) -> Pass[PrismState]:
+def rolled(track: PrismTrack, law: Law, load: PatchLoad, count: int = 1) -> Pass[PrismState]:
     """The last of so many passes."""
     state, guess = track.virgin(law), None
     with one_thread():
@@ -53,18 +54,21 @@ def rolled(track: PrismTrack, law: Law, load: PatchPassing, count: int = 1) -> P
     return found
 
 
-def wheel(track: PrismTrack, friction: float, drive: float, middle: float = 0.0) -> PatchPassing:
+def wheel(track: PrismTrack, friction: float, drive: float, middle: float = 0.0) -> RollingPatch:
     """The crowned wheel, 150 kN."""
     body, of = crowned(middle), (track.grid, track.compliance)
-    return PatchPassing(RollingPatch(*of, body, friction=friction, force=150e3, drive=drive))
+    return wheel_on(*of, body, friction=friction, force=150e3, drive=drive)
 
 
 # -- a strip held across is plane strain ----------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Line:
-    """A line pressure with shear in proportion, uniform across; see `PatchLoad`."""
+FACTOR = RollingLoad(force=1.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Line(PatchLoad):
+    """A line pressure with shear in proportion, uniform across."""
 
     track: PrismTrack
     a: float
@@ -156,7 +160,7 @@ def test_a_strip_held_across_has_the_pass_of_plane_strain() -> None:
     a, peak, shear, depths = 8.29, 1360.0, -0.09, np.array([1.0, 2.0, 3.0, 5.0, 8.0, 10.0, 12.0])
     track = strip(320.0, 1.0, 3, spacing=0.5, zone_depth=15.0)
     track.far = Alone(track, width=2.0)  # type: ignore[assignment]
-    load = PatchPassing(Line(track, a, peak, shear))  # type: ignore[arg-type]
+    load = Line(track=track, a=a, peak=peak, shear=shear, load=FACTOR)
     left = rolled(track, PERFECT, load).after
     stress = residual(PERFECT, left)
     assert np.abs(stress[[1, 3, 4, 5]]).max() < 1e-3 * RE
@@ -180,7 +184,7 @@ def test_divided_rows_above_halve_the_elements_where_plastic_strain_is_steep() -
 
     def left(h: float, split: int) -> Array:
         track = strip(256.0, h, split)
-        load = PatchPassing(Line(track, 8.29, 1360.0, 0.0))  # type: ignore[arg-type]
+        load = Line(track=track, a=8.29, peak=1360.0, shear=0.0, load=FACTOR)
         stress = residual(PERFECT, rolled(track, PERFECT, load).after)
         down = np.argsort(-track.points[1])
         own = -track.points[1][down]

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.linear.threads import one_thread
+from solver.rolling.load import RollingLoad
 from solver.rolling.passing import passing
-from solver.rolling.rail.given_patch import EllipticPatch
-from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.rail.patch_contact import EllipticPatch
 from solver.rolling.rail.track import PrismTrack
 from tests.verification.prism_blocks import PERFECT, RE, block
 
@@ -31,7 +31,7 @@ def track() -> PrismTrack:
 def growth(ratio: float) -> NDArray[np.float64]:
     """Return the largest growth of plastic strain (PASSES,) in each pass, over the yield strain."""
     force = 2 * np.pi * RADIUS**2 * ratio * RE / np.sqrt(3) / 3
-    load = PatchPassing(EllipticPatch(grid=track().grid, force=force, a=RADIUS, b=RADIUS))
+    load = EllipticPatch(grid=track().grid, load=RollingLoad(force=force), a=RADIUS, b=RADIUS)
     state, guess, each = track().virgin(PERFECT), None, []
     with one_thread():
         for _ in range(PASSES):

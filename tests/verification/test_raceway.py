@@ -14,12 +14,12 @@ from solver import ModelError, Record
 from solver.linear.threads import one_thread
 from solver.results.record import Status
 from solver.results.shakedown import QUIET, ShakedownState
+from solver.rolling.load import RollingLoad
 from solver.rolling.passing import passing
-from solver.rolling.rail.given_patch import EllipticPatch
-from solver.rolling.rail.patch_passing import PatchPassing
+from solver.rolling.rail.patch_contact import EllipticPatch
 from solver.rolling.scenes.hertz_ellipse import HertzEllipse
 from solver.rolling.scenes.raceway_parameters import MOST_LONG, RacewayParameters
-from solver.rolling.scenes.raceway_track import RolledRaceway, geometry, track_of
+from solver.rolling.scenes.raceway_setup import RolledRaceway, geometry, track_of
 from solver.shipped import SCENES
 from tests.records import kept
 from tests.verification import closed_forms
@@ -150,10 +150,11 @@ def test_a_raceway_of_another_size_strains_alike() -> None:
 
 @pytest.mark.parametrize("radius", [2.523, 7.1, 33.0])
 def test_zone_and_window_do_not_depend_on_the_unit_of_length(radius: float) -> None:
-    sizes = {
-        geometry(RacewayParameters(radius=radius * unit, accuracy="draft")).window.size
+    each = (
+        geometry(RacewayParameters(radius=radius * unit, accuracy="draft"))
         for unit in (1.0, 10.0, 100.0, 1e3)
-    }
+    )
+    sizes = {(own.zone.columns, own.elements, own.stations(2.2), own.waves) for own in each}
     assert len(sizes) == 1
 
 
@@ -180,9 +181,11 @@ def test_the_scene_is_a_pass_of_the_given_ellipse() -> None:
     record = rolled(load="hertz", **given)
     p = SCENE.parameters(**ball() | given, load="hertz")
     track, law, hertz = track_of(geometry(p)), p.material(), p.ellipse
-    load = EllipticPatch(grid=track.grid, force=hertz.force, a=hertz.a, b=hertz.b, shear=(0.1, 0))
+    load = EllipticPatch(
+        grid=track.grid, load=RollingLoad(force=hertz.force), a=hertz.a, b=hertz.b, shear=(0.1, 0)
+    )
     with one_thread():
-        found = passing(track, law, PatchPassing(load), track.virgin(law))
+        found = passing(track, law, load, track.virgin(law))
     strain = float(found.after.accumulated.max())
     depth = -float(track.points[1, found.after.accumulated.argmax()])
     assert record.scalars["max_plastic_strain"] == strain > 0.005
@@ -255,33 +258,27 @@ def test_the_limit_without_friction_is_that_of_the_alternating_shear() -> None:
     ("given", "told"),
     [
         ({"groove_radius": 9.0}, r"groove_radius = 9\.0: must be greater than 10, the radius"),
-        (
-            {"groove_radius": 10.01},
-            r"groove_radius = 10\.01: must be at least 10\.05\d+: .* ratio of 67",
-        ),
+        ({"groove_radius": 10.01}, r"_radius = 10\.01: must be at least 10\.05\d+: .* ratio of 67"),
         ({"crown_radius": 2e3}, r"crown_radius = 2000\.0: must be at most 1727\.\d: .* ratio of 2"),
         ({"crown_radius": 0.01}, r"crown_radius = 0\.01: must be at least 0\.05\d+: .* ratio of 6"),
         (
             BEARING | {"conformity": 0.501},
             r"conformity = 0\.501: must be at least 0\.5036\d+: .* 52",
         ),
-        (
-            {"radius": 1e4, "crown_radius": 10.0, "groove_radius": 20.0},
-            r"groove_radius = 20\.0: must be at most 12\.08\d+: ",
-        ),
+        ({"radius": 1e4, "crown_radius": 10.0, "groove_radius": 20.0}, r"be at most 12\.08\d+: "),
         ({"ring_radius": -9.0}, r"ring_radius = -9\.0: must be positive, or below -10"),
         ({"ring_radius": 0.0}, r"ring_radius = 0\.0: must be positive, or below -10"),
         (
             {"load_ratio": 9.0, "yield_stress": 5e3},
-            r"load_ratio = 9\.0: must be at most \d\.\d+: .* along",
+            r"= 9\.0: must be at most \d\.\d+: .* along",
         ),
         (
             {"load_by": "force", "force": 1e8},
-            r"force = 100000000\.0: must be at most \d+: .* along",
+            r"= 100000000\.0: must be at most \d+: .* along",
         ),
         (
             {"groove_radius": 10.4, "load_ratio": 4.0},
-            r"load_ratio = 4\.0: must be at most 3\.\d+: .* across",
+            r"= 4\.0: must be at most 3\.\d+: .* across",
         ),
         ({"load": "hertz", "control": "creepage"}, r"control = 'creepage': must be moment"),
         ({"load": "hertz", "lateral_creepage": 0.01}, r"lateral_creepage = 0\.01: must be 0"),

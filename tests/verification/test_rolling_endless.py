@@ -11,13 +11,13 @@ import pytest
 
 from solver import SCENES, ModelError, Status
 from solver.errors import NotConverged, TooLong, WindowTooSmall
+from solver.rolling import search
 from solver.rolling.audit.plane import audit_pass
 from solver.rolling.passing import SolveBudget
-from solver.rolling.plane import search
 from solver.rolling.plane.rolling import rolling
-from solver.rolling.scenes import rolling_endless, rolling_steady
+from solver.rolling.scenes import pass_runner, rolling_endless
+from solver.rolling.scenes.rolling_endless import load_on, track_for
 from solver.rolling.scenes.rolling_parameters import RollingParameters
-from solver.rolling.scenes.rolling_steady import load_on, track_for
 from tests.records import kept
 
 COARSE = {"element_size": 3.0, "growth": 1.3}
@@ -385,7 +385,7 @@ def test_a_pass_that_is_not_found_ends_after_so_many_solves(monkeypatch):
         made.append(SolveBudget(30))
         return made[-1]
 
-    for place in (search, rolling_endless):
+    for place in (search, pass_runner):
         monkeypatch.setattr(place, "SolveBudget", little)
     (record,) = records.__wrapped__((5,), **HEAVY, traction=-0.9)
     assert record.status is Status.NOT_CONVERGED
@@ -404,7 +404,7 @@ def test_windows_of_all_sizes_share_their_solves(monkeypatch):
         raise WindowTooSmall("the window is too small below for a steady pass")
         yield
 
-    monkeypatch.setattr(rolling_endless, "SolveBudget", lambda: SolveBudget(30))
+    monkeypatch.setattr(pass_runner, "SolveBudget", lambda: SolveBudget(30))
     monkeypatch.setattr(rolling_endless, "steady_passes", beyond)
     (record,) = records.__wrapped__((5,), **HEAVY)
     assert tried == [1.0, 1.5]
@@ -421,7 +421,7 @@ def test_a_coarser_mesh_that_takes_too_long_does_not_end_the_run(monkeypatch):
         tried.append(given)
         raise TooLong("no steady pass was found in so many solves")
 
-    monkeypatch.setattr(rolling_steady, "search", never)
+    monkeypatch.setattr(rolling_endless, "search", never)
     other = records.__wrapped__((1,), **fields)[0]
     assert tried
     assert other.status is usual.status
@@ -432,7 +432,7 @@ def test_a_coarser_mesh_that_takes_too_long_does_not_end_the_run(monkeypatch):
 
 def test_a_pass_beyond_its_window_is_found_in_a_larger_one(monkeypatch):
     tried = []
-    found = rolling_steady.steady_passes
+    found = rolling_endless.steady_passes
 
     def needs_more(parameters, reach, budget):
         tried.append(reach)

@@ -10,39 +10,38 @@ import pytest
 from solver import LimitLoad, Material
 from solver.errors import NotConverged, WindowTooSmall
 from solver.fem.fields import recovery
+from solver.rolling import search as steady_search
+from solver.rolling.load import PassingLoad, RollingLoad
 from solver.rolling.passing import passing, searched
-from solver.rolling.plane import search as steady_search
+from solver.rolling.plane.lines import wheel_nodes
 from solver.rolling.plane.rolling import Expected
-from solver.rolling.plane.search import _HARDEST, _LIGHTER, _SOFTEST, _approached, _fading, search
 from solver.rolling.plane.track import track_of
 from solver.rolling.results.plane import TrackBody
-from solver.rolling.scenes.rolling_grids import wheel_nodes
+from solver.rolling.scenes.rolling_endless import load_on, track_for
 from solver.rolling.scenes.rolling_parameters import RollingParameters
-from solver.rolling.scenes.rolling_steady import load_on, track_for
+from solver.rolling.search import _HARDEST, _LIGHTER, _SOFTEST, _approached, _fading, search
 
 
-class Weight:
-    """A load that knows its size alone."""
+class Weight(PassingLoad):
+    """A load that knows its force alone."""
 
-    def __init__(self, size=1.0):
-        self.size = size
+    def on(self, u, before, start=None):
+        raise NotImplementedError
 
-    moment = 0.0
 
-    def scaled(self, share):
-        return Weight(share * self.size)
+WEIGHT = Weight(load=RollingLoad(force=1.0))
 
 
 def solver(steps, failures, near=0.94):
     """A pass that is found from one whose load is nearly its own, and fails as told otherwise."""
 
     def solve(load, guess=None):
-        steps.append(load.size)
-        if load.size in failures:
-            raise failures[load.size]
-        if load.size == 1.0 and (guess is None or abs(1.0 - guess) > 1.0 - near):
+        steps.append(load.force)
+        if load.force in failures:
+            raise failures[load.force]
+        if load.force == 1.0 and (guess is None or abs(1.0 - guess) > 1.0 - near):
             raise LimitLoad("flows without bound")
-        return SimpleNamespace(strain=load.size)
+        return SimpleNamespace(strain=load.force)
 
     return solve
 
@@ -51,7 +50,7 @@ LOST = LimitLoad("flows without bound")
 
 
 def approached(solve, shares=_LIGHTER, begun=None):
-    return _approached(solve, Weight().scaled, shares, begun, LOST)
+    return _approached(solve, WEIGHT.load.scaled, shares, begun, LOST)
 
 
 def test_lighter_loads_lead_to_what_seemed_a_limit():
@@ -142,7 +141,7 @@ def test_where_a_material_hardens_more_hardening_fades_if_the_hardest_pass_is_no
 
 @pytest.mark.parametrize("ratio", [0.0, 1e-3])
 def test_only_what_does_not_harden_is_at_its_limit_where_it_gathers_much(monkeypatch, ratio):
-    found = SimpleNamespace(strain=1.0, most_added=0.5)
+    found = SimpleNamespace(strain=1.0, most_added=0.5, loading=SimpleNamespace(start=None))
     monkeypatch.setattr(steady_search, "passing", lambda *given, **settings: found)
     steel = Material(
         youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=500.0,
@@ -150,10 +149,10 @@ def test_only_what_does_not_harden_is_at_its_limit_where_it_gathers_much(monkeyp
     )  # fmt: skip
     virgin = SimpleNamespace(accumulated=np.zeros(1))
     if ratio:
-        assert search(None, steel, Weight(), virgin) is found
+        assert search(None, steel, WEIGHT, virgin) is found
     else:
         with pytest.raises(LimitLoad, match="more than 30%"):
-            search(None, steel, Weight(), virgin)
+            search(None, steel, WEIGHT, virgin)
 
 
 def test_passes_of_fading_hardening_that_gather_too_much_are_at_their_limit():
@@ -167,7 +166,7 @@ def test_passes_of_fading_hardening_that_gather_too_much_are_at_their_limit():
 
 @pytest.mark.parametrize("failure", [LimitLoad, NotConverged])
 def test_a_bad_guess_does_not_make_a_limit_of_a_pass_that_exists(monkeypatch, failure):
-    found = SimpleNamespace(strain=1.0, most_added=0.01)
+    found = SimpleNamespace(strain=1.0, most_added=0.01, loading=SimpleNamespace(start=None))
 
     def passing(track, material, load, before, guess=None, **settings):
         if guess is not None:
@@ -177,7 +176,7 @@ def test_a_bad_guess_does_not_make_a_limit_of_a_pass_that_exists(monkeypatch, fa
     monkeypatch.setattr(steady_search, "passing", passing)
     rolled = SimpleNamespace(accumulated=np.ones(1))
     steel = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=500.0)
-    assert search(None, steel, Weight(), rolled, guess=np.ones(1)) is found
+    assert search(None, steel, WEIGHT, rolled, guess=np.ones(1)) is found
 
 
 # -- passes that repeat ----------------------------------------------------------------------------

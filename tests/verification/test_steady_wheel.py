@@ -17,11 +17,12 @@ from solver.contact.problem import OPEN, STICK
 from solver.errors import LimitLoad
 from solver.model.friction import Coulomb
 from solver.rolling.audit.plane import audit_pass
+from solver.rolling.load import RollingLoad
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.track import track_of
 from solver.rolling.plane.wheel import RollingWheel
+from solver.rolling.scenes.rolling_endless import rim_of
 from solver.rolling.scenes.rolling_parameters import RollingParameters
-from solver.rolling.scenes.rolling_steady import rim_of
 from tests.verification.closed_forms import carter_creepage
 
 A, YIELD, FRICTION = 8.0, 502.0, 0.3
@@ -46,12 +47,10 @@ def wheel(pressure=4.7, size=2.0, share=0.0, friction=FRICTION, creepage=None, h
     place = track_of(A, size, 1.15, material.elasticity)
     drive = share * friction * parameters.force if creepage is None and friction else None
     load = RollingWheel(
-        place,
-        rim_of(parameters),
+        track=place,
+        rim=rim_of(parameters),
         friction=Coulomb(friction=friction),
-        force=parameters.force,
-        drive=drive,
-        creepage=creepage or 0.0,
+        load=RollingLoad(force=parameters.force, drive=drive, creepage=creepage or 0.0),
     )
     return parameters, place, material, load
 
@@ -59,7 +58,7 @@ def wheel(pressure=4.7, size=2.0, share=0.0, friction=FRICTION, creepage=None, h
 def elastic(**fields):
     """The wheel on an elastic track."""
     parameters, place, _, load = wheel(**fields)
-    return parameters, load.on(np.zeros(len(place.operator.kept)))
+    return parameters, load.on(np.zeros(len(place.operator.kept)), None)
 
 
 def test_an_elastic_track_is_touched_as_hertz_says():
@@ -128,9 +127,10 @@ def test_the_derivative_of_the_contact_is_that_of_differences(share):
         )
     )
     step = 1e-4
-    after, before = (load.on(u + sign * step * change).u for sign in (1, -1))
+    here = load.on(u, one.before)
+    after, before = (load.on(u + sign * step * change, one.before, here).u for sign in (1, -1))
     differences = (after - before) / (2 * step) - change
-    exact = load.on(u).along(change) - change
+    exact = here.along(change) - change
     # as forces on the surface, which make these displacements
     forces = [np.linalg.solve(place.compliance, d[place.at_surface]) for d in (exact, differences)]
     level = 1e-9 * abs(exact).max()
@@ -178,11 +178,13 @@ def test_without_hardening_a_locked_wheel_has_its_limit():
 def test_a_lighter_load_is_one_of_less_force(share):
     parameters, place, _, load = wheel(share=share)
     nothing = np.zeros(len(place.operator.kept))
-    touching, whole = load.scaled(0.8).on(nothing), load.on(nothing)
+    touching = load.changed(load=load.load.scaled(0.8)).on(nothing, None)
+    whole = load.on(nothing, None)
     # normals are tilted by up to a / R = 0.03, a little more under more force
     one, other = (t.normal.sum() / parameters.force for t in (touching, whole))
     assert (one, other) == (pytest.approx(0.8, rel=1e-3), pytest.approx(1.0, rel=1e-3))
     drive = share * FRICTION * parameters.force
     assert -touching.tangential.sum() == pytest.approx(0.8 * drive, abs=1e-3 * parameters.force)
     given = place.hertz(500.0, 0.1)
-    np.testing.assert_allclose(given.scaled(0.8).on(nothing).u, 0.8 * given.u, rtol=1e-12)
+    lighter = given.changed(load=given.load.scaled(0.8))
+    np.testing.assert_allclose(lighter.on(nothing, None).u, 0.8 * given.u, rtol=1e-12)

@@ -201,7 +201,7 @@ def test_the_zone_is_at_the_contact() -> None:
 
 
 def test_a_zone_that_is_too_small_is_begun_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("solver.rolling.scenes.rail_passes._REACHES", (0.6, 1.0))
+    monkeypatch.setattr("solver.rolling.scenes.wheel_rail_setup.REACHES", (0.6, 1.0))
     again = SCENE.path(SCENE.parameters(**PUBLISHED), [1], lambda share: None)
     (record,) = again
     assert record.status is Status.OK
@@ -217,8 +217,7 @@ def test_the_effort_is_that_of_the_run() -> None:
 
 
 def test_a_load_above_the_limit_is_a_record_with_a_message() -> None:
-    soft = ("hardening", "none"), ("hardening_ratio", 0.0), ("friction", 0.0)
-    (record,) = rolled(*soft, ("load", 700e3))
+    (record,) = rolled(("hardening", "none"), ("hardening_ratio", 0.0), ("load", 700e3))
     assert record.status is Status.LIMIT_LOAD
     assert "grows without bound" in record.message
     assert record.scalars["degrees_of_freedom"] > 0

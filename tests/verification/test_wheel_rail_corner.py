@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
 
 from solver import ModelError, Record
-from solver.errors import WindowTooSmall
+from solver.errors import NoContact, NotConverged, WindowTooSmall
 from solver.results.record import Status
+from solver.rolling import search
 from solver.rolling.scenes import rail_passes as prism_passes
 from solver.rolling.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
 from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
@@ -60,10 +62,35 @@ def test_a_wheel_on_the_corner_alone_presses_along_its_normal() -> None:
     assert numbers["audit_reactions"] < 1e-6
 
 
-def test_where_no_contact_is_found_at_the_corner_a_finer_accuracy_is_advised() -> None:
+def test_easier_passes_lead_to_one_that_newtons_method_does_not_find(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """On elements of 2 mm friction leaves several balances of two contacts, or none."""
-    own = SCENE.parameters(**DRAFT | {"lateral_position": 3.0, "friction": 0.3})
-    (record,) = SCENE.path(own, [1], lambda share: None)
+    missed = 0
+    own = search.passing
+
+    def counted(*given: Any, **settings: Any) -> Any:
+        nonlocal missed
+        try:
+            return own(*given, **settings)
+        except NotConverged:
+            missed += 1
+            raise
+
+    monkeypatch.setattr(search, "passing", counted)
+    record = rolled(lateral_position=3.0, friction=0.3)
+    assert missed
+    assert record.scalars["audit_reactions"] < 1e-6
+
+
+def test_where_no_contact_is_found_at_the_corner_a_finer_accuracy_is_advised(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def lost(*given: object, **settings: object) -> None:
+        raise NoContact("no contact forces were found")
+
+    monkeypatch.setattr(search, "passing", lost)
+    (record,) = SCENE.path(SCENE.parameters(**DRAFT), [1], lambda share: None)
     assert record.status is Status.NOT_CONVERGED
     assert "choose a finer accuracy, above all at the gauge corner" in record.message
 
@@ -77,10 +104,10 @@ def test_a_lateral_force_that_no_contact_at_this_position_has_is_told_with_the_l
 
 
 def test_the_largest_zone_is_told_if_it_is_too_small(monkeypatch: pytest.MonkeyPatch) -> None:
-    def beyond(*given: object) -> None:
+    def beyond(*given: object, **settings: object) -> None:
         raise WindowTooSmall("the window is too small around for a steady pass")
 
-    monkeypatch.setattr(prism_passes, "passing", beyond)
+    monkeypatch.setattr(prism_passes, "search", beyond)
     (record,) = SCENE.path(SCENE.parameters(**DRAFT), [1], lambda share: None)
     assert record.status is Status.NOT_CONVERGED
     told = r"steady pass, in the largest zone, \d\d.* mm wide and 13.* mm deep; choose a finer acc"

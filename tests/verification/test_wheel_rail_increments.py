@@ -7,6 +7,7 @@ the rail, which is soft that way, aside for metres; so it has the lateral force 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -14,8 +15,7 @@ import pytest
 
 from solver.linear.threads import one_thread
 from solver.rolling.passing import Pass, passing
-from solver.rolling.rail.patch_passing import PatchPassing
-from solver.rolling.rail.state import PrismState
+from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.rail_passes import contact_of
 from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
@@ -40,10 +40,10 @@ def both() -> tuple[Pass[PrismState], SteppedIncrement]:
     law = ACCELERATING.material()
     of, body = RolledRail(ACCELERATING).load(rail(), 0), SteppedPrism(rail(), law)
     with one_thread():
-        found = passing(rail(), law, PatchPassing(of), rail().virgin(law))
+        found = passing(rail(), law, of, rail().virgin(law))
         wheel = SteppedPatch(
-            rail().grid, rail().compliance, of.wheel, friction=of.friction, force=of.force,
-            drive=of.drive, lateral_force=float(contact_of(found).force[2]),
+            grid=rail().grid, compliance=rail().compliance, wheel=of.wheel, friction=of.friction,
+            load=replace(of.load, lateral_force=float(contact_of(found).force[2])),
         )  # fmt: skip
         return found, body.rolled(body.virgin, wheel, STEPS)
 

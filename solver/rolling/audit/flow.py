@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from solver.audit.large_strain import of_material
+from solver.audit.report import Audit, broken, warnings
 from solver.audit.theory import Neglected, equivalent
 from solver.materials.law import Law
 from solver.materials.state import PlasticState, Response
@@ -114,6 +116,23 @@ class AuditedFlow:
         material = self._material
         yield_strain = material.yield_stress / material.elasticity.youngs_modulus
         return largest(added) / max(_LEAST * yield_strain, self._found.most_added)
+
+
+def judged(
+    law: Law,
+    figures: Mapping[str, float],
+    limits: Mapping[str, float],
+    neglected: Sequence[Neglected],
+) -> Audit:
+    """Return the audit of a pass by its figures, their limits, and what the theory neglects."""
+    figures = {**figures, "audit_large_strain": max(each.share for each in neglected)}
+    own = {name: at for name, at in limits.items() if name in figures}
+    return Audit(
+        figures,
+        violations=broken(figures, own, law.yield_stress),
+        warnings=warnings(figures),
+        outside=sum((each.outside for each in neglected), ()),
+    )
 
 
 def difference(material: Law, one: PlasticState, other: PlasticState) -> float:

@@ -10,10 +10,9 @@ from solver.audit.pairs import COARSE, GAP, OVERLAP, PRESSED, STILL
 from solver.materials.law import Law
 from solver.rolling.audit.flow import largest
 from solver.rolling.rail.friction_cone import NORMAL, TANGENTS
-from solver.rolling.rail.given_patch import EllipticPatch
 from solver.rolling.rail.half_space import half_space
 from solver.rolling.rail.patch import RollingPatch
-from solver.rolling.rail.patch_contact import PatchContact, PatchLoad
+from solver.rolling.rail.patch_contact import EllipticPatch, PatchContact, PatchLoad
 from solver.typing import Array
 
 _FORCE = 1e-6
@@ -65,18 +64,18 @@ class AuditedPatch:
         load, contact = self._load, self._contact
         given: list[float] = []
         if isinstance(load, EllipticPatch):
-            wanted = load.force * np.array([load.shear[0], -1.0, load.shear[1]])
+            wanted = load.load.force * np.array([load.shear[0], -1.0, load.shear[1]])
             given = list((self._local * self._area[:, None]).sum(axis=(0, 1)) - wanted)
         elif isinstance(load, RollingPatch):
             force = (contact.traction * self._area[:, None]).sum(axis=(0, 1))
-            given = [force[1] + load.force]
-            if load.lateral_force is not None:
-                given.append(force[2] - load.lateral_force)
-            if load.drive is not None:  # the moment on the axle, over its radius
+            given = [force[1] + load.load.force]
+            if load.load.lateral_force is not None:
+                given.append(force[2] - load.load.lateral_force)
+            if load.load.drive is not None:  # the moment on the axle, over its radius
                 _, motions = load.wheel.rolling(contact.grid)
                 arm = -motions[1][..., TANGENTS] / contact.grid.spacing
                 work = (arm * self._local[..., TANGENTS] * self._area[:, None]).sum()
-                given.append(work - load.drive * load.friction * load.force)
+                given.append(work - load.load.drive)
         return float(np.abs(given).max(initial=0.0)) / self.force
 
     @cached_property

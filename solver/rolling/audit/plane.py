@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from solver.audit.plain import PlainBody
-from solver.audit.report import Audit, broken, estimated_error, limits_at, warnings
+from solver.audit.report import Audit, estimated_error, limits_at
 from solver.audit.theory import Neglected, equivalent, largest_strain
 from solver.materials.law import Law
-from solver.rolling.audit.flow import INFLOW, STEADINESS, AuditedFlow, difference, largest
-from solver.rolling.layers import Layers
+from solver.rolling.audit.flow import INFLOW, STEADINESS, AuditedFlow, difference, judged, largest
 from solver.rolling.passing import Pass
 from solver.rolling.plane.fields import of_layers, under_load
-from solver.rolling.plane.touching import RollingContact
+from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.track import Track
+from solver.rolling.plane.wheel import RollingContact
 
 _LIMITS = {"audit_inflow": INFLOW, "audit_steadiness": STEADINESS}
 
@@ -55,17 +55,10 @@ def audit_pass(
         "audit_error_loaded": estimated_error([(track.part, stress)]),
         "audit_error_residual": estimated_error([(track.part, residual)]),
         "audit_plastic_strain": largest(found.after.whole.accumulated),
-        "audit_large_strain": max(each.share for each in neglected),
         **_of_contact(material, found),
     }
     limits = limits_at(level, travelling=True) | _LIMITS
-    limits = {name: at for name, at in limits.items() if name in figures}
-    return Audit(
-        figures,
-        violations=broken(figures, limits, material.yield_stress),
-        warnings=warnings(figures),
-        outside=sum((each.outside for each in neglected), ()),
-    )
+    return judged(material, figures, limits, neglected)
 
 
 def _neglected(track: Track, found: Pass[Layers], flow: AuditedFlow) -> tuple[Neglected, Neglected]:

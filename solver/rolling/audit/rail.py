@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.audit.report import Audit, broken, limits_at, warnings
+from solver.audit.report import Audit, limits_at
 from solver.audit.theory import largest_strain
 from solver.materials.law import Law
 from solver.rolling.audit.flow import (
@@ -13,13 +13,14 @@ from solver.rolling.audit.flow import (
     AuditedFlow,
     deviation,
     difference,
+    judged,
     largest,
 )
 from solver.rolling.audit.patch import AuditedPatch
 from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.passing import Pass
-from solver.rolling.rail.patch_passing import AppliedPatch
-from solver.rolling.rail.state import PrismState
+from solver.rolling.rail.flow import PrismState
+from solver.rolling.rail.patch_contact import AppliedPatch
 from solver.rolling.rail.track import PrismTrack
 from solver.typing import Array, Ints
 
@@ -99,19 +100,12 @@ def audit_prism(
         "audit_length": _far(track, law, plain.resultants(waves.pulled)) / law.yield_stress,
         "audit_initial_stress": track.initial.change / law.yield_stress if track.initial else 0.0,
         "audit_plastic_strain": largest(after.accumulated),
-        "audit_large_strain": max(each.share for each in neglected),
         **patch.figures,
     }  # fmt: skip
     limits = limits_at(patch.force) | _LIMITS
     if patch.figures:
         limits |= patch.limits
-    limits = {name: at for name, at in limits.items() if name in figures}
-    return Audit(
-        figures,
-        violations=broken(figures, limits, law.yield_stress),
-        warnings=warnings(figures),
-        outside=sum((each.outside for each in neglected), ()),
-    )
+    return judged(law, figures, limits, neglected)
 
 
 def _rows(found: Pass[PrismState]) -> Ints:

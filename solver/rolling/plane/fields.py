@@ -8,8 +8,8 @@ import numpy as np
 
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
-from solver.rolling.layers import Layers
 from solver.rolling.passing import Pass
+from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.rows import FlowRows
 from solver.rolling.plane.track import Track
 from solver.tensors import SQRT2

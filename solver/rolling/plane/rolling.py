@@ -10,11 +10,11 @@ from functools import partial
 from solver.errors import ModelError
 from solver.linear.threads import one_thread
 from solver.materials.law import Law
-from solver.rolling.layers import Layers
-from solver.rolling.load import PassingLoad
+from solver.rolling.load import AppliedLoad, PassingLoad
 from solver.rolling.passing import TOLERANCE, Pass, SolveBudget
-from solver.rolling.plane.search import search
+from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.track import Track
+from solver.rolling.search import search
 from solver.typing import Array
 
 EXACT_AFTER = 4
@@ -87,18 +87,20 @@ def rolling(
     state: Layers = track.rows.virgin(material)
     budget = budget or SolveBudget()
     expected: dict[tuple[int, int], Expected] = {}
+    starts: dict[int, AppliedLoad] = {}
     loads = load if isinstance(load, Iterable) else itertools.repeat(load)
     for number, (own, direction) in enumerate(zip(loads, directions, strict=False)):
         which = id(own), direction
         solve = partial(
             search, track, material, own, state if direction == 1 else state.mirrored,
-            parts=parts, tolerance=TOLERANCE if number < EXACT_AFTER else REPEATED, budget=budget,
+            start=starts.get(id(own)), parts=parts, budget=budget,
+            tolerance=TOLERANCE if number < EXACT_AFTER else REPEATED,
         )  # fmt: skip
         with one_thread():
             found = solve(expected[which].next if which in expected else guess)
         budget.renew()
         found = replace(found, direction=direction)
-        guess = found.strain
+        guess, starts[id(own)] = found.strain, found.loading.start
         expected[which] = expected[which].after(guess) if which in expected else Expected(guess)
         state = found.left
         yield found

@@ -7,6 +7,7 @@ end of the mesh, plastic strain is that of the last column after unloading to th
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -15,10 +16,61 @@ from scipy.interpolate import RegularGridInterpolator
 
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
+from solver.linear import solvers as linear
+from solver.linear.schur import SchurComplement
 from solver.materials.law import Law
-from solver.rolling.layers import Layers
-from solver.rolling.plane.condensed import CondensedTrack
+from solver.materials.state import PlasticState
+from solver.rolling.body import FlowPast
+from solver.rolling.flow import Flow, allowed_inflow, flow_of
+from solver.rolling.plane.layers import Layers
 from solver.typing import Array, Bools, Ints
+
+
+class CondensedTrack:
+    """The elastic half-plane reduced to the nodes of its window, exactly.
+
+    It is the inverse of an elastic stiffness, for forces on the kept nodes and, slower, on all
+    nodes. Outside the window plastic strain depends on depth alone. The condensed stiffness is
+    sparse except for a dense block on the boundary of the window, and has a third of the unknowns.
+
+    Parameters
+    ----------
+    part : the body
+    nodes : nodes that are kept; no support holds them
+
+    Attributes
+    ----------
+    kept : (m,) unknowns of these nodes, increasing
+    """
+
+    def __init__(self, part: Discretisation, nodes: Ints) -> None:
+        self.kept = np.sort(np.concatenate([2 * nodes, 2 * nodes + 1]))
+        K = part.elastic_matrix()
+        self._outside = SchurComplement(K, self.kept, np.setdiff1d(part.free, self.kept))
+        at = self._outside.boundary
+        pairs = np.repeat(at, len(at)), np.tile(at, len(at))
+        taken = sparse.csr_array((self._outside.taken.ravel(), pairs), shape=(len(self.kept),) * 2)
+        upper = sparse.csr_array(sparse.triu(K[self.kept][:, self.kept] - taken, format="csr"))
+        upper.sort_indices()
+        self._window = linear.analyse(upper, coupled=True)
+        self._window.factorise(upper.data)
+
+    def place(self, unknowns: Ints) -> Ints:
+        """Return the positions of unknowns of the body among the kept ones."""
+        return np.searchsorted(self.kept, unknowns)
+
+    def condense(self, force: Array) -> Array:
+        """Return condensed forces (m, ...), equivalent to forces on all nodes (n, ...) [N]."""
+        return self._outside.begin(force).condensed
+
+    def solve(self, force: Array) -> Array:
+        """Return displacements (m,) or (m, k) for condensed forces."""
+        return self._window.solve(force)
+
+    def expand(self, kept: Array, force: Array) -> Array:
+        """Return all displacements (n,) from the kept ones (m,) and the forces (n,)."""
+        return self._outside.begin(force).finish(kept)
+
 
 _LEVEL = 1e-6
 """Ratio of a difference of depth to the depth of the rows; up to it points lie on one row."""
@@ -88,8 +140,8 @@ class FlowRows:
     def virgin(self, law: Law) -> Layers:
         """Return the state before any load."""
         k = self.uppermost
-        surface = Layers(np.zeros(k), np.zeros(k), law.initial(k, 4))
-        return Layers(self.depth, self._thickness, law.initial(len(self.depth), 4), surface)
+        surface = Layers(law.initial(k, 4), np.zeros(k), np.zeros(k))
+        return Layers(law.initial(len(self.depth), 4), self.depth, self._thickness, surface)
 
     @property
     def every(self) -> Ints:
@@ -180,3 +232,51 @@ def _in_rows(part: Discretisation, elements: Bools, deep: float, interleaved: bo
     if interleaved:
         rows = rows.reshape(len(depths), -1, 2).swapaxes(1, 2).reshape(2 * len(depths), -1)
     return rows
+
+
+class RowFlow(FlowPast[Layers]):
+    """Plastic strain along all rows of a window for given strains, and its derivative."""
+
+    def __init__(self, rows: FlowRows, law: Law, before: Layers, added: Array, parts: int) -> None:
+        self._rows, self._law, self._added, self._parts = rows, law, added, parts
+        self._flow = self._of(before, added)
+        super().__init__(law, before, self._flow)
+        self.after = replace(before, state=self._flow.after)
+        plastic = np.moveaxis(self.states.plastic_strain, 0, 2)
+        self.force = rows.force(
+            plastic - before.plastic_strain[:, None],
+            self.after.plastic_strain - before.plastic_strain,
+        )
+
+    def left(self) -> tuple[PlasticState, Layers]:
+        """Return the internal variables (..., n, n_columns) at the surface, and the layers behind.
+
+        The strain at the surface is extrapolated from the uppermost rows. Plastic strain changes
+        too abruptly in depth for that; it follows from the strain, as on any row.
+        """
+        top = self._begin.top
+        flow = self._of(top, self._rows.onto_surface(self._added))
+        return flow.states, replace(self.after, surface=replace(top, state=flow.after))
+
+    def _of(self, before: Layers, added: Array) -> Flow:
+        """Return the flow along rows with these states before and these added strains."""
+        at_rest = before.strain(self._law.elasticity)[:, None]
+        strain = np.concatenate([at_rest, at_rest + added], axis=1)
+        return flow_of(self._law, strain, before.state, self._parts)
+
+    @property
+    def beyond(self) -> str:
+        """Where the window is too small, because points yield at its edge; empty if nowhere.
+
+        Points that an earlier pass left on the yield surface may flow a little there.
+        """
+        before = self._begin.accumulated
+        ahead = (self.states.accumulated[:, 0] - before).max()
+        below = self.after.accumulated[-1] - before[-1]
+        if ahead > allowed_inflow(self._law, self.most_added):
+            return "ahead"
+        return "below" if below > allowed_inflow(self._law, 0.0) else ""
+
+    def along(self, added: Array) -> Array:
+        """Return the nodal forces (m,) for a change of the strains."""
+        return self._rows.force(*self._flow.along(added))

@@ -20,12 +20,10 @@ from solver.mesh.grids import grid, within
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.motion import TravellingPressure
-from solver.rolling.flow import RowFlow
-from solver.rolling.layers import Layers
 from solver.rolling.load import Given
-from solver.rolling.plane.condensed import CondensedTrack
-from solver.rolling.plane.endless import MOST_COLUMNS, track_lines, window_depth, window_elements
-from solver.rolling.plane.rows import FlowRows
+from solver.rolling.plane.layers import Layers
+from solver.rolling.plane.lines import MOST_COLUMNS, track_lines, window_depth, window_elements
+from solver.rolling.plane.rows import CondensedTrack, FlowRows, RowFlow
 from solver.typing import Array, Ints
 
 CONTACT = 2.0
@@ -174,7 +172,7 @@ class Track:
         """
         pressure = standing_pressure(half_width or self.half_width, peak, shear_ratio)
         force = travelling_forces(self.part, pressure, 0.0)
-        return Given(force, self.operator.solve(self.operator.condense(force)))
+        return Given(force=force, u=self.operator.solve(self.operator.condense(force)))
 
 
 def standing_pressure(half_width: float, peak: float, shear_ratio: float) -> TravellingPressure:

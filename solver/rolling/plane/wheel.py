@@ -17,8 +17,9 @@ J.J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), section
 
 from __future__ import annotations
 
-from copy import copy
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -26,24 +27,77 @@ from solver.contact.complementarity import change_of, solve_contact
 from solver.contact.geometry import pair
 from solver.contact.problem import OPEN, ContactProblem, ContactSolution
 from solver.errors import ModelError, NoContact, NotConverged, WindowTooSmall
+from solver.fem.discretisation import Discretisation
+from solver.fem.frame import turning
+from solver.fem.surface import Surface, extract
+from solver.fem.wheel import Wheel
+from solver.model.body import Body
 from solver.model.friction import BoundLines, ContactPlaces, FrictionLaw, lines_of
-from solver.rolling.plane.rim import Rim, flowed
-from solver.rolling.plane.touching import RollingContact
+from solver.rolling.load import AppliedLoad, PassingLoad
+from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.track import Track
 from solver.typing import Array, Ints
 
-_ROUNDS = 40
-_NEAR = 0.01
-"""Ratio of the expected change of a contact force to the load; up to it the expected contact is the
-initial guess."""
-_COVERED = 0.999
-"""Share of a vertex's hat that must face the rim; below it the vertex is no contact point."""
-_SETTLED = 1e-7
-"""Ratio of the change of contact forces to the load; below it the contact geometry converged."""
+
+class Rim:
+    """The part of a wheel's rim that may touch a track, in the frame of the hub.
+
+    Parameters
+    ----------
+    body : the wheel, with its axle; its lowest point is at x = 0, and elements along the rim are as
+        long as those of the track
+    boundary : name of the part of the rim that may touch the track
+
+    Attributes
+    ----------
+    wheel : the wheel condensed to this part of the rim
+    surface : the rim as a chain of edges
+    """
+
+    def __init__(self, body: Body, boundary: str) -> None:
+        whole = Discretisation(body)
+        chain = extract(whole, boundary)
+        self.wheel = Wheel(whole, [chain], "auto")
+        self.surface = self.wheel.surface(chain)
+
+    def rolled(self, length: float) -> Array:
+        """Return the displacements (n,) of a rigid wheel that rolls over a length [mm].
+
+        Material moves along the arc. Along the tangent it would leave the rim by
+        ``length^2 / (2 R)``, and have an apparent slip of x / R of that at a contact at x: with
+        elements of a quarter of the half-width, 2 % of the slip at 30 % braking.
+        """
+        frame = self.wheel.frame
+        arm = self.surface.X - frame.centre[:, None]
+        return np.asarray((arm - turning(length / frame.radius) @ arm).T.ravel())
+
+    def passing(self, d: Array) -> Array:
+        """Return the derivative (n,) of positions by the arc, on a rim with displacements (n,)."""
+        return self.wheel.passing(self.surface, d.reshape(-1, 2).T).T.ravel()
+
+    @cached_property
+    def compliance(self) -> Array:
+        """Displacements of the rim for forces on it (n, n), over its unknowns [mm/N]."""
+        dofs = self.surface.dofs
+        return self.wheel.operators([], "auto").elastic.compliance(dofs, np.eye(len(dofs)))
+
+
+def flowed(surface: Surface, way: int) -> Array:
+    """Return the matrix from a nodal field to its change over one element, from upstream.
+
+    ``way`` is +1 for a chain of edges that goes downstream. At the upstream end of the chain the
+    change is zero.
+    """
+    chain = np.append(surface.edges[:, [0, 2]].ravel(), surface.edges[-1, 1])
+    chain = chain if way > 0 else chain[::-1]
+    change = np.zeros((surface.X.shape[1],) * 2)
+    change[chain[2:], chain[2:]] = 1.0
+    change[chain[2:], chain[:-2]] = -1.0
+    return np.asarray(np.kron(change, np.eye(2)), dtype=float)
 
 
 @dataclass(frozen=True, slots=True)
-class _Linearisation:
+class Linearisation:
     """An approximate contact, about which the next contact problem is linearised.
 
     ``on_track`` and ``on_wheel`` are nodal forces on the surfaces, ``tilt`` is the vertical
@@ -55,6 +109,64 @@ class _Linearisation:
     height: float
     tilt: float
     status: Ints
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RollingContact(AppliedLoad):
+    """The contact of a wheel with a track.
+
+    Attributes
+    ----------
+    x : (n,) positions of the vertices of the track [mm]
+    normal, tangential : (n,) contact forces on the track; tangential forces are positive against
+        the motion of the load [N]
+    area : (n,) areas of the vertices' hats [mm2]
+    gap : (n,) gap between track and rim, NaN if they do not face each other [mm]
+    status : (n,) status of the contact points, as in `solver.contact.problem`
+    bound : (n,) friction bound of the tangential forces [N]
+    creepage : 1 + R d(rotation) / d(advance)
+    height : displacement of the axle along y [mm]
+    near : (shape of the surface without the wheel) -> what the next contact begins with
+    """
+
+    x: Array
+    normal: Array
+    tangential: Array
+    area: Array
+    gap: Array
+    status: Ints
+    bound: Array
+    creepage: float
+    height: float
+    near: Callable[[Array], Linearisation]
+
+    @property
+    def pressure(self) -> Array:
+        """Contact pressure at the vertices (n,) [MPa], zero at those that do not face the rim."""
+        return self._over_area(self.normal)
+
+    @property
+    def most_shear(self) -> Array:
+        """Largest shear that friction permits at the vertices (n,) [MPa]."""
+        return self._over_area(np.nan_to_num(self.bound))
+
+    @property
+    def shear(self) -> Array:
+        """Shear on the track at the vertices (n,), positive against the load's motion [MPa]."""
+        return self._over_area(self.tangential)
+
+    def _over_area(self, force: Array) -> Array:
+        return np.divide(force, self.area, out=np.zeros_like(force), where=self.area > 0)
+
+
+_ROUNDS = 40
+_NEAR = 0.01
+"""Ratio of the expected change of a contact force to the load; up to it the expected contact is the
+initial guess."""
+_COVERED = 0.999
+"""Share of a vertex's hat that must face the rim; below it the vertex is no contact point."""
+_SETTLED = 1e-7
+"""Ratio of the change of contact forces to the load; below it the contact geometry converged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,91 +186,73 @@ class _Geometry:
     moves: list[Array]
 
 
-class RollingWheel:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RollingWheel(PassingLoad):
     """A wheel pressed on a track.
 
-    Parameters
+    Attributes
     ----------
     track : the track on which it rolls
     rim : the part of the wheel that may touch the track
     friction : friction law; it must not depend on slip or plastic strain here
     strength : initial shear yield stress of the track [MPa]
-    force : vertical force on the axle [N]
-    drive : moment on the axle over radius, positive when braking [N]; None if `creepage` is given
-    creepage : 1 + R d(rotation) / d(advance)
+    load : force and moment; without friction the moment is left out. Its creepage is
+        1 + R d(rotation) / d(advance)
     """
 
-    def __init__(
-        self,
-        track: Track,
-        rim: Rim,
-        *,
-        friction: FrictionLaw,
-        force: float,
-        strength: float = np.inf,
-        drive: float | None = None,
-        creepage: float = 0.0,
-    ) -> None:
-        self._track, self._rim, self._friction, self._force = track, rim, friction, force
-        self._drive = drive if friction.rough else None
-        self._strength = strength
-        self._creepage = creepage
-        surface = track.surface
-        self._length = float(np.ptp(surface.X[0]) / len(surface.edges))
-        self._compliance = track.compliance, rim.compliance
-        self._flowed = flowed(surface, +1), flowed(rim.surface, -1)
-        self._rolled = rim.rolled(self._length)
-        self._up = np.tile([0.0, 1.0], rim.surface.X.shape[1])
-        self._found: tuple[Array, _Geometry, ContactProblem, ContactSolution] | None = None
-        self._known = _Linearisation(
-            on_track=np.zeros(len(surface.dofs)),
-            on_wheel=np.zeros(len(rim.surface.dofs)),
-            height=0.0,
-            tilt=0.0,
-            status=np.full(len(surface.vertices), OPEN),
-        )
+    track: Track
+    rim: Rim
+    friction: FrictionLaw
+    strength: float = np.inf
 
-    def scaled(self, share: float) -> RollingWheel:
-        """See `Load`."""
-        other = self.driven(share)
-        other._force *= share
-        return other
+    @cached_property
+    def _length(self) -> float:
+        """Length of an element along the track [mm]."""
+        surface = self.track.surface
+        return float(np.ptp(surface.X[0]) / len(surface.edges))
 
-    def driven(self, share: float) -> RollingWheel:
-        """See `Load`."""
-        other = copy(self)
-        if other._drive is not None:
-            other._drive *= share
-        return other
+    @cached_property
+    def _flowed(self) -> tuple[Array, Array]:
+        return flowed(self.track.surface, +1), flowed(self.rim.surface, -1)
+
+    @cached_property
+    def _rolled(self) -> Array:
+        return self.rim.rolled(self._length)
 
     @property
-    def moment(self) -> float:
-        """See `Load`."""
-        return self._drive or 0.0
+    def _up(self) -> Array:
+        return np.tile([0.0, 1.0], self.rim.surface.X.shape[1])
 
     @property
-    def slipping(self) -> RollingWheel:
-        """See `Load`."""
-        other = copy(self)
-        if self.moment:
-            other._drive, other._creepage = None, float(np.sign(self.moment))
-        return other
+    def _drive(self) -> float | None:
+        """The moment over radius that is prescribed [N], or None."""
+        return self.load.drive if self.friction.rough else None
 
-    def on(self, u: Array) -> RollingContact:
-        """See `Load`.
+    def on(self, u: Array, before: Layers, start: RollingContact | None = None) -> RollingContact:
+        """See `PassingLoad`; the track is as wide as before, and its surface as straight.
 
         Raises
         ------
         NoContact, NotConverged
             if no contact forces are found
         """
-        track = self._track
+        del before
+        track = self.track
         surface, at = track.surface, track.at_surface
-        geometry, problem, found = self._solve(u[at])
+        shape = u[at]
+        geometry, problem, found, known = self._solve(shape, start)
 
         def along(change: Array) -> Array:
             forces, _ = change_of(problem, found, geometry.moves[0] @ change[at])
             return np.asarray(change + track.under(geometry.rows[0].T @ forces))
+
+        def near(other: Array) -> Linearisation:
+            forces, rigid = change_of(problem, found, geometry.moves[0] @ (other - shape))
+            if np.abs(forces).max(initial=0.0) > _NEAR * self.load.force:
+                return known
+            return self._following(
+                geometry, replace(found, forces=found.forces + forces, rigid=found.rigid + rigid)
+            )
 
         every = np.zeros((2, len(surface.vertices)))
         every[:, geometry.at] = found.forces.reshape(2, -1)
@@ -168,27 +262,30 @@ class RollingWheel:
         gap[geometry.at] = moved[: len(geometry.at)]
         turns = self._drive is not None
         return RollingContact(
-            force=self._nodal(self._known.on_track),
-            u=u + track.under(self._known.on_track),
+            force=self._nodal(known.on_track),
+            u=u + track.under(known.on_track),
             along=along,
             x=surface.X[0, surface.vertices],
             normal=every[0],
             tangential=every[1],
             area=geometry.area,
             gap=gap,
-            status=self._known.status,
+            status=known.status,
             bound=bound,
-            creepage=float(found.rigid[1]) / self._length if turns else self._creepage,
-            height=self._known.height,
+            creepage=float(found.rigid[1]) / self._length if turns else self.load.creepage,
+            height=known.height,
             moment=-float(geometry.creeping @ found.forces[len(geometry.at) :]),
+            near=near,
         )
 
-    def _solve(self, shape: Array) -> tuple[_Geometry, ContactProblem, ContactSolution]:
+    def _solve(
+        self, shape: Array, start: RollingContact | None
+    ) -> tuple[_Geometry, ContactProblem, ContactSolution, Linearisation]:
         """Solve the contact with a surface of this shape (2 n_nodes,) [mm].
 
-        Returns the geometry, the contact problem and its solution.
+        Returns the geometry, the contact problem, its solution, and the contact of this.
         """
-        known = self._expected(shape)
+        known = self._apart if start is None else start.near(shape)
         for _ in range(_ROUNDS):
             geometry = self._geometry(shape, known)
             problem = self._problem(geometry, shape, known)
@@ -196,31 +293,30 @@ class RollingWheel:
             if found is None:
                 raise NoContact("no contact forces were found in a steady pass")
             before, known = known, self._following(geometry, found)
-            if np.abs(known.on_track - before.on_track).max() < _SETTLED * self._force:
+            if np.abs(known.on_track - before.on_track).max() < _SETTLED * self.load.force:
                 if (known.status[[0, -1]] != OPEN).any():
                     raise WindowTooSmall("the contact reaches the ends of the surface")
-                self._known, self._found = known, (shape, geometry, problem, found)
-                return geometry, problem, found
+                return geometry, problem, found, known
         raise NotConverged("the geometry of the contact was not found in a steady pass")
 
-    def _expected(self, shape: Array) -> _Linearisation:
-        """Return the contact expected for this shape, by linearisation of the last one found."""
-        if self._found is None:
-            return self._known
-        before, geometry, problem, found = self._found
-        forces, rigid = change_of(problem, found, geometry.moves[0] @ (shape - before))
-        if np.abs(forces).max(initial=0.0) > _NEAR * self._force:
-            return self._known
-        return self._following(
-            geometry, replace(found, forces=found.forces + forces, rigid=found.rigid + rigid)
+    @property
+    def _apart(self) -> Linearisation:
+        """The bodies without contact."""
+        surface = self.track.surface
+        return Linearisation(
+            on_track=np.zeros(len(surface.dofs)),
+            on_wheel=np.zeros(len(self.rim.surface.dofs)),
+            height=0.0,
+            tilt=0.0,
+            status=np.full(len(surface.vertices), OPEN),
         )
 
-    def _geometry(self, shape: Array, known: _Linearisation) -> _Geometry:
+    def _geometry(self, shape: Array, known: Linearisation) -> _Geometry:
         """Return how gaps and slips depend on displacements, linearised at a known contact."""
-        u = self._compliance[0] @ known.on_track + shape
-        bent = self._compliance[1] @ known.on_wheel
+        u = self.track.compliance @ known.on_track + shape
+        bent = self.rim.compliance @ known.on_wheel
         d = bent + known.height * self._up
-        surface, rim = self._track.surface, self._rim.surface
+        surface, rim = self.track.surface, self.rim.surface
         pairing = pair(surface, u.reshape(-1, 2).T, rim, d.reshape(-1, 2).T)
         at = np.flatnonzero(pairing.covered > _COVERED)
         normal = [block[at] for block in pairing.normal]
@@ -230,18 +326,18 @@ class RollingWheel:
             at=at,
             area=pairing.area,
             gap=pairing.gap[at] - normal[0] @ u - normal[1] @ d,
-            creeping=tangent[1] @ self._rim.passing(bent),
+            creeping=tangent[1] @ self.rim.passing(bent),
             rows=[np.vstack(both) for both in zip(normal, tangent, strict=True)],
             moves=[np.vstack(both) for both in zip(normal, slips, strict=True)],
         )
 
-    def _following(self, geometry: _Geometry, found: ContactSolution) -> _Linearisation:
+    def _following(self, geometry: _Geometry, found: ContactSolution) -> Linearisation:
         """Return the contact of a solution of the contact problem."""
         n = len(geometry.at)
         track, wheel = geometry.rows
-        status = np.full(len(self._track.surface.vertices), OPEN)
+        status = np.full(len(self.track.surface.vertices), OPEN)
         status[geometry.at] = found.status
-        return _Linearisation(
+        return Linearisation(
             on_track=track.T @ found.forces,
             on_wheel=wheel.T @ found.forces,
             height=float(found.rigid[0]),
@@ -249,7 +345,7 @@ class RollingWheel:
             status=status,
         )
 
-    def _problem(self, geometry: _Geometry, shape: Array, known: _Linearisation) -> ContactProblem:
+    def _problem(self, geometry: _Geometry, shape: Array, known: Linearisation) -> ContactProblem:
         """Return the frictional problem; ``shape`` is that of the surface without the wheel."""
         n = len(geometry.at)
         track, wheel = geometry.rows
@@ -259,13 +355,14 @@ class RollingWheel:
         offset[:n] += geometry.gap
         offset[n:] += tangent @ self._rolled - self._length * (track[n:] @ ahead)
         motions = [np.concatenate([normal @ self._up, np.zeros(n)])]
-        balance = [known.tilt - self._force]
+        balance = [known.tilt - self.load.force]
         if self._drive is None:
-            offset[n:] += self._creepage * self._length * geometry.creeping
+            offset[n:] += self.load.creepage * self._length * geometry.creeping
         else:
             motions.append(np.concatenate([np.zeros(n), geometry.creeping]))
             balance.append(self._drive)
-        sides = zip(geometry.moves, self._compliance, geometry.rows, strict=True)
+        compliance = self.track.compliance, self.rim.compliance
+        sides = zip(geometry.moves, compliance, geometry.rows, strict=True)
         W = np.sum([moves @ C @ rows.T for moves, C, rows in sides], axis=0)
         return ContactProblem(
             W=W,
@@ -280,18 +377,18 @@ class RollingWheel:
 
         def nothing() -> Array:
             allowed = "must not depend on slip or plastic strain on a track without ends"
-            raise ModelError("friction_law", self._friction, allowed)
+            raise ModelError("friction_law", self.friction, allowed)
 
         places = ContactPlaces(
             n=n,
-            find_strength=lambda: np.full(n, self._strength),
+            find_strength=lambda: np.full(n, self.strength),
             find_plastic_strain=nothing,
             find_slip=nothing,
         )
-        return lines_of(self._friction, places)
+        return lines_of(self.friction, places)
 
     def _nodal(self, force: Array) -> Array:
         """Return the forces (n,) on all nodes of the track from those on its surface."""
-        whole = np.zeros(self._track.part.n)
-        whole[self._track.surface.dofs] = force
+        whole = np.zeros(self.track.part.n)
+        whole[self.track.surface.dofs] = force
         return whole

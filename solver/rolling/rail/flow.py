@@ -3,21 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
+from solver.rolling.body import FlowPast, LeftState
 from solver.rolling.flow import allowed_inflow, sweep_of
 from solver.rolling.load import Given
 from solver.rolling.passing import passing
 from solver.rolling.rail.modes import Modes
-from solver.rolling.rail.state import PrismState
 from solver.typing import Array, Ints
 
 
-class _Swept:
-    """Plastic strain of material that flows along rows of n points, and its derivative.
+@dataclass(frozen=True, slots=True)
+class PrismState(LeftState):
+    """The state at the n points of the zone.
+
+    Attributes
+    ----------
+    strain : (n, 6) strain without load, with the elastic strain of the initial stress, Mandel
+    displacement : (m, 3) displacement of the surface without load, means under the hats [mm]
+    """
+
+    strain: Array
+    displacement: Array
+
+    @property
+    def mirrored(self) -> PrismState:
+        """The same state, seen along -x."""
+        return replace(
+            self,
+            state=self.state.mirrored,
+            strain=self.strain * [1.0, 1.0, 1.0, -1.0, 1.0, -1.0],
+            displacement=self.displacement * [-1.0, 1.0, 1.0],
+        )
+
+
+class _Swept(FlowPast[PrismState]):
+    """Material that flows along rows of n points.
 
     Parameters
     ----------
@@ -28,43 +53,26 @@ class _Swept:
 
     Attributes
     ----------
-    states : internal variables (..., n, n_columns) at the columns
     force : (n, n_columns, 6) eigenstress of the plastic strain since ``before`` [MPa]
     """
 
     def __init__(
         self, law: Law, begin: PrismState, before: PrismState, strain: Array, parts: int
     ) -> None:
-        self._begin, self._strain, self._parts = begin, strain, parts
-        self._stiff = 2 * law.elasticity.shear_modulus  # plastic strain changes no volume
         path = np.concatenate([begin.strain[:, None], strain], axis=1)
-        self._sweep = sweep_of(law, path, begin.state, parts)
-        self.states = self._sweep.states
+        super().__init__(law, begin, sweep_of(law, path, begin.state, parts))
+        self._strain, self._parts = strain, parts
+        self._stiff = 2 * law.elasticity.shear_modulus  # plastic strain changes no volume
         plastic = np.moveaxis(self.states.plastic_strain, 0, 2)
         self.force = self._stiff * (plastic - before.plastic_strain[:, None])
 
     def along(self, added: Array) -> Array:
-        """Return the change of ``force`` for a change of the strains."""
+        """See `FlowPast`."""
         return self._stiff * self._sweep.changes(added)
-
-    @property
-    def ago(self) -> PlasticState:
-        """Internal variables at the beginning of the last increment before each column."""
-        return self._sweep.ago
-
-    @property
-    def _added(self) -> Array:
-        """Accumulated plastic strain (n, n_columns) added since the beginning of the rows."""
-        return np.asarray(self.states.accumulated - self._begin.accumulated[:, None])
-
-    @property
-    def most_added(self) -> float:
-        """Largest accumulated plastic strain that is added at a point."""
-        return float(self._added.max())
 
     def _last(self, displacement: Array) -> PrismState:
         """Return the state at the last column, with this displacement of the surface."""
-        state = self._begin.state.unpacked(self.states.packed[..., -1])
+        state = self.states.unpacked(self.states.packed[..., -1])
         return PrismState(state, self._strain[:, -1], displacement)
 
 
@@ -84,13 +92,12 @@ class PrismFlow(_Swept):
         before: PrismState, added: Array, parts: int,
     ) -> None:  # fmt: skip
         super().__init__(law, before, before, before.strain[:, None] + added, parts)
-        self._modes, self._rim, self._law = modes, rim, law
-        self._virgin, self._before = virgin, before
+        self._modes, self._rim, self._virgin = modes, rim, virgin
 
     @property
     def beyond(self) -> str:
         """Where the window is too small, because points yield at its edge; empty if nowhere."""
-        added, most = self._added, allowed_inflow(self._law, self.most_added)
+        added, most = self.added, allowed_inflow(self._law, self.most_added)
         if added[:, 0].max() > most:
             return "ahead"
         return "around" if added[self._rim].max(initial=0.0) > most else ""
@@ -104,10 +111,10 @@ class PrismFlow(_Swept):
         of each release would add up from pass to pass.
         """
         body = _Release(self._modes, self._virgin())
-        end = self._last(self._before.displacement)
-        had = self._stiff * self._before.plastic_strain[:, None]
+        end = self._last(self._begin.displacement)
+        had = self._stiff * self._begin.plastic_strain[:, None]
         guess, nothing = body.strain(self.force[:, -1:] + had), body.at_rest
-        load, parts = Given(nothing, nothing), self._parts
+        load, parts = Given(force=nothing, u=nothing), self._parts
         return self.states, passing(body, self._law, load, end, guess, parts=parts).after
 
 
@@ -144,8 +151,6 @@ class _Release:
 
 class _ReleaseFlow(_Swept):
     """The flow from the last station to the state without load: one column."""
-
-    beyond = ""
 
     def __init__(
         self, modes: Modes, law: Law, virgin: PrismState, end: PrismState, added: Array, parts: int

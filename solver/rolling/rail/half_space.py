@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.materials import Elasticity
-from solver.rolling.rail.hats import Hats
+from solver.rolling.rail.patch_grid import Hats
 from solver.typing import Array
 
 

@@ -25,17 +25,9 @@ class Influence:
 
     def of(self, values: Array) -> Array:
         """Return the effects (n, m, 3) of values (n, m, 3)."""
-        return self._everywhere(values)[: self.shape[0]]
+        return self.everywhere(values)[: self.shape[0]]
 
-    def around(self, values: Array) -> Array:
-        """Return the effects (n + 2, m, 3) also one station before the first and after the last.
-
-        The values at these two stations are taken as 0.
-        """
-        n = self.shape[0]
-        return self._everywhere(values)[np.arange(-1, n + 1)]
-
-    def _everywhere(self, values: Array) -> Array:
+    def everywhere(self, values: Array) -> Array:
         """Return the effects (2n, m, 3); those at stations before the first are at the end."""
         n, m, _ = self.shape
         modes = np.fft.rfft(values.reshape(n, 3 * m, 1), 2 * n, axis=0)

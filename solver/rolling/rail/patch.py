@@ -19,13 +19,13 @@ J.J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), section
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import copy
-from dataclasses import replace
-from typing import Required, Self, TypedDict, Unpack
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
 
-from solver.errors import LimitLoad, ModelError, NoContact, Spins, WindowTooSmall
+from solver.errors import ModelError, NoContact, Spins, WindowTooSmall
 from solver.linear.threads import one_thread
 from solver.model.friction import LEAST_FRICTION
 from solver.rolling.rail.friction_cone import (
@@ -38,7 +38,7 @@ from solver.rolling.rail.friction_cone import (
 )
 from solver.rolling.rail.half_space import half_space
 from solver.rolling.rail.influence import Influence
-from solver.rolling.rail.patch_contact import PatchContact
+from solver.rolling.rail.patch_contact import PatchContact, PatchLoad
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from solver.typing import Array, Ints
@@ -54,24 +54,11 @@ _SLIDES = 1.0
 """Creepage at which all of a contact slips."""
 
 
-class RollingLoad(TypedDict, total=False):
-    """Friction and load of a `RollingPatch`, with its units; creepages that are not given are 0."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RollingPatch(PatchLoad):
+    """A wheel pressed on the surface of a prism.
 
-    friction: Required[float]
-    force: Required[float]
-    drive: float | None
-    lateral_force: float | None
-    creepage: float
-    lateral_creepage: float
-    spin: float
-
-
-class RollingPatch:
-    """A wheel pressed on the surface of a prism; see `PatchLoad`.
-
-    Friction and load, the parameters after ``wheel``, are given by name.
-
-    Parameters
+    Attributes
     ----------
     grid : stations and vertices of the surface
     compliance : (N, m, 3, m, 3) [mm/MPa], N >= n: entry ``[d, i, a, j, b]`` is the displacement of
@@ -80,122 +67,65 @@ class RollingPatch:
         stations that repeats itself has every d once
     wheel : the wheel
     friction : coefficient of friction; without it moment and lateral force are left out
-    force : vertical force on the axle [N]
-    drive : moment on the axle over radius, positive when braking, over friction times force; None
-        if ``creepage`` is given
-    lateral_force : force on the surface along z [N]; None if ``lateral_creepage`` is given
-    creepage, lateral_creepage, spin : as in `ProfiledWheel.rolling` [1, 1, 1/mm]
-
-    Attributes
-    ----------
-    grid, wheel, friction, force, drive, lateral_force : as above; what is left out is None
+    load : force and motion; creepages and spin are those of `ProfiledWheel.rolling`
     """
 
-    def __init__(
-        self,
-        grid: PatchGrid,
-        compliance: Array,
-        wheel: ProfiledWheel,
-        **load: Unpack[RollingLoad],
-    ) -> None:
-        n, m = grid.stations, len(grid.z)
-        if compliance.shape[1:] != (m, 3, m, 3) or len(compliance) < n:
-            allowed = f"must be ({n} or more, {m}, 3, {m}, 3) on this grid"
-            raise ModelError("compliance", compliance.shape, allowed)
-        self.grid, self._axes, self._area = grid, grid.axes, grid.area
-        self._set_wheel(wheel)
-        self._set_load(**load)
+    grid: PatchGrid
+    compliance: Array
+    wheel: ProfiledWheel
+    friction: float
+
+    def __post_init__(self) -> None:
+        """Raise `ModelError` for arrays and numbers that do not fit."""
+        n, m = self.grid.stations, len(self.grid.z)
+        shape = self.compliance.shape
+        if shape[1:] != (m, 3, m, 3) or len(self.compliance) < n:
+            raise ModelError("compliance", shape, f"must be ({n} or more, {m}, 3, {m}, 3)")
+        if not 0 <= self.friction <= 1:
+            raise ModelError("friction", self.friction, "must lie between 0 and 1")
+        if not self.load.force > 0:
+            raise ModelError("force", self.load.force, "must be positive")
+        if not self.friction > LEAST_FRICTION:
+            object.__setattr__(self, "friction", 0.0)
+            object.__setattr__(self, "load", replace(self.load, drive=None, lateral_force=None))
+
+    def changed(self, **changes: Any) -> Self:
+        """See `PassingLoad`; influences of tractions are shared with a wheel of this elasticity."""
+        other = replace(self, **changes)
+        if other.wheel.elasticity == self.wheel.elasticity:
+            vars(other)["_influence"] = self._influence
+        return other
+
+    @cached_property
+    def _influence(self) -> Influence:
+        """Slip and gap by tractions."""
         with one_thread():
-            self._influence = Influence(self._kernel(_apart(grid, compliance, wheel)))
-        if not self._influence.own()[:, NORMAL, NORMAL].min() > 0:
+            found = Influence(self._kernel(_apart(self.grid, self.compliance, self.wheel)))
+        if not found.own()[:, NORMAL, NORMAL].min() > 0:
             raise ModelError("compliance", 0.0, "surface and wheel must not both be rigid")
+        return found
 
-    def _set_wheel(self, wheel: ProfiledWheel) -> None:
-        """Set what depends on the shape of the wheel."""
-        self.wheel = wheel
-        self._rest, self._motions = wheel.rolling(self.grid)
-        self._sums = self._resultants()
+    @cached_property
+    def _axes(self) -> Array:
+        return self.grid.axes
 
-    def _set_load(
-        self,
-        *,
-        friction: float,
-        force: float,
-        drive: float | None = None,
-        lateral_force: float | None = None,
-        creepage: float = 0.0,
-        lateral_creepage: float = 0.0,
-        spin: float = 0.0,
-    ) -> None:
-        """Set friction and load; parameters are those of the class."""
-        if not 0 <= friction <= 1:
-            raise ModelError("friction", friction, "must lie between 0 and 1")
-        if not force > 0:
-            raise ModelError("force", force, "must be positive")
-        self.force = force
-        self.friction = friction if friction > LEAST_FRICTION else 0.0
-        self.drive = drive if self.friction else None
-        self.lateral_force = lateral_force if self.friction else None
-        self._given = np.array([0.0, creepage, lateral_creepage, spin])
-
-    def with_wheel(self, wheel: ProfiledWheel) -> Self:
-        """Return the same load with a wheel of another shape, or beside the place of this one.
-
-        Influences of tractions are shared.
-
-        Raises
-        ------
-        ModelError
-            if its elastic constants are others
-        """
-        if wheel.elasticity != self.wheel.elasticity:
-            raise ModelError("elasticity", wheel.elasticity, f"must be {self.wheel.elasticity}")
-        other = copy(self)
-        other._set_wheel(wheel)
-        return other
-
-    def with_load(self, **load: Unpack[RollingLoad]) -> Self:
-        """Return the same wheel with another load and friction, parameters as of the class."""
-        other = copy(self)
-        other._set_load(**load)
-        return other
-
-    def scaled(self, share: float) -> Self:
-        """See `PatchLoad`."""
-        other = copy(self)
-        other.force *= share
-        if other.lateral_force is not None:
-            other.lateral_force *= share
-        return other
-
-    def driven(self, share: float) -> Self:
-        """See `PatchLoad`."""
-        other = copy(self)
-        if other.drive is not None:
-            other.drive *= share
-        return other
+    @cached_property
+    def _rolling(self) -> tuple[Array, Array]:
+        """Slip and gap at rest, and of the rigid motions; see `ProfiledWheel.rolling`."""
+        return self.wheel.rolling(self.grid)
 
     @property
-    def moment(self) -> float:
-        """See `PatchLoad`."""
-        return (self.drive or 0.0) * self.friction * self.force
-
-    @property
-    def slipping(self) -> Self:
-        """See `PatchLoad`."""
-        other = copy(self)
-        if self.moment:
-            other.drive = None
-            other._given = self._given.copy()
-            other._given[1] += np.sign(self.moment) * _SLIDES
-        return other
+    def _given(self) -> Array:
+        """Height and prescribed motions (4,); some of them are free."""
+        load = self.load
+        return np.array([0.0, load.creepage, load.lateral_creepage, load.spin])
 
     def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
         """See `PatchLoad`.
 
         Raises
         ------
-        Spins, LimitLoad
+        Spins
             if moment or lateral force exceed the friction of the whole contact
         WindowTooSmall
             if the contact reaches the outermost stations or vertices
@@ -223,6 +153,7 @@ class RollingPatch:
                 creepage=creepage,
                 lateral_creepage=lateral,
                 spin=spin,
+                moment=float(np.tensordot(self._sums[1], values, 3)),
                 steps=found.steps,
             )
 
@@ -270,17 +201,19 @@ class RollingPatch:
     @property
     def _free(self) -> list[int]:
         """Numbers of the rigid motions whose resultant is given: height and creepages."""
-        given = (self.force, self.drive, self.lateral_force)
+        given = (self.load.force, self.load.drive, self.load.lateral_force)
         return [number for number, value in enumerate(given) if value is not None]
 
-    def _resultants(self) -> Array:
-        """Return the sums (3, n, m, 3) of (q_x, p, q_s) that height and creepages work with."""
+    @cached_property
+    def _sums(self) -> Array:
+        """Sums (3, n, m, 3) of (q_x, p, q_s) that height and creepages work with."""
+        rest, motions = self._rolling
         sin, cos = np.sin(self.grid.angle), np.cos(self.grid.angle)
-        sums = np.zeros((3, *self._rest.shape))
+        sums = np.zeros((3, *rest.shape))
         sums[0, ..., 1], sums[0, ..., 2] = cos, -sin
-        sums[1] = -self._motions[1] / self.grid.spacing
+        sums[1] = -motions[1] / self.grid.spacing
         sums[2, ..., 1], sums[2, ..., 2] = sin, cos
-        return sums * self._area[:, None]
+        return sums * self.grid.area[:, None]
 
     def _offset(self, u: Array) -> Array:
         """Return slip and gap (n, m, 3) from displacements (n, m, 3) of the surface."""
@@ -301,16 +234,15 @@ class RollingPatch:
 
     def _problem(self, u: Array) -> ConeProblem:
         """Return the frictional problem of a surface with these displacements (n, m, 3)."""
-        free = self._free
-        drive = 0.0 if self.drive is None else self.drive * self.friction * self.force
-        resultants = np.array([self.force, drive, self.lateral_force or 0.0])
+        free, load, (rest, motions) = self._free, self.load, self._rolling
+        resultants = np.array([load.force, load.drive or 0.0, load.lateral_force or 0.0])
         given = self._given.copy()
         given[free] = 0.0
         return ConeProblem(
             influence=self._influence,
-            offset=self._rest + self._offset(u) + np.tensordot(given, self._motions, 1),
+            offset=rest + self._offset(u) + np.tensordot(given, motions, 1),
             friction=self.friction,
-            motions=self._motions[free],
+            motions=motions[free],
             weights=self._sums[free],
             resultants=resultants[free],
         )
@@ -345,45 +277,49 @@ class RollingPatch:
         """
         gap = (problem.offset[..., NORMAL] / problem.motions[0, ..., NORMAL]).ravel()
         nearest = np.argsort(gap)
-        area = np.cumsum(np.broadcast_to(self._area, problem.offset.shape[:2]).ravel()[nearest])
+        each = self.grid.area
+        area = np.cumsum(np.broadcast_to(each, problem.offset.shape[:2]).ravel()[nearest])
         own = problem.influence.own()[:, NORMAL, NORMAL].mean()
-        approach = own * self.force / np.sqrt(area * self._area.mean())
+        approach = own * self.load.force / np.sqrt(area * each.mean())
         inside = gap[nearest] - gap[nearest[0]] <= _PRESSED * approach
         return float(gap[nearest[np.flatnonzero(inside)[-1]]])
 
     def _check_sliding(self, u: Array) -> None:
-        """Raise `Spins` or `LimitLoad` if full slip carries less than moment and lateral force.
+        """Raise `Spins` if full slip carries less than moment and lateral force.
 
         Full slip may carry less than friction times load: spin turns shear, and shear on a slope
         carries a part of the load.
         """
-        if self.drive is None and self.lateral_force is None:
+        load = self.load
+        if load.drive is None and load.lateral_force is None:
             return
         smooth = np.tensordot(self._sums[1:], self._smooth(self._problem(u)).values, 3)
-        given = np.array([value is not None for value in (self.drive, self.lateral_force)])
-        wanted = np.where(given, [self.moment, self.lateral_force or 0.0] - smooth, 0.0)
+        given = np.array([value is not None for value in (load.drive, load.lateral_force)])
+        forces = np.array([load.drive or 0.0, load.lateral_force or 0.0])
+        wanted = np.where(given, forces - smooth, 0.0)
         size = float(np.hypot(*wanted))
         if not size:
             return
-        other = copy(self)
-        other.drive = other.lateral_force = None
-        other._given = self._given.copy()
-        other._given[1:3] += _SLIDES * wanted / size
+        along, across = _SLIDES * wanted / size
+        slides = replace(
+            load, drive=None, lateral_force=None, creepage=load.creepage + float(along),
+            lateral_creepage=load.lateral_creepage + float(across),
+        )  # fmt: skip
         try:
-            found = other._solve(u, None)
+            found = self.changed(load=slides)._solve(u, None)
         except NoContact:
             return
         forces = np.tensordot(self._sums[1:], found.values, 3) - smooth
         carried = float(forces @ wanted) / size**2
         if carried >= 1:
             return
-        if self.lateral_force is not None:
+        if load.lateral_force is not None:
             lateral = float(np.tensordot(self._sums[2], found.values, 3))
-            wanted_force = self.lateral_force
+            wanted_force = load.lateral_force
             told = f"{wanted_force:.0f}" if abs(wanted_force) >= 1 else f"{wanted_force:.2g}"
             much = f"with all of its contact slipping the lateral force is {lateral:.0f} N"
             much += f", not {told}: give one that a wheel at this position can have"
-            raise LimitLoad(f"the wheel slides off: {much}", carried, 1.0)
+            raise Spins(f"the wheel slides off: {much}", carried, 1.0)
         much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"
         raise Spins(much, carried, 1.0)
 

@@ -155,7 +155,11 @@ class ProfiledWheel:
         return np.asarray(self.middle + along)
 
     def _at(self, grid: PatchGrid) -> tuple[Array, Array]:
-        """Return gap at height 0 [mm], and rolling radius of what lies above over R, (n, m)."""
+        """Return gap at height 0 [mm], and rolling radius of what lies above over R, (n, m).
+
+        At height d the gap is larger by d cos(angle). It is exact at the height at which the
+        undeformed bodies touch. Raises `ModelError` where there is no wheel above.
+        """
         z, y, angle = grid.surface
         x = grid.x[:, None]
         if not np.isfinite(self.surface(x, z)).all():
@@ -166,14 +170,6 @@ class ProfiledWheel:
         arc = 1 - np.where(np.isfinite(rise), rise, y) / self.radius
         mean = grid.hats.mean.T
         return gap @ mean - height * np.cos(grid.angle), arc @ mean
-
-    def gap(self, grid: PatchGrid) -> Array:
-        """Return the gap (n, m) above the surface along its normals, at height 0 [mm].
-
-        At height d it is larger by d cos(angle). It is exact at the height at which the undeformed
-        bodies touch. Raises `ModelError` where there is no wheel above.
-        """
-        return self._at(grid)[0]
 
     def rolling(self, grid: PatchGrid) -> tuple[Array, Array]:
         """Return slip and gap of the rigid wheel: (n, m, 3) at rest, (4, n, m, 3) of its motions.

@@ -18,12 +18,11 @@ from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
 from solver.rolling.rail.far_field import FarField
-from solver.rolling.rail.flow import PrismFlow
+from solver.rolling.rail.flow import PrismFlow, PrismState
 from solver.rolling.rail.modes import Modes
+from solver.rolling.rail.patch_grid import RunningSurface
 from solver.rolling.rail.section import Section
-from solver.rolling.rail.state import PrismState
 from solver.rolling.rail.straight import SettledStress, StraightPrism, check_elastic
-from solver.rolling.rail.surface import RunningSurface
 from solver.typing import Array, Bools, Ints
 
 

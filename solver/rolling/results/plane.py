@@ -2,51 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array, hstack
 from scipy.spatial import cKDTree
 
-from solver.contact.state import State
-from solver.fem.discretisation import Discretisation
 from solver.fem.fields import Sampler, recovery
 from solver.fem.frame import RigidMotion
-from solver.materials.state import Response
 from solver.results.contact_result import contact_patches
-from solver.rolling.layers import Layers
+from solver.results.tractions import SurfaceTractions
 from solver.rolling.passing import Pass
 from solver.rolling.plane.fields import TrackFields, of_layers, under_load
-from solver.rolling.plane.touching import RollingContact
+from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.track import Track
+from solver.rolling.plane.wheel import RollingContact
+from solver.rolling.results.stage import LOADED, RELEASED, PassStage, SteadyBody
 from solver.typing import Array, Ints
 
-_LOADED, _RELEASED = 0.0, 1.0
 _LEVEL = 1e-6
 """Ratio of a difference of depth to the depth of the first row; up to it points and nodes are on
 one line."""
 _MIRRORED = np.array([[1.0], [1.0], [1.0], [-1.0]])
 
 
-@dataclass(frozen=True, slots=True)
-class TrackState:
-    """A state of the half-plane.
-
-    Attributes
-    ----------
-    state : displacements and internal variables; its time is 0 under the load and 1 after it
-    response : stress at the points
-    touching : the contact with a wheel in the frame of the load, or None
-    """
-
-    state: State
-    response: Response
-    touching: RollingContact | None
-
-
-class TrackBody:
+class TrackBody(SteadyBody):
     """The body of a track in a fixed frame; the track itself is computed for a load along +x.
+
+    Its points are followed by places at the surface above the first row.
 
     Parameters
     ----------
@@ -56,26 +39,12 @@ class TrackBody:
 
     def __init__(self, track: Track, way: int) -> None:
         self.track, self.way = track, way
-        self._part = track.part if way == 1 else track.mirrored
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of the only body."""
-        return (self._part.body.name,)
-
-    @property
-    def n_unknowns(self) -> int:
-        """Number of displacement unknowns."""
-        return len(self._part.free)
-
-    def full(self, name: str) -> Discretisation:
-        """Return the body."""
-        del name
-        return self._part
+        part = track.part if way == 1 else track.mirrored
+        super().__init__(part, len(part.free))
 
     def sampler(self, name: str, X: Array) -> Sampler:
         """Return the interpolation of nodal fields at positions (2, n) [mm]."""
-        return Sampler(self.full(name), X)
+        return Sampler(self.part, X)
 
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n) from values at points and at the surface to nodes.
@@ -83,8 +52,7 @@ class TrackBody:
         Nodes of the surface take the values at the surface: plastic strain, and thus stress, may
         change too much between the first two rows of points for extrapolation.
         """
-        del name
-        part, first = self._part, self._first
+        part, first = self.part, self._first
         points, y = part.points.reshape(2, -1), part.X[1]
         top = np.flatnonzero(y > y.max() - _LEVEL * abs(points[1].max()))
         nearest = cKDTree(points[0, first, None]).query(part.X[0, top, None], k=2)[1]
@@ -97,46 +65,31 @@ class TrackBody:
     @cached_property
     def _first(self) -> Ints:
         """Indices of the points nearest to the surface."""
-        y = self._part.points[1].ravel()
+        y = self.part.points[1].ravel()
         return np.flatnonzero(y > y.max() * (1 + _LEVEL))
 
     def positions(self, name: str) -> Array:
         """Return positions (2, n) of the points, then at the surface above the first row [mm]."""
-        points = self.full(name).points.reshape(2, -1)
+        points = self.part.points.reshape(2, -1)
         return np.concatenate([points, points[:, self._first] * [[1.0], [0.0]]], axis=1)
 
-    def response(self, name: str, converged: TrackState) -> Response:
-        """Return stress and internal variables at the points, then at the surface above them."""
-        del name
-        return converged.response
-
-    def strain(self, name: str, converged: TrackState) -> Array:
-        """Return the strain (4, n, Mandel) at the points, then at the surface above them."""
-        found = converged.response
-        return self.full(name).body.law.elastic_strain(found.stress) + found.state.plastic_strain
-
-    def displacement(self, name: str, state: State) -> Array:
-        """Return the displacements (n,) [mm]."""
-        del name
-        return state.u[0]
-
-    def axle(self, converged: TrackState) -> RigidMotion | None:
+    def axle(self, converged: PassStage) -> RigidMotion | None:
         """Return the displacement of the axle, which stays at x = 0, or None without a wheel."""
         touching = converged.touching
         return None if touching is None else RigidMotion(x=0.0, y=touching.height, rotation=0.0)
 
-    def under_load(self, found: Pass[Layers]) -> TrackState:
+    def under_load(self, found: Pass[Layers]) -> PassStage:
         """Return the state under the load of a pass."""
         touching = found.loading if isinstance(found.loading, RollingContact) else None
-        return self._state(_LOADED, under_load(self.track, found), touching)
+        return self._stage(LOADED, under_load(self.track, found), touching)
 
-    def left_by(self, found: Pass[Layers]) -> TrackState:
+    def left_by(self, found: Pass[Layers]) -> PassStage:
         """Return the state after a pass."""
-        return self._state(_RELEASED, of_layers(self.track, found.law, found.after), None)
+        return self._stage(RELEASED, of_layers(self.track, found.law, found.after), None)
 
-    def _state(
+    def _stage(
         self, time: float, fields: TrackFields, touching: RollingContact | None
-    ) -> TrackState:
+    ) -> PassStage:
         u, strain, inside, (above, at_surface) = fields
         strain = np.concatenate([strain, above], axis=1)
         plastic = inside.unpacked(np.concatenate([inside.packed, at_surface.packed], axis=1))
@@ -148,12 +101,11 @@ class TrackBody:
             u = (u.reshape(-1, 2)[nodes] * [-1.0, 1.0]).ravel()
             stress = stress[:, points] * _MIRRORED
             plastic = plastic.at(points).mirrored
-        response = Response(stress, np.zeros((4, 4, 0)), plastic, np.zeros(0, dtype=bool))
-        return TrackState(State(time, (u,), (plastic,), ()), response, touching)
+        return PassStage.of(time, u, stress, plastic, touching)
 
 
-class SteadyTractions:
-    """Pressure and shear of a wheel; see `solver.results.tractions.SurfaceTractions`.
+class SteadyTractions(SurfaceTractions):
+    """Pressure and shear of a wheel.
 
     Parameters
     ----------
@@ -163,7 +115,7 @@ class SteadyTractions:
     def __init__(self, way: int) -> None:
         self._way = way
 
-    def along(self, converged: TrackState, x: Array) -> tuple[Array, Array, Array]:
+    def along(self, converged: PassStage, x: Array) -> tuple[Array, Array, Array]:
         """See `SurfaceTractions`."""
         touching = converged.touching
         if touching is None:
@@ -180,7 +132,7 @@ class SteadyTractions:
             sampled(touching.gap, np.nan),
         )
 
-    def extent(self, converged: TrackState) -> tuple[float, float]:
+    def extent(self, converged: PassStage) -> tuple[float, float]:
         """See `SurfaceTractions`."""
         touching = converged.touching
         assert touching is not None
@@ -189,16 +141,7 @@ class SteadyTractions:
         patches = contact_patches(touching.x[order], touching.gap[order], closed)
         return (patches[-1][1] - patches[0][0]) / 2, float(touching.pressure.max())
 
-    def force(self, converged: TrackState) -> float:
+    def force(self, converged: PassStage) -> float:
         """See `SurfaceTractions`."""
         assert converged.touching is not None
         return -self._way * float(converged.touching.tangential.sum())
-
-    def centre(self, converged: TrackState) -> float:
-        """See `SurfaceTractions`."""
-        del converged
-        return 0.0
-
-    def points(self, converged: TrackState) -> None:
-        """See `SurfaceTractions`."""
-        del converged

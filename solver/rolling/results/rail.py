@@ -6,49 +6,51 @@ the load they are known in the zone that may yield; elsewhere they are NaN.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
+from skfem import CellBasis
 
-from solver.contact.state import State
 from solver.fem.fields import Sampler, recovery
 from solver.materials.law import Law
-from solver.materials.state import PlasticState, Response
+from solver.materials.state import PlasticState
 from solver.memory import kept
 from solver.model.body import Body
+from solver.results.mesh_fields import MeshFields, counterclockwise
+from solver.results.tractions import SurfaceTractions
 from solver.rolling.passing import Pass
-from solver.rolling.rail.patch_contact import PatchContact
+from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.section import Section
-from solver.rolling.rail.state import PrismState
 from solver.rolling.rail.track import PrismTrack
-from solver.tensors import to_tensor
-from solver.typing import Array
+from solver.rolling.results.stage import LOADED, RELEASED, PassStage, SteadyBody
+from solver.tensors import not_below_zero, to_tensor, von_mises
+from solver.typing import Array, Ints
 
-_LOADED, _RELEASED = 0.0, 1.0
 
-
-@dataclass(frozen=True, slots=True)
-class PrismStage:
-    """A state of the section at x = 0.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SectionInSpace:
+    """A section as results see a body, in x, y and z at x = 0.
 
     Attributes
     ----------
-    state : displacements; its time is 0 under the load and 1 after it
-    response : stress and internal variables at the points of the section
-    touching : the contact, None after it
-    lowest : (6,) smallest stress components at any station of the window, None after it [MPa]
+    X : (3, n_nodes) positions of the nodes [mm]
+    points : (3, n_points) positions of the points [mm]
+    body : the body, with its name and its law
+    basis, weights, boundary_nodes : those of the nodes in the plane (z, y), see `Nodes`
     """
 
-    state: State
-    response: Response
-    touching: PatchContact | None = None
-    lowest: Array | None = None
+    X: Array
+    points: Array
+    body: Body
+    basis: CellBasis
+    weights: Array
+    boundary_nodes: Callable[[str], Ints]
 
 
-class PrismBody:
+class PrismBody(SteadyBody):
     """The section of a prism as results see a body, at x = 0 in x, y and z.
 
     Parameters
@@ -60,63 +62,35 @@ class PrismBody:
 
     def __init__(self, track: PrismTrack, law: Law, name: str) -> None:
         self.track, self._law = track, law
-        self.names = (name,)
         plane = track.section.plane
-        self._part = SimpleNamespace(
-            X=in_space(plane.X), basis=plane.basis,
-            weights=track.section.weights, points=in_space(plane.points.reshape(2, -1)),
-            body=Body(name=name, mesh=plane.body.mesh, material=law),
-            boundary_nodes=plane.boundary_nodes,
+        part = SectionInSpace(
+            X=in_space(plane.X), points=in_space(plane.positions),
+            body=Body(name=name, mesh=plane.body.mesh, material=law), basis=plane.basis,
+            weights=plane.weights, boundary_nodes=plane.boundary_nodes,
         )  # fmt: skip
-        self._recovery = recovery(self._part)  # type: ignore[arg-type]
-
-    @property
-    def n_unknowns(self) -> int:
-        """Number of displacement unknowns of the section."""
-        return len(self.track.section.free)
-
-    def full(self, name: str) -> Any:
-        """Return the body: ``X`` (3, n_nodes), ``basis`` in the plane (z, y), ``body``."""
-        del name
-        return self._part
+        super().__init__(part, len(track.section.free))
+        self._recovery = recovery(plane)
 
     def sampler(self, name: str, X: Array) -> Sampler:
         """Return the interpolation of nodal fields at positions (3, n) [mm]; x has no effect."""
-        del name
         return _sampler(self.track.section, np.ascontiguousarray(X[[2, 1]]).tobytes())
 
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n_points) from values at points to nodes."""
-        del name
         return self._recovery
 
     def positions(self, name: str) -> Array:
         """Return positions (3, n) of the points [mm]."""
-        del name
-        return np.asarray(self._part.points)
+        return np.asarray(self.part.points)
 
-    def response(self, name: str, converged: PrismStage) -> Response:
-        """Return stress and internal variables at the points."""
-        del name
-        return converged.response
-
-    def strain(self, name: str, converged: PrismStage) -> Array:
+    def strain(self, name: str, converged: PassStage) -> Array:
         """Return the strain (6, n, Mandel) at the points, without that of an initial stress."""
-        del name
-        found = converged.response
-        strain = self._law.elastic_strain(found.stress) + found.state.plastic_strain
-        return strain - self.track.initial_strain.T
+        return super().strain(name, converged) - self.track.initial_strain.T
 
-    def displacement(self, name: str, state: State) -> Array:
-        """Return the displacements (n,) [mm]."""
-        del name
-        return state.u[0]
-
-    def axle(self, converged: PrismStage) -> None:
+    def axle(self, converged: PassStage) -> None:
         """Return None: the wheel has no mesh."""
-        del converged
 
-    def under_load(self, found: Pass[PrismState]) -> PrismStage:
+    def under_load(self, found: Pass[PrismState]) -> PassStage:
         """Return the state under the load of a pass; NaN outside the zone."""
         track, before, middle = self.track, found.before, self.track.before
         applied: Any = found.loading
@@ -127,20 +101,20 @@ class PrismBody:
         u[track.modes.unknowns] += track.left_by(before.plastic_strain)[track.modes.unknowns]
         whole = np.full((track.section.weights.size, 6), np.nan)
         whole[track.modes.points] = strain
-        stage = self._stage(_LOADED, u, whole, inside)
+        stage = self._stage(LOADED, u, whole, inside)
         elastic = before.strain[:, None] + found.strain - found.plastic_strain
         stress = np.einsum("ab,pcb->apc", self._law.stiffness(6), elastic)
         lowest = to_tensor(stress.reshape(6, -1)).min(axis=1)
         return replace(stage, touching=applied.contact, lowest=lowest)
 
-    def left_by(self, found: Pass[PrismState]) -> PrismStage:
+    def left_by(self, found: Pass[PrismState]) -> PassStage:
         """Return the state after a pass, in the whole section."""
         track, after = self.track, found.after
         u = track.left_by(after.plastic_strain)
         strain = track.initial_strain + track.straight.strain(u)
-        return self._stage(_RELEASED, u, strain, after.state)
+        return self._stage(RELEASED, u, strain, after.state)
 
-    def _stage(self, time: float, u: Array, strain: Array, inside: PlasticState) -> PrismStage:
+    def _stage(self, time: float, u: Array, strain: Array, inside: PlasticState) -> PassStage:
         """Return a state with these displacements, strains and, in the zone, internal variables."""
         n, points = len(strain), self.track.modes.points
         whole = self._law.initial(n, 6)
@@ -148,16 +122,14 @@ class PrismBody:
         packed[..., points] = inside.packed
         plastic = whole.unpacked(packed)
         stress = self._law.stiffness(6) @ (strain.T - plastic.plastic_strain)
-        nothing = np.zeros((6, 6, 0)), np.zeros(0, dtype=bool)
-        response = Response(stress, nothing[0], plastic, nothing[1])
-        return PrismStage(State(time, (u,), (plastic,), ()), response)
+        return PassStage.of(time, u, stress, plastic)
 
 
 @kept
 def _sampler(section: Section, positions: bytes) -> Sampler:
     """Return the interpolation at positions (2, n) in a section; runs over a prism share it."""
     x = np.frombuffer(positions).reshape(2, -1)
-    return Sampler(section.plane, x)  # type: ignore[arg-type]
+    return Sampler(section.plane, x)
 
 
 def in_space(plane: Array) -> Array:
@@ -166,35 +138,98 @@ def in_space(plane: Array) -> Array:
     return np.stack([np.zeros_like(z), y, z])
 
 
-class PatchTractions:
-    """Resultants of a contact in a patch; see `solver.results.tractions.SurfaceTractions`.
+class PatchTractions(SurfaceTractions):
+    """Resultants of a contact in a patch: it has no pressure along a line."""
 
-    The contact is a surface, so that there is no pressure along a line.
-    """
-
-    def along(self, converged: PrismStage, x: Array) -> tuple[Array, Array, Array]:
-        """See `SurfaceTractions`: NaN."""
-        del converged
-        nowhere = np.full_like(x, np.nan)
-        return nowhere, nowhere, nowhere
-
-    def extent(self, converged: PrismStage) -> tuple[float, float]:
+    def extent(self, converged: PassStage) -> tuple[float, float]:
         """See `SurfaceTractions`: half the width across the track."""
-        assert converged.touching is not None
         contact = converged.touching
         z = contact.grid.z[(contact.status != 0).any(axis=0)]
         return float(np.ptp(z)) / 2, float(contact.pressure.max())
 
-    def force(self, converged: PrismStage) -> float:
+    def force(self, converged: PassStage) -> float:
         """See `SurfaceTractions`."""
-        assert converged.touching is not None
         return float(converged.touching.force[0])
 
-    def centre(self, converged: PrismStage) -> float:
-        """See `SurfaceTractions`."""
-        del converged
-        return 0.0
 
-    def points(self, converged: PrismStage) -> None:
-        """See `SurfaceTractions`."""
-        del converged
+_CORNERS = 4
+_ELEMENT = "hexahedron20"
+
+
+def zone_fields(body: PrismBody, loaded: str, left: str, found: Pass[PrismState]) -> MeshFields:
+    """Return stress and plastic strain at nodes of the zone, around the load and behind the pass.
+
+    The 8-node quadrilaterals of the section are extruded over the stations of the window to
+    hexahedra of 20 nodes: two distances of stations long, with corners and mid-sides at every other
+    station, and mid-sides along x at those in between. Under the load displacements are not known
+    everywhere: NaN.
+
+    Parameters
+    ----------
+    loaded, left : names of the two stages
+    """
+    track, name = body.track, f"{body.names[0]} around the load"
+    modes, plane = track.modes, track.section.plane
+    n_points = track.section.weights.shape[1]
+    elements = modes.points[::n_points] // n_points
+    cells = counterclockwise(plane.basis.element_dofs.T[elements], plane.X)
+    nodes, flat = np.unique(cells, return_inverse=True)
+    cells = flat.reshape(cells.shape)
+    corners = np.unique(cells[:, :_CORNERS])
+    place = np.searchsorted(corners, cells[:, :_CORNERS])
+    window = len(modes.x)
+    main, between = np.arange(0, window, 2), np.arange(1, window - 1, 2)
+    count, first = len(nodes), len(main) * len(nodes)
+
+    layers = []
+    for k in range(len(between)):
+        near, far = (np.split(cells + at * count, [_CORNERS], axis=1) for at in (k, k + 1))
+        sides = first + k * len(corners) + place
+        layers.append(np.hstack([near[0], far[0], near[1], far[1], sides]))
+
+    share = body.recovery(name)[nodes][:, modes.points]  # of the elements in the zone alone
+    share = share.multiply(1 / share.sum(axis=1)[:, None]).tocsr()
+
+    def at_nodes(values: Array) -> Array:
+        """Return values (..., n) at the nodes of those at the points (..., n_points, stations)."""
+        flat = np.moveaxis(values, -2, 0)
+        each = (share @ flat.reshape(len(flat), -1)).reshape(count, *flat.shape[1:])
+        each = np.moveaxis(each, 0, -1)  # (..., stations, nodes)
+        both = each[..., main, :], each[..., between, :][..., corners]
+        return np.concatenate([own.reshape(*own.shape[:-2], -1) for own in both], axis=-1)
+
+    initial = track.initial_strain[modes.points, None]
+
+    def stage(elastic: Array, plastic: Array, accumulated: Array, u: Array) -> Mapping[str, Array]:
+        strain = np.moveaxis(elastic + plastic - initial, -1, 0)
+        stress = np.einsum("ab,pcb->apc", found.law.stiffness(6), elastic)
+        return {
+            "displacement": u,
+            "stress": to_tensor(at_nodes(stress)),
+            "mises": not_below_zero(at_nodes(von_mises(stress))),
+            "plastic_strain": not_below_zero(at_nodes(accumulated)),
+            "plastic_tensor": to_tensor(at_nodes(np.moveaxis(plastic, -1, 0))),
+            "strain": to_tensor(at_nodes(strain)),
+        }
+
+    x = track.before * (modes.length / modes.stations) + modes.x
+    z, y = plane.X[:, nodes]
+    X = np.hstack([
+        np.stack([each.ravel() for each in np.broadcast_arrays(at[:, None], own[1], own[0])])
+        for at, own in ((x[main], (z, y)), (x[between], (z[corners], y[corners])))
+    ])  # fmt: skip
+    before, after = found.before, found.after
+    moved = track.left_by(after.plastic_strain).reshape(-1, 3)[nodes].T
+    still = np.hstack([np.tile(moved, len(main)), np.tile(moved[:, corners], len(between))])
+
+    def along(values: Array) -> Array:
+        return np.repeat(values[:, None], window, axis=1)
+
+    under = before.strain[:, None] + found.strain - found.plastic_strain
+    behind, remains = along(after.strain - after.plastic_strain), along(after.plastic_strain)
+    nothing = np.full_like(still, np.nan)
+    stages = {
+        loaded: stage(under, found.plastic_strain, found.accumulated, nothing),
+        left: stage(behind, remains, along(after.accumulated), still),
+    }
+    return MeshFields(X=X, bodies={name: (_ELEMENT, np.vstack(layers))}, stages=stages)

@@ -1,20 +1,26 @@
-"""Residual stress and plastic strain after each pass, and their changes over a cycle."""
+"""What each pass leaves, its changes over a cycle, and the shakedown state they tend to."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from solver.contact.state import Converged
+from solver.results.cycles import (
+    SHAKEDOWN_STATE,
+    STEADY_NET_INCREMENT,
+    STEADY_PLASTIC_INCREMENT,
+)
 from solver.results.fields import Bodies, Solved
 from solver.results.maps import PROFILE_PLASTIC_STRAIN, RESIDUAL_PROFILE
 from solver.results.quantities import declare
 from solver.results.run import Values
 from solver.results.samples import Samples
 from solver.results.shakedown import Shakedown, ShakedownState, classify
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.tensors import SQRT2, to_mandel
 from solver.typing import Array
 
 _EACH = ("pass",)
@@ -46,36 +52,62 @@ PASS_SURFACE_ADVANCE = declare(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Trace:
-    """Results of one pass at the stations of a view.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PassTrace:
+    """What a pass leaves at n points: along depth under mid-track, or of the zone of a prism.
+
+    Attributes
+    ----------
+    accumulated : (n,) equivalent plastic strain
+    plastic_strain : (n, n_components) signed plastic strain, Mandel
+    creepage : creepage of the wheel; by increments over the second half of the track
+    surface : displacement of the surface along x [mm]
+    peak : largest equivalent plastic strain in the body
+    """
+
+    accumulated: Array
+    plastic_strain: Array
+    creepage: float
+    surface: float
+    peak: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trace(PassTrace):
+    """What a pass over a half-space leaves, also at the stations of a view.
 
     Attributes
     ----------
     stress : (station, 4, depth) residual stress, tensor components [MPa]
     strain : (station, depth) equivalent plastic strain
     flow : (station, 4, depth) signed plastic strain, tensor components
-    surface : (2, station) displacement of the surface [mm]
-    creepage : 1 + R d(rotation) / d(advance) over the second half of the track
-    peak : largest equivalent plastic strain in the half-space
     """
 
     stress: Array
     strain: Array
     flow: Array
-    surface: Array
-    creepage: float
-    peak: float
+
+    @classmethod
+    def at(
+        cls, stress: Array, strain: Array, flow: Array, surface: Array, creepage: float, peak: float
+    ) -> Trace:
+        """Return the trace from values at all stations; ``surface`` (station,) is along x."""
+        middle = len(strain) // 2
+        return cls(
+            accumulated=strain[middle], plastic_strain=to_mandel(flow[middle]).T,
+            creepage=creepage, surface=float(surface[middle]), peak=peak,
+            stress=stress, strain=strain, flow=flow,
+        )  # fmt: skip
 
     @classmethod
     def of(cls, samples: Samples, points: Mapping[str, Converged]) -> Trace:
         """Return the trace of a pass from its states ``mid_track``, ``loaded``, ``unloaded``."""
         left = points["unloaded"]
-        return cls(
+        return cls.at(
             samples.profile("stress", left).swapaxes(0, 1),
             samples.profile("plastic_strain", left),
             samples.flow(left).swapaxes(0, 1),
-            samples.profile("displacement", left)[:, :, 0],
+            samples.profile("displacement", left)[0, :, 0],
             _creepage(samples.system, points["mid_track"], points["loaded"]),
             float(left.responses[-1].state.accumulated.max()),
         )
@@ -91,58 +123,84 @@ def _creepage(bodies: Bodies, first: Solved, last: Solved) -> float:
     return 1 + axle.radius * (now.rotation - before.rotation) / (now.x - before.x)
 
 
-def passes(traces: Sequence[Trace], cycle: int) -> Values:
+def passes(traces: Sequence[PassTrace], cycle: int) -> Values:
     """Return the variables over passes; increments are those of the cycle that ends with a pass."""
-    middle = len(traces[0].strain) // 2
-    accumulated, left = _increments(traces, cycle)
-    shear = 2 * left[:, 3]
-    largest = np.abs(shear).argmax(axis=1)
-    surface = np.stack([t.surface[0, middle] for t in traces])
+    added = [added_by(traces, number, cycle) for number in range(len(traces))]
+    surface = np.array([t.surface for t in traces])
+    before = np.concatenate([np.zeros(cycle), surface])[: len(surface)]
     return {
         PASS: np.arange(1, len(traces) + 1),
-        RESIDUAL_PROFILE.over("pass"): np.stack([t.stress for t in traces]),
-        PROFILE_PLASTIC_STRAIN.over("pass"): np.stack([t.strain for t in traces]),
-        PLASTIC_FLOW_PROFILE.over("pass"): np.stack([t.flow for t in traces]),
         PASS_CREEPAGE: np.array([t.creepage for t in traces]),
         PASS_MAX_PLASTIC_STRAIN: np.array([t.peak for t in traces]),
-        PASS_PLASTIC_INCREMENT: accumulated.max(axis=1),
-        PASS_NET_INCREMENT: _equivalent(left).max(axis=1),
-        PASS_NET_SHEAR: shear[np.arange(len(shear)), largest],
-        PASS_SURFACE_ADVANCE: _differences(surface, cycle),
+        PASS_PLASTIC_INCREMENT: np.array([accumulated.max() for accumulated, _ in added]),
+        PASS_NET_INCREMENT: np.array([_equivalent(left).max() for _, left in added]),
+        PASS_SURFACE_ADVANCE: surface - before,
     }
 
 
-def shakedown_of(parameters: RollingParameters, traces: Sequence[Trace]) -> Shakedown:
-    """Return the shakedown state that the passes tend to.
+def profiles(traces: Sequence[Trace], cycle: int) -> Values:
+    """Return the variables over passes and depth, and the shear that a cycle leaves."""
+    each = (added_by(traces, number, cycle)[1] for number in range(len(traces)))
+    shear = np.array([SQRT2 * left[:, 3] for left in each])
+    largest = np.abs(shear).argmax(axis=1)
+    return {
+        RESIDUAL_PROFILE.over("pass"): np.stack([t.stress for t in traces]),
+        PROFILE_PLASTIC_STRAIN.over("pass"): np.stack([t.strain for t in traces]),
+        PLASTIC_FLOW_PROFILE.over("pass"): np.stack([t.flow for t in traces]),
+        PASS_NET_SHEAR: shear[np.arange(len(shear)), largest],
+    }
 
-    On a track with ends a body that yields stays undecided: the ends constrain the layer that
-    ratchetting moves, so that the cycle seems closed.
+
+def shakedown_of(parameters: Any, traces: Sequence[PassTrace], cycle: int | None) -> Shakedown:
+    """Return the shakedown state that the passes tend to, of a material with these parameters.
+
+    Parameters
+    ----------
+    cycle : passes after which the loading repeats itself. With None it never does: if anything
+        yields no state is decided
     """
-    cycle, yield_strain = parameters.cycle, parameters.yield_stress / parameters.youngs_modulus
-    hardens = parameters.material().hardens
-    accumulated, left = _increments(traces, cycle)
-    last = slice((len(traces) - 1) % cycle, None, cycle)
-    found = classify(accumulated[last], _equivalent(left)[last], yield_strain, hardens=hardens)
-    if parameters.endless or found.state is ShakedownState.ELASTIC:
-        return found
-    return Shakedown(ShakedownState.UNDECIDED, found.accumulated, found.net)
+    length = cycle or 1
+    ends = range((len(traces) - 1) % length, len(traces), length)
+    last = [added_by(traces, number, length) for number in ends]
+    found = classify(
+        np.stack([accumulated for accumulated, _ in last]),
+        np.stack([_equivalent(left) for _, left in last]),
+        parameters.yield_stress / parameters.youngs_modulus,
+        hardens=parameters.material().hardens,
+    )
+    if cycle is None and found.state is not ShakedownState.ELASTIC:
+        return Shakedown(ShakedownState.UNDECIDED, np.nan, np.nan)
+    return found
 
 
-def _increments(traces: Sequence[Trace], cycle: int) -> tuple[Array, Array]:
-    """Return accumulated (pass, depth) and signed (pass, 4, depth) plastic strain of a cycle."""
-    middle = len(traces[0].strain) // 2
-    accumulated = np.stack([t.strain[middle] for t in traces])
-    flow = np.stack([t.flow[middle] for t in traces])
-    return _differences(accumulated, cycle), _differences(flow, cycle)
+def shakedown(found: Shakedown) -> Values:
+    """Return the variables of a shakedown state."""
+    return {
+        SHAKEDOWN_STATE: found.state,
+        STEADY_PLASTIC_INCREMENT: found.accumulated,
+        STEADY_NET_INCREMENT: found.net,
+    }
 
 
-def _differences(values: Array, cycle: int) -> Array:
-    """Return the changes of values (pass, ...) over a cycle; values before the first are zero."""
-    before = np.concatenate([np.zeros((cycle, *values.shape[1:])), values[:-cycle]])
-    return values - before[: len(values)]
+def mean_added(traces: Sequence[PassTrace], most: int) -> tuple[float, float]:
+    """Return the largest strain added in a pass, its mean over the last passes: half, or ``most``.
+
+    It is that accumulated, and the equivalent of the signed one that is left.
+    """
+    average = max(min(len(traces) // 2, most), 1)
+    accumulated, left = added_by(traces, len(traces) - 1, average)
+    return float(accumulated.max() / average), float(_equivalent(left).max() / average)
+
+
+def added_by(traces: Sequence[PassTrace], number: int, cycle: int) -> tuple[Array, Array]:
+    """Return what the cycle that ends with a pass adds: equivalent (n,), signed (n, components)."""
+    after = traces[number]
+    if number < cycle:
+        return after.accumulated, after.plastic_strain
+    before = traces[number - cycle]
+    return after.accumulated - before.accumulated, after.plastic_strain - before.plastic_strain
 
 
 def _equivalent(flow: Array) -> Array:
-    """Return the equivalent (pass, depth) of signed strain (pass, 4, depth), tensor components."""
-    square = (flow[:, :3] ** 2).sum(axis=1) + 2 * flow[:, 3] ** 2
-    return np.asarray(np.sqrt(2 / 3 * square))
+    """Return the equivalent (n,) of signed strain (n, n_components), Mandel."""
+    return np.asarray(np.sqrt(2 / 3 * (flow**2).sum(axis=1)))

@@ -16,10 +16,13 @@ from solver.late import late
 from solver.rolling.scenes.raceway_parameters import RacewayParameters
 from solver.rolling.scenes.rail_scene import rail_scene
 
+(_geometry,) = late("rolling.scenes.raceway_setup", "geometry")
+
 RACEWAY = rail_scene(
     "raceway",
     "ball or roller rolling along an elastic-plastic raceway, in three dimensions",
     RacewayParameters,
+    geometry=_geometry,
     outputs=(
         *late("rolling.scenes.rail_outputs", "cycles"),
         *late("rolling.scenes.raceway_setup", "elastic"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -11,24 +11,10 @@ import scipy
 
 from solver.materials.law import Law
 from solver.model.friction import PatchStatus
-from solver.results.cycles import (
-    SHAKEDOWN_STATE,
-    STEADY_NET_INCREMENT,
-    STEADY_PLASTIC_INCREMENT,
-)
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values
-from solver.results.shakedown import Shakedown, ShakedownState, classify
 from solver.rolling.rail.section import Section
-from solver.rolling.scenes.passes import (
-    PASS,
-    PASS_CREEPAGE,
-    PASS_MAX_PLASTIC_STRAIN,
-    PASS_NET_INCREMENT,
-    PASS_PLASTIC_INCREMENT,
-    PASS_SURFACE_ADVANCE,
-)
-from solver.rolling.scenes.rail_passes import PassTrace
+from solver.rolling.scenes.passes import mean_added, passes, shakedown, shakedown_of
 from solver.rolling.scenes.rolling_setup import CREEPAGE, LONGITUDINAL_FORCE
 from solver.scenes.sketch import Sketch
 from solver.typing import Array
@@ -187,48 +173,14 @@ def cycles(run: FinishedRun, cycle: int | None = 1) -> Values:
     Parameters
     ----------
     cycle : passes after which the loading repeats itself; increments are those of the cycle that
-        ends with a pass. With None it never does: increments are those of a pass, and if anything
-        yields no state is decided
+        ends with a pass. With None it never does: increments are those of a pass
     """
-    p, traces = run.parameters, run.outcome.traces
-    numbers = range(len(traces))
-    accumulated, net = map(
-        np.stack, zip(*(_added(traces, number, cycle or 1) for number in numbers), strict=True)
-    )
-    last = slice((len(traces) - 1) % (cycle or 1), None, cycle)
-    yield_strain = p.yield_stress / p.youngs_modulus
-    hardens = p.material().hardens
-    found = classify(accumulated[last], net[last], yield_strain, hardens=hardens)
-    if cycle is None and found.state is not ShakedownState.ELASTIC:
-        found = Shakedown(ShakedownState.UNDECIDED, np.nan, np.nan)
-    average = max(min(len(traces) // 2, _AVERAGED), 1)
-    mean, mean_net = (each.max() / average for each in _added(traces, numbers[-1], average))
-    surface = np.array([t.surface for t in traces])
-    before = np.concatenate([np.zeros(cycle or 1), surface])[: len(surface)]
+    traces = run.outcome.traces
+    mean, mean_net = mean_added(traces, _AVERAGED)
     return {
-        PASS: np.arange(1, len(traces) + 1),
-        PASS_CREEPAGE: np.array([t.creepage for t in traces]),
-        PASS_MAX_PLASTIC_STRAIN: np.array([t.accumulated.max() for t in traces]),
+        **passes(traces, cycle or 1),
+        **shakedown(shakedown_of(run.parameters, traces, cycle)),
         PASS_RESIDUAL_MIN: np.stack([t.lowest for t in traces], axis=1),
-        PASS_PLASTIC_INCREMENT: accumulated.max(axis=1),
-        PASS_NET_INCREMENT: net.max(axis=1),
-        PASS_SURFACE_ADVANCE: surface - before,
-        SHAKEDOWN_STATE: found.state,
-        STEADY_PLASTIC_INCREMENT: found.accumulated,
-        STEADY_NET_INCREMENT: found.net,
-        MEAN_PLASTIC_INCREMENT: float(mean),
-        MEAN_NET_INCREMENT: float(mean_net),
+        MEAN_PLASTIC_INCREMENT: mean,
+        MEAN_NET_INCREMENT: mean_net,
     }
-
-
-def _added(traces: Sequence[PassTrace], number: int, cycle: int) -> tuple[Array, Array]:
-    """Return the plastic strain (n,) that the cycle which ends with a pass adds at each point.
-
-    It is that accumulated, and the equivalent of the signed one that is left.
-    """
-    after = traces[number]
-    accumulated, flow = after.accumulated, after.plastic_strain
-    if number >= cycle:
-        accumulated = accumulated - traces[number - cycle].accumulated
-        flow = flow - traces[number - cycle].plastic_strain
-    return accumulated, np.sqrt(2 / 3 * (flow**2).sum(axis=1))

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
 from solver.parameters import Fraction, Other, described
+from solver.rolling.load import RollingLoad
 from solver.rolling.scenes.wheel_parameters import (
     CONTROL,
     POISSON,
@@ -74,12 +74,13 @@ class PrismParameters(MaterialParameters):
             1 / each.plane_strain_modulus for each in (self.elasticity, self.wheel_elasticity)
         )
 
-    @property
-    def motion(self) -> Mapping[str, Any]:
-        """Drive and creepages of the wheel, as `RollingPatch` takes them."""
+    def under(self, force: float) -> RollingLoad:
+        """Return the load with this vertical force [N], and the motion of the wheel."""
         locked = self.traction == 1.0
-        return {
-            "drive": None if locked or self.control == "creepage" else self.traction,
-            "creepage": _LOCKED if locked else self.given_creepage,
-            "lateral_creepage": self.lateral_creepage,
-        }
+        drive = self.traction * self.friction * force
+        return RollingLoad(
+            force=force,
+            drive=None if locked or self.control == "creepage" else drive,
+            creepage=_LOCKED if locked else self.given_creepage,
+            lateral_creepage=self.lateral_creepage,
+        )

@@ -10,17 +10,19 @@ from solver.scenes.scene import Scene
 
 
 def rail_scene(
-    name: str, summary: str, parameters: type[Any], outputs: tuple[Late, ...], advice: str
-) -> Scene:
+    name: str, summary: str, parameters: type[Any], *, geometry: Late, outputs: tuple[Late, ...],
+    advice: str,
+) -> Scene:  # fmt: skip
     """Return a scene whose set-up is in ``NAME_setup``.
 
     Parameters
     ----------
+    geometry : (parameters) -> what the set-up depends on
     outputs : those beside maps, profiles, extremes, the contact patch and the section
     advice : what to do if a pass does not converge
     """
-    method, view, sketch, effort, setup = late(
-        f"rolling.scenes.{name}_setup", "method", "view", "sketch", "effort", "setup"
+    method, view, sketch, effort = late(
+        f"rolling.scenes.{name}_setup", "method", "view", "sketch", "effort"
     )
     return Scene(
         name=name,
@@ -39,7 +41,7 @@ def rail_scene(
         ),
         costs=late("results.figures", "cost"),
         effort=effort,
-        setup=setup,
+        setup=geometry,
         advice={
             Status.LIMIT_LOAD: "lower load or traction, or let the material harden",
             Status.NOT_CONVERGED: advice,

@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
 from solver.rolling.rail.section import Section
 from solver.rolling.rail.track import PrismTrack
-from solver.rolling.scenes.rail_effort import PrismSize
 from solver.rolling.scenes.rail_parameters import PrismParameters
+from solver.scenes.effort import Effort
 from solver.tensors import SQRT2
+
+_FIRST, _FACTOR = 0.5, 2.2e-5
+"""Seconds of a set-up: at least, and per wave and unknown of the zone."""
+_LEAST_BYTES, _BYTES = 1.4e8, 4400.0
+"""Bytes of a path: at least, and per wave and unknown of the zone."""
+_STILL, _POINT = 0.01, 1.5e-6
+"""Seconds of a pass where nothing yields: at least, and per point and station of the window."""
+_YIELDS = 28.0
+"""Work of all yielding under a wheel that rolls again and again, in passes where nothing yields.
+Half of it is in the first pass, a quarter in the second, and so on."""
+
 
 _AHEAD, _BEHIND, _LENGTH = 2.2, 2.6, 7.0
 """The window ahead and behind, and the length after which waves repeat, over half the length where
@@ -67,43 +80,41 @@ def _weak(law: Law) -> bool:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PrismWindow:
-    """Where a prism may yield, across and along.
+class PrismGeometry:
+    """All that the set-up of a prism depends on; runs with equal geometry share it.
 
     Attributes
     ----------
-    columns, elements : elements of the zone that may yield, along its surface and in all
-    half_width : half the width of the zone, along its surface [mm]
+    elasticity : Young's modulus and Poisson ratio
+    half_width, depth, size, split : of the zone that may yield, see `Zone` [mm]
     spacing : distance of stations [mm]
     reach : half the length where the load is expected to act [mm]; it may act as far as the window
         allows, since yielding makes a contact longer ahead
     """
 
-    columns: int
-    elements: int
+    elasticity: tuple[float, float]
     half_width: float
+    depth: float
+    size: float
+    split: int
     spacing: float
     reach: float
 
     @property
-    def length(self) -> float:
-        """Length after which waves repeat, an even number of stations [mm]."""
-        return 2 * self._waves * self.spacing
+    def elements(self) -> int:
+        """Number of elements of the zone."""
+        raise NotImplementedError
 
     @property
-    def _waves(self) -> int:
+    def material(self) -> Elasticity:
+        """Elastic constants."""
+        E, nu = self.elasticity
+        return Elasticity(youngs_modulus=E, poisson_ratio=nu)
+
+    @property
+    def waves(self) -> int:
         """Number of stations in half the length after which waves repeat."""
-        return self._stations(max(_LENGTH, _WIDE * self.half_width / self.reach) / 2)
-
-    @property
-    def size(self) -> PrismSize:
-        """Numbers that tell the work of a pass."""
-        return PrismSize(
-            columns=self.columns,
-            elements=self.elements,
-            window=self._stations(_AHEAD) + self._stations(_BEHIND) + 1,
-            waves=self._waves + 1,
-        )
+        return self.stations(max(_LENGTH, _WIDE * self.half_width / self.reach) / 2)
 
     def track(
         self,
@@ -125,16 +136,38 @@ class PrismWindow:
             section,
             np.arange(len(section.weights)) < self.elements,
             "running",
-            length=length or self.length,
+            length=length or 2 * self.waves * self.spacing,
             spacing=self.spacing,
-            ahead=self._stations(_AHEAD) * self.spacing,
-            behind=self._stations(_BEHIND) * self.spacing,
-            reach=self._stations(_AHEAD) // 2 * self.spacing,
+            ahead=self.stations(_AHEAD) * self.spacing,
+            behind=self.stations(_BEHIND) * self.spacing,
+            reach=self.stations(_AHEAD) // 2 * self.spacing,
             levels=levels,
             span=span,
         )
 
-    def _stations(self, ratio: float) -> int:
+    def effort(
+        self, section: Section, passes: Sequence[float], turns: int = 1, *, scattered: bool = False
+    ) -> Effort:
+        """Return the work of passes of ``turns`` loads in turn over the section, on one core.
+
+        If the loads are scattered, ever heavier ones come along, ever more rarely.
+        """
+        count, window = int(max(passes)), self.stations(_AHEAD) + self.stations(_BEHIND) + 1
+        zone = len(np.unique(section.dofs[: self.elements]))
+        factorised = (self.waves + 1) * zone
+        still = _STILL + _POINT * section.weights[: self.elements].size * window
+        yields = _YIELDS * turns * (1 - 0.5 ** (count / turns))
+        return Effort(
+            elements=len(section.weights),
+            unknowns=len(section.free),
+            increments=count,
+            most_increments=count,
+            seconds=still * (count + yields * (1 + math.log(count) * scattered)),
+            set_up=_FIRST + _FACTOR * factorised,
+            memory=_LEAST_BYTES + _BYTES * factorised,
+        )
+
+    def stations(self, ratio: float) -> int:
         """Return the number of stations that cover a ratio of the reach."""
         # a whole number is not rounded up, whatever the unit of length makes of its last digit
         return math.ceil(round(ratio * self.reach / self.spacing, 6))

@@ -24,7 +24,7 @@ _method, _program, _refinement, _warnings, _advice = late(
     "rolling.scenes.rolling_setup", "method", "program", "refinement", "warnings", "advice"
 )
 _model, _sketch = late("rolling.scenes.rolling_model", "model", "sketch")
-(_view,) = late("rolling.scenes.rolling_view", "view")
+(_view,) = late("rolling.scenes.rolling_setup", "view")
 (_effort,) = late("rolling.scenes.rolling_effort", "effort")
 (_trace,) = late("rolling.scenes.passes", "Trace.of")
 

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 from solver.loading.refinement import HALVINGS
-from solver.rolling.plane.endless import track_lines
-from solver.rolling.scenes.rolling_grids import half_space_nodes, rim_elements, wheel_nodes
+from solver.rolling.plane.lines import half_space_nodes, rim_elements, track_lines, wheel_nodes
 from solver.rolling.scenes.rolling_model import track_grid
 from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.scenes.effort import Effort

@@ -2,38 +2,148 @@
 
 from __future__ import annotations
 
-import time
+import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from solver.audit.report import Audit
-from solver.errors import LimitLoad, ModelError, NotConverged, Spins, WindowTooSmall
-from solver.loading.outcome import Outcome, Tally
-from solver.materials.doubts import doubts
-from solver.model.motion import TravellingPressure
+from solver.errors import LimitLoad, ModelError, NotConverged, Spins
+from solver.linear.threads import one_thread
+from solver.loading.bearing import too_much_shear
+from solver.materials.material import Material
+from solver.memory import kept
+from solver.model.amplitude import Amplitude
+from solver.model.friction import effective_friction
+from solver.model.motion import Axle
 from solver.results.run import FinishedRun
 from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
 from solver.results.tractions import PrescribedTractions, SurfaceTractions
 from solver.results.view import View
 from solver.rolling.audit.plane import audit_pass
-from solver.rolling.layers import Layers
+from solver.rolling.load import PassingLoad, RollingLoad
 from solver.rolling.passing import Pass, SolveBudget
-from solver.rolling.plane.touching import RollingContact
-from solver.rolling.plane.track import Track, standing_pressure
-from solver.rolling.results.plane import SteadyTractions, TrackBody, TrackState
+from solver.rolling.plane.layers import Layers
+from solver.rolling.plane.rolling import rolling
+from solver.rolling.plane.track import Track, standing_pressure, track_of
+from solver.rolling.plane.wheel import Rim, RollingContact, RollingWheel
+from solver.rolling.results.plane import SteadyTractions, TrackBody
+from solver.rolling.scenes.pass_runner import Passes, by_passes
 from solver.rolling.scenes.passes import Trace, shakedown_of
+from solver.rolling.scenes.rolling_model import wheel_body
 from solver.rolling.scenes.rolling_parameters import RollingParameters
-from solver.rolling.scenes.rolling_steady import steady_passes, track_for
+from solver.rolling.search import search
 from solver.scenes.driver import by_increments
 from solver.scenes.scene import Monitor, Scene
 from solver.tensors import to_tensor
 from solver.typing import Array
+
+_PARTS, _TOLERANCE = 4, 0.01
+"""Increments between two points of a row, and tolerance, of a pass on a coarser mesh."""
+
+
+def steady_passes(
+    parameters: RollingParameters,
+    reach: float = 1.0,
+    parts: int | None = None,
+    budget: SolveBudget | None = None,
+) -> Iterator[Pass[Layers]]:
+    """Yield the passes in their order.
+
+    Parameters
+    ----------
+    reach : ratio of the size of the window to the usual size
+    parts : increments between two points of a row, or None for the usual number
+    budget : counts the solves of each pass, as in `rolling`
+    """
+    p = parameters
+    track = track_for(p, reach)
+    block = p.block  # equal passes are one object
+    load_of = {id(own): load_on(track, p, own) for own in block}
+    loads = itertools.cycle(load_of[id(own)] for own in block)
+    guess = _first_guess(p, reach)
+    yield from rolling(
+        track, p.material(), loads, p.directions, guess=guess, parts=parts, budget=budget
+    )
+
+
+def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
+    """Return the strain of the first pass as found with elements of twice the side, or None.
+
+    Half of Newton's steps only come near the solution; on the coarser mesh they cost a fifth.
+    """
+    p = parameters
+    try:
+        coarse = replace(p, element_size=2 * p.element_size, growth=p.growth**2)
+        track = track_for(coarse, reach)
+        with one_thread():
+            found = search(
+                track, p.material(), load_on(track, coarse, coarse.of_pass(0)),
+                track.rows.virgin(p.material()), _first_guess(coarse, reach), parts=_PARTS,
+                tolerance=_TOLERANCE,
+            )  # fmt: skip
+    except LimitLoad:
+        raise
+    except (NotConverged, ModelError):
+        return None
+    return track_for(p, reach).rows.interpolated(found.strain, track.rows)
+
+
+def track_for(parameters: RollingParameters, reach: float = 1.0) -> Track:
+    """Return the half-space, built once in a process for each mesh."""
+    p = parameters
+    return track_of(p.mesh_width, p.element_size, p.growth, p.material().elasticity, reach)
+
+
+def rim_of(parameters: RollingParameters) -> Rim:
+    """Return the rim of the wheel, condensed once in a process for each wheel."""
+    p = parameters
+    return _rim(p.radius, p.widest.reach, p.element_size, p.wheel_material)
+
+
+@kept
+def _rim(radius: float, reach: float, h: float, material: Material) -> Rim:
+    still = Amplitude.constant(0.0)
+    axle = Axle(centre=(0.0, radius), radius=radius, force=still, moment=still, position=still)
+    return Rim(wheel_body(axle, reach, h, material), "rim")
+
+
+def load_on(track: Track, run: RollingParameters, parameters: RollingParameters) -> PassingLoad:
+    """Return the load of a pass, which moves along +x.
+
+    Parameters
+    ----------
+    run : parameters of the run, for the rim of its widest contact
+    parameters : those of the pass
+
+    Raises
+    ------
+    LimitLoad
+        if its prescribed shear is above the shear strength of the material
+    """
+    p = parameters
+    if p.load == "hertz":
+        shear = p.friction * abs(p.traction) * p.peak_pressure
+        if (limit := too_much_shear(p.material(), shear)) is not None:
+            raise limit
+        return track.hertz(p.peak_pressure, p.friction * p.traction, p.half_width)
+    friction = effective_friction(p.friction)
+    return RollingWheel(
+        track=track,
+        rim=rim_of(run),
+        friction=p.friction_part,
+        strength=p.material().shear_yield_stress,
+        load=RollingLoad(
+            force=p.force,
+            drive=None if p.guided else p.traction * friction * p.force,
+            creepage=1.0 if p.traction == 1.0 else p.given_creepage,
+        ),
+    )
+
 
 _REACHES = (1.0, 1.5, 2.5, 4.0)
 """Ratios of the size of the window to the usual size, tried in turn."""
@@ -48,28 +158,27 @@ def by_steady_passes(
 ) -> Iterator[FinishedRun]:
     """Compute pass after pass; yield the runs, which differ in the number of passes.
 
-    1. If yielding or contact reaches the edge of the window, begin again with a larger window.
-    2. If no steady pass is found, roll the remaining runs by increments on a short track: there a
-       wheel that sinks in may still be in equilibrium. A prescribed pressure above the limit load
-       and a wheel that spins cannot be.
+    If no steady pass is found, roll the remaining runs by increments on a short track: there a
+    wheel that sinks in may still be in equilibrium. A prescribed pressure above the limit load and
+    a wheel that spins cannot be.
     """
-    remaining = list(runs)
-    path = _SteadyPath(scene, runs[-1])
-    for reach in _REACHES:
-        for run in path.runs(remaining, monitor, reach):
-            remaining.pop(0)
-            yield run
-        if not isinstance(path.error, WindowTooSmall):
-            break
-    final = LimitLoad if runs[-1].load == "hertz" else Spins
-    if not isinstance(path.error, final) and remaining and (others := _on_short_track(remaining)):
+
+    def otherwise(
+        remaining: Sequence[RollingParameters], error: NotConverged
+    ) -> Iterator[FinishedRun] | None:
+        final = LimitLoad if runs[-1].load == "hertz" else Spins
+        others = [] if isinstance(error, final) else _on_short_track(remaining)
+        if not others:
+            return None
         length, side = others[0].length, others[0].element_size
-        note = f"{path.error}: rolled by increments instead, over {length:.4g} mm"
+        note = f"{error}: rolled by increments instead, over {length:.4g} mm"
         note += f" with elements of {side:.3g} mm"
-        for run in by_increments(scene, others, monitor):
-            yield replace(run, notes=(*run.notes, note))
-        return
-    yield from map(path.finished, remaining)
+        rolled = by_increments(scene, others, monitor)
+        return (replace(run, notes=(*run.notes, note)) for run in rolled)
+
+    return by_passes(
+        scene, runs, monitor, window=TrackPasses, reaches=_REACHES, otherwise=otherwise
+    )
 
 
 def _on_short_track(runs: Sequence[RollingParameters]) -> list[RollingParameters]:
@@ -89,152 +198,66 @@ def _on_short_track(runs: Sequence[RollingParameters]) -> list[RollingParameters
     return []
 
 
-class _SteadyPath:
-    """The steady passes of a loading path that are computed so far.
+class TrackPasses(Passes):
+    """Passes over a half-space; those along -x are mirrored."""
 
-    Attributes
-    ----------
-    error : why there are no more, or None
-    """
+    def __init__(self, parameters: RollingParameters, view: View, reach: float) -> None:
+        self.parameters, self.law, self._reach = parameters, parameters.material(), reach
+        self._track = track_for(parameters, reach)
+        self._ways = parameters.directions
+        self._by_way = {way: Samples(TrackBody(self._track, way), view) for way in set(self._ways)}
+        self._by_depth: dict[int, Array] = {}
 
-    def __init__(self, scene: Scene, last: RollingParameters) -> None:
-        self._scene, self._last = scene, last
-        self._started, self._elsewhere = time.process_time(), 0.0
-        self._budget = SolveBudget()
-        self.error: NotConverged | None = None
+    def found(self, budget: SolveBudget) -> Iterator[Pass[Layers]]:
+        """See `Passes`."""
+        return steady_passes(self.parameters, self._reach, budget=budget)
 
-    def _begin(self, reach: float) -> None:
-        last = self._last
-        view, track = self._scene.view(last), track_for(last, reach)
-        self._by_way = {way: _Direction(track, view, way) for way in set(last.directions)}
-        self._steps: list[int] = []
-        self._traces: list[Trace] = []
-        self._found: Pass[Layers] | None = None
-        self._previous: Pass[Layers] | None = None
+    def shown(self, number: int) -> tuple[Samples, SurfaceTractions]:
+        """See `Passes`."""
+        p, way = self.parameters.of_pass(number), self._ways[number]
+        if p.load == "contact":
+            return self._by_way[way], SteadyTractions(way)
+        shear = way * p.friction * p.traction
+        pressure = standing_pressure(p.half_width, p.peak_pressure, shear)
+        return self._by_way[way], PrescribedTractions(pressure)
 
-    def runs(
-        self, runs: Sequence[RollingParameters], monitor: Monitor, reach: float
-    ) -> Iterator[FinishedRun]:
-        """Yield those of the runs whose passes are found; ``error`` says why others are not.
-
-        ``reach`` is the ratio of the size of the window to the usual size.
-        """
-        last, remaining = self._last, list(runs)
-        try:
-            self._begin(reach)
-        except ModelError:
-            if self.error is None:
-                raise
-            return  # this window has too many elements: keep the error of the smaller one
-        self.error = None
-        try:
-            passes = steady_passes(last, reach, budget=self._budget)
-            for number, found in enumerate(passes, start=1):
-                self._previous, self._found = self._found, found
-                self._steps.append(max(found.steps, 1))
-                self._traces.append(self._by_way[found.direction].trace(found))
-                monitor(min(number / last.passes, 0.99))
-                decided = last.until == "decided" and _decided(last, self._traces)
-                while remaining and (decided or remaining[0].passes == number):
-                    run = self.finished(remaining.pop(0))
-                    paused = time.process_time()
-                    yield run
-                    self._elsewhere += time.process_time() - paused
-                if not remaining:
-                    return
-        except NotConverged as failure:
-            self.error = failure
-
-    def finished(self, run: RollingParameters) -> FinishedRun:
-        """Return a run with the results of the last pass found."""
-        found = self._found
-        direction = self._by_way[found.direction if found else self._last.directions[0]]
-        samples, body = direction.samples, direction.half_plane
-        view = samples.view
-        seconds = time.process_time() - self._started - self._elsewhere
-        points = direction.states(found) if found else {}
-        outcome = Outcome(
-            tally=Tally(iterations=tuple(self._steps), seconds=seconds, plastic_work=np.nan),
-            last=points.get(view.unloaded),
-            points=points,
-            traces=tuple(self._traces),
-            error=self.error,
+    def trace(self, found: Pass[Layers]) -> Trace:
+        """Return the trace of a pass, from the state that it leaves."""
+        left, elasticity = found.left.whole, self._track.elasticity
+        by_depth = self._profile(found.direction)
+        strain = np.maximum(by_depth @ left.accumulated, 0.0)
+        stress, flow = (
+            to_tensor((by_depth @ values).T)[None]
+            for values in (left.stress(elasticity), left.plastic_strain)
         )
+        contact = found.loading
+        creepage = contact.creepage if isinstance(contact, RollingContact) else np.nan
+        moved = left.displacement(elasticity)[:1]
+        peak = float(left.accumulated.max())
+        return Trace.at(stress, strain[None], flow, moved, creepage, peak)
 
-        previous, ways = self._previous, self._last.directions
-
-        def check() -> Audit:
-            assert found is not None
-            way = ways[len(self._steps) - 1]
-            return audit_pass(body.track, run.material(), found, previous, way)
-
-        own = run.of_pass(max(len(self._steps) - 1, 0))
-        return FinishedRun(
-            parameters=run,
-            samples=samples,
-            tractions=_tractions(own, body.way),
-            outcome=outcome,
-            check=check,
-            notes=doubts({view.profile_body: run.material()}),
-        )
-
-
-class _Direction:
-    """The half-space and its samples for passes along +x (``way`` 1) or -x (``way`` -1)."""
-
-    def __init__(self, track: Track, view: View, way: int) -> None:
-        self.half_plane = TrackBody(track, way)
-        self.samples = Samples(self.half_plane, view)
-
-    @cached_property
-    def _by_depth(self) -> Array:
-        """The matrix (n_depth, 1 + n_rows) from values at surface and rows to the profile."""
-        body, track = self.samples.view.profile_body, self.half_plane.track
+    def _profile(self, way: int) -> Array:
+        """Return the matrix (n_depth, 1 + n_rows) from surface and rows to the profile."""
+        if way in self._by_depth:
+            return self._by_depth[way]
+        samples, track = self._by_way[way], self._track
         rows, n = track.rows, track.part.weights.size
         each = np.zeros((1 + len(rows.every), n + len(rows.highest)))
         each[0, n:] = 1.0
         np.put_along_axis(each[1:], rows.every, 1.0, axis=1)
-        return self.samples.along_depth(self.samples.fields.recovered(body, each))[:, 0].T
+        nodal = samples.fields.recovered(samples.view.profile_body, each)
+        self._by_depth[way] = samples.along_depth(nodal)[:, 0].T
+        return self._by_depth[way]
 
-    def trace(self, found: Pass[Layers]) -> Trace:
-        """Return the trace of a pass, from the state that it leaves."""
-        left, elasticity = found.left.whole, self.half_plane.track.elasticity
-        strain = np.maximum(self._by_depth @ left.accumulated, 0.0)
-        stress, flow = (
-            to_tensor((self._by_depth @ values).T)[None]
-            for values in (left.stress(elasticity), left.plastic_strain)
+    def audit(self, found: Pass[Layers], previous: Pass[Layers] | None, number: int) -> Audit:
+        """See `Passes`."""
+        return audit_pass(self._track, self.law, found, previous, self._ways[number])
+
+    def decided(self, traces: Sequence[Trace]) -> bool:
+        """Return whether the passes so far decide the shakedown state, if they end then."""
+        if self.parameters.until != "decided":
+            return False
+        return (
+            shakedown_of(self.parameters, traces, self.parameters.cycle).state
+            is not ShakedownState.UNDECIDED
         )
-        contact = found.loading
-        return Trace(
-            stress=stress,
-            strain=strain[None],
-            flow=flow,
-            surface=left.displacement(elasticity)[:, None],
-            creepage=contact.creepage if isinstance(contact, RollingContact) else np.nan,
-            peak=float(left.accumulated.max()),
-        )
-
-    def states(self, found: Pass[Layers]) -> dict[str, TrackState]:
-        """Return the states of a pass by the names of their stages."""
-        loaded, left = self.half_plane.under_load(found), self.half_plane.left_by(found)
-        view = self.samples.view
-        return {name: left if name == view.unloaded else loaded for name in view.stages}
-
-
-def _decided(parameters: RollingParameters, traces: Sequence[Trace]) -> bool:
-    """Tell whether the passes so far decide the shakedown state."""
-    state = shakedown_of(parameters, traces).state
-    return state is not ShakedownState.UNDECIDED
-
-
-def _tractions(parameters: RollingParameters, way: int) -> SurfaceTractions:
-    """Return pressure and shear on the half-space."""
-    if parameters.load == "contact":
-        return SteadyTractions(way)
-    return PrescribedTractions(_moving(parameters, way))
-
-
-def _moving(parameters: RollingParameters, way: int) -> TravellingPressure:
-    """Return the Hertz pressure, at x = 0."""
-    p, ratio = parameters, way * parameters.friction * parameters.traction
-    return standing_pressure(p.half_width, p.peak_pressure, ratio)

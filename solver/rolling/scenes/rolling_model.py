@@ -13,9 +13,8 @@ from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.model.motion import Axle, TravellingPressure
-from solver.rolling.plane.endless import track_lines
+from solver.rolling.plane.lines import half_space_nodes, track_lines, wheel_nodes
 from solver.rolling.plane.track import CONTACT, half_space_body, standing_pressure
-from solver.rolling.scenes.rolling_grids import half_space_nodes, wheel_nodes
 from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.scenes.sketch import Sketch
 

@@ -12,7 +12,7 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.loading.refinement import HALVINGS
 from solver.parameters import Accuracy, Other, by_accuracy, described
-from solver.rolling.plane.endless import MOST_COLUMNS, window_elements
+from solver.rolling.plane.lines import MOST_COLUMNS, window_elements
 from solver.rolling.scenes.schedule import Schedule
 from solver.rolling.scenes.sequence import block_of
 from solver.rolling.scenes.wheel_parameters import WheelParameters

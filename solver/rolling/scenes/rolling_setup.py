@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from solver.loading.program import Program
 from solver.loading.refinement import StepRefinement
-from solver.results.cycles import (
-    SHAKEDOWN_STATE,
-    STEADY_NET_INCREMENT,
-    STEADY_PLASTIC_INCREMENT,
-)
+from solver.mesh.lines import cells
 from solver.results.quantities import Quantity, declare
 from solver.results.record import Status
 from solver.results.run import FinishedRun, Values
+from solver.results.shakedown import Shakedown, ShakedownState
+from solver.results.view import View
+from solver.rolling.plane.lines import recorded_step
 from solver.rolling.results.free_surface import FreeSurface
-from solver.rolling.scenes.passes import Trace, passes, shakedown_of
+from solver.rolling.scenes.passes import Trace, passes, profiles, shakedown, shakedown_of
 from solver.rolling.scenes.rolling_endless import by_steady_passes
 from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.scenes.driver import by_increments
@@ -175,14 +178,24 @@ def surface(run: FinishedRun) -> Values:
 
 def cycles(run: FinishedRun) -> Values:
     """Return the results of every pass, and the shakedown state that the passes tend to."""
-    parameters = run.parameters
-    found = shakedown_of(parameters, run.outcome.traces)
+    parameters, traces = run.parameters, run.outcome.traces
     return {
-        **passes(run.outcome.traces, parameters.cycle),
-        SHAKEDOWN_STATE: found.state,
-        STEADY_PLASTIC_INCREMENT: found.accumulated,
-        STEADY_NET_INCREMENT: found.net,
+        **passes(traces, parameters.cycle),
+        **profiles(traces, parameters.cycle),
+        **shakedown(state_of(parameters, traces)),
     }
+
+
+def state_of(parameters: RollingParameters, traces: Sequence[Trace]) -> Shakedown:
+    """Return the shakedown state that passes over a half-space tend to.
+
+    On a track with ends a body that yields stays undecided: the ends constrain the layer that
+    ratchetting moves, so that the cycle seems closed.
+    """
+    found = shakedown_of(parameters, traces, parameters.cycle)
+    if parameters.endless or found.state is ShakedownState.ELASTIC:
+        return found
+    return replace(found, state=ShakedownState.UNDECIDED)
 
 
 def warnings(run: FinishedRun) -> tuple[str, ...]:
@@ -210,3 +223,52 @@ def advice(parameters: RollingParameters) -> dict[Status, str]:
         if parameters.endless
         else f"reduce advance_step, or {refined}",
     }
+
+
+_EXTENT = 4.0
+"""Ratio of the largest x of results on an endless track to the Hertz half-width."""
+
+
+def view(parameters: RollingParameters) -> View:
+    """Return the positions of results, which depend on dimensions and not on the mesh."""
+    if parameters.endless:
+        return _around_the_load(parameters.widest.half_width)
+    half, a = parameters.length / 2, parameters.half_width
+    edge = math.ceil(half + max(2 * a, parameters.spread))
+    places = round(edge / recorded_step(a))
+    return View(
+        x=np.linspace(-edge, edge, places + 1),
+        y=-_pixels(a),
+        depth=_depths(a),
+        station=np.array([-10.0, 0.0, 10.0]) * min(1.0, parameters.length / 50.0),
+        s=np.linspace(-edge, edge, 2 * places + 1),
+        profile_body="half_space",
+        surfaces={"half_space": "top"},
+        stages=("loaded", "mid_track", "unloaded"),
+        loaded="mid_track",
+        following=("loaded",),
+    )
+
+
+def _around_the_load(a: float) -> View:
+    """Return the positions of results on an endless track for the half-width a [mm]."""
+    return View(
+        x=a * np.linspace(-_EXTENT, _EXTENT, 161),
+        y=-_pixels(a),
+        depth=_depths(a),
+        station=np.array([0.0]),
+        s=a * np.linspace(-_EXTENT, _EXTENT, 641),
+        profile_body="half_space",
+        surfaces={"half_space": "top"},
+        stages=("loaded", "unloaded"),
+    )
+
+
+def _pixels(a: float) -> Array:
+    """Return the depths of the map for the half-width a [mm]."""
+    return cells(5 * a, smallest=a / 64, ratio=1.05, largest=a / 16)
+
+
+def _depths(a: float) -> Array:
+    """Return the depths of profiles for the half-width a [mm]."""
+    return np.concatenate([np.linspace(0.0, 3 * a, 121), np.linspace(3.1 * a, 6 * a, 30)])

@@ -15,10 +15,13 @@ from solver.late import late
 from solver.rolling.scenes.rail_scene import rail_scene
 from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
 
+(_geometry,) = late("rolling.scenes.wheel_rail_track", "geometry")
+
 WHEEL_RAIL = rail_scene(
     "wheel_rail",
     "railway wheel rolling along an elastic-plastic rail, in three dimensions",
     WheelRailParameters,
+    geometry=_geometry,
     outputs=late("rolling.scenes.wheel_rail_setup", "traffic", "wheel"),
     advice="choose a finer accuracy, above all at the gauge corner, or another "
     "position; or lower load or traction",

@@ -13,8 +13,8 @@ from solver.errors import ModelError
 from solver.materials import Elasticity
 from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from solver.rolling.rail.profiles.meshed_rail import MeshedRail
+from solver.rolling.rail.profiles.points import RUNNING, SectionMesh
 from solver.rolling.rail.profiles.rail import Rail, RailSection, rail_60e1
-from solver.rolling.rail.profiles.section_mesh import RUNNING, SectionMesh
 from solver.rolling.rail.profiles.wheel_profile import (
     WheelProfile,
     conical,

@@ -13,12 +13,11 @@ from solver.errors import ModelError
 from solver.late import late
 from solver.parameters import Other, Stress, described
 from solver.parts import declared
-from solver.rolling.rail.profiles.points import as_points
-from solver.rolling.rail.profiles.section_mesh import SectionMesh
+from solver.rolling.load import RollingLoad
+from solver.rolling.rail.profiles.points import SectionMesh, as_points
 from solver.rolling.scenes.initial_stress import INITIAL_STRESS, SectionStress
 from solver.rolling.scenes.rail_parameters import PrismParameters
-from solver.rolling.scenes.sequence import block_of
-from solver.rolling.scenes.traffic import CUT, check_spreads, deviations
+from solver.rolling.scenes.sequence import CUT, block_of, check_spreads, deviations
 
 ELEMENT_SIZE: Mapping[str, float] = {"draft": 2.0, "standard": 1.0, "fine": 0.5}
 """Side of the elements under the contact, across and in depth [mm]."""
@@ -257,12 +256,11 @@ class WheelRailParameters(PrismParameters):
             found += [own.deviating((CUT, place, 0.0)) for place in places]
         return found
 
-    @property
-    def motion(self) -> Mapping[str, Any]:
-        """Drive, lateral force, creepages and spin; see `PrismParameters.motion`."""
-        own: Mapping[str, Any] = PrismParameters.motion.fget(self)  # type: ignore[attr-defined]
-        force = self.given_lateral_force if self.lateral_control == "force" else None
-        return {**own, "lateral_force": force, "spin": self.spin}
+    def under(self, force: float) -> RollingLoad:
+        """See `PrismParameters`."""
+        lateral = self.given_lateral_force if self.lateral_control == "force" else None
+        own = PrismParameters.under(self, force)
+        return replace(own, lateral_force=lateral, spin=self.spin)
 
     @property
     def element_size(self) -> float:

@@ -12,13 +12,13 @@ from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values
 from solver.results.view import ACROSS_TRACK, View
 from solver.rolling.rail.patch_contact import PatchContact
-from solver.rolling.scenes.rail_effort import effort_of
+from solver.rolling.scenes.pass_runner import by_passes
 from solver.rolling.scenes.rail_outputs import cycles, sketched
-from solver.rolling.scenes.rail_passes import by_passes
+from solver.rolling.scenes.rail_passes import REACHES, RailPasses
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
 from solver.rolling.scenes.wheel_rail_contact import expected_contact, wheel_of
 from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.rolling.scenes.wheel_rail_track import RailGeometry, RolledRail, geometry, meshed
+from solver.rolling.scenes.wheel_rail_track import RolledRail, geometry, meshed
 from solver.scenes.effort import Effort
 from solver.scenes.scene import Method
 from solver.scenes.sketch import Sketch
@@ -53,7 +53,7 @@ def method(parameters: WheelRailParameters) -> Method:
     """Return the method of the passes."""
     del parameters
 
-    return partial(by_passes, rolled=RolledRail)
+    return partial(by_passes, window=partial(RailPasses, RolledRail), reaches=REACHES)
 
 
 def view(parameters: WheelRailParameters) -> View:
@@ -95,11 +95,6 @@ def traffic(run: FinishedRun) -> Values:
     }
 
 
-def setup(parameters: WheelRailParameters) -> RailGeometry:
-    """Return the geometry of the rail, which decides its set-up."""
-    return geometry(parameters)
-
-
 def wheel(run: FinishedRun) -> Values:
     """Return the wheel of the last pass: its profile as it touches the rail, height, and slip.
 
@@ -125,7 +120,4 @@ def _at_first_touch(p: WheelRailParameters, z: Array) -> Array:
 def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
     own, turns = geometry(parameters), len({id(each) for each in parameters.block})
-    return effort_of(
-        meshed(parameters, own), own.window.size, passes, turns=turns,
-        scattered=parameters.scattered,
-    )  # fmt: skip
+    return own.effort(meshed(parameters, own), passes, turns, scattered=parameters.scattered)

@@ -7,22 +7,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from solver.errors import ModelError
-from solver.materials import Elasticity
 from solver.memory import kept
 from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.profiles.meshed_rail import MeshedRail, ZonedMesh
-from solver.rolling.rail.profiles.section_mesh import SectionMesh
+from solver.rolling.rail.profiles.points import SectionMesh
 from solver.rolling.rail.profiles.zone import Zone, rail_mesh
 from solver.rolling.rail.section import Section
 from solver.rolling.rail.straight import SettledStress, StraightPrism, check_elastic
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.initial_stress import NoStress, SectionStress
-from solver.rolling.scenes.rail_window import PrismWindow, split_rows, whole
+from solver.rolling.scenes.rail_window import PrismGeometry, split_rows, whole
 from solver.rolling.scenes.wheel_rail_contact import (
     canted,
     expected_contact,
@@ -55,41 +53,28 @@ _LEVELS = 4
 """Levels of the far field: the last one is 260 m long, where a rail on 21 MPa turns over 10 m."""
 
 
-@dataclass(frozen=True, slots=True)
-class RailGeometry:
-    """All that the set-up of a rail depends on; runs with equal geometry share it.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RailGeometry(PrismGeometry):
+    """The geometry of a rail.
 
     Attributes
     ----------
     profile, cant, foundation : of the rail
     span : length of a rail clamped at both ends, the wheel in its middle [mm]; None if it is
         endless
-    elasticity : Young's modulus and Poisson ratio of the rail
-    at, half_width, depth, size, split : of the zone, see `Zone`
-    spacing, reach : distance of stations; half the length where the load may act [mm]
+    at : of the zone, see `Zone` [mm]
     """
 
     profile: str | Points | SectionMesh
     cant: float
     foundation: float
     span: float | None
-    elasticity: tuple[float, float]
     at: float
-    half_width: float
-    depth: float
-    size: float
-    split: int
-    spacing: float
-    reach: float
 
     @property
-    def window(self) -> PrismWindow:
-        """Where the rail may yield."""
-        own = mesh_of(self)
-        return PrismWindow(
-            columns=own.columns, elements=own.elements, half_width=self.half_width,
-            spacing=self.spacing, reach=self.reach,
-        )  # fmt: skip
+    def elements(self) -> int:
+        """See `PrismGeometry`."""
+        return mesh_of(self).elements
 
 
 def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometry:
@@ -207,17 +192,17 @@ def mesh_of(own: RailGeometry) -> ZonedMesh:
     rail = canted(own.profile, own.cant)
     if isinstance(rail, MeshedRail):
         return rail.zoned(zone, _COARSE * own.size)
-    return ZonedMesh(rail_mesh(rail, zone), zone.columns, zone.elements)
+    return ZonedMesh(rail_mesh(rail, zone), zone.elements)
 
 
 @kept
 def section_of(own: RailGeometry) -> Section:
     """Return the meshed section of a rail on its foundation."""
-    (E, nu), rail = own.elasticity, canted(own.profile, own.cant)
+    rail = canted(own.profile, own.cant)
     spring = own.foundation / (rail.foot if isinstance(rail, MeshedRail) else _FOOT)
     return Section(
         mesh_of(own).mesh,
-        Elasticity(youngs_modulus=E, poisson_ratio=nu),
+        own.material,
         springs={"foot": (spring, spring, spring)},
     )
 
@@ -264,7 +249,7 @@ def track_of(own: RailGeometry, length: float | None = None) -> PrismTrack:
     ----------
     length : after which waves repeat [mm]; by default long enough for a pass
     """
-    return own.window.track(section_of(own), _LEVELS, length=length, span=own.span)
+    return own.track(section_of(own), _LEVELS, length=length, span=own.span)
 
 
 @kept
@@ -293,12 +278,14 @@ class RolledRail:
         p, last = self._passes[number], self._made
         if last is not None and last[:2] == (track, p):
             return last[2]
-        wheel = wheel_of(p)
+        wheel, rolls = wheel_of(p), p.under(p.load)
         if last is not None and last[0] is track:
-            make = last[2].with_wheel(wheel).with_load
+            made = last[2].changed(wheel=wheel, friction=p.friction, load=rolls)
         else:
-            make = partial(RollingPatch, track.grid, track.compliance, wheel)
-        made = make(friction=p.friction, force=p.load, **p.motion)
+            made = RollingPatch(
+                grid=track.grid, compliance=track.compliance, wheel=wheel, friction=p.friction,
+                load=rolls,
+            )  # fmt: skip
         self._made = track, p, made
         return made
 

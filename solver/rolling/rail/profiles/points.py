@@ -1,10 +1,10 @@
-"""Curves given by points, in memory or in a file."""
+"""Curves given by points, in memory or in a file, and sections given by a mesh."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -75,3 +75,29 @@ def checked_points(points: Array, field: str = "points") -> Array:
         allowed = f"must be points whose z increases; these are number {k} and {k + 1}"
         raise ModelError(field, X[:, k : k + 2].T.tolist(), allowed)
     return X
+
+
+RUNNING, FOOT = "running", "foot"
+"""Lines that a section must have: where the wheel may touch, and where the foundation acts."""
+
+
+class SectionMesh(NamedTuple):
+    """A mesh of quadrilaterals with the lines `RUNNING` and `FOOT`, as plain numbers.
+
+    Attributes
+    ----------
+    points : positions z, y [mm]
+    cells : numbers of the points of each element, from 0 on: four corners, or with the middles of
+        the sides
+    running, foot : pairs of corners, the edges of the lines
+    """
+
+    points: tuple[tuple[float, float], ...]
+    cells: tuple[tuple[int, ...], ...]
+    running: tuple[tuple[int, int], ...]
+    foot: tuple[tuple[int, int], ...]
+
+    @property
+    def told(self) -> str:
+        """The mesh in a few words, for errors."""
+        return f"a mesh of {len(self.cells)} elements"

@@ -3,9 +3,9 @@
 If Newton's method fails although a pass may exist, try in turn:
 
 1. if the first contact problem has no solution: the same load with smaller moments first
-2. on a track that was not rolled: the same load with more hardening, which is then reduced to that
+2. on a body that has not yielded: the same load with more hardening, which is then reduced to that
    of the material; then a heavier load, and back
-3. on a track that was rolled: lighter loads first
+3. on one that has yielded: lighter loads first
 
 If friction exceeds the shear strength of a material without hardening, the contact flattens until
 it does not; more than 30 % of plastic strain in a pass counts as the limit load.
@@ -22,11 +22,9 @@ import numpy as np
 from solver.errors import LimitLoad, NoContact, NotConverged, Spins, TooLong, WindowTooSmall
 from solver.materials.law import Law
 from solver.materials.material import Material
-from solver.rolling.layers import Layers
-from solver.rolling.load import PassingLoad
+from solver.rolling.body import PassedBody, S
+from solver.rolling.load import AppliedLoad, PassingLoad, RollingLoad
 from solver.rolling.passing import TOLERANCE, Pass, SolveBudget, passing
-from solver.rolling.plane.touching import RollingContact
-from solver.rolling.plane.track import Track
 from solver.typing import Array
 
 _HARDEST, _SOFTEST = 0.024, 1e-4
@@ -46,61 +44,86 @@ _PARTS, _TOLERANCE = 8, 2e-3
 
 
 def search(
-    track: Track,
+    track: PassedBody[S],
     material: Law,
     load: PassingLoad,
-    before: Layers,
+    before: S,
     guess: Array | None = None,
     *,
+    start: AppliedLoad | None = None,
     parts: int | None = None,
     tolerance: float = TOLERANCE,
     budget: SolveBudget | None = None,
-) -> Pass[Layers]:
+    wider: bool = True,
+) -> Pass[S]:
     """Return the steady pass that `passing` finds, from this guess or by continuation.
 
-    Parameters are those of `passing`.
+    Other parameters are those of `passing`.
+
+    Parameters
+    ----------
+    wider : whether an easier pass that needs a larger window, or too many solves, is an error of
+        its own; if not, the error is that of the pass itself
 
     Raises
     ------
-    LimitLoad, WindowTooSmall, TooLong, NotConverged
+    LimitLoad, WindowTooSmall, TooLong, Spins, NotConverged
         as `passing` does, `TooLong` for all attempts together; `LimitLoad` also if a pass adds more
         than 30 % of plastic strain in a material without hardening
     """
     budget = budget or SolveBudget()
 
-    def exactly(load: PassingLoad, guess: Array | None = None) -> Pass[Layers]:
-        return passing(
-            track, material, load, before, guess, parts=parts, tolerance=tolerance, budget=budget
-        )
-
-    def eased(load: PassingLoad, ratio: float, guess: Array | None) -> Pass[Layers]:
-        return passing(
-            track, _linear(material, ratio), load, before, guess, parts=_PARTS,
-            tolerance=_TOLERANCE, budget=budget,
+    def rolled(
+        law: Law, rolls: RollingLoad, guess: Array | None, parts: int | None, tolerance: float
+    ) -> Pass[S]:
+        nonlocal start
+        found = passing(
+            track, law, load.changed(load=rolls), before, guess, start=start, parts=parts,
+            tolerance=tolerance, budget=budget,
         )  # fmt: skip
+        start = found.loading.start
+        return found
+
+    def exactly(rolls: RollingLoad, guess: Array | None = None) -> Pass[S]:
+        return rolled(material, rolls, guess, parts, tolerance)
+
+    def eased(rolls: RollingLoad, ratio: float, guess: Array | None) -> Pass[S]:
+        return rolled(_linear(material, ratio), rolls, guess, _PARTS, _TOLERANCE)
 
     own = 0.0
     if isinstance(material, Material) and material.hardens:
         own = material.hardening_ratio
     largest = np.inf if material.hardens else _LARGE
-    found = _tried(exactly, load, guess)
-    if isinstance(found, NoContact):  # contact on the elastic track differs from the final one
-        found = _approached(exactly, load.driven, _LIGHTER, None, found)
-    if isinstance(found, NoContact):
-        _check_spinning(exactly, load)
-    # on a rolled track more hardening would act on strain that accumulated with less hardening
-    if own < _HARDEST and not before.accumulated.any():
-        if isinstance(found, NotConverged):
-            found = _tried(_fading, partial(eased, load), partial(exactly, load), own, largest)
-        if isinstance(found, NotConverged) and not isinstance(found, LimitLoad):
-            above = load.scaled(_HEAVIER[0])
-            begun = _tried(_fading, partial(eased, above), partial(exactly, above), own, np.inf)
-            found = _approached(exactly, load.scaled, _HEAVIER[1:], begun, found)
-    else:
-        if guess is not None and isinstance(found, NotConverged):  # the guess may be unsuitable
-            found = _tried(exactly, load)
-        if isinstance(found, NotConverged):
-            found = _approached(exactly, load.scaled, _LIGHTER, None, found)
+    rolls = load.load
+
+    def easier(found: Pass[S] | NotConverged) -> Pass[S] | NotConverged:
+        if isinstance(found, NoContact):  # contact on the elastic track differs from the final one
+            found = _approached(exactly, rolls.driven, _LIGHTER, None, found)
+        if isinstance(found, NoContact):
+            _check_spinning(exactly, rolls)
+        # on a body that has yielded more hardening would act on strain accumulated with less
+        if own < _HARDEST and not before.accumulated.any():
+            if isinstance(found, NotConverged):
+                found = _tried(
+                    _fading, partial(eased, rolls), partial(exactly, rolls), own, largest
+                )
+            if isinstance(found, NotConverged) and not isinstance(found, LimitLoad):
+                above = rolls.scaled(_HEAVIER[0])
+                begun = _tried(_fading, partial(eased, above), partial(exactly, above), own, np.inf)
+                found = _approached(exactly, rolls.scaled, _HEAVIER[1:], begun, found)
+        else:
+            if guess is not None and isinstance(found, NotConverged):  # it may be unsuitable
+                found = _tried(exactly, rolls)
+            if isinstance(found, NotConverged):
+                found = _approached(exactly, rolls.scaled, _LIGHTER, None, found)
+        return found
+
+    found = _tried(exactly, rolls, guess)
+    try:
+        found = easier(found)
+    except (WindowTooSmall, TooLong):
+        if wider:
+            raise
     if isinstance(found, NotConverged):
         raise found
     if found.most_added > largest:
@@ -126,38 +149,37 @@ def _excessive(ratio: float) -> LimitLoad:
     return LimitLoad(f"{much}: this counts as the limit")
 
 
-def _check_spinning(exactly: Callable[[PassingLoad], Pass[Layers]], load: PassingLoad) -> None:
+def _check_spinning(exactly: Callable[[RollingLoad], Pass[Any]], load: RollingLoad) -> None:
     """Raise `Spins` if the moment on a wheel exceeds that of full slip.
 
     Full slip may carry less than friction times load: shear on a slope carries a part of the load,
     and pressure shortens the rim along which shear works.
     """
-    most = _tried(exactly, load.slipping) if load.moment else None
-    if most is None or isinstance(most, NotConverged):
+    most = _tried(exactly, load.slipping) if load.drive else None
+    if load.drive is None or most is None or isinstance(most, NotConverged):
         return
-    assert isinstance(most.loading, RollingContact)
-    carried = most.loading.moment / load.moment
+    carried = most.loading.moment / load.drive
     if carried < 1.0:
         much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"
         raise Spins(much, carried, 1.0)
 
 
-def _tried(solve: Callable[..., Pass[Layers]], *given: Any) -> Pass[Layers] | NotConverged:
-    """Return a pass, or the reason why it was not found; raise `WindowTooSmall` and `TooLong`."""
+def _tried(solve: Callable[..., Pass[S]], *given: Any) -> Pass[S] | NotConverged:
+    """Return a pass, or the reason why it was not found; raise what no easier pass can mend."""
     try:
         return solve(*given)
-    except (WindowTooSmall, TooLong):
+    except (WindowTooSmall, TooLong, Spins):
         raise
     except NotConverged as failure:
         return failure
 
 
 def _fading(
-    eased: Callable[[float, Array | None], Pass[Layers]],
-    exactly: Callable[[Array | None], Pass[Layers]],
+    eased: Callable[[float, Array | None], Pass[S]],
+    exactly: Callable[[Array | None], Pass[S]],
     own: float,
     largest: float,
-) -> Pass[Layers]:
+) -> Pass[S]:
     """Return the pass found by reducing the hardening ratio, in smaller steps if one fails.
 
     No pass may add more plastic strain than ``largest``. If the first pass is not found and the
@@ -172,7 +194,7 @@ def _fading(
     """
     ratio, share = _HARDEST, _SHARE
     stiffest = _STIFFEST if own else _HARDEST
-    found: Pass[Layers] | None = None
+    found: Pass[S] | None = None
     while True:
         guess = found.strain if found else None
         last = ratio <= max(own, _SOFTEST)
@@ -196,12 +218,12 @@ def _fading(
 
 
 def _approached(
-    exactly: Callable[..., Pass[Layers]],
-    eased: Callable[[float], PassingLoad],
+    exactly: Callable[..., Pass[S]],
+    eased: Callable[[float], RollingLoad],
     shares: tuple[float, ...],
-    begun: Pass[Layers] | NotConverged | None,
+    begun: Pass[S] | NotConverged | None,
     failure: NotConverged,
-) -> Pass[Layers] | NotConverged:
+) -> Pass[S] | NotConverged:
     """Return the pass found by changing the load through ``shares`` to 1, or ``failure``.
 
     ``eased`` gives the load for a share; ``begun`` is the pass to start from, None for no guess.

@@ -16,36 +16,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.materials.elasticity import Elasticity
-from solver.materials.state import PlasticState
+from solver.rolling.body import LeftState
 from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True)
-class Layers:
-    """Internal variables by depth; never changed, only replaced.
+class Layers(LeftState):
+    """The state by depth.
 
     Attributes
     ----------
     depth : (n,) depths of the rows of integration points, increasing [mm]
     thickness : (n,) thickness of the layer of each row [mm]
-    state : internal variables of the law at the n depths
     surface : the layer at depth zero, without thickness; None in that layer itself
     """
 
     depth: Array
     thickness: Array
-    state: PlasticState
     surface: Layers | None = None
-
-    @property
-    def plastic_strain(self) -> Array:
-        """Plastic strain (n, 4), Mandel."""
-        return np.ascontiguousarray(self.state.plastic_strain.T)
-
-    @property
-    def accumulated(self) -> Array:
-        """Accumulated plastic strain (n,)."""
-        return self.state.accumulated
 
     @property
     def top(self) -> Layers:
@@ -62,7 +50,7 @@ class Layers:
             for name in ("depth", "thickness")
         )
         packed = np.concatenate([each.state.packed for each in both], axis=1)
-        return Layers(depth, thickness, self.state.unpacked(packed))
+        return Layers(self.state.unpacked(packed), depth, thickness)
 
     def strain(self, elasticity: Elasticity) -> Array:
         """Return total strain (n, 4), Mandel."""

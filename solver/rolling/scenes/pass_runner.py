@@ -1,0 +1,191 @@
+"""Runs of steady passes: pass after pass, in windows of several sizes around the load."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Any, cast
+
+import numpy as np
+
+from solver.audit.report import Audit
+from solver.errors import ModelError, NotConverged, WindowTooSmall
+from solver.loading.outcome import Outcome, Tally
+from solver.materials.doubts import doubts
+from solver.materials.law import Law
+from solver.results.mesh_fields import MeshFields
+from solver.results.run import FinishedRun
+from solver.results.samples import Samples
+from solver.results.tractions import SurfaceTractions
+from solver.results.view import View
+from solver.rolling.passing import Pass, SolveBudget
+from solver.rolling.results.stage import SteadyBody
+from solver.scenes.scene import Monitor, Scene
+
+
+class Passes(ABC):
+    """The passes of a loading path in a window of one size, and what results need of them.
+
+    Making it raises `ModelError` if there is no room for the window.
+
+    Attributes
+    ----------
+    parameters : those of the run with the most passes
+    law : law of the material
+    extent : size of the window in words, for the error that the largest one is too small
+    beside : (pass) -> fields of a further body, None without
+    """
+
+    parameters: Any
+    law: Law
+    extent = ""
+    beside: Callable[[Pass[Any]], MeshFields] | None = None
+
+    @abstractmethod
+    def found(self, budget: SolveBudget) -> Iterator[Pass[Any]]:
+        """Yield the passes in their order; ``budget`` counts the solves of each."""
+
+    @abstractmethod
+    def shown(self, number: int) -> tuple[Samples, SurfaceTractions]:
+        """Return the fields of a `SteadyBody`, pressure and shear in a pass, counted from 0."""
+
+    @abstractmethod
+    def trace(self, found: Pass[Any]) -> Any:
+        """Return what is kept of each pass."""
+
+    @abstractmethod
+    def audit(self, found: Pass[Any], previous: Pass[Any] | None, number: int) -> Audit:
+        """Return the audit of a pass, counted from 0, and the one before it."""
+
+    def decided(self, traces: Sequence[Any]) -> bool:
+        """Return whether the passes so far are enough for all runs."""
+        del traces
+        return False
+
+
+Window = Callable[[Any, View, float], Passes]
+"""(parameters, positions of results, ratio of the window to its usual size) -> passes."""
+Otherwise = Callable[[Sequence[Any], NotConverged], Iterator[FinishedRun] | None]
+"""(remaining runs, why their passes are not found) -> the runs found in another way, or None."""
+
+
+def by_passes(
+    scene: Scene,
+    runs: Sequence[Any],
+    monitor: Monitor,
+    *,
+    window: Window,
+    reaches: Sequence[float],
+    otherwise: Otherwise = lambda remaining, error: None,
+) -> Iterator[FinishedRun]:
+    """Compute pass after pass; yield the runs, which differ in the number of passes.
+
+    If yielding or contact reaches the edge of the window, begin again with a larger window.
+
+    Parameters
+    ----------
+    reaches : ratios of the size of the window to the usual size, tried in turn
+    """
+    remaining = list(runs)
+    path = _Path(scene, runs[-1], window)
+    for reach in reaches:
+        for run in path.runs(remaining, monitor, reach):
+            remaining.pop(0)
+            yield run
+        if not isinstance(path.error, WindowTooSmall):
+            break
+    others = otherwise(remaining, path.error) if path.error and remaining else None
+    yield from map(path.finished, remaining) if others is None else others
+
+
+class _Path:
+    """The passes of a loading path that are computed so far.
+
+    Attributes
+    ----------
+    error : why there are no more, or None
+    """
+
+    def __init__(self, scene: Scene, last: Any, window: Window) -> None:
+        self._last, self._window, self._view = last, window, scene.view(last)
+        self._started, self._elsewhere = time.process_time(), 0.0
+        self._budget = SolveBudget()
+        self.error: NotConverged | None = None
+
+    def _begin(self, reach: float) -> None:
+        self._passes = self._window(self._last, self._view, reach)
+        self._steps: list[int] = []
+        self._traces: list[Any] = []
+        self._found: Pass[Any] | None = None
+        self._previous: Pass[Any] | None = None
+
+    def runs(self, runs: Sequence[Any], monitor: Monitor, reach: float) -> Iterator[FinishedRun]:
+        """Yield those of the runs whose passes are found; ``error`` says why others are not.
+
+        ``reach`` is the ratio of the size of the window to the usual size.
+        """
+        remaining = list(runs)
+        try:
+            self._begin(reach)
+        except ModelError:
+            if self.error is None:
+                raise
+            return  # this window has no room: keep the error of the smaller one
+        self.error = None
+        try:
+            for number, found in enumerate(self._passes.found(self._budget), start=1):
+                self._previous, self._found = self._found, found
+                self._steps.append(max(found.steps, 1))
+                self._traces.append(self._passes.trace(found))
+                monitor(min(number / self._last.passes, 0.99))
+                decided = self._passes.decided(self._traces)
+                while remaining and (decided or remaining[0].passes == number):
+                    run = self.finished(remaining.pop(0))
+                    paused = time.process_time()
+                    yield run
+                    self._elsewhere += time.process_time() - paused
+                if not remaining:
+                    return
+        except NotConverged as failure:
+            self.error = failure
+
+    def finished(self, run: Any) -> FinishedRun:
+        """Return a run with the results of the last pass found."""
+        passes, found, previous = self._passes, self._found, self._previous
+        number = max(len(self._steps) - 1, 0)
+        (samples, tractions), points, beside = passes.shown(number), {}, None
+        view, body = samples.view, cast("SteadyBody", samples.system)
+        if found is not None and self.error is None:
+            loaded, left = body.under_load(found), body.left_by(found)
+            points = {name: left if name == view.unloaded else loaded for name in view.stages}
+            if (fields := passes.beside) is not None:
+                beside = partial(fields, found)
+        seconds = time.process_time() - self._started - self._elsewhere
+
+        def check() -> Audit:
+            assert found is not None
+            return passes.audit(found, previous, number)
+
+        return FinishedRun(
+            parameters=run,
+            samples=samples,
+            tractions=tractions,
+            outcome=Outcome(
+                tally=Tally(iterations=tuple(self._steps), seconds=seconds, plastic_work=np.nan),
+                last=points.get(view.unloaded),
+                points=points,
+                traces=tuple(self._traces),
+                error=self._reported(),
+            ),
+            check=check,
+            notes=doubts({view.profile_body: passes.law}),
+            beside=beside,
+        )
+
+    def _reported(self) -> NotConverged | None:
+        """Return the error, with the size of the window that is too small."""
+        if isinstance(self.error, WindowTooSmall) and self._passes.extent:
+            return WindowTooSmall(f"{self.error}, in the largest zone, {self._passes.extent}")
+        return self.error
