@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.errors import ModelError
-from solver.materials.attribute import attribute
+from solver.materials.law import attribute
 from solver.typing import Array
 
 _STEP = 1e-5

@@ -32,7 +32,7 @@ class Voce:
 
     Attributes
     ----------
-    yield_stress : Re, tensile stress at first yield [MPa]
+    yield_stress : Re, tensile stress at first yield [MPa]; inf if it never yields
     saturation : Q, growth at saturation [MPa]
     rate : b, rate of growth with plastic strain
     modulus : H, slope of the linear part [MPa]
@@ -48,10 +48,10 @@ class Voce:
     modulus: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, low in (("yield_stress", 0.0), ("rate", 0.0)):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > low):
-                raise ModelError(name, value, "must be finite and positive")
+        if not self.yield_stress > 0:
+            raise ModelError("yield_stress", self.yield_stress, "must be positive [MPa]")
+        if not (math.isfinite(self.rate) and self.rate > 0):
+            raise ModelError("rate", self.rate, "must be finite and positive")
         for name in ("saturation", "modulus"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):

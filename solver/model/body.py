@@ -140,7 +140,7 @@ class Body:
         """The material law in the kinematics of the body."""
         if self.kinematics != "plane_stress":
             return self.material
-        return self.material.in_plane_stress() or PlaneStress(self.material)
+        return PlaneStress(self.material)
 
     @property
     def box(self) -> np.ndarray:

@@ -9,14 +9,36 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.kinds import check_kinds
-from solver.materials import Law
-from solver.materials.rigid import Rigid
+from solver.materials import Elasticity, Law, PlasticState, Response
 from solver.model.loads import Load
 from solver.typing import Array, Ints
 
-_RIGID = Rigid()
 _TURN = 0.1
 """Largest angle of an edge of an arc [rad]: the error of its curvature is then 0.1 %."""
+
+
+class Rigid(Law):
+    """A law without strain: infinitely stiff, it never yields."""
+
+    @property
+    def elasticity(self) -> Elasticity:
+        """Elastic constants with an infinite modulus."""
+        return Elasticity(youngs_modulus=np.inf, poisson_ratio=0.0)
+
+    def flow_stress(self, state: PlasticState) -> Array:
+        """Return inf: it never yields."""
+        return np.full(state.accumulated.shape, np.inf)
+
+    def respond(self, strain: Array, state: PlasticState) -> Response:
+        """Return the empty response of zero points; a rigid body has no others."""
+        if strain.shape[1]:
+            raise ValueError("a rigid body has no points")
+        count = len(strain)
+        empty = np.zeros(0, dtype=bool)
+        return Response(np.zeros((count, 0)), np.zeros((count, count, 0)), state, empty)
+
+
+_RIGID = Rigid()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

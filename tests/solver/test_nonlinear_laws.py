@@ -25,9 +25,9 @@ from solver.materials import (
     Layered,
     PlaneStress,
     Table,
+    TrescaMaterial,
     Voce,
 )
-from solver.materials.tresca import TrescaMaterial
 from solver.materials.yield_surface import Tresca, VonMises
 from solver.mesh import grid
 from solver.tensors import identity
@@ -227,13 +227,32 @@ def test_wrong_numbers_are_refused_by_name(make, field):
 # -- back stresses -----------------------------------------------------------------------------
 
 
-def test_one_back_stress_that_does_not_fade_is_pragers():
-    like = steel("mixed")
-    law = Chaboche(
+def of_parts(like, saturation=0.0):
+    """The law of a material, written in parts."""
+    return Chaboche(
         elasticity=STEEL,
-        curve=Voce(yield_stress=RE, modulus=like.isotropic_modulus),
+        curve=Voce(yield_stress=RE, modulus=like.isotropic_modulus, saturation=saturation),
         back_stresses=(ArmstrongFrederick(like.kinematic_modulus),),
     )
+
+
+def test_parts_that_harden_linearly_respond_in_closed_form():
+    like = steel("mixed")
+    law = of_parts(like)
+    assert law.linear_hardening is not None
+    assert law.linear_hardening == like.linear_hardening
+    assert law.initial(3, 4).packed.shape == like.initial(3, 4).packed.shape
+    assert _differ(law, like, 6) == 0.0
+    other = ArmstrongFrederick(1000.0, 1.0)
+    own = type("Own", (Voce,), {})(yield_stress=RE)
+    for change in ({"curve": CURVES["voce"]}, {"curve": own}, {"back_stresses": (other,)}):
+        assert replace(law, **change).linear_hardening is None
+
+
+def test_one_back_stress_that_does_not_fade_is_pragers():
+    like = steel("mixed")
+    law = of_parts(like, saturation=1e-9)
+    assert law.linear_hardening is None
     assert _differ(law, like, 6) < 1e-12
 
 

@@ -79,9 +79,9 @@ def search(
             tolerance=_TOLERANCE, budget=budget,
         )  # fmt: skip
 
-    own = 0.0
-    if isinstance(material, Material) and material.hardens:
-        own = material.hardening_ratio
+    linear, E = material.linear_hardening, material.elasticity.youngs_modulus
+    # without the rounding of this ratio, which would decide by the last digit of E
+    own = round(linear.modulus / (E + linear.modulus), 12) if linear else 0.0
     largest = np.inf if material.hardens else _LARGE
     found = _tried(exactly, load, guess)
     if isinstance(found, NoContact):  # contact on the elastic track differs from the final one
