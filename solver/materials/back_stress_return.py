@@ -79,7 +79,7 @@ def back_stress_return(
     if not len(at):
         return Response(stress, tangent, state, yielding)
 
-    known = all(isinstance(rule, ArmstrongFrederick) for rule in rules)
+    known = all(type(rule) is ArmstrongFrederick for rule in rules)
     some, any_rules = state.at(at), cast("Any", rules)
     step = (fading_return if known else general_return)(
         deviator(stress[:, at]), some.back, some.accumulated, any_rules, curve, G

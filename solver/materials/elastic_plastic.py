@@ -48,10 +48,15 @@ class ElasticPlastic(Law):
     @cached_property
     def linear_hardening(self) -> LinearHardening | None:
         """Its hardening, if the surface is von Mises' and grows and moves linearly."""
-        curve, moduli = self.curve, 0.0
+        curve, moduli, own = self.curve, 0.0, type(self)
         # a subclass may change what it inherits
         if not (
-            isinstance(self.surface, VonMises) and type(curve) is Voce and not curve.saturation
+            type(self.surface) is VonMises
+            and type(curve) is Voce
+            and not curve.saturation
+            and own.respond is ElasticPlastic.respond
+            and own.flow_stress is ElasticPlastic.flow_stress
+            and own.back_stress is ElasticPlastic.back_stress
         ):
             return None
         for rule in self.back_stresses:

@@ -12,6 +12,7 @@ associated flow on a von Mises surface and isotropic hardening that saturates. O
 - `hardens` if stress grows without bound, `ultimate_shear_stress` if there is no hardening
 - `surface` for another yield condition, `flow_rule_error` and `has_corners` if it has edges
 - `symmetric` if the tangent is not symmetric
+- `linear_hardening` if the closed forms of linear hardening may replace `respond`
 
 A law with more internal variables returns them from `initial`; its state names those that are
 tensors (`PlasticState.TENSORS`), so that they can be mirrored for passes in the other direction.
