@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from solver.errors import ModelError
 from solver.materials.back_stress import ArmstrongFrederick, BackStress
 from solver.materials.back_stress_return import ChabocheState, back_stress_return
 from solver.materials.curves import Curve, Voce
@@ -29,6 +30,10 @@ from solver.typing import Array
 
 class ElasticPlastic(Law):
     """An isotropic elastic material with associated flow, made of parts."""
+
+    def __post_init__(self) -> None:
+        if math.isinf(self.elasticity.youngs_modulus):
+            raise ModelError("youngs_modulus", math.inf, "must be finite [MPa]")
 
     @attribute
     def surface(self) -> VonMises | Tresca | SmoothSurface:
@@ -237,4 +242,5 @@ class SmoothMaterial(ElasticPlastic):
     surface: SmoothSurface
 
     def __post_init__(self) -> None:
+        ElasticPlastic.__post_init__(self)
         self.surface.check()

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.errors import ModelError
+from solver.kinds import check_kinds
 from solver.tensors import identity
 from solver.typing import Array
 
@@ -16,12 +18,24 @@ class Elasticity:
 
     Attributes
     ----------
-    youngs_modulus : E [MPa]
-    poisson_ratio : nu
+    youngs_modulus : E [MPa]; inf for a rigid wheel, but a body that may yield needs a finite one
+    poisson_ratio : nu, 0 <= nu < 0.5
+
+    Raises
+    ------
+    ModelError
+        if a number is out of its range
     """
 
     youngs_modulus: float
     poisson_ratio: float
+
+    def __post_init__(self) -> None:
+        check_kinds(Elasticity, self)
+        if not self.youngs_modulus > 0:
+            raise ModelError("youngs_modulus", self.youngs_modulus, "must be positive [MPa]")
+        if not 0 <= self.poisson_ratio < 0.5:
+            raise ModelError("poisson_ratio", self.poisson_ratio, "must be in [0, 0.5)")
 
     @property
     def shear_modulus(self) -> float:

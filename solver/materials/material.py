@@ -47,10 +47,7 @@ class Material(ElasticPlastic):
 
     def __post_init__(self) -> None:
         check_kinds(Material, self)
-        if not (math.isfinite(self.youngs_modulus) and self.youngs_modulus > 0):
-            raise ModelError("youngs_modulus", self.youngs_modulus, "must be positive [MPa]")
-        if not 0 <= self.poisson_ratio < 0.5:
-            raise ModelError("poisson_ratio", self.poisson_ratio, "must be in [0, 0.5)")
+        ElasticPlastic.__post_init__(self)
         if not self.yield_stress > 0:
             raise ModelError("yield_stress", self.yield_stress, "must be positive [MPa]")
         if self.hardening not in get_args(Hardening):

@@ -80,8 +80,8 @@ def search(
         )  # fmt: skip
 
     linear, E = material.linear_hardening, material.elasticity.youngs_modulus
-    # without the rounding of this ratio, which would decide by the last digit of E
-    own = round(linear.modulus / (E + linear.modulus), 12) if linear else 0.0
+    # to 12 digits: the rounding of a ratio that is one of those below must not decide
+    own = float(f"{linear.modulus / (E + linear.modulus):.12g}") if linear else 0.0
     largest = np.inf if material.hardens else _LARGE
     found = _tried(exactly, load, guess)
     if isinstance(found, NoContact):  # contact on the elastic track differs from the final one
