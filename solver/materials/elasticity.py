@@ -6,20 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.errors import ModelError
-from solver.kinds import check_kinds
+from solver.kinds import Checked
+from solver.parameters import Infinite, Modulus, Poisson
 from solver.tensors import identity
 from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Elasticity:
+class Elasticity(Checked):
     """Hooke's law of an isotropic material.
 
     Attributes
     ----------
     youngs_modulus : E [MPa]; inf for a rigid wheel, but a body that may yield needs a finite one
-    poisson_ratio : nu, 0 <= nu < 0.5
+    poisson_ratio : nu
 
     Raises
     ------
@@ -27,15 +27,8 @@ class Elasticity:
         if a number is out of its range
     """
 
-    youngs_modulus: float
-    poisson_ratio: float
-
-    def __post_init__(self) -> None:
-        check_kinds(Elasticity, self)
-        if not self.youngs_modulus > 0:
-            raise ModelError("youngs_modulus", self.youngs_modulus, "must be positive [MPa]")
-        if not 0 <= self.poisson_ratio < 0.5:
-            raise ModelError("poisson_ratio", self.poisson_ratio, "must be in [0, 0.5)")
+    youngs_modulus: Modulus | Infinite
+    poisson_ratio: Poisson
 
     @property
     def shear_modulus(self) -> float:

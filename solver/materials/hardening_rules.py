@@ -8,24 +8,23 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
-from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
+from solver.kinds import Checked
 from solver.materials.back_stress import ArmstrongFrederick, BackStress
-from solver.materials.curves import Curve, Table, Voce
+from solver.materials.curves import Curve, Rate, Saturation, Table, Voce
 from solver.materials.elastic_plastic import Chaboche
 from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
 from solver.materials.layered import Layered
-from solver.parameters import Fraction, HardeningRatio, Pairs, described, pairs
+from solver.parameters import Fraction, HardeningRatio, Pairs, described
 from solver.parts import Parts
 from solver.typing import Array
 
 
-class HardeningRule(ABC):
+class HardeningRule(Checked, ABC):
     """How a material hardens once it has yielded."""
 
     __slots__ = ()
@@ -143,10 +142,10 @@ def _mixed(elasticity: Elasticity, yield_stress: float, grows: float, moves: flo
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Saturating:
-    saturation: Annotated[float, Interval(ge=0.0, le=1e7), Unit("MPa")] = described(
+    saturation: Saturation = described(
         0.0, "growth of the yield stress at saturation, with voce and chaboche hardening"
     )
-    saturation_rate: Annotated[float, Interval(gt=0.0, le=1e6), Unit("1")] = described(
+    saturation_rate: Rate = described(
         10.0, "rate of this growth: it follows 1 - exp(-rate * plastic strain)"
     )
 
@@ -180,7 +179,7 @@ class _Measured:
 
         Raises `ModelError` unless they begin at [0, yield_stress] and rise.
         """
-        strain, stress = np.reshape(pairs("curve", self.curve), (-1, 2)).T
+        strain, stress = np.reshape(self.curve, (-1, 2)).T
         begins = bool(self.curve) and (strain[0], stress[0]) == (0.0, yield_stress)
         rises = (np.diff(strain) > 0).all() and (np.diff(stress) >= 0).all()
         if not (begins and rises):
@@ -221,7 +220,7 @@ class ChabocheHardening(_Saturating, MovingRule):
             )
             raise ModelError("back_stresses", self.back_stresses, allowed)
         found = []
-        for k, pair in enumerate(pairs("back_stresses", self.back_stresses), start=1):
+        for k, pair in enumerate(self.back_stresses, start=1):
             try:
                 found.append(ArmstrongFrederick(*pair))
             except ModelError as error:

@@ -5,26 +5,26 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Literal
 
-from solver.errors import ModelError
-from solver.kinds import check_kinds
+from solver.kinds import Checked
 from solver.materials.back_stress import ArmstrongFrederick
 from solver.materials.curves import Voce
 from solver.materials.elastic_plastic import ElasticPlastic
 from solver.materials.elasticity import Elasticity
+from solver.parameters import Fraction, HardeningRatio, Infinite, Modulus, Poisson
 
 Hardening = Literal["none", "isotropic", "kinematic", "mixed"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Material(ElasticPlastic):
+class Material(Checked, ElasticPlastic):
     """An isotropic elastic, linearly hardening von Mises material.
 
     Attributes
     ----------
     youngs_modulus : E [MPa]
-    poisson_ratio : nu, 0 <= nu < 0.5
+    poisson_ratio : nu
     yield_stress : uniaxial yield stress [MPa]; ``inf`` (default) means elastic
     hardening : ``none``, ``isotropic``, ``kinematic`` (Prager) or ``mixed``
     hardening_ratio : Eu / E, ratio of the slope of the uniaxial curve beyond yield to Young's
@@ -38,25 +38,12 @@ class Material(ElasticPlastic):
         if a number is out of its range, or the word unknown
     """
 
-    youngs_modulus: float
-    poisson_ratio: float
-    yield_stress: float = math.inf
+    youngs_modulus: Modulus
+    poisson_ratio: Poisson
+    yield_stress: Modulus | Infinite = math.inf
     hardening: Hardening = "none"
-    hardening_ratio: float = 0.0
-    isotropic_fraction: float = 0.5
-
-    def __post_init__(self) -> None:
-        check_kinds(Material, self)
-        ElasticPlastic.__post_init__(self)
-        if not self.yield_stress > 0:
-            raise ModelError("yield_stress", self.yield_stress, "must be positive [MPa]")
-        if self.hardening not in get_args(Hardening):
-            allowed = "must be one of " + ", ".join(get_args(Hardening))
-            raise ModelError("hardening", self.hardening, allowed)
-        if not 0 <= self.hardening_ratio < 1:
-            raise ModelError("hardening_ratio", self.hardening_ratio, "must be in [0, 1)")
-        if not 0 <= self.isotropic_fraction <= 1:
-            raise ModelError("isotropic_fraction", self.isotropic_fraction, "must be in [0, 1]")
+    hardening_ratio: HardeningRatio = 0.0
+    isotropic_fraction: Fraction = 0.5
 
     # -- parts ---------------------------------------------------------------------------------
 

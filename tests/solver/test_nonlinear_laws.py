@@ -255,7 +255,7 @@ def test_a_law_of_parts_is_not_rigid(kind):
     parts = {"elasticity": Elasticity(youngs_modulus=np.inf, poisson_ratio=0.3), "curve": SOFT}
     parts |= {"surface": Hosford(8.0)} if kind is SmoothMaterial else {}
     given = {"youngs_modulus": np.inf, "poisson_ratio": 0.3} if kind is Material else parts
-    with pytest.raises(ModelError, match="youngs_modulus = inf: must be finite"):
+    with pytest.raises(ModelError, match=r"youngs_modulus = inf: must be (a )?finite"):
         kind(**given)
 
 
