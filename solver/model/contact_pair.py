@@ -10,7 +10,7 @@ import numpy as np
 from solver.errors import ModelError
 from solver.kinds import check
 from solver.model.amplitude import Amplitude
-from solver.model.friction import Coulomb, FrictionLaw
+from solver.model.friction import FrictionLaw, law_of
 from solver.parameters import Coordinate, Friction
 
 
@@ -61,9 +61,7 @@ class ContactPair:
     @property
     def law(self) -> FrictionLaw:
         """The law of friction."""
-        if isinstance(self.friction, FrictionLaw):
-            return self.friction
-        return Coulomb(friction=self.friction)
+        return law_of(self.friction)
 
     def offset(self, time: float) -> float:
         """Return the gap added at a time to the distance of the surfaces in the mesh [mm]."""

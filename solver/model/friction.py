@@ -211,6 +211,11 @@ class Coulomb(FrictionLaw):
         return lines
 
 
+def law_of(friction: float | FrictionLaw) -> FrictionLaw:
+    """Return the law of a coefficient, Coulomb's, or the law that is given."""
+    return friction if isinstance(friction, FrictionLaw) else Coulomb(friction=friction)
+
+
 def effective_friction(friction: float) -> float:
     """Return the coefficient that the solver uses: zero up to `LEAST_FRICTION`."""
     return friction if friction > LEAST_FRICTION else 0.0
@@ -243,6 +248,28 @@ def lines_of(law: FrictionLaw, at: ContactPlaces) -> BoundLines:
         allowed = "must give a bound that is zero without pressure: the least stress of its lines "
         raise ModelError("friction_law", law, f"{allowed}is {least[least != 0][0]:.4g} MPa")
     return found
+
+
+def pressure_lines(law: FrictionLaw, n: int, strength: float) -> BoundLines:
+    """Return the lines of a law that depends on pressure alone, at n places of one strength [MPa].
+
+    Raises
+    ------
+    ModelError
+        naming the law, if it asks for slip or plastic strain
+    """
+
+    def nothing() -> Array:
+        allowed = "must not depend on slip or plastic strain on a track without ends"
+        raise ModelError("friction_law", law, allowed)
+
+    places = ContactPlaces(
+        n=n,
+        find_strength=lambda: np.full(n, strength),
+        find_plastic_strain=nothing,
+        find_slip=nothing,
+    )
+    return lines_of(law, places)
 
 
 def through(pressure: Sequence[float], shear: Sequence[float]) -> list[tuple[Value, Value]]:

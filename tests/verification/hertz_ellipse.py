@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
@@ -33,7 +35,7 @@ def surface_of(grid: PatchGrid, elasticity: Elasticity = STEEL) -> Array:
 
 def pressed(
     hertz: HertzEllipse, along: float, across: float, *, margin: float = 1.25,
-    shift: float = 0.0, **given: float,
+    shift: float = 0.0, **given: Any,
 ) -> RollingPatch:  # fmt: skip
     """Return a cylinder on a crowned rail whose contact has this ellipse.
 

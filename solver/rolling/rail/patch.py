@@ -27,7 +27,14 @@ import numpy as np
 
 from solver.errors import LimitLoad, ModelError, NoContact, Spins, WindowTooSmall
 from solver.linear.threads import one_thread
-from solver.model.friction import LEAST_FRICTION
+from solver.model.friction import (
+    BoundLines,
+    Coulomb,
+    FrictionLaw,
+    effective_friction,
+    law_of,
+    pressure_lines,
+)
 from solver.rolling.rail.friction_cone import (
     NORMAL,
     OPEN,
@@ -57,8 +64,9 @@ _SLIDES = 1.0
 class RollingLoad(TypedDict, total=False):
     """Friction and load of a `RollingPatch`, with its units; creepages that are not given are 0."""
 
-    friction: Required[float]
+    friction: Required[float | FrictionLaw]
     force: Required[float]
+    strength: float
     drive: float | None
     lateral_force: float | None
     creepage: float
@@ -79,16 +87,20 @@ class RollingPatch:
         along axis b at vertex j, in x, y, z. Negative d are at the end, as in an FFT; a prism of N
         stations that repeats itself has every d once
     wheel : the wheel
-    friction : coefficient of friction; without it moment and lateral force are left out
+    friction : Coulomb coefficient, or a friction law that depends on pressure alone; without
+        friction moment and lateral force are left out
     force : vertical force on the axle [N]
+    strength : initial shear yield stress of the prism [MPa]
     drive : moment on the axle over radius, positive when braking, over friction times force; None
-        if ``creepage`` is given
+        if ``creepage`` is given. It must be 0 unless the law is Coulomb's
     lateral_force : force on the surface along z [N]; None if ``lateral_creepage`` is given
     creepage, lateral_creepage, spin : as in `ProfiledWheel.rolling` [1, 1, 1/mm]
 
     Attributes
     ----------
-    grid, wheel, friction, force, drive, lateral_force : as above; what is left out is None
+    grid, wheel, friction, force, drive, lateral_force : as above; what is left out is None, and a
+        coefficient of friction is Coulomb's law
+    full_slip : the coefficient to which ``drive`` refers
     """
 
     def __init__(
@@ -119,8 +131,9 @@ class RollingPatch:
     def _set_load(
         self,
         *,
-        friction: float,
+        friction: float | FrictionLaw,
         force: float,
+        strength: float = np.inf,
         drive: float | None = None,
         lateral_force: float | None = None,
         creepage: float = 0.0,
@@ -128,14 +141,16 @@ class RollingPatch:
         spin: float = 0.0,
     ) -> None:
         """Set friction and load; parameters are those of the class."""
-        if not 0 <= friction <= 1:
-            raise ModelError("friction", friction, "must lie between 0 and 1")
         if not force > 0:
             raise ModelError("force", force, "must be positive")
         self.force = force
-        self.friction = friction if friction > LEAST_FRICTION else 0.0
-        self.drive = drive if self.friction else None
-        self.lateral_force = lateral_force if self.friction else None
+        self.friction = law = law_of(friction)
+        self._lines = pressure_lines(law, 1, strength)
+        self.full_slip = effective_friction(law.friction) if isinstance(law, Coulomb) else 0.0
+        if drive and not isinstance(law, Coulomb):
+            raise ModelError("drive", drive, f"must be 0 with {law}")
+        self.drive = drive if law.rough else None
+        self.lateral_force = lateral_force if law.rough else None
         self._given = np.array([0.0, creepage, lateral_creepage, spin])
 
     def with_wheel(self, wheel: ProfiledWheel) -> Self:
@@ -178,7 +193,7 @@ class RollingPatch:
     @property
     def moment(self) -> float:
         """See `PatchLoad`."""
-        return (self.drive or 0.0) * self.friction * self.force
+        return (self.drive or 0.0) * self.full_slip * self.force
 
     @property
     def slipping(self) -> Self:
@@ -302,14 +317,14 @@ class RollingPatch:
     def _problem(self, u: Array) -> ConeProblem:
         """Return the frictional problem of a surface with these displacements (n, m, 3)."""
         free = self._free
-        drive = 0.0 if self.drive is None else self.drive * self.friction * self.force
+        drive = 0.0 if self.drive is None else self.drive * self.full_slip * self.force
         resultants = np.array([self.force, drive, self.lateral_force or 0.0])
         given = self._given.copy()
         given[free] = 0.0
         return ConeProblem(
             influence=self._influence,
             offset=self._rest + self._offset(u) + np.tensordot(given, self._motions, 1),
-            friction=self.friction,
+            lines=self._lines,
             motions=self._motions[free],
             weights=self._sums[free],
             resultants=resultants[free],
@@ -324,8 +339,8 @@ class RollingPatch:
     def _smooth(self, problem: ConeProblem) -> ConeSolution:
         """Return the contact without friction; the undeformed bodies give the first points."""
         smooth = replace(
-            problem, friction=0.0, motions=problem.motions[:1], weights=problem.weights[:1],
-            resultants=problem.resultants[:1],
+            problem, lines=BoundLines.none(1), motions=problem.motions[:1],
+            weights=problem.weights[:1], resultants=problem.resultants[:1],
         )  # fmt: skip
         height = np.array([-self._expected_edge(problem)])
         return solve_cone(smooth, np.zeros_like(problem.offset), height)

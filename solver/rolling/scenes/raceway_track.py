@@ -170,6 +170,5 @@ class RolledRaceway:
             track_radius=p.ring,
         )
         return RollingPatch(
-            track.grid, track.compliance, wheel, friction=p.friction, force=ellipse.force,
-            **p.motion,
+            track.grid, track.compliance, wheel, force=ellipse.force, **p.motion
         )  # fmt: skip

@@ -298,7 +298,7 @@ class RolledRail:
             make = last[2].with_wheel(wheel).with_load
         else:
             make = partial(RollingPatch, track.grid, track.compliance, wheel)
-        made = make(friction=p.friction, force=p.load, **p.motion)
+        made = make(force=p.load, **p.motion)
         self._made = track, p, made
         return made
 
