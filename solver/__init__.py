@@ -18,6 +18,7 @@ _HOMES = {
     "Audit": "audit.report",
     "Body": "model.body",
     "ContactPair": "model.contact_pair",
+    "Coulomb": "model.friction",
     "Displacement": "model.loads",
     "InitialStress": "model.loads",
     "LimitLoad": "errors",

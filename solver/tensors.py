@@ -1,4 +1,4 @@
-"""Names of axes and tensor components, and the scaling of components of symmetric tensors.
+"""Names of axes and tensor components, their scaling, and invariants of symmetric tensors.
 
 Inside the solver strain and stress are Mandel vectors, components first, points last:
 ``(xx, yy, zz, sqrt(2) xy)`` in two dimensions, followed by ``(sqrt(2) yz, sqrt(2) zx)`` in three.
@@ -17,6 +17,10 @@ AXES = ("x", "y", "z")
 """Names of coordinates: two in the plane, three in space."""
 _COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "zx")
 SQRT2 = float(np.sqrt(2.0))
+_PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
+"""Row and column of each Mandel component; in two dimensions the first four."""
+PAIRS = ((0, 1), (0, 2), (1, 2))
+"""Pairs of principal directions."""
 
 
 def components(count: int) -> tuple[str, ...]:
@@ -64,6 +68,39 @@ def deviator(mandel: Array) -> Array:
 def von_mises(mandel: Array) -> Array:
     """Return the von Mises stress (...) from Mandel components (n_components, ...) [MPa]."""
     return np.asarray(np.sqrt(1.5 * (deviator(mandel) ** 2).sum(axis=0)))
+
+
+def principal(mandel: Array) -> tuple[Array, Array]:
+    """Return the principal values (3, n), the largest first, and their directions.
+
+    In the directions (3, 3, n) the first axis is the component of the unit vector, the second its
+    number. Values of a tensor that is not finite are NaN.
+
+    Parameters
+    ----------
+    mandel : (n_components, n)
+    """
+    full = np.zeros((mandel.shape[1], 3, 3))
+    for value, (i, j) in zip(mandel, _PLACES, strict=False):
+        full[:, i, j] = full[:, j, i] = value if i == j else value / SQRT2
+    unknown = ~np.isfinite(full).all(axis=(1, 2))
+    full[unknown] = 0.0
+    values, directions = np.linalg.eigh(full)
+    values[unknown] = np.nan
+    return values.T[::-1], directions.transpose(1, 2, 0)[:, ::-1]
+
+
+def dyad(directions: Array, i: int, j: int, n_components: int) -> Array:
+    """Return the unit tensor (n_components, n), Mandel, of two principal directions.
+
+    It is e_i e_i, or (e_i e_j + e_j e_i) / sqrt(2); these tensors are an orthonormal basis.
+    """
+    a, b = directions[:, i], directions[:, j]
+    rows = [
+        a[k] * b[k] if k == m else (a[k] * b[m] + a[m] * b[k]) / SQRT2
+        for k, m in _PLACES[:n_components]
+    ]
+    return np.stack(rows) * (1.0 if i == j else SQRT2)
 
 
 def not_below_zero(values: Array) -> Array:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from solver.errors import ModelError
-from solver.kinds import check_kinds
+from solver.kinds import Checked
 from solver.loading.program import Program, load_and_release
+from solver.parameters import AtLeastOne, Infinite, Positive
 
 INCREMENT_ERROR = 0.006
 """Error of stress by the length of an increment, over the yield stress, at most: the errors of all
@@ -15,7 +15,7 @@ increments of a load then sum to one or two percent. The number of increments gr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tolerances:
+class Tolerances(Checked):
     """When an increment counts as converged.
 
     Attributes
@@ -26,9 +26,9 @@ class Tolerances:
         in windows of the bodies, where an iteration is cheap, and in the last attempt
     """
 
-    residual: float = 1e-8
-    contact: float = 1e-7
-    iterations: int = 40
+    residual: Positive = 1e-8
+    contact: Positive = 1e-7
+    iterations: AtLeastOne = 40
 
     @property
     def patient(self) -> Tolerances:
@@ -37,25 +37,20 @@ class Tolerances:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Control:
+class Control(Checked):
     """How a program is solved.
 
     Attributes
     ----------
     max_cuts : how often an increment may be halved before the run ends with an error
     increment_error : largest error of stress, over the yield stress, that the length of an
-        increment may add before it is divided: see `solver.loading.integration`
+        increment may add before it is divided, inf if none is: see `solver.loading.integration`
     tolerances : of an increment
     """
 
     max_cuts: int = 4
-    increment_error: float = INCREMENT_ERROR
+    increment_error: Positive | Infinite = INCREMENT_ERROR
     tolerances: Tolerances = field(default_factory=Tolerances)
-
-    def __post_init__(self) -> None:
-        check_kinds(type(self), self)
-        if not self.increment_error > 0:
-            raise ModelError("increment_error", self.increment_error, "must be positive")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,15 +66,8 @@ class PathControl(Control):
     tolerances : of an increment
     """
 
-    load_step: float = 0.05
-    unload_steps: int = 5
-
-    def __post_init__(self) -> None:
-        Control.__post_init__(self)
-        if not self.load_step > 0:
-            raise ModelError("load_step", self.load_step, "must be positive")
-        if self.unload_steps < 1:
-            raise ModelError("unload_steps", self.unload_steps, "must be at least 1")
+    load_step: Positive = 0.05
+    unload_steps: AtLeastOne = 5
 
     def program(self, load: float) -> Program:
         """Return the program that raises the load factor to ``load`` and removes it."""

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise, takewhile
 
 from solver.errors import ModelError
-from solver.kinds import check_kinds
+from solver.kinds import check
+from solver.parameters import AtLeastOne, NotNegative
 
 ROUNDING = 1e-9
 """Relative difference of two times: times that differ by less are equal."""
@@ -39,8 +40,8 @@ class Stage:
 
     name: str
     target: float
-    steps: int = 1
-    step: float = 0.0
+    steps: AtLeastOne = 1
+    step: NotNegative = 0.0
     apart: bool = False
     turns: bool = False
     refined: bool = False
@@ -48,15 +49,9 @@ class Stage:
     cycle: int = 0
 
     def __post_init__(self) -> None:
-        check_kinds(Stage, self, f"{self.name}.")
-        if self.steps < 1:
-            raise ModelError(f"{self.name}.steps", self.steps, "must be at least 1")
-        if not self.step >= 0:
-            raise ModelError(f"{self.name}.step", self.step, "must not be negative")
+        check(self, f"{self.name}.")
         if self.stops and self.step:
             raise ModelError(f"{self.name}.step", self.step, "must be 0 with stops: give steps")
-        if not math.isfinite(self.target):
-            raise ModelError(f"{self.name}.target", self.target, "must be finite")
 
     def times(self, start: float) -> list[float]:
         """Return the times at which its increments end."""

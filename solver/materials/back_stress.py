@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.errors import ModelError
-from solver.materials.attribute import attribute
+from solver.kinds import Checked
+from solver.materials.law import attribute
+from solver.parameters import NotNegative
 from solver.typing import Array
 
 _STEP = 1e-5
@@ -122,7 +123,7 @@ class BackStress(ABC):
 
 
 @dataclass(frozen=True, slots=True)
-class ArmstrongFrederick(BackStress):
+class ArmstrongFrederick(Checked, BackStress):
     """Armstrong and Frederick's rule: dX = 2/3 C d(plastic strain) - gamma X dp.
 
     Attributes
@@ -131,14 +132,8 @@ class ArmstrongFrederick(BackStress):
     recall : gamma, rate at which it fades; 0 is Prager's rule. In tension it tends to C / gamma
     """
 
-    modulus: float
-    recall: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("modulus", "recall"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise ModelError(name, value, "must be finite and not negative")
+    modulus: NotNegative
+    recall: NotNegative = 0.0
 
     @property
     def limit(self) -> float:

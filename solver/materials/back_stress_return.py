@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 
 from solver.materials.back_stress import ArmstrongFrederick, BackStress
 from solver.materials.curves import Curve
+from solver.materials.elasticity import Elasticity
 from solver.materials.radial_return import SQRT23
 from solver.materials.scalar import falling_root
-from solver.tensors import identity, von_mises
+from solver.materials.state import PlasticState, Response
+from solver.tensors import deviator, identity, von_mises
 from solver.typing import Array, Ints
 
 _ROUNDING = 8 * float(np.finfo(float).eps)
@@ -19,6 +22,18 @@ _ROUNDING = 8 * float(np.finfo(float).eps)
 _SMALL = 1e-10
 """Ratio up to which a point counts as solved when further steps do not lessen the residual."""
 _MAX_ITERATIONS = 100
+
+
+@dataclass(frozen=True, slots=True)
+class ChabocheState(PlasticState):
+    """Internal variables, with the back stresses (n_back, n_components, n_points) [MPa].
+
+    Each is 2/3 C times a strain, the plastic strain less the faded part, and `stretched` scales it
+    like a strain.
+    """
+
+    back: Array
+    TENSORS: ClassVar[tuple[str, ...]] = ("plastic_strain", "back")
 
 
 class FlowStep(NamedTuple):
@@ -33,6 +48,49 @@ class FlowStep(NamedTuple):
     flow: Array
     back: Array
     softening: Array
+
+
+def back_stress_return(
+    strain: Array,
+    state: PlasticState,
+    elasticity: Elasticity,
+    curve: Curve,
+    rules: Sequence[BackStress],
+) -> Response:
+    """Return stress, consistent tangent and new state for all strain components given.
+
+    Fading back stresses make the tangent unsymmetric.
+
+    Parameters
+    ----------
+    strain : (n_components, n_points) total Mandel strain
+    state : internal variables of the last converged state, left unchanged
+    """
+    assert isinstance(state, ChabocheState)
+    n_components, n_points = strain.shape
+    G, C = elasticity.shear_modulus, elasticity.stiffness(n_components)
+    stress = C @ (strain - state.plastic_strain)
+    tangent = np.repeat(C[:, :, None], n_points, axis=2)
+    relative = stress - state.back.sum(axis=0)
+    yielding = von_mises(relative) - curve.flow_stress(state.accumulated) > 0
+    at = np.flatnonzero(yielding)
+    if not len(at):
+        return Response(stress, tangent, state, yielding)
+
+    known = all(type(rule) is ArmstrongFrederick for rule in rules)
+    some, any_rules = state.at(at), cast("Any", rules)
+    step = (fading_return if known else general_return)(
+        deviator(stress[:, at]), some.back, some.accumulated, any_rules, curve, G
+    )
+    plastic_strain, accumulated = state.plastic_strain.copy(), state.accumulated.copy()
+    plastic_strain[:, at] += step.flow
+    accumulated[at] += step.growth
+    stress[:, at] -= 2 * G * step.flow
+    back = state.back.copy()
+    back[:, :, at] = step.back
+    tangent[:, :, at] -= step.softening
+    after = ChabocheState(plastic_strain, accumulated, back)
+    return Response(stress, tangent, after, yielding)
 
 
 def fading_return(

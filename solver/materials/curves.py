@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
+from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
+from solver.kinds import Checked
+from solver.parameters import Infinite, Modulus, NotNegative
 from solver.typing import Array
+
+Saturation = Annotated[float, Interval(ge=0.0, le=1e7), Unit("MPa")]
+Rate = Annotated[float, Interval(gt=0.0, le=1e6), Unit("1")]
 
 
 class Curve(Protocol):
@@ -27,12 +33,12 @@ class Curve(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Voce:
+class Voce(Checked):
     """Exponential growth that saturates, plus a linear part: Re + Q (1 - exp(-b p)) + H p.
 
     Attributes
     ----------
-    yield_stress : Re, tensile stress at first yield [MPa]
+    yield_stress : Re, tensile stress at first yield [MPa]; inf if it never yields
     saturation : Q, growth at saturation [MPa]
     rate : b, rate of growth with plastic strain
     modulus : H, slope of the linear part [MPa]
@@ -42,20 +48,10 @@ class Voce:
     E. Voce, J. Inst. Metals 74 (1948) 537-562.
     """
 
-    yield_stress: float
-    saturation: float = 0.0
-    rate: float = 1.0
-    modulus: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name, low in (("yield_stress", 0.0), ("rate", 0.0)):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > low):
-                raise ModelError(name, value, "must be finite and positive")
-        for name in ("saturation", "modulus"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise ModelError(name, value, "must be finite and not negative [MPa]")
+    yield_stress: Modulus | Infinite
+    saturation: Saturation = 0.0
+    rate: Rate = 1.0
+    modulus: NotNegative = 0.0
 
     def flow_stress(self, accumulated: Array) -> Array:
         """See `Curve`."""

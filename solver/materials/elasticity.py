@@ -6,22 +6,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.kinds import Checked
+from solver.parameters import Infinite, Modulus, Poisson
 from solver.tensors import identity
 from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Elasticity:
+class Elasticity(Checked):
     """Hooke's law of an isotropic material.
 
     Attributes
     ----------
-    youngs_modulus : E [MPa]
+    youngs_modulus : E [MPa]; inf for a rigid wheel, but a body that may yield needs a finite one
     poisson_ratio : nu
+
+    Raises
+    ------
+    ModelError
+        if a number is out of its range
     """
 
-    youngs_modulus: float
-    poisson_ratio: float
+    youngs_modulus: Modulus | Infinite
+    poisson_ratio: Poisson
 
     @property
     def shear_modulus(self) -> float:

@@ -7,26 +7,24 @@ by which the yield surface grows and does not move gives a curve and goes with a
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import asdict, dataclass
-from typing import Annotated, Any, ClassVar, cast
+from dataclasses import dataclass
 
 import numpy as np
-from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
+from solver.kinds import Checked
 from solver.materials.back_stress import ArmstrongFrederick, BackStress
-from solver.materials.chaboche import Chaboche
-from solver.materials.curves import Curve, Table, Voce
+from solver.materials.curves import Curve, Rate, Saturation, Table, Voce
+from solver.materials.elastic_plastic import Chaboche
 from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
 from solver.materials.layered import Layered
-from solver.materials.material import Hardening, Material
-from solver.parameters import Fraction, HardeningRatio, Pairs, described, pairs
+from solver.parameters import Fraction, HardeningRatio, Pairs, described
 from solver.parts import Parts
 from solver.typing import Array
 
 
-class HardeningRule(ABC):
+class HardeningRule(Checked, ABC):
     """How a material hardens once it has yielded."""
 
     __slots__ = ()
@@ -79,83 +77,75 @@ class MovingRule(HardeningRule):
         return Chaboche(elasticity=elasticity, curve=curve, back_stresses=parts)
 
 
-class LinearRule(HardeningRule):
-    """A rule that `Material` has in closed form, under the same word."""
-
-    __slots__ = ()
-    word: ClassVar[Hardening]
-
-    def law(self, elasticity: Elasticity, yield_stress: float) -> Material:
-        """Return the closed-form law; it is elastic if the yield stress is inf."""
-        return Material(
-            youngs_modulus=elasticity.youngs_modulus,
-            poisson_ratio=elasticity.poisson_ratio,
-            yield_stress=yield_stress,
-            hardening=self.word,
-            **asdict(cast("Any", self)),
-        )
-
-
-class LinearGrowingRule(LinearRule, GrowingRule):
-    """A rule of `Material` whose yield surface does not move."""
-
-    __slots__ = ()
-
-    def flow_curve(self, elasticity: Elasticity, yield_stress: float) -> Curve:
-        """Return the yield stress with the linear growth of `Material`."""
-        modulus = self.law(elasticity, yield_stress).isotropic_modulus
-        return Voce(yield_stress=yield_stress, modulus=modulus)
-
-
 # -- the rules of the package --------------------------------------------------------------------
 
 
 @HARDENING.word("none")
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NoHardening(LinearGrowingRule):
+class NoHardening(GrowingRule):
     """The yield surface does not change."""
 
-    word: ClassVar[Hardening] = "none"
+    def flow_curve(self, elasticity: Elasticity, yield_stress: float) -> Curve:
+        """Return the constant yield stress."""
+        return Voce(yield_stress=yield_stress)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Sloped(LinearRule):
+class _Sloped:
     hardening_ratio: HardeningRatio = described(
         0.024, "ratio of the slope Eu of the uniaxial hardening branch to Young's modulus"
     )
 
+    def modulus(self, elasticity: Elasticity) -> float:
+        """Return the slope of stress over plastic strain in tension [MPa]."""
+        return elasticity.youngs_modulus * self.hardening_ratio / (1 - self.hardening_ratio)
+
 
 @HARDENING.word("isotropic")
 @dataclass(frozen=True, slots=True, kw_only=True)
-class IsotropicHardening(_Sloped, LinearGrowingRule):
+class IsotropicHardening(_Sloped, GrowingRule):
     """The yield surface grows linearly."""
 
-    word: ClassVar[Hardening] = "isotropic"
+    def flow_curve(self, elasticity: Elasticity, yield_stress: float) -> Curve:
+        """Return the yield stress with its linear growth."""
+        return Voce(yield_stress=yield_stress, modulus=self.modulus(elasticity))
 
 
 @HARDENING.word("kinematic")
 @dataclass(frozen=True, slots=True, kw_only=True)
-class KinematicHardening(_Sloped):
+class KinematicHardening(_Sloped, HardeningRule):
     """The yield surface moves linearly."""
 
-    word: ClassVar[Hardening] = "kinematic"
+    def law(self, elasticity: Elasticity, yield_stress: float) -> Law:
+        """Return the law with Prager's back stress."""
+        return _mixed(elasticity, yield_stress, 0.0, self.modulus(elasticity))
 
 
 @HARDENING.word("mixed")
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MixedHardening(_Sloped):
+class MixedHardening(_Sloped, HardeningRule):
     """The yield surface grows and moves linearly."""
 
-    word: ClassVar[Hardening] = "mixed"
     isotropic_fraction: Fraction = described(0.5, "part of mixed hardening that is isotropic")
+
+    def law(self, elasticity: Elasticity, yield_stress: float) -> Law:
+        """Return the law with linear growth and Prager's back stress."""
+        H = self.modulus(elasticity)
+        grows = self.isotropic_fraction * H
+        return _mixed(elasticity, yield_stress, grows, H - grows)
+
+
+def _mixed(elasticity: Elasticity, yield_stress: float, grows: float, moves: float) -> Law:
+    curve, back = Voce(yield_stress=yield_stress, modulus=grows), ArmstrongFrederick(moves)
+    return Chaboche(elasticity=elasticity, curve=curve, back_stresses=(back,))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Saturating:
-    saturation: Annotated[float, Interval(ge=0.0, le=1e7), Unit("MPa")] = described(
+    saturation: Saturation = described(
         0.0, "growth of the yield stress at saturation, with voce and chaboche hardening"
     )
-    saturation_rate: Annotated[float, Interval(gt=0.0, le=1e6), Unit("1")] = described(
+    saturation_rate: Rate = described(
         10.0, "rate of this growth: it follows 1 - exp(-rate * plastic strain)"
     )
 
@@ -189,7 +179,7 @@ class _Measured:
 
         Raises `ModelError` unless they begin at [0, yield_stress] and rise.
         """
-        strain, stress = np.reshape(pairs("curve", self.curve), (-1, 2)).T
+        strain, stress = np.reshape(self.curve, (-1, 2)).T
         begins = bool(self.curve) and (strain[0], stress[0]) == (0.0, yield_stress)
         rises = (np.diff(strain) > 0).all() and (np.diff(stress) >= 0).all()
         if not (begins and rises):
@@ -230,7 +220,7 @@ class ChabocheHardening(_Saturating, MovingRule):
             )
             raise ModelError("back_stresses", self.back_stresses, allowed)
         found = []
-        for k, pair in enumerate(pairs("back_stresses", self.back_stresses), start=1):
+        for k, pair in enumerate(self.back_stresses, start=1):
             try:
                 found.append(ArmstrongFrederick(*pair))
             except ModelError as error:

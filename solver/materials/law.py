@@ -12,6 +12,7 @@ associated flow on a von Mises surface and isotropic hardening that saturates. O
 - `hardens` if stress grows without bound, `ultimate_shear_stress` if there is no hardening
 - `surface` for another yield condition, `flow_rule_error` and `has_corners` if it has edges
 - `symmetric` if the tangent is not symmetric
+- `linear_hardening` if the closed forms of linear hardening may replace `respond`
 
 A law with more internal variables returns them from `initial`; its state names those that are
 tensors (`PlasticState.TENSORS`), so that they can be mirrored for passes in the other direction.
@@ -22,16 +23,38 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from solver.materials.attribute import attribute
 from solver.materials.elasticity import Elasticity
+from solver.materials.radial_return import LinearHardening
 from solver.materials.state import PlasticState, Response
 from solver.materials.yield_surface import VonMises, YieldSurface
 from solver.typing import Array, Ints
 
+T = TypeVar("T")
+
 _ROUNDING = 8 * float(np.finfo(float).eps)
+
+
+class attribute(Generic[T]):  # noqa: N801
+    """A property that a subclass may replace by a field of its dataclass.
+
+    With a plain property, ``dataclass`` would take the property for the field's default value,
+    and the field could not be set.
+    """
+
+    def __init__(self, compute: Callable[[Any], T]) -> None:
+        self._compute = compute
+        self.__doc__ = compute.__doc__
+
+    def __get__(self, instance: Any, owner: type) -> T:
+        """Return the value for an instance; the class itself has none."""
+        if instance is None:
+            raise AttributeError(f"{owner.__name__}.{self._compute.__name__}")
+        return self._compute(instance)
 
 
 class Law(ABC):
@@ -62,6 +85,14 @@ class Law(ABC):
         """Return the centre of the yield surface (n_components, n_points), Mandel [MPa]."""
         return np.zeros_like(state.plastic_strain)
 
+    @attribute
+    def linear_hardening(self) -> LinearHardening | None:
+        """Its hardening, if it is von Mises' law with linear hardening; None otherwise.
+
+        Its responses then have closed forms, and its flow along rows is compiled.
+        """
+        return None
+
     # -- response ------------------------------------------------------------------------------
 
     def initial(self, n_points: int, n_components: int) -> PlasticState:
@@ -81,10 +112,6 @@ class Law(ABC):
     def stiffness(self, n_components: int) -> Array:
         """Return the elastic stiffness (n_components, n_components) on Mandel strain [MPa]."""
         return self.elasticity.stiffness(n_components)
-
-    def in_plane_stress(self) -> Law | None:
-        """Return a special form of this law for plane stress; None means `PlaneStress`."""
-        return None
 
     def elastic_strain(self, stress: Array) -> Array:
         """Return the elastic Mandel strain (n_components, n_points) of a stress, all components."""

@@ -9,14 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
 from solver.errors import ModelError
+from solver.materials.curves import Voce
+from solver.materials.elastic_plastic import Chaboche
 from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
-from solver.materials.material import Material
 from solver.materials.state import PlasticState, Response
 from solver.typing import Array
 
@@ -36,7 +38,7 @@ class LayeredState(PlasticState):
     TENSORS: ClassVar[tuple[str, ...]] = ("plastic_strain", "layer_strain")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Layered(Law):
     """Besseling's material of layers under one strain.
 
@@ -121,12 +123,11 @@ class Layered(Law):
 
     # -- layers --------------------------------------------------------------------------------
 
-    @property
-    def _layers(self) -> list[tuple[float, Material]]:
+    @cached_property
+    def _layers(self) -> list[tuple[float, Law]]:
         """Weight and law of each layer that yields."""
-        E, nu = self.elasticity.youngs_modulus, self.elasticity.poisson_ratio
         return [
-            (weight, Material(youngs_modulus=E, poisson_ratio=nu, yield_stress=stress))
+            (weight, Chaboche(elasticity=self.elasticity, curve=Voce(yield_stress=stress)))
             for weight, stress in zip(self.weights, self.yields, strict=True)
         ]
 

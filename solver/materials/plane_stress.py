@@ -1,4 +1,4 @@
-"""Plane stress for any law: solve for the thickness strain at each point."""
+"""Plane stress for any law: the projected return, or the thickness strain solved at each point."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.materials.law import Law
+from solver.materials.projected_return import plane_stiffness, projected_return
 from solver.materials.state import PlasticState, Response
 from solver.materials.wrapped import Wrapped
 from solver.typing import Array, Bools, Ints
@@ -44,6 +45,8 @@ def _without_zz(strain: Array, state: PlasticState, C: Array) -> Array:
 class PlaneStress(Wrapped):
     """Any law in plane stress, with four components; the zz row of strain is not read.
 
+    Von Mises with linear hardening has `projected_return`; for any other law:
+
     1. strain zz from the elastic stiffness, plastic strain frozen
     2. Newton's method for stress zz = 0; stress zz grows with strain zz. If a step leaves the
        bracket of strains known to be too small and too large, the bracket is halved instead
@@ -74,13 +77,18 @@ class PlaneStress(Wrapped):
 
     def stiffness(self, n_components: int) -> Array:
         """Return the elastic stiffness, row and column zz zero [MPa]."""
+        if self.law.linear_hardening:
+            return plane_stiffness(self.elasticity)
         return condensed(self.law.stiffness(n_components))
 
     def respond(self, strain: Array, state: PlasticState) -> Response:
-        """Return the response of the wrapped law at the thickness strain that makes stress zz zero.
+        """Return stress with zz = 0, consistent tangent and new state.
 
         If no such strain is found, stress is NaN and the increment does not converge.
         """
+        linear = self.law.linear_hardening
+        if linear:
+            return projected_return(strain, state, self.elasticity, linear)
         C = self.law.stiffness(len(strain))
         whole = _without_zz(strain, state, C)
         scale = C[_ZZ, _ZZ] * (np.abs(whole) + np.abs(state.plastic_strain)).sum(axis=0)

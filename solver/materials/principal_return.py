@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from solver.materials.curves import Curve
 from solver.materials.elasticity import Elasticity
-from solver.materials.principal import PAIRS, dyad, principal
 from solver.materials.scalar import falling_root
 from solver.materials.state import PlasticState, Response
-from solver.tensors import von_mises
+from solver.tensors import PAIRS, dyad, principal, von_mises
 from solver.typing import Array
 
 _ALIKE = 1e-10
 """Ratio of the difference of two principal stresses to the largest one; up to it they are equal."""
-
-
-class IsotropicSurface(Protocol):
-    """A yield surface that depends on principal stresses alone."""
-
-    @property
-    def over_mises(self) -> float:
-        """Upper bound of the ratio of its equivalent stress to that of von Mises."""
-
-    def of_principal(self, values: Array) -> Array:
-        """Return the equivalent stress (n,) of principal stresses (3, n), largest first [MPa]."""
 
 
 class Returned(NamedTuple):
@@ -42,19 +29,38 @@ class Returned(NamedTuple):
     derivative: Array
 
 
+class IsotropicSurface(Protocol):
+    """A yield surface that depends on principal stresses alone."""
+
+    @property
+    def over_mises(self) -> float:
+        """Upper bound of the ratio of its equivalent stress to that of von Mises."""
+
+    def of_principal(self, values: Array) -> Array:
+        """Return the equivalent stress (n,) of principal stresses (3, n), largest first [MPa]."""
+
+    def returned(self, trial: Array, before: Array, G: float, curve: Curve) -> Returned:
+        """Return the plastic increment for principal trial stresses beyond the surface.
+
+        Parameters
+        ----------
+        trial : (3, n) principal trial stresses s1 >= s2 >= s3 [MPa]
+        before : (n,) p, the accumulated plastic strain
+        """
+
+
 def principal_return(
     strain: Array,
     state: PlasticState,
     elasticity: Elasticity,
     curve: Curve,
     surface: IsotropicSurface,
-    returned: Callable[[Array, Array], Returned],
 ) -> Response:
     """Return stress, consistent tangent and new state for all strain components given.
 
     1. trial: elastic strain with the plastic strain frozen, its principal stresses s1 >= s2 >= s3
     2. elastic where their equivalent stress is not above R(p)
-    3. elsewhere ``returned`` gives the plastic flow; the order of the stresses does not change
+    3. elsewhere the surface gives the plastic flow; the order of the stresses does not change
     4. principal directions are those of the trial stress. Tangent: the derivative of the principal
        stresses, and (s_i - s_j) / (trial_i - trial_j) for the rotation of the directions
 
@@ -62,8 +68,6 @@ def principal_return(
     ----------
     strain : (n_components, n_points) total Mandel strain
     state : internal variables of the last converged state, left unchanged
-    returned : maps principal trial stresses (3, n) beyond the surface [MPa] and accumulated plastic
-        strain (n,) to the plastic increment
 
     References
     ----------
@@ -85,7 +89,7 @@ def principal_return(
 
     yielding[at] = True
     G = elasticity.shear_modulus
-    found = returned(values, state.accumulated[at])
+    found = surface.returned(values, state.accumulated[at], G, curve)
     plastic_strain, accumulated = state.plastic_strain.copy(), state.accumulated.copy()
     accumulated[at] += found.growth
     turn = np.zeros((n_components, n_components, len(at)))

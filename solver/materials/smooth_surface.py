@@ -15,9 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.errors import ModelError
-from solver.materials.principal import dyad, principal
+from solver.materials.curves import Curve
+from solver.materials.principal_return import Returned, grown
 from solver.materials.scalar import falling_root
 from solver.materials.yield_surface import Tension
+from solver.tensors import dyad, principal
 from solver.typing import Array
 
 SIXTH = math.pi / 3
@@ -179,6 +181,53 @@ class SmoothSurface(ABC):
 
     def _size(self, angle: Array) -> Array:
         return self.tension(_stresses(angle))
+
+    # -- return mapping ---------------------------------------------------------------------
+
+    def returned(self, trial: Array, before: Array, G: float, curve: Curve) -> Returned:
+        """Return to the surface along its normal.
+
+        A deviator has the size r and the Lode angle x; on the surface f(x) r = R(p). The normal has
+        the components f along the deviator and f' across it. If the trial stress has size t and
+        angle y:
+
+        1. along: t cos(y - x) = r + 2 G dp f, so that 2 G f^2 dp + R(p + dp) = t cos(y - x) f
+        2. across: t sin(y - x) = 2 G dp f', solved for x with dp(x) from step 1. There is one root,
+           since a convex surface has only one point nearest to the trial stress: the left side is
+           larger below the root and smaller above it
+        3. derivative: (I + 2 G dp H)^-1 less its part along the normal, where H = (f + f'') / r is
+           the curvature across
+
+        Parameters
+        ----------
+        trial : (3, n) principal trial stresses s1 >= s2 >= s3 beyond the surface [MPa]
+        before : (n,) p, the accumulated plastic strain
+        """
+        size, angle = polar(trial)
+        first = curve.flow_stress(before)
+
+        def solved(x: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
+            """Return f, f', f + f'', r, dp and the slope of R, each (n,), at angles (n,)."""
+            f, slope, bend = self.at(x)
+            along = np.maximum(size * np.cos(angle - x) * f, first)
+            growth, hardening = grown(2 * G * f**2, along, before, curve)
+            return f, slope, f + bend, curve.flow_stress(before + growth) / f, growth, hardening
+
+        def across(x: Array) -> tuple[Array, Array]:
+            f, slope, round_, r, growth, hardening = solved(x)
+            excess = size * np.sin(angle - x) - 2 * G * growth * slope
+            resisted = 2 * G * slope**2 / (2 * G * f**2 + hardening)
+            return excess, -(r * (1 + resisted) + 2 * G * growth * round_)  # exact at the root
+
+        x = falling_angle(across, angle, size)
+        f, slope, round_, r, growth, hardening = solved(x)
+        out, aside = base(x)
+        shrunk = 1 / (1 + 2 * G * growth * round_ / r)
+        flow = growth * (f * out + slope * aside)
+        m = f * out + shrunk * slope * aside
+        stiff = 2 * G * (f**2 + shrunk * slope**2) + hardening
+        derivative = out[:, None] * out[None] + shrunk * aside[:, None] * aside[None] + 1 / 3
+        return Returned(flow, growth, derivative - 2 * G / stiff * m[:, None] * m[None])
 
     # -- check ---------------------------------------------------------------------------------
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from solver.materials.attribute import attribute
-from solver.materials.law import Law
+from solver.materials.law import Law, attribute
+from solver.materials.radial_return import LinearHardening
 from solver.materials.state import PlasticState
 from solver.typing import Array
 
@@ -25,8 +25,9 @@ class Wrapped(Law):
         """Return the flow stress (n_points,) of the wrapped law [MPa]."""
         return self.law.flow_stress(state)
 
-    def in_plane_stress(self) -> Law | None:
-        """Return None: `PlaneStress` then wraps this law, not the law inside it."""
+    @property
+    def linear_hardening(self) -> LinearHardening | None:
+        """None: the response of the law inside is not that of this law."""
         return None
 
 

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from solver.errors import ModelError
+from solver.kinds import Checked
+from solver.materials.elastic_plastic import SmoothMaterial, TrescaMaterial
 from solver.materials.elasticity import Elasticity
 from solver.materials.hardening_rules import GrowingRule, HardeningRule
 from solver.materials.law import Law
-from solver.materials.smooth import SmoothMaterial
 from solver.materials.smooth_surface import SmoothSurface
-from solver.materials.tresca import TrescaMaterial
 from solver.parts import Parts
 
 
-class YieldCondition(ABC):
+class YieldCondition(Checked, ABC):
     """The stress at which a material yields, and the direction of flow.
 
     Attributes

@@ -10,16 +10,22 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Interval, Unit
 from skfem import Mesh
 
 from solver.errors import ModelError
+from solver.kinds import Checked, require
 from solver.mesh.grids import grid, joined, mapped, merged, renamed
 from solver.mesh.lines import continued, refined
+from solver.parameters import Coordinate, Length
 from solver.typing import Array
 
-Pair = tuple[float, float]
+Pair = tuple[Coordinate, Coordinate]
+Growth = Annotated[float, Interval(gt=1.0, le=3.0)]
+Radius = Annotated[float, Interval(ge=0.0, le=1e6), Unit("mm")]
 
 
 _MOST_ELEMENTS = 200_000
@@ -35,18 +41,12 @@ _FINE = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Near:
+class Near(Checked):
     """A finely meshed region: elements have the side ``size`` within ``radius`` of ``at`` [mm]."""
 
     at: Pair
-    size: float
-    radius: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Raise `ModelError` for a size that is not positive, and a negative radius."""
-        _positive(size=self.size)
-        if not 0 <= self.radius < math.inf:
-            raise ModelError("radius", self.radius, "must be at least 0 [mm]")
+    size: Length
+    radius: Radius = 0.0
 
 
 def rectangle(
@@ -320,16 +320,11 @@ def _onto_disc(x: Array, radius: float) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class _Spread:
+class _Spread(Checked):
     """Grading along one direction: the largest side, and the ratio of neighbouring sides."""
 
-    size: float
-    growth: float
-
-    def __post_init__(self) -> None:
-        _positive(size=self.size)
-        if not 1 < self.growth < math.inf:
-            raise ModelError("growth", self.growth, "must be greater than 1")
+    size: Length
+    growth: Growth
 
     def lines(
         self,
@@ -375,5 +370,4 @@ def few(count: int) -> None:
 def _positive(**lengths: float) -> None:
     """Raise `ModelError` for lengths that are not positive and finite."""
     for name, length in lengths.items():
-        if not 0 < length < math.inf:
-            raise ModelError(name, length, "must be positive [mm]")
+        require(name, length, Length)

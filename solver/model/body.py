@@ -5,24 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from skfem import Mesh
 
 from solver.errors import ModelError
-from solver.kinds import check_kinds
+from solver.kinds import check
 from solver.materials import Law, PlaneStress
 from solver.mesh.check import check_mesh
 from solver.mesh.elements import element_type
 from solver.mesh.rounding import with_zeros
 from solver.model.amplitude import Amplitude
-from solver.model.kinematics import KINEMATICS, Kinematics
+from solver.model.kinematics import Kinematics
 from solver.model.loads import Displacement, Load, Pressure
 from solver.model.motion import Axle, TravellingPressure
+from solver.parameters import Thickness
 from solver.tensors import AXES
 
-_HELD = {2: ("x", "y", "xy"), 3: ("x", "y", "z", "xy", "xz", "yz", "xyz")}
-"""Components that a support may hold, by number of axes."""
+Held = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
+"""Components that a support may hold; those with z in space alone."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,8 +60,8 @@ class Body:
     kinematics: Kinematics = "plane_strain"
     element: str = "quad8"
     full_integration: bool = False
-    thickness: float = 1.0
-    supports: Mapping[str, str] = field(default_factory=dict)
+    thickness: Thickness = 1.0
+    supports: Mapping[str, Held] = field(default_factory=dict)
     pressure: Mapping[str, float] = field(default_factory=dict)
     amplitude: Amplitude | None = None
     loads: tuple[Load, ...] = ()
@@ -68,13 +70,7 @@ class Body:
     travelling: TravellingPressure | None = None
 
     def __post_init__(self) -> None:
-        check_kinds(Body, self)
-        if self.kinematics not in KINEMATICS:
-            raise ModelError(
-                "kinematics", self.kinematics, "must be one of " + ", ".join(KINEMATICS)
-            )
-        if not (np.isfinite(self.thickness) and self.thickness > 0):
-            raise ModelError("thickness", self.thickness, "must be positive [mm]")
+        check(self)
         element = element_type(self.element)
         shapes = element.element.refdom, self.mesh.elem.refdom
         if shapes[0] is not shapes[1]:
@@ -90,8 +86,10 @@ class Body:
             object.__setattr__(self, "mesh", with_zeros(self.mesh))
             if self.mesh.p[0].min() < 0:
                 raise ModelError("mesh", self.mesh.p[0].min(), "an axisymmetric body needs x >= 0")
-        for boundary in self.supports:
+        for boundary, held in self.supports.items():
             self.facets(boundary, "supports")
+            if self.dim == 2 and "z" in held:
+                raise ModelError(f"supports.{boundary}", held, "must be x, y or xy in a plane body")
         for load in self.every_load:
             load.check(self.kinematics)
             for axis in load.components.keys() - set(range(self.dim)):
@@ -101,11 +99,6 @@ class Body:
                 self.facets(boundary, load.name, outer=load.outside)
             if load.removes:
                 self.region(load.removes, f"{load.name}.region")
-        for boundary, held in self.supports.items():
-            if held not in _HELD[self.dim]:
-                *others, last = _HELD[self.dim]
-                allowed = f"must be {', '.join(others)} or {last}"
-                raise ModelError(f"supports.{boundary}", held, allowed)
         if self.axle is not None and not self.material.elastic:
             raise ModelError("axle", self.name, "a wheel must be elastic: leave out yield_stress")
         if self.travelling is not None:
@@ -140,7 +133,7 @@ class Body:
         """The material law in the kinematics of the body."""
         if self.kinematics != "plane_stress":
             return self.material
-        return self.material.in_plane_stress() or PlaneStress(self.material)
+        return PlaneStress(self.material)
 
     @property
     def box(self) -> np.ndarray:

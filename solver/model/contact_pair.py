@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from solver.errors import ModelError
-from solver.kinds import check_kinds
+from solver.kinds import check
 from solver.model.amplitude import Amplitude
-from solver.model.friction import Coulomb, FrictionLaw
+from solver.model.friction import FrictionLaw, law_of
+from solver.parameters import Coordinate, Friction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,14 +25,8 @@ class ContactPair:
         the surface that ends at a corner, else the finer one or the one that yields. The two are
         exchanged if the slave is unsuitable (`solver.contact.slave`)
     friction : Coulomb coefficient; zero, or a value that counts as zero (`effective_friction`),
-        leaves out the tangential unknowns. Or a law of friction (`FrictionLaw`)
-    cohesion : shear that contact carries in addition to friction [MPa]: the shear is at most
-        ``friction * pressure + min(cohesion, pressure)``
-    shear_limit : ratio of the largest contact shear to the initial shear yield stress of the weaker
-        body, at any pressure; inf (default) sets no limit. If heat lowers the yield stress
-        (`Temperature`), that of the surfaces at the end of the increment counts. If friction
-        permits more shear than the material, the surface layer flows instead of slipping, and its
-        strain grows as the mesh is refined
+        leaves out the tangential unknowns. Or a law of friction, as `Coulomb` with cohesion and a
+        limit of shear
     sliding : which point of the master belongs to a point of the slave, and along which normal.
         ``small``: the point that it faces before loading; consistent with small strains, and
         exactly linear between changes of status. ``finite``: the point that it faces in the current
@@ -52,38 +46,22 @@ class ContactPair:
 
     slave: tuple[str, str]
     master: tuple[str, str]
-    friction: float | FrictionLaw = 0.0
-    shear_limit: float = math.inf
+    friction: Friction | FrictionLaw = 0.0
     sliding: Literal["auto", "small", "finite"] = "auto"
-    cohesion: float = 0.0
-    gap: float = 0.0
-    interference: float = 0.0
+    gap: Coordinate = 0.0
+    interference: Coordinate = 0.0
     amplitude: Amplitude | None = None
     presence: Amplitude | None = None
 
     def __post_init__(self) -> None:
-        check_kinds(ContactPair, self)
+        check(self)
         if self.presence is not None and (least := float(np.min(self.presence.value))) < 0:
             raise ModelError("presence", least, "must not be negative")
-        if not self.shear_limit > 0:
-            raise ModelError("shear_limit", self.shear_limit, "must be positive")
-        if isinstance(self.friction, FrictionLaw):
-            for name, none in (("cohesion", 0.0), ("shear_limit", math.inf)):
-                if (value := getattr(self, name)) != none:
-                    raise ModelError(name, value, "must not stand beside a law of friction")
-        _ = self.law  # checks itself
-        if self.sliding not in ("auto", "small", "finite"):
-            raise ModelError("sliding", self.sliding, "must be auto, small or finite")
-        for name in ("gap", "interference"):
-            if not np.isfinite(getattr(self, name)):
-                raise ModelError(name, getattr(self, name), "must be finite [mm]")
 
     @property
     def law(self) -> FrictionLaw:
         """The law of friction."""
-        if isinstance(self.friction, FrictionLaw):
-            return self.friction
-        return Coulomb(friction=self.friction, cohesion=self.cohesion, shear_limit=self.shear_limit)
+        return law_of(self.friction)
 
     def offset(self, time: float) -> float:
         """Return the gap added at a time to the distance of the surfaces in the mesh [mm]."""

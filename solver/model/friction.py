@@ -8,7 +8,6 @@ is a class in a file of your own.
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.kinds import check_kinds
+from solver.kinds import Checked
 from solver.parameters import Friction, Other, described
 from solver.parts import Parts
 from solver.typing import Array, Bools, Ints
@@ -128,7 +127,7 @@ class ContactPlaces:
         return self.find_slip()
 
 
-class FrictionLaw(ABC):
+class FrictionLaw(Checked, ABC):
     """A friction law; your own is a frozen dataclass that inherits from it."""
 
     __slots__ = ()
@@ -163,10 +162,13 @@ FRICTION: Parts[FrictionLaw] = Parts("friction_law")
 @FRICTION.word("coulomb")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coulomb(FrictionLaw):
-    """Coulomb's law with cohesion and a limit of shear; see `solver.ContactPair`.
+    """Coulomb's law with cohesion and a limit of shear.
 
-    Cohesion is limited to the pressure, because a jump of the bound at zero pressure would leave
-    many problems without a solution.
+    The shear is at most ``friction * pressure + min(cohesion, pressure)``: a jump of the bound at
+    zero pressure would leave many problems without a solution. The limit refers to the initial
+    yield stress of the weaker body or, if heat lowers it (`Temperature`), to that of the surfaces
+    at the end of the increment. If friction permits more shear than the material, the surface layer
+    flows instead of slipping, and its strain grows as the mesh is refined.
     """
 
     friction: Friction = described(0.0, "Coulomb friction coefficient")
@@ -180,19 +182,6 @@ class Coulomb(FrictionLaw):
         0.0, "contact shear beyond friction * pressure; no more than the pressure itself"
     )
 
-    def __post_init__(self) -> None:
-        check_kinds(Coulomb, self)
-        if not (np.isfinite(self.friction) and self.friction >= 0):
-            raise ModelError("friction", self.friction, "must be finite and at least 0")
-        if not (np.isfinite(self.cohesion) and self.cohesion >= 0):
-            raise ModelError("cohesion", self.cohesion, "must be finite and at least 0 [MPa]")
-        if not self.shear_limit >= 0:
-            raise ModelError("shear_limit", self.shear_limit, "must be at least 0")
-
-    @property
-    def _limited(self) -> bool:
-        return 0 < self.shear_limit < math.inf
-
     @property
     def rough(self) -> bool:
         """See `FrictionLaw`."""
@@ -201,14 +190,14 @@ class Coulomb(FrictionLaw):
     @property
     def proportional(self) -> bool:
         """See `FrictionLaw`."""
-        return not (self._limited or self.cohesion)
+        return not (self.shear_limit or self.cohesion)
 
     def check_bodies(self, *, elastic: bool) -> None:
         """See `FrictionLaw`: a shear limit refers to a yield stress."""
-        if elastic and self._limited:
+        if elastic and self.shear_limit:
             raise ModelError(
                 "shear_limit", self.shear_limit,
-                "must be inf between elastic bodies: there is no yield stress to refer to",
+                "must be 0 between elastic bodies: there is no yield stress to refer to",
             )  # fmt: skip
 
     def bound(self, at: ContactPlaces) -> list[tuple[Value, Value]]:
@@ -217,9 +206,14 @@ class Coulomb(FrictionLaw):
         lines: list[tuple[Value, Value]] = [(mu, 0.0)]
         if self.cohesion:
             lines = [(mu + 1, 0.0), (mu, self.cohesion)]
-        if self._limited:
+        if self.shear_limit:
             lines.append((0.0, self.shear_limit * at.strength))
         return lines
+
+
+def law_of(friction: float | FrictionLaw) -> FrictionLaw:
+    """Return the law of a coefficient, Coulomb's, or the law that is given."""
+    return friction if isinstance(friction, FrictionLaw) else Coulomb(friction=friction)
 
 
 def effective_friction(friction: float) -> float:
@@ -254,6 +248,28 @@ def lines_of(law: FrictionLaw, at: ContactPlaces) -> BoundLines:
         allowed = "must give a bound that is zero without pressure: the least stress of its lines "
         raise ModelError("friction_law", law, f"{allowed}is {least[least != 0][0]:.4g} MPa")
     return found
+
+
+def pressure_lines(law: FrictionLaw, n: int, strength: float) -> BoundLines:
+    """Return the lines of a law that depends on pressure alone, at n places of one strength [MPa].
+
+    Raises
+    ------
+    ModelError
+        naming the law, if it asks for slip or plastic strain
+    """
+
+    def nothing() -> Array:
+        allowed = "must not depend on slip or plastic strain on a track without ends"
+        raise ModelError("friction_law", law, allowed)
+
+    places = ContactPlaces(
+        n=n,
+        find_strength=lambda: np.full(n, strength),
+        find_plastic_strain=nothing,
+        find_slip=nothing,
+    )
+    return lines_of(law, places)
 
 
 def through(pressure: Sequence[float], shear: Sequence[float]) -> list[tuple[Value, Value]]:

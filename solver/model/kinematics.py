@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Literal
 
 Kinematics = Literal["plane_strain", "plane_stress", "axisymmetric"]
-KINEMATICS: tuple[str, ...] = get_args(Kinematics)

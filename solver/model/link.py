@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.kinds import check_kinds
+from solver.kinds import check
+from solver.parameters import Infinite
 
 Components = Literal["x", "y", "xy", "normal", "tangential"]
+Springs = Annotated[float, Interval(gt=0.0), Unit("N/mm3")]
 Side = tuple[str, str]
 """Name of a body and of its boundary."""
 
@@ -43,19 +45,14 @@ class Link:
     master: Side | None = None
     rigid: str | None = None
     components: Components = "xy"
-    stiffness: Annotated[float, Interval(gt=0.0), Unit("N/mm3")] = math.inf
+    stiffness: Springs | Infinite = math.inf
     distributed: bool = False
 
     def __post_init__(self) -> None:
-        check_kinds(Link, self)
-        if self.components not in get_args(Components):
-            allowed = f"must be one of {', '.join(get_args(Components))}"
-            raise ModelError("components", self.components, allowed)
+        check(self)
         if self.local and (self.master or self.distributed):
             allowed = "must be x, y or xy with a master, and where it is distributed"
             raise ModelError("components", self.components, allowed)
-        if not self.stiffness > 0:
-            raise ModelError("stiffness", self.stiffness, "must be positive [N/mm3]")
         if self.distributed and (
             self.rigid is None or self.master or math.isfinite(self.stiffness)
         ):

@@ -14,18 +14,18 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal, get_args
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 import scipy
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
+from solver.kinds import check
 from solver.model.amplitude import Amplitude
 from solver.model.kinematics import Kinematics
 from solver.parameters import Coordinate
 from solver.parts import Parts
-from solver.tensors import AXES
 from solver.typing import Array
 
 Field = Callable[[Array], Array]
@@ -54,6 +54,10 @@ class Load:
     amplitude: Amplitude | None = None
     varies: ClassVar[bool] = True
     outside: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        """Raise `ModelError` for a value that is not allowed."""
+        check(self, f"{self.name}.")
 
     def factor(self, time: float) -> float:
         """Return the load factor at a time."""
@@ -139,11 +143,6 @@ class Pressure(BoundaryLoad):
 
     value: StressValue
 
-    def check(self, kinematics: Kinematics) -> None:
-        """Raise `ModelError` for a pressure that is not finite."""
-        del kinematics
-        _check_value(f"pressure.{self.boundary}", self.value, "MPa")
-
     def push(self, x: Array, along: Array) -> Array:
         """Return the forces (2, n) on pieces of the boundary [N/mm]."""
         pressure = _values(f"pressure.{self.boundary}", self.value, x, "MPa")
@@ -158,11 +157,6 @@ class Traction(BoundaryLoad):
     x: StressValue = 0.0
     y: StressValue = 0.0
 
-    def check(self, kinematics: Kinematics) -> None:
-        """Raise `ModelError` for a component that is not finite."""
-        del kinematics
-        _check_components(f"traction.{self.boundary}", self, _VECTOR, "MPa")
-
     def push(self, x: Array, along: Array) -> Array:
         """Return the forces (2, n) on pieces of the boundary [N/mm]."""
         traction = _components(f"traction.{self.boundary}", self, _VECTOR, x, "MPa")
@@ -176,11 +170,6 @@ class BodyForce(Load):
 
     x: Annotated[Value, Unit("N/mm3")] = 0.0
     y: Annotated[Value, Unit("N/mm3")] = 0.0
-
-    def check(self, kinematics: Kinematics) -> None:
-        """Raise `ModelError` for a component that is not finite."""
-        del kinematics
-        _check_components("body_force", self, _VECTOR, "N/mm3")
 
     def body_force(self, x: Array) -> Array:
         """Return the force per volume (2, n) at positions x [N/mm3]."""
@@ -207,10 +196,7 @@ class Gravity(Load):
     y: Annotated[float, Unit("mm/s2")] = -9806.65
 
     def check(self, kinematics: Kinematics) -> None:
-        """Raise `ModelError` for a number that is not allowed, or weight across the axis."""
-        _density("gravity", self.density)
-        for axis in ("x", "y"):
-            _finite(f"gravity.{axis}", getattr(self, axis), "mm/s2")
+        """Raise `ModelError` for weight across the axis."""
         if kinematics == "axisymmetric" and self.x:
             raise ModelError("gravity.x", self.x, "must be 0 in an axisymmetric body: x is radial")
 
@@ -240,15 +226,7 @@ class Centrifugal(Load):
     centre: tuple[Coordinate, Coordinate] = (0.0, 0.0)
 
     def check(self, kinematics: Kinematics) -> None:
-        """Raise `ModelError` for a number that is not allowed, or another axis than its own."""
-        _density("centrifugal", self.density)
-        _finite("centrifugal.speed", self.speed, "rad/s")
-        if self.axis not in get_args(Axis):
-            raise ModelError("centrifugal.axis", self.axis, "must be y or z")
-        if np.shape(self.centre) != (2,):
-            raise ModelError("centrifugal.centre", self.centre, "must be two numbers [mm]")
-        for value in self.centre:
-            _finite("centrifugal.centre", value, "mm")
+        """Raise `ModelError` for another axis than its own."""
         if kinematics == "axisymmetric" and (self.axis != "y" or self.centre[0]):
             given = self.axis if self.axis != "y" else self.centre
             name = "axis" if self.axis != "y" else "centre"
@@ -283,12 +261,10 @@ class Displacement(BoundaryLoad):
         return {axis: value for axis, value in given if value is not None}
 
     def check(self, kinematics: Kinematics) -> None:
-        """Raise `ModelError` if no component is given, or one is not finite."""
+        """Raise `ModelError` if no component is given."""
         del kinematics
         if not self.components:
             raise ModelError(f"displacement.{self.boundary}", None, "must give x, y or both [mm]")
-        for axis, value in self.components.items():
-            _finite(f"displacement.{self.boundary}.{AXES[axis]}", value, "mm")
 
 
 @LOADS.word("temperature")
@@ -308,13 +284,6 @@ class Temperature(Load):
     expansion: PerKelvin
     modulus_drop: PerKelvin = 0.0
     yield_drop: PerKelvin = 0.0
-
-    def check(self, kinematics: Kinematics) -> None:
-        """Raise `ModelError` for a number that is not finite."""
-        del kinematics
-        for name in ("expansion", "modulus_drop", "yield_drop"):
-            _finite(f"temperature.{name}", getattr(self, name), "1/K")
-        _check_value("temperature.rise", self.rise, "K")
 
     def at(self, x: Array) -> Array:
         """Return the rise of temperature (n,) at positions (2, n) [K]."""
@@ -418,12 +387,9 @@ class InitialStress(Load):
         return cls(stress=between)
 
     def check(self, kinematics: Kinematics) -> None:
-        """Raise `ModelError` if the stress is neither components nor a function of position."""
+        """Raise `ModelError` for components beside a function of position, or an amplitude."""
         del kinematics
         each = {name: getattr(self, name) for name in _TENSOR}
-        _check_components("initial_stress", self, _TENSOR, "MPa")
-        if self.stress is not None and not callable(self.stress):
-            raise ModelError("initial_stress.stress", self.stress, "must be a function of position")
         if self.stress is not None and any(each.values()):
             allowed = "must be left out if stress, a function of position, is given"
             raise ModelError("initial_stress", each, allowed)
@@ -435,28 +401,6 @@ class InitialStress(Load):
         if self.stress is not None:
             return checked("initial_stress.stress", self.stress(x), (4, x.shape[1]), "MPa")
         return _components("initial_stress", self, _TENSOR, x, "MPa")
-
-
-def _check_value(field: str, value: object, unit: str) -> None:
-    """Raise `ModelError` for a number that is not finite; functions are checked at the points."""
-    if not callable(value):
-        _finite(field, value, unit)
-
-
-def _check_components(field: str, load: Load, names: tuple[str, ...], unit: str) -> None:
-    for name in names:
-        _check_value(f"{field}.{name}", getattr(load, name), unit)
-
-
-def _finite(field: str, value: object, unit: str) -> None:
-    if not isinstance(value, int | float | np.number) or not np.isfinite(float(value)):
-        raise ModelError(field, value, f"must be finite [{unit}]")
-
-
-def _density(load: str, value: float) -> None:
-    _finite(f"{load}.density", value, "t/mm3")
-    if not value > 0:
-        raise ModelError(f"{load}.density", value, "must be > 0 [t/mm3]")
 
 
 def _components(field: str, load: Load, names: tuple[str, ...], x: Array, unit: str) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.errors import ModelError
-from solver.kinds import check_kinds
+from solver.kinds import check
 from solver.materials.doubts import doubts
 from solver.model.body import Body
 from solver.model.contact_pair import ContactPair
@@ -36,7 +36,7 @@ class Model:
     singular: tuple[SingularPoint, ...] = ()
 
     def __post_init__(self) -> None:
-        check_kinds(Model, self)
+        check(self)
         names = [body.name for body in self.bodies] + [body.name for body in self.rigid]
         if not self.bodies or len(set(names)) < len(names):
             raise ModelError("bodies", names, "must be at least one, with different names")

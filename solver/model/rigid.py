@@ -8,15 +8,38 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.errors import ModelError
-from solver.kinds import check_kinds
-from solver.materials import Law
-from solver.materials.rigid import Rigid
+from solver.kinds import check
+from solver.materials import Elasticity, Law, PlasticState, Response
 from solver.model.loads import Load
+from solver.parameters import Coordinate, Infinite, Thickness
 from solver.typing import Array, Ints
 
-_RIGID = Rigid()
 _TURN = 0.1
 """Largest angle of an edge of an arc [rad]: the error of its curvature is then 0.1 %."""
+
+
+class Rigid(Law):
+    """A law without strain: infinitely stiff, it never yields."""
+
+    @property
+    def elasticity(self) -> Elasticity:
+        """Elastic constants with an infinite modulus."""
+        return Elasticity(youngs_modulus=np.inf, poisson_ratio=0.0)
+
+    def flow_stress(self, state: PlasticState) -> Array:
+        """Return inf: it never yields."""
+        return np.full(state.accumulated.shape, np.inf)
+
+    def respond(self, strain: Array, state: PlasticState) -> Response:
+        """Return the empty response of zero points; a rigid body has no others."""
+        if strain.shape[1]:
+            raise ValueError("a rigid body has no points")
+        count = len(strain)
+        empty = np.zeros(0, dtype=bool)
+        return Response(np.zeros((count, 0)), np.zeros((count, count, 0)), state, empty)
+
+
+_RIGID = Rigid()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,7 +60,7 @@ class Pushed(Load):
     """
 
     value: float = 0.0
-    locked: float = np.inf
+    locked: float | Infinite = np.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -109,26 +132,16 @@ class RigidBody:
 
     name: str
     surfaces: Mapping[str, RigidSurface] = field(default_factory=dict)
-    centre: tuple[float, float] = (0.0, 0.0)
+    centre: tuple[Coordinate, Coordinate] = (0.0, 0.0)
     x: Moved | Pushed = field(default_factory=Moved)
     y: Moved | Pushed = field(default_factory=Moved)
     rotation: Moved | Pushed = field(default_factory=Moved)
-    thickness: float = 1.0
+    thickness: Thickness = 1.0
 
     def __post_init__(self) -> None:
-        check_kinds(RigidBody, self)
+        check(self)
         for name, curve in self.surfaces.items():
             curve.check(name)
-        if not np.isfinite(self.centre).all():
-            raise ModelError("centre", self.centre, "must be finite [mm]")
-        if not (np.isfinite(self.thickness) and self.thickness > 0):
-            raise ModelError("thickness", self.thickness, "must be positive [mm]")
-        for name in ("x", "y", "rotation"):
-            motion = getattr(self, name)
-            if not np.isfinite(motion.value):
-                raise ModelError(name, motion.value, "must be finite")
-            if isinstance(motion, Pushed) and np.isnan(motion.locked):
-                raise ModelError(f"{name}.locked", motion.locked, "must be a time")
 
     @property
     def every_load(self) -> tuple[Moved | Pushed, ...]:

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.errors import ModelError
-from solver.kinds import check_kinds
+from solver.kinds import Checked
+from solver.parameters import Coordinate, Length
 from solver.typing import Array, Bools
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SingularPoint:
+class SingularPoint(Checked):
     """A point at which strain grows without bound as the mesh is refined.
 
     Strain within its radius, in any body, depends on the mesh. The audit checks small-strain theory
@@ -25,15 +25,8 @@ class SingularPoint:
         point
     """
 
-    at: tuple[float, float]
-    radius: float
-
-    def __post_init__(self) -> None:
-        check_kinds(SingularPoint, self)
-        if len(self.at) != 2 or not np.isfinite(self.at).all():
-            raise ModelError("at", self.at, "must be two finite numbers [mm]")
-        if not (np.isfinite(self.radius) and self.radius > 0):
-            raise ModelError("radius", self.radius, "must be positive and finite [mm]")
+    at: tuple[Coordinate, Coordinate]
+    radius: Length
 
     def reaches(self, X: Array) -> Bools:
         """Return which of the positions (2, n) [mm] lie within its radius (n,)."""

@@ -6,7 +6,8 @@ from dataclasses import MISSING, dataclass
 
 import numpy as np
 
-from solver.parameters import Length, Stress, check, described
+from solver.kinds import Checked
+from solver.parameters import Length, Stress, described
 from solver.results.contact_result import ContactResult
 from solver.results.outputs import output
 from solver.results.run import FinishedRun, Values
@@ -35,7 +36,7 @@ _SEEN = (0.01, 0.1)
 
 @output("corner", "contact")
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Corner:
+class Corner(Checked):
     """The power of the singularity with its error, its intensity, and the apparent power.
 
     Contact pressure is fitted from a distance of ten elements from the corner up to the least of
@@ -62,9 +63,6 @@ class Corner:
     flush: bool = described(
         False, "whether a straight side continues beyond the corner: if it sticks it is no notch"
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def __call__(self, run: FinishedRun) -> Values:
         """Return the quantities of a run."""

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from solver.fem.dofs import Dofs, vectors
+from solver.kinds import Checked
 from solver.mesh.rounding import ROUNDED
-from solver.parameters import Length, check, described
+from solver.parameters import Length, described
 from solver.results.contact_result import contact_patches
 from solver.results.fields import Bodies, Solved
 from solver.results.outputs import output
@@ -42,7 +43,7 @@ INCREMENT_RADIUS = declare(
 
 @output("indentation", "contact", "s", "profile", "surfaces", "release")
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Indentation:
+class Indentation(Checked):
     """Force, approach, mean pressure under load, and the displacement of the profile's surface.
 
     The ball touches the origin, and its axis is x = 0. Force, approach and contact radius are also
@@ -51,9 +52,6 @@ class Indentation:
 
     body: str = described(MISSING, "name of the ball")
     radius: Length = described(MISSING, "radius of the ball")
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def watch(self, system: Any, converged: Any) -> Values:
         """Return force, approach and contact radius of an increment."""

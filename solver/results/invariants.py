@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.materials.principal import principal
-from solver.tensors import components, to_mandel
+from solver.tensors import components, principal, to_mandel
 from solver.typing import Array
 
 PRINCIPAL = ("principal_1", "principal_2", "principal_3")

@@ -9,7 +9,8 @@ from dataclasses import MISSING, dataclass
 
 import numpy as np
 
-from solver.parameters import Friction, Length, Stress, check, described
+from solver.kinds import Checked
+from solver.parameters import Friction, Length, Stress, described
 from solver.results.outputs import output
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values
@@ -25,7 +26,7 @@ _AWAY = 0.9
 
 @output("pressure_error", "contact")
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PressureError:
+class PressureError(Checked):
     """The error against p(x) / p0 = 2 / (pi sqrt(1 - (x/a)^2)), with p0 the mean pressure.
 
     It is NaN with friction: there is no closed form.
@@ -34,9 +35,6 @@ class PressureError:
     half_width: Length = described(MISSING, "half-width a of the punch")
     mean_pressure: Stress = described(MISSING, "mean pressure p0 under the punch")
     friction: Friction = described(0.0, "Coulomb friction coefficient")
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def __call__(self, run: FinishedRun) -> Values:
         """Return the error of a run."""

@@ -29,6 +29,7 @@ from solver.loading.walker import Walker
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.model.rigid import RigidBody
+from solver.parameters import Positive
 from solver.results import saved
 from solver.results.at_all_nodes import mesh_fields
 from solver.results.body_fields import BodyValues
@@ -45,6 +46,7 @@ from solver.typing import Array
 
 _LOG = logging.getLogger("solver")
 _STAGES = tuple[Stage, ...]
+_UNTIL = Literal["shaken_down"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -239,7 +241,7 @@ def solve(
     *,
     load: float | None = None,
     stages: Sequence[Stage] = (),
-    until: Literal["shaken_down"] | None = None,
+    until: _UNTIL | None = None,
     control: PathControl | None = None,
     linear_solver: str = "auto",
     progress: Callable[[float], None] | None = None,
@@ -271,17 +273,14 @@ def solve(
     NotConverged
         if an increment failed although an equilibrium may exist
     """
-    given = ("model", model, Model), ("load", load, float | None), ("stages", stages, _STAGES)
-    for name, value, kind in (*given, ("control", control, PathControl | None)):
+    given = ("model", model, Model), ("load", load, Positive | None), ("stages", stages, _STAGES)
+    chosen = ("control", control, PathControl | None), ("until", until, _UNTIL | None)
+    for name, value, kind in (*given, *chosen):
         require(name, value, kind)
     stages = tuple(stages)
     if load is not None and stages:
         raise ModelError("load", load, "must be left out if stages are given")
     load = 1.0 if load is None else load
-    if not (np.isfinite(load) and load > 0):
-        raise ModelError("load", load, "must be positive and finite")
-    if until not in (None, "shaken_down"):
-        raise ModelError("until", until, "must be shaken_down or None")
     names = [stage.name for stage in stages if stage.cycle < 2]
     names += [f"{stage.name}_before" for stage in stages if stage.cycle == 2]
     if len(set(names)) < len(names):

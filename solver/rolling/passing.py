@@ -27,7 +27,7 @@ from solver.linear.krylov import gmres
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
 from solver.rolling.body import FlowPast, PassedBody, S
-from solver.rolling.flow import usual_parts
+from solver.rolling.flow import PARTS
 from solver.rolling.load import AppliedLoad, PassingLoad
 from solver.typing import Array
 
@@ -152,7 +152,7 @@ def passing(
     before : state by depth before the pass
     guess : strains (n_rows, n_columns, n_components) to start from, for instance of a similar pass
     start : what the first contact begins with, for instance that of the pass before
-    parts : number of increments between two points of a row, `usual_parts` if None
+    parts : number of increments between two points of a row, `PARTS` if None
     tolerance : largest deviatoric strain of the residual, times 2 G / yield stress
     budget : counts the solves, those of earlier attempts included
 
@@ -167,7 +167,7 @@ def passing(
     NotConverged
         if Newton's method does not converge
     """
-    parts = parts or usual_parts(material)
+    parts = parts or PARTS
     scale, rough = np.sqrt(track.weights)[..., None], track.rough
     double_shear = 2 * material.elasticity.shear_modulus
     budget, krylov = budget or SolveBudget(), _KRYLOV

@@ -90,9 +90,9 @@ def search(
     def eased(rolls: RollingLoad, ratio: float, guess: Array | None) -> Pass[S]:
         return rolled(_linear(material, ratio), rolls, guess, _PARTS, _TOLERANCE)
 
-    own = 0.0
-    if isinstance(material, Material) and material.hardens:
-        own = material.hardening_ratio
+    linear, E = material.linear_hardening, material.elasticity.youngs_modulus
+    # to 12 digits: the rounding of a ratio that is one of those below must not decide
+    own = float(f"{linear.modulus / (E + linear.modulus):.12g}") if linear else 0.0
     largest = np.inf if material.hardens else _LARGE
     rolls = load.load
 

@@ -19,8 +19,8 @@ import math
 import numpy as np
 from numba import float64, int64, njit, types
 
-from solver.materials.material import Material
-from solver.materials.radial_return import SQRT23
+from solver.materials.elasticity import Elasticity
+from solver.materials.radial_return import SQRT23, LinearHardening
 from solver.materials.state import PlasticState
 from solver.typing import Array
 
@@ -34,8 +34,11 @@ _EACH = tuple(types.UniTuple(int64, n) for n in (4, 6))
 class CompiledSweep:
     """Sweep of a material with linear hardening along rows; see `solver.rolling.flow.Sweep`."""
 
-    def __init__(self, law: Material, strain: Array, start: PlasticState, parts: int) -> None:
-        rule, double_shear = law.hardening_rule, 2 * law.elasticity.shear_modulus
+    def __init__(
+        self, elasticity: Elasticity, rule: LinearHardening, strain: Array, start: PlasticState,
+        parts: int,
+    ) -> None:  # fmt: skip
+        double_shear = 2 * elasticity.shear_modulus
         self._law = np.array(
             [
                 double_shear,
@@ -73,13 +76,16 @@ class CompiledSweep:
 class CompiledFlow(CompiledSweep):
     """Flow of a material with linear hardening along rows; see `solver.rolling.flow.Flow`."""
 
-    def __init__(self, law: Material, strain: Array, start: PlasticState, parts: int) -> None:
-        super().__init__(law, strain, start, parts)
+    def __init__(
+        self, elasticity: Elasticity, rule: LinearHardening, strain: Array, start: PlasticState,
+        parts: int,
+    ) -> None:  # fmt: skip
+        super().__init__(elasticity, rule, strain, start, parts)
         left, gathered, *self._closing = close(
             np.ascontiguousarray(self.states.plastic_strain[..., -1].T),
             self.states.accumulated[:, -1].copy(),
             self._law,
-            law.elasticity.bulk_modulus,
+            elasticity.bulk_modulus,
         )
         self.after = PlasticState(left.T, gathered)
 

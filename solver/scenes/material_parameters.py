@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from solver.errors import ModelError
+from solver.kinds import check
 from solver.materials.elasticity import Elasticity
-from solver.materials.hardening_rules import HARDENING, LinearRule, NoHardening
+from solver.materials.hardening_rules import HARDENING
 from solver.materials.law import Law
+from solver.materials.material import Material
 from solver.materials.yield_conditions import YIELD_CONDITIONS
 from solver.model.contact_pair import ContactPair
 from solver.model.friction import FRICTION, FrictionLaw
-from solver.parameters import Accuracy, Poisson, Stress, check, described
+from solver.parameters import Accuracy, Poisson, Stress, described
 from solver.parts import Parts
 
 
@@ -75,12 +76,10 @@ class MaterialParameters(HardeningParameters):
             does not allow the rule
         """
         rule = HARDENING.made(self.hardening, self)
-        elasticity = Elasticity(
-            youngs_modulus=self.youngs_modulus * stiffness, poisson_ratio=self.poisson_ratio
-        )
+        E, nu = self.youngs_modulus * stiffness, self.poisson_ratio
         if elastic:
-            linear = rule if isinstance(rule, LinearRule) else NoHardening()
-            return linear.law(elasticity, math.inf)
+            return Material(youngs_modulus=E, poisson_ratio=nu)
+        elasticity = Elasticity(youngs_modulus=E, poisson_ratio=nu)
         condition = YIELD_CONDITIONS.made(self.yield_condition, self)
         if not isinstance(rule, condition.rules):
             words = [word for word, kind in HARDENING.all().items()

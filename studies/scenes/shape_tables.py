@@ -8,14 +8,15 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from annotated_types import Interval
 from pydantic import Field
 
 from solver.errors import ModelError
 from solver.mesh.grids import grid
 from solver.mesh.lines import refined
 from solver.mesh.shapes import (
+    Growth,
     Near,
+    Radius,
     ball,
     ball_lines,
     ball_sides,
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-Growth = Annotated[float, Interval(gt=1.0, le=3.0)]
-
 
 class NearTable(SceneTable):
     """A place at which a shape is meshed finely.
@@ -47,7 +46,7 @@ class NearTable(SceneTable):
 
     at: Place
     size: Length
-    radius: Annotated[Coordinate, Interval(ge=0.0, le=1e6)] = 0.0
+    radius: Radius = 0.0
 
 
 class _MeshedTable(SceneTable):

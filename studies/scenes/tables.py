@@ -27,7 +27,7 @@ from pydantic import Field, StringConstraints, create_model
 from solver.errors import ModelError
 from solver.loading.control import INCREMENT_ERROR
 from solver.mesh.lines import closer
-from solver.model.link import Components
+from solver.model.link import Components, Springs
 from solver.model.loads import LOADS, Load
 from solver.parameters import Accuracy, Coordinate, Length, Needs, Other, Stress
 from solver.parts import Declared, declared
@@ -275,7 +275,7 @@ class LinkTable(SceneTable):
     master: Side | None = None
     rigid: str | None = None
     components: Components = "xy"
-    stiffness: Annotated[float, Interval(gt=0.0), Unit("N/mm3")] | None = None
+    stiffness: Springs | None = None
     distributed: bool = False
 
     @property

@@ -24,6 +24,7 @@ from solver.materials import (
     TrescaMaterial,
     Voce,
 )
+from solver.materials.wrapped import Wrapped
 from tests.solver.back_stress_rules import BurletCailletaud, OhnoWang
 from tests.solver.yield_surfaces import Hosford, Odd, Quick
 
@@ -141,10 +142,20 @@ def _ones(n: int) -> np.ndarray:
     return np.outer(one, one)
 
 
+@dataclass(frozen=True)
+class Forwarded(Wrapped):
+    """A law that does not say that its hardening is linear."""
+
+    law: Law
+
+    def respond(self, strain: np.ndarray, state: PlasticState) -> Response:
+        return self.law.respond(strain, state)
+
+
 LAWS: dict[str, tuple[Law, int]] = {
     **{f"radial {h} {n}": (steel(h), n) for h in HARDENING for n in (4, 6)},
-    **{f"projected {h}": (steel(h).in_plane_stress(), 4) for h in HARDENING},
-    **{f"wrapped {h}": (PlaneStress(steel(h)), 4) for h in HARDENING},
+    **{f"projected {h}": (PlaneStress(steel(h)), 4) for h in HARDENING},
+    **{f"wrapped {h}": (PlaneStress(Forwarded(steel(h))), 4) for h in HARDENING},
     **{
         f"tresca {c} {n}": (TrescaMaterial(elasticity=STEEL, curve=CURVES[c]), n)
         for c in CURVES

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from solver.materials import Elasticity, Law, Layered, PlasticState, Tresca, VonMises
+from solver.materials import Elasticity, Law, Layered, PlaneStress, PlasticState, Tresca, VonMises
 from tests.solver.laws import HARDENING, LAWS, StoredCentre, steel
 
 every_law = pytest.mark.parametrize(("law", "n_components"), LAWS.values(), ids=LAWS)
@@ -286,7 +286,7 @@ def test_biaxial_stress_leaves_none_across():
 @pytest.mark.parametrize("hardening", HARDENING)
 def test_uniaxial_tension_follows_the_bilinear_curve(hardening):
     material = steel(hardening)
-    law = material.in_plane_stress()
+    law = PlaneStress(material)
     E, Eu = material.youngs_modulus, 0.024 * material.youngs_modulus
     strain, state = np.zeros((4, 1)), law.initial(1, 4)
     for axial in np.linspace(0, 0.01, 11):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from solver import Body, ContactPair, Material, Model, NotConverged, System, sol
 from solver.contact.problem import STICK
 from solver.loading.increment import Increment
 from solver.mesh import grid
+from solver.model.friction import FrictionLaw
 from tests.verification.flat_punches import press
 
 pytestmark = pytest.mark.solves
@@ -93,9 +96,19 @@ def two_blocks(friction, top):
     return Model(bodies=(upper, lower), contacts=(pair,))
 
 
+@dataclass(frozen=True)
+class Rough(FrictionLaw):
+    """Five times the largest coefficient of Coulomb's law."""
+
+    proportional = True
+
+    def bound(self, at):
+        return [(50.0, 0.0)]
+
+
 def test_two_blocks_that_stick_deform_like_one():
     """Matching linear edges, hats on their vertices: sticking ties the nodes exactly."""
-    parts = solve(two_blocks(50.0, PRESSURE))
+    parts = solve(two_blocks(Rough(), PRESSURE))
     status = parts.loaded.state.contacts[0].status
     assert (status == STICK).all()
     mesh = grid(np.linspace(0.0, 6.0, 13), np.linspace(-3.0, 3.0, 13))

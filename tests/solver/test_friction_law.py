@@ -106,10 +106,9 @@ def test_a_dragged_block_slides_at_the_bound_of_its_law(pressure: float) -> None
 
 
 @pytest.mark.solves
-def test_coulombs_law_is_the_pair_with_its_numbers_to_the_bit() -> None:
-    limited = {"cohesion": 5.0, "shear_limit": 0.2}
-    numbers = solve(dragged(100.0, 0.3, WEAK, **limited))
-    named = solve(dragged(100.0, Coulomb(friction=0.3, **limited), WEAK))
+def test_a_coefficient_is_coulombs_law_to_the_bit() -> None:
+    numbers = solve(dragged(100.0, 0.3, WEAK))
+    named = solve(dragged(100.0, Coulomb(friction=0.3), WEAK))
     assert np.array_equal(numbers.contact().shear, named.contact().shear)
     assert numbers.contact().shear.any()
 
@@ -213,12 +212,6 @@ def test_lines_of_pairs_stand_side_by_side() -> None:
     assert both.over(np.array([1.0, 2.0, 0.0])).least(np.full(3, 10.0)) == pytest.approx(
         [5.0, 7.0, 0.0]
     )
-
-
-def test_a_law_stands_alone() -> None:
-    for own in ({"cohesion": 1.0}, {"shear_limit": 0.5}):
-        with pytest.raises(ModelError, match="must not stand beside a law of friction"):
-            dragged(1.0, Coulomb(friction=0.3), WEAK, **own)
 
 
 # -- tracks without ends -------------------------------------------------------------------------

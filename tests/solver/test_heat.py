@@ -56,7 +56,7 @@ def own(e: float, r: float) -> Chaboche:
 LAWS: dict[str, Any] = {
     **{h: lambda e, r, h=h: linear(e, r, h) for h in ("none", "isotropic", "kinematic", "mixed")},
     "plane stress": lambda e, r: PlaneStress(linear(e, r, "mixed")),
-    "projected": lambda e, r: linear(e, r, "mixed").in_plane_stress(),
+    "projected": lambda e, r: PlaneStress(linear(e, r, "mixed")),
     "tresca": lambda e, r: TrescaMaterial(elasticity=elastic(e), curve=curve(e, r)),
     "hosford": lambda e, r: SmoothMaterial(
         elasticity=elastic(e), curve=curve(e, r), surface=Hosford(8.0)

@@ -57,8 +57,8 @@ def pushed(push: float, stages: Any = STAGES, **own: Any) -> Solution:
 def test_a_fit_is_pushed_off_by_as_much_as_friction_bears(
     own: dict[str, Any], sliding: str
 ) -> None:
-    own = own | {"sliding": sliding}
-    held = pushed(2.0, **own)
+    given = {"friction": Coulomb(**own), "sliding": sliding}
+    held = pushed(2.0, **given)
     along = held.stages["pushed"].state.contacts[0].tangential.sum()
     tilt = 1e-3 if sliding == "finite" else 1e-6  # of the deformed surface
     assert along == pytest.approx(-2.0 * AREA, rel=tilt)
@@ -66,7 +66,7 @@ def test_a_fit_is_pushed_off_by_as_much_as_friction_bears(
     normal = held.stages["pushed"].state.contacts[0].normal.sum()
     borne = own["friction"] * normal + own.get("cohesion", 0.0) * 2 * np.pi * 10.0 * 20.0
     with pytest.raises(LimitLoad, match="body 'hub' slides on all its contacts") as caught:
-        pushed(20.0, **own)
+        pushed(20.0, **given)
     error = caught.value
     reached, attempted = ((time - 1.0) * 20.0 * AREA for time in (error.reached, error.attempted))
     # pushed from one end the hub grows thicker, and friction bears a little more

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 from solver import (
     Body,
     ContactPair,
+    Coulomb,
     Link,
     Material,
     Model,
@@ -19,12 +22,27 @@ from solver import (
     SingularPoint,
     Solution,
     Stage,
+    Tolerances,
     solve,
 )
 from solver.contact.system import System
 from solver.kinds import require
 from solver.loading.outcome import Tally
 from solver.mesh import grid
+from solver.model.friction import ContactPlaces, FrictionLaw, Value
+from solver.parameters import Length
+from solver.scenes.punch import PunchParameters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Worn(FrictionLaw):
+    """A law of a user's own, without any check of its own."""
+
+    length: Length
+
+    def bound(self, at: ContactPlaces) -> list[tuple[Value, Value]]:
+        return [(0.1, 0.0)]
+
 
 STEEL = {"youngs_modulus": 2e5, "poisson_ratio": 0.3}
 PLATE: dict[str, Any] = {
@@ -33,13 +51,14 @@ PLATE: dict[str, Any] = {
 BODY = Body(**PLATE, supports={"bottom": "xy"})
 PAIR = {"slave": ("up", "bottom"), "master": ("plate", "top")}
 STAGE = {"name": "pressed", "target": 1.0}
+HELD = "a dict of text to one of x, y, z, xy, xz, yz, xyz"
 
 
 @pytest.mark.parametrize(
     ("make", "given", "field", "value", "allowed"),
     [
-        (Material, STEEL, "yield_stress", "300", "a number"),
-        (Material, STEEL, "yield_stress", True, "a number"),
+        (Material, STEEL, "yield_stress", "300", "a number or inf"),
+        (Material, STEEL, "yield_stress", True, "a number or inf"),
         (ContactPair, PAIR, "friction", "0.3", "a number or FrictionLaw"),
         (ContactPair, PAIR, "slave", "up.bottom", "a tuple (text, text)"),
         (ContactPair, PAIR, "slave", ("up", "bottom", "left"), "a tuple (text, text)"),
@@ -48,10 +67,8 @@ STAGE = {"name": "pressed", "target": 1.0}
         (Model, {}, "bodies", BODY, "a tuple of Body"),
         (Model, {}, "bodies", {BODY.name}, "a tuple of Body"),
         (SingularPoint, {"radius": 1.0}, "at", np.array(3.0), "a tuple (a number, a number)"),
-        (Model, {}, "bodies", (BODY, "up"), "a tuple of Body"),
         (Model, {"bodies": [BODY]}, "contacts", ContactPair(**PAIR), "a tuple of ContactPair"),
-        (Body, PLATE, "supports", ["left"], "a dict of text to text"),
-        (Body, PLATE, "pressure", {"left": "1"}, "a dict of text to a number"),
+        (Body, PLATE, "supports", ["left"], HELD),
         (Body, PLATE, "material", "steel", "Law"),
         (Body, PLATE, "mesh", "plate.msh", "Mesh"),
         (Body, PLATE, "condense", "no", "true or false"),
@@ -69,6 +86,38 @@ def test_a_field_of_another_kind_is_refused(
     named = f"pressed.{field}" if make is Stage else field
     assert (caught.value.field, caught.value.allowed) == (named, f"must be {allowed}")
     assert caught.value.value is value or caught.value.value == value
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Coulomb(shear_limit=99), "shear_limit = 99: must be at least 0 and at most 10"),
+        (
+            lambda: ContactPair(**PAIR, friction=11.0),
+            "friction = 11.0: must be at least 0 and at most 10 or FrictionLaw",
+        ),
+        (
+            lambda: Material(**STEEL, hardening_ratio=0.95),
+            "hardening_ratio = 0.95: must be at least 0 and at most 0.9",
+        ),
+        (
+            lambda: Material(**STEEL, yield_stress=-1.0),
+            "yield_stress = -1.0: must be greater than 0 [MPa] or inf",
+        ),
+        (lambda: Tolerances(residual=0.0), "residual = 0.0: must be greater than 0"),
+        (lambda: Worn(length=-2.0), "length = -2.0: must be greater than 0 and at most 1e+06 [mm]"),
+        (
+            lambda: PunchParameters(curve=((0.0, math.nan),)),
+            "curve[0][1] = nan: must be a finite number",
+        ),
+        (lambda: Model(bodies=(BODY, "up")), "bodies[1] = 'up': must be Body"),
+        (lambda: Body(**PLATE, pressure={"left": "1"}), "pressure.left = '1': must be a number"),
+    ],
+)  # fmt: skip
+def test_a_value_outside_of_its_declared_range_is_refused(make: Any, message: str) -> None:
+    with pytest.raises(ModelError) as caught:
+        make()
+    assert str(caught.value) == message
 
 
 @pytest.mark.parametrize(

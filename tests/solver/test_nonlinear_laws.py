@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from functools import partialmethod
 
 import numpy as np
 import pytest
@@ -23,17 +24,21 @@ from solver.materials import (
     Chaboche,
     Elasticity,
     Layered,
+    Material,
     PlaneStress,
+    SmoothMaterial,
     Table,
+    TrescaMaterial,
     Voce,
 )
-from solver.materials.tresca import TrescaMaterial
+from solver.materials.hardening_rules import HARDENING
 from solver.materials.yield_surface import Tresca, VonMises
 from solver.mesh import grid
 from solver.tensors import identity
 from tests.solver.laws import CURVES, LAYERED, SOFT, STEEL, SURFACES, chaboche, steel
 from tests.solver.yield_surfaces import Hosford
 
+FIELDS = ("elasticity", "curve", "back_stresses")
 RE, E, G = 350.0, 2e5, STEEL.shear_modulus
 
 
@@ -224,16 +229,82 @@ def test_wrong_numbers_are_refused_by_name(make, field):
     assert refusal.value.field == field
 
 
+@pytest.mark.parametrize("word", ["none", "isotropic", "kinematic", "mixed", "material"])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("youngs_modulus", 0.0),
+        ("youngs_modulus", np.nan),
+        ("youngs_modulus", "2e5"),
+        ("poisson_ratio", -0.1),
+        ("poisson_ratio", 0.5),
+    ],
+)
+def test_no_law_takes_elastic_constants_out_of_their_range(word, name, value):
+    given = {"youngs_modulus": E, "poisson_ratio": 0.3} | {name: value}
+    with pytest.raises(ModelError) as refusal:
+        if word == "material":
+            Material(**given)
+        else:
+            HARDENING.all()[word]().law(Elasticity(**given), RE)
+    assert (refusal.value.field, str(refusal.value.value)) == (name, str(value))
+
+
+@pytest.mark.parametrize("kind", [Chaboche, TrescaMaterial, SmoothMaterial, Material])
+def test_a_law_of_parts_is_not_rigid(kind):
+    parts = {"elasticity": Elasticity(youngs_modulus=np.inf, poisson_ratio=0.3), "curve": SOFT}
+    parts |= {"surface": Hosford(8.0)} if kind is SmoothMaterial else {}
+    given = {"youngs_modulus": np.inf, "poisson_ratio": 0.3} if kind is Material else parts
+    with pytest.raises(ModelError, match=r"youngs_modulus = inf: must be (a )?finite"):
+        kind(**given)
+
+
 # -- back stresses -----------------------------------------------------------------------------
+
+
+def of_parts(like, saturation=0.0):
+    """The law of a material, written in parts."""
+    return Chaboche(
+        elasticity=STEEL,
+        curve=Voce(yield_stress=RE, modulus=like.isotropic_modulus, saturation=saturation),
+        back_stresses=(ArmstrongFrederick(like.kinematic_modulus),),
+    )
+
+
+def test_parts_that_harden_linearly_respond_in_closed_form():
+    like = steel("mixed")
+    law = of_parts(like)
+    assert law.linear_hardening is not None
+    assert law.linear_hardening == like.linear_hardening
+    assert law.initial(3, 4).packed.shape == like.initial(3, 4).packed.shape
+    assert _differ(law, like, 6) == 0.0
+    other = ArmstrongFrederick(1000.0, 1.0)
+    own = type("Own", (Voce,), {})(yield_stress=RE)
+    for change in ({"curve": CURVES["voce"]}, {"curve": own}, {"back_stresses": (other,)}):
+        assert replace(law, **change).linear_hardening is None
+
+
+@pytest.mark.parametrize("name", ["surface", "respond", "flow_stress", "back_stress"])
+def test_a_law_of_ones_own_that_changes_a_part_has_no_closed_form(name):
+    parts = {field: getattr(of_parts(steel("mixed")), field) for field in FIELDS}
+    own = property(lambda law: type("Own", (VonMises,), {})())
+    if name != "surface":
+        own = partialmethod(getattr(Chaboche, name))
+    assert type("Own", (Chaboche,), {})(**parts).linear_hardening is not None
+    assert type("Own", (Chaboche,), {name: own})(**parts).linear_hardening is None
+
+
+def test_a_rule_derived_from_armstrong_and_frederick_evolves_by_itself():
+    still = type("Still", (ArmstrongFrederick,), {"evolve": lambda rule, old, *given: old})
+    law = chaboche("fading", "voce")
+    moving, alone = replace(law, back_stresses=(still(5e4, 300.0),)), replace(law, back_stresses=())
+    assert _differ(moving, alone, 6) < 1e-12
 
 
 def test_one_back_stress_that_does_not_fade_is_pragers():
     like = steel("mixed")
-    law = Chaboche(
-        elasticity=STEEL,
-        curve=Voce(yield_stress=RE, modulus=like.isotropic_modulus),
-        back_stresses=(ArmstrongFrederick(like.kinematic_modulus),),
-    )
+    law = of_parts(like, saturation=1e-9)
+    assert law.linear_hardening is None
     assert _differ(law, like, 6) < 1e-12
 
 

@@ -80,7 +80,7 @@ def test_a_slope_is_straight() -> None:
 def test_what_is_asked_for_is_taken() -> None:
     assert finite(block(), STRAIGHT, "finite")
     assert not finite(block(-1e-3), ROUND, "small")
-    with pytest.raises(ModelError, match="must be auto, small or finite"):
+    with pytest.raises(ModelError, match="must be one of auto, small, finite"):
         ContactPair(**PAIR, sliding="large")
 
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from solver.materials import Elasticity, Heated, Law, Material, PlaneStress, TrescaMaterial, Voce
-from solver.materials.attribute import attribute
+from solver.materials.law import attribute
 from solver.materials.wrapped import Wrapped
 
 MEMBERS = {name: member for name, member in vars(Law).items() if not name.startswith("_")}
-OWN = {"respond", "in_plane_stress"}
+OWN = {"respond", "linear_hardening"}
 """Members that every wrapper has for itself."""
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
 from solver.materials import Elasticity
+from solver.model.friction import FrictionLaw
 from solver.rolling.load import RollingLoad
 from solver.rolling.rail.half_space import half_space
 from solver.rolling.rail.patch import RollingPatch
@@ -25,13 +26,17 @@ Patch = TypeVar("Patch", bound=RollingPatch)
 
 
 def wheel_on(
-    grid: PatchGrid, compliance: Array, wheel: ProfiledWheel, *, friction: float,
-    drive: float | None = None, kind: type[Patch] = RollingPatch, force: float, **rolls: float,
+    grid: PatchGrid, compliance: Array, wheel: ProfiledWheel, *, friction: float | FrictionLaw,
+    strength: float = np.inf, drive: float | None = None, kind: type[Patch] = RollingPatch,
+    force: float, **rolls: float,
 ) -> Patch:  # fmt: skip
-    """Return a wheel on a surface; ``drive`` is its moment over that of full slip."""
-    moment = None if drive is None else drive * friction * force
+    """Return a wheel on a surface; ``drive`` is its moment over that of Coulomb's full slip."""
+    moment = drive if not drive else drive * getattr(friction, "friction", friction) * force
     load = RollingLoad(force=force, drive=moment, **rolls)
-    return kind(grid=grid, compliance=compliance, wheel=wheel, friction=friction, load=load)
+    return kind(
+        grid=grid, compliance=compliance, wheel=wheel, friction=friction, strength=strength,
+        load=load,
+    )  # fmt: skip
 
 
 def ellipse(a: float, b: float, peak: float = 1e-3) -> HertzEllipse:
@@ -49,7 +54,7 @@ def surface_of(grid: PatchGrid, elasticity: Elasticity = STEEL) -> Array:
 
 def pressed(
     hertz: HertzEllipse, along: float, across: float, *, margin: float = 1.25,
-    shift: float = 0.0, **given: float,
+    shift: float = 0.0, **given: Any,
 ) -> RollingPatch:  # fmt: skip
     """Return a cylinder on a crowned rail whose contact has this ellipse.
 

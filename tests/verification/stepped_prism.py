@@ -34,7 +34,7 @@ from solver.errors import ModelError, NotConverged, WindowTooSmall
 from solver.linear.krylov import gmres
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
-from solver.rolling.flow import allowed_inflow, sweep_of, usual_parts
+from solver.rolling.flow import PARTS, allowed_inflow, sweep_of
 from solver.rolling.passing import TOLERANCE, deviation, searched
 from solver.rolling.rail.friction_cone import OPEN
 from solver.rolling.rail.modes import Modes
@@ -167,12 +167,12 @@ class SteppedPrism:
     track : the prism; stations are numbered as its own are, round the length. Ends of a clamped one
         move with the load, which stays in the middle of the span
     law : law of the material
-    parts : number of parts of the way of strain in an increment, `usual_parts` if None
+    parts : number of parts of the way of strain in an increment, `PARTS` if None
     """
 
     def __init__(self, track: PrismTrack, law: Law, parts: int | None = None) -> None:
         self._track, self._law, self._modes = track, law, everywhere(track.modes)
-        self._parts = parts or usual_parts(law)
+        self._parts = parts or PARTS
         self._double_shear = 2 * law.elasticity.shear_modulus
         self._stiffness = law.stiffness(6)
         self._shape = len(self._modes.points), self._modes.stations, 6

@@ -541,7 +541,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         {**SLAVE, "components": "normal", "master": ("other", "left")},
         "components = 'normal': must be x, y or xy with a master",
     ),
-    "stiffness": ({**SLAVE, "stiffness": 0.0}, "stiffness = 0.0: must be positive"),
+    "stiffness": ({**SLAVE, "stiffness": 0.0}, "stiffness = 0.0: must be greater than 0"),
     "distributed": ({**SLAVE, "distributed": True}, "distributed = True: needs a rigid body"),
     "not facing": ({**SLAVE, "master": ("block", "bottom")}, r"links\[0\] .* do not face"),
     "corner": (

@@ -5,19 +5,68 @@ from __future__ import annotations
 import gc
 import re
 import weakref
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from solver.errors import LimitLoad, ModelError, Spins, WindowTooSmall
 from solver.materials import Elasticity
+from solver.model.friction import ContactPlaces, Coulomb, FrictionLaw, Value, through
+from solver.rolling.rail.friction_cone import OPEN, SLIP, STICK
 from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.profiled_wheel import ProfiledWheel
+from solver.typing import Array
 from tests.verification.hertz_ellipse import STEEL, ellipse, flat, pressed, surface_of, wheel_on
 from tests.verification.rolling_cases import moved, random_case, worst
 
 FRICTION = 0.3
+LIMITED = Coulomb(friction=FRICTION, shear_limit=0.5)
+
+
+@dataclass(frozen=True)
+class Worn(FrictionLaw):
+    """Friction that falls with slip."""
+
+    def bound(self, at: ContactPlaces) -> list[tuple[Value, Value]]:
+        return [(0.3 * np.exp(-at.slip), 0.0)]
+
+
+@dataclass(frozen=True)
+class Knees(FrictionLaw):
+    """A coefficient that falls from 0.4 to 0.1 above 100 MPa."""
+
+    def bound(self, at: ContactPlaces) -> list[tuple[Value, Value]]:
+        return through([0.0, 100.0, 1e4], [0.0, 40.0, 1030.0])
+
+
+@pytest.mark.parametrize("law", [
+    LIMITED, Coulomb(friction=FRICTION, cohesion=50.0), Coulomb(cohesion=50.0), Knees(),
+])  # fmt: skip
+def test_shear_follows_a_law_of_pressure(law: FrictionLaw) -> None:
+    """With a small creepage some points stick below the bound, with a large one all are at it."""
+    strength, share = 200.0, {}
+    for creepage in (2e-4, 0.1):
+        patch = pressed(ellipse(1.0, 1.0), 1 / 8, 1 / 6, friction=law, strength=strength,
+                        lateral_creepage=creepage)  # fmt: skip
+        contact = patch.solve(flat(patch))
+        local = np.einsum("jab,cjb->cja", patch.grid.axes, contact.traction)
+        p, shear = -local[..., 1], np.hypot(local[..., 0], local[..., 2])
+        bound = lines_of_own(law, p, strength)
+        assert (shear <= bound + 1e-6 * p.max()).all()
+        assert shear[contact.status == SLIP] == pytest.approx(bound[contact.status == SLIP])
+        share[creepage] = (contact.status == STICK).sum() / (contact.status != OPEN).sum()
+    assert share[2e-4] > 0.05
+    assert share[0.1] == 0.0
+
+
+def lines_of_own(law: FrictionLaw, p: Array, strength: float) -> Array:
+    """Return the bound at pressures (n, m), written out."""
+    if isinstance(law, Knees):
+        return np.where(p < 100.0, 0.4 * p, 40.0 + 0.1 * (p - 100.0))
+    assert isinstance(law, Coulomb)
+    bound = law.friction * p + np.minimum(law.cohesion, p)
+    return np.minimum(bound, law.shear_limit * strength or np.inf)
 
 
 @pytest.mark.parametrize("seed", range(60))
@@ -137,7 +186,8 @@ def test_bad_input_is_named() -> None:
         "grid": grid, "compliance": surface_of(grid), "wheel": wheel, "friction": 0.1, "force": 1.0,
     }  # fmt: skip
     cases = (
-        ({"friction": 1.2}, "friction = 1.2: must lie between 0 and 1"),
+        ({"friction": 11.0}, "friction = 11.0: must be at least 0 and at most 10"),
+        ({"friction": Worn()}, "must not depend on slip or plastic strain on a track without ends"),
         ({"force": 0.0}, "force = 0.0: must be positive"),
         ({"compliance": np.ones((5, 15, 3, 15, 3))}, "must be (15 or more, 15, 3, 15, 3)"),
         ({"compliance": 0 * surface_of(grid), "wheel": replace(wheel, elasticity=rigid)},
@@ -154,12 +204,12 @@ def test_bad_input_is_named() -> None:
         ("z", grid.z[::-1], "must increase, 3 positions or more"),
         ("y", grid.y[1:], "must have 15 values, as z"),
         ("angle", grid.angle + 2.0, "must lie between -pi/2 and pi/2"),
-        ("spacing", 0.0, "spacing = 0.0: must be positive"),
+        ("spacing", 0.0, "spacing = 0.0: must be greater than 0"),
         ("stations", 2, "stations = 2: must be at least 3"),
     ):
         with pytest.raises(ModelError, match=re.escape(message)):
             replace(grid, **{name: value})
-    with pytest.raises(ModelError, match=re.escape("radius = -1.0: must be positive")):
+    with pytest.raises(ModelError, match=re.escape("radius = -1.0: must be greater than 0")):
         replace(wheel, radius=-1.0)
 
 

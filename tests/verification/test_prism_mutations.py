@@ -15,6 +15,7 @@ from solver.audit.report import Audit
 from solver.linear.threads import one_thread
 from solver.materials import Material
 from solver.mesh import grid, within
+from solver.model.friction import BoundLines
 from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.audit.rail import audit_prism
 from solver.rolling.passing import Pass, passing
@@ -174,7 +175,8 @@ def more_friction(patch: Patch) -> None:
     own = RollingPatch._problem
 
     def problem(self: RollingPatch, u: Any) -> Any:
-        return replace(own(self, u), friction=1.02 * self.friction)
+        found = own(self, u)
+        return replace(found, lines=BoundLines(*(1.02 * of for of in found.lines)))
 
     patch.setattr(RollingPatch, "_problem", problem)
 

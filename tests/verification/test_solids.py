@@ -210,7 +210,7 @@ def test_a_cube_that_nothing_holds_is_refused():
         ({"pressure": {"top": 1.0}}, "pressure = .*: must be left out"),
         ({"loads": (Traction(boundary="top", y=1.0),)}, "traction = .*: must be left out"),
         ({"loads": (Gravity(density=8e-9),)}, "gravity = .*: must be left out"),
-        ({"supports": {"left": "zx"}}, "supports.left = 'zx': must be x, y, z, xy, xz, yz or xyz"),
+        ({"supports": {"left": "zx"}}, "supports.left = 'zx': must be one of x, y, z, xy, xz, yz"),
         (
             {"element": "quad8"},
             "needs cells with 4 corners; the mesh of body 'cube' has 8 corners in space",

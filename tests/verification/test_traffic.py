@@ -123,15 +123,15 @@ def test_wheels_in_turn_may_push_with_different_lateral_forces() -> None:
         (({"cant": 0.1},), r"sequence\[0\]\.cant = 0\.1: must be one of load, lateral_position"),
         (
             ({"wheel_profile": "flat"},),
-            r"sequence\[0\]\.wheel_profile = 'flat': must be a list",
+            r"sequence\[0\]\.wheel_profile = 'flat': must be one of",
         ),
         (({}, {}, {"load": "much"}), r"sequence\[2\]\.load = 'much': must be a number"),
         (({"traction": 0.5, "friction": 0.0},), r"sequence\[0\]\.traction = 0\.5: must be 0"),
         (({"times": 0},), r"sequence\[0\]\.times = 0: must be an integer"),
         (({},) * 1001, r"sequence\[1000\]\.times = 1: must make at most 1000 passes in all"),
         (({"times": 600}, {"times": 500}), r"sequence\[1\]\.times = 500: must make at most"),
-        ((5.0,), r"sequence\[0\] = 5\.0: must be a table"),
-        ("heavy", r"sequence = 'heavy': must be a list of tables"),
+        ((5.0,), r"sequence\[0\] = 5\.0: must be a dict"),
+        ("heavy", r"sequence = 'heavy': must be a tuple of a dict"),
     ],
 )
 def test_wrong_entries_are_refused_by_name(sequence: Any, told: str) -> None:

@@ -88,7 +88,7 @@ def noisy(points: np.ndarray) -> np.ndarray:
             "lateral_position = .* from the ends of",
         ),
         ({"wheel_profile": wheel_points()[-4:]}, "lateral_position = .* not beside it"),
-        ({"rail_profile": "54e9"}, "rail_profile = '54e9': must be a list or 60e1"),
+        ({"rail_profile": "54e9"}, "rail_profile = '54e9': must be 60e1 or a tuple"),
     ],
 )
 def test_points_that_are_no_profile_are_refused(given: dict[str, Any], told: str) -> None:

@@ -7,9 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-import solver.materials.smooth
 from solver import Body, LimitLoad, Model, PathControl, solve
-from solver.materials import Chaboche, Elasticity, SmoothMaterial, TrescaMaterial, Voce
+from solver.materials import (
+    Chaboche,
+    Elasticity,
+    SmoothMaterial,
+    SmoothSurface,
+    TrescaMaterial,
+    Voce,
+)
 from solver.materials.principal_return import Returned
 from solver.mesh import grid
 from tests.solver.yield_surfaces import Hosford
@@ -87,8 +93,8 @@ def bent_bar() -> Any:
 def along_the_deviator(find: Any) -> Any:
     """The mistake of one who returns as von Mises does: flow is not normal to the surface."""
 
-    def returned(trial: Any, before: Any, G: float, curve: Any, surface: Any) -> Returned:
-        found = find(trial, before, G, curve, surface)
+    def returned(surface: Any, trial: Any, before: Any, G: float, curve: Any) -> Returned:
+        found = find(surface, trial, before, G, curve)
         s = trial - trial.mean(axis=0)
         left = curve.flow_stress(before + found.growth) / surface.of_principal(trial)
         return found._replace(flow=(1 - left) * s / (2 * G))
@@ -111,8 +117,7 @@ def test_the_audit_finds_a_flow_that_is_not_that_of_the_surface(
     mistake: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if mistake is not None:
-        find = solver.materials.smooth.smooth_return
-        monkeypatch.setattr(solver.materials.smooth, "smooth_return", mistake(find))
+        monkeypatch.setattr(SmoothSurface, "returned", mistake(SmoothSurface.returned))
     report = bent_bar().audit()
     assert report.passed == (mistake is None)
     assert any("law" in text for text in report.violations) == (mistake is not None)

@@ -68,7 +68,7 @@ def rolling(
     load : load as it moves along +x; one for all passes, or one for each
     directions : for each pass, 1 along +x, -1 along -x
     guess : strains (n_rows, n_columns, 4) that the first pass adds, for instance of a coarser mesh
-    parts : number of increments between two points of a row, `usual_parts` if None
+    parts : number of increments between two points of a row, `PARTS` if None
     budget : counts the solves of each pass, those of earlier attempts at the first one included
 
     Raises

@@ -26,13 +26,13 @@ import numpy as np
 from solver.contact.complementarity import change_of, solve_contact
 from solver.contact.geometry import pair
 from solver.contact.problem import OPEN, ContactProblem, ContactSolution
-from solver.errors import ModelError, NoContact, NotConverged, WindowTooSmall
+from solver.errors import NoContact, NotConverged, WindowTooSmall
 from solver.fem.discretisation import Discretisation
 from solver.fem.frame import turning
 from solver.fem.surface import Surface, extract
 from solver.fem.wheel import Wheel
 from solver.model.body import Body
-from solver.model.friction import BoundLines, ContactPlaces, FrictionLaw, lines_of
+from solver.model.friction import FrictionLaw, pressure_lines
 from solver.rolling.load import AppliedLoad, PassingLoad
 from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.track import Track
@@ -364,28 +364,14 @@ class RollingWheel(PassingLoad):
         compliance = self.track.compliance, self.rim.compliance
         sides = zip(geometry.moves, compliance, geometry.rows, strict=True)
         W = np.sum([moves @ C @ rows.T for moves, C, rows in sides], axis=0)
+        lines = pressure_lines(self.friction, n, self.strength)
         return ContactProblem(
             W=W,
             offset=offset,
-            lines=self._bound(n).over(geometry.area[geometry.at]),
+            lines=lines.over(geometry.area[geometry.at]),
             A=np.stack(motions, axis=1),
             balance=np.array(balance),
         )
-
-    def _bound(self, n: int) -> BoundLines:
-        """Return the friction bound at n points: lines of shear over pressure [MPa]."""
-
-        def nothing() -> Array:
-            allowed = "must not depend on slip or plastic strain on a track without ends"
-            raise ModelError("friction_law", self.friction, allowed)
-
-        places = ContactPlaces(
-            n=n,
-            find_strength=lambda: np.full(n, self.strength),
-            find_plastic_strain=nothing,
-            find_slip=nothing,
-        )
-        return lines_of(self.friction, places)
 
     def _nodal(self, force: Array) -> Array:
         """Return the forces (n,) on all nodes of the track from those on its surface."""

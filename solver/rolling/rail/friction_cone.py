@@ -6,12 +6,13 @@ vertices, and rigid motions. Gap g and slip w depend linearly on them::
     (w_x, g, w_s) = offset + influence (q_x, p, q_s) + motions r
     weights (q_x, p, q_s) = resultants
     p >= 0, g >= 0, p g = 0
-    |q| <= mu p,  w = 0 where |q| < mu p,  q = -mu p w / |w| where w is not 0
+    |q| <= b(p),  w = 0 where |q| < b(p),  q = -b(p) w / |w| where w is not 0
 
-The conditions are p = max(0, p - c g) and q = the vector nearest to q - d w with |q| <= mu p, for
-any c, d > 0. Newton's method solves them: influences of all points come from a Fourier transform,
-and only closed points are unknowns, with pressure and two shears where they stick, pressure and the
-shear across the slip where they slip.
+The bound b(p) is the least of some lines, mu p by Coulomb's law. The conditions are
+p = max(0, p - c g) and q = the vector nearest to q - d w with |q| <= b(p), for any c, d > 0.
+Newton's method solves them: influences of all points come from a Fourier transform, and only closed
+points are unknowns, with pressure and two shears where they stick, pressure and the shear across
+the slip where they slip.
 
 P. Alart, A. Curnier, Comput. Methods Appl. Mech. Engrg. 92 (1991) 353-375, section 3.
 """
@@ -24,7 +25,7 @@ import numpy as np
 
 from solver.errors import NoContact
 from solver.linear.dense import RefinedLU
-from solver.model.friction import PatchStatus
+from solver.model.friction import BoundLines, PatchStatus
 from solver.rolling.passing import searched
 from solver.rolling.rail.influence import Influence
 from solver.typing import Array
@@ -35,7 +36,8 @@ NORMAL, TANGENTS = 1, (0, 2)
 """Places of the normal and of the tangents among local axes (x, normal, tangent across)."""
 
 _TOLERANCE = 1e-9
-"""Largest error of a condition over the largest pressure, or over friction times it for shear."""
+"""Largest error of a condition over the largest pressure, for shear times the steepest slope of the
+friction bound."""
 _STEPS = 60
 _SHORTEST = 1 / 256
 """Smallest share of a Newton step in the line search. Where all points slip, a creepage that is
@@ -56,7 +58,7 @@ class ConeProblem:
     ----------
     influence : effects (n, m, 3) of values (n, m, 3) [mm/MPa]
     offset : (n, m, 3) effects without tractions and motions [mm]
-    friction : coefficient mu
+    lines : (n_lines, 1) lines of the largest shear over pressure
     motions : (k, n, m, 3) effects of the rigid motions
     weights : (k, n, m, 3) sums of values that are given, such as areas [mm2]
     resultants : (k,) what they are [N]; the first is the load
@@ -64,10 +66,15 @@ class ConeProblem:
 
     influence: Influence
     offset: Array
-    friction: float
+    lines: BoundLines
     motions: Array
     weights: Array
     resultants: Array
+
+    @property
+    def steepest(self) -> float:
+        """Steepest slope of the friction bound; 0 without friction."""
+        return float(self.lines.slope.max())
 
 
 class ConeSolution:
@@ -137,7 +144,10 @@ class _Iterate:
         p, q = values[..., NORMAL], values[..., TANGENTS]
         pushed = p - self.stiffness * self.effects[..., NORMAL]
         self.closed = pushed > 0
-        self.bound = problem.friction * np.maximum(p, 0)
+        pressed, lines = np.maximum(p, 0).ravel(), problem.lines
+        line = lines.piece(pressed)
+        self.slope, self.level = (of[line, 0].reshape(p.shape) for of in lines)
+        self.bound = lines.least(pressed).reshape(p.shape)
         pulled = q - self.grip * self.effects[..., TANGENTS]
         self.pull = np.hypot(pulled[..., 0], pulled[..., 1])
         slips = self.closed & (self.pull > self.bound)
@@ -152,7 +162,7 @@ class _Iterate:
         normal = np.append(p - np.maximum(pushed, 0), balance[0])
         tangential = np.append(self.missed, balance[1:])
         self.error = float(max(
-            np.abs(normal).max(), np.abs(tangential).max() / (problem.friction or 1.0)
+            np.abs(normal).max(), np.abs(tangential).max() / (problem.steepest or 1.0)
         ))  # fmt: skip
         self.size = float(np.hypot(np.linalg.norm(normal), np.linalg.norm(tangential)))
 
@@ -166,7 +176,7 @@ class _Tangent:
         status, pull, bound = (a.ravel() for a in (here.status, here.pull, here.bound))
         along = here.along.reshape(-1, 2)
         closed = np.flatnonzero(status != OPEN)
-        rough = problem.friction > 0
+        rough = problem.steepest > 0
         stick = np.flatnonzero(status == STICK) if rough else closed[:0]
         slip = np.flatnonzero(status == SLIP) if rough else closed[:0]
         self._at = np.concatenate([closed, stick, stick, slip])
@@ -174,7 +184,7 @@ class _Tangent:
         columns = np.zeros((len(self._at), 3))
         columns[: len(closed), NORMAL] = 1
         rows = columns.copy()
-        columns[: len(closed), TANGENTS] = problem.friction * along[closed]
+        columns[: len(closed), TANGENTS] = here.slope.reshape(-1, 1)[closed] * along[closed]
         for axis, first in zip(TANGENTS, (len(closed), len(closed) + len(stick)), strict=True):
             rows[first : first + len(stick), axis] = 1
         # the direction across the slip
@@ -211,9 +221,9 @@ class _Tangent:
         known = np.where(here.closed[..., None], 0, -here.values)
         slips = here.status == SLIP
         p, q = here.values[..., NORMAL], here.values[..., TANGENTS]
-        short = here.problem.friction * p - (q * here.along).sum(axis=-1)
+        short = here.slope * p + here.level - (q * here.along).sum(axis=-1)
         known[..., TANGENTS] += np.where(slips, short, 0)[..., None] * here.along
-        if not here.problem.friction:
+        if not here.problem.steepest:
             known[..., TANGENTS] = -q
         follows = self._influence.of(known)
         wanted = -self._of(here.effects + follows)

@@ -27,7 +27,7 @@ import numpy as np
 
 from solver.errors import ModelError, NoContact, Spins, WindowTooSmall
 from solver.linear.threads import one_thread
-from solver.model.friction import LEAST_FRICTION
+from solver.model.friction import BoundLines, FrictionLaw, law_of, pressure_lines
 from solver.rolling.rail.friction_cone import (
     NORMAL,
     OPEN,
@@ -66,14 +66,17 @@ class RollingPatch(PatchLoad):
         along axis b at vertex j, in x, y, z. Negative d are at the end, as in an FFT; a prism of N
         stations that repeats itself has every d once
     wheel : the wheel
-    friction : coefficient of friction; without it moment and lateral force are left out
+    friction : Coulomb coefficient, or a friction law that depends on pressure alone; without
+        friction moment and lateral force are left out
+    strength : initial shear yield stress of the prism [MPa]
     load : force and motion; creepages and spin are those of `ProfiledWheel.rolling`
     """
 
     grid: PatchGrid
     compliance: Array
     wheel: ProfiledWheel
-    friction: float
+    friction: float | FrictionLaw
+    strength: float = np.inf
 
     def __post_init__(self) -> None:
         """Raise `ModelError` for arrays and numbers that do not fit."""
@@ -81,12 +84,9 @@ class RollingPatch(PatchLoad):
         shape = self.compliance.shape
         if shape[1:] != (m, 3, m, 3) or len(self.compliance) < n:
             raise ModelError("compliance", shape, f"must be ({n} or more, {m}, 3, {m}, 3)")
-        if not 0 <= self.friction <= 1:
-            raise ModelError("friction", self.friction, "must lie between 0 and 1")
         if not self.load.force > 0:
             raise ModelError("force", self.load.force, "must be positive")
-        if not self.friction > LEAST_FRICTION:
-            object.__setattr__(self, "friction", 0.0)
+        if not self._lines.rough.any():
             object.__setattr__(self, "load", replace(self.load, drive=None, lateral_force=None))
 
     def changed(self, **changes: Any) -> Self:
@@ -95,6 +95,11 @@ class RollingPatch(PatchLoad):
         if other.wheel.elasticity == self.wheel.elasticity:
             vars(other)["_influence"] = self._influence
         return other
+
+    @cached_property
+    def _lines(self) -> BoundLines:
+        """Friction bound of every point; see `pressure_lines`."""
+        return pressure_lines(law_of(self.friction), 1, self.strength)
 
     @cached_property
     def _influence(self) -> Influence:
@@ -241,7 +246,7 @@ class RollingPatch(PatchLoad):
         return ConeProblem(
             influence=self._influence,
             offset=rest + self._offset(u) + np.tensordot(given, motions, 1),
-            friction=self.friction,
+            lines=self._lines,
             motions=motions[free],
             weights=self._sums[free],
             resultants=resultants[free],
@@ -256,8 +261,8 @@ class RollingPatch(PatchLoad):
     def _smooth(self, problem: ConeProblem) -> ConeSolution:
         """Return the contact without friction; the undeformed bodies give the first points."""
         smooth = replace(
-            problem, friction=0.0, motions=problem.motions[:1], weights=problem.weights[:1],
-            resultants=problem.resultants[:1],
+            problem, lines=BoundLines.none(1), motions=problem.motions[:1],
+            weights=problem.weights[:1], resultants=problem.resultants[:1],
         )  # fmt: skip
         height = np.array([-self._expected_edge(problem)])
         return solve_cone(smooth, np.zeros_like(problem.offset), height)

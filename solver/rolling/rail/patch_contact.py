@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.errors import ModelError, WindowTooSmall
+from solver.errors import WindowTooSmall
+from solver.kinds import check
+from solver.parameters import Length
 from solver.rolling.load import AppliedLoad, PassingLoad
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.friction_cone import NORMAL, OPEN, SLIP, TANGENTS
@@ -160,16 +162,14 @@ class EllipticPatch(PatchLoad):
     """
 
     grid: PatchGrid
-    a: float
-    b: float
+    a: Length
+    b: Length
     centre: float = 0.0
     shear: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         """Raise `ModelError` for axes that are not positive, `WindowTooSmall` for a small grid."""
-        for name in ("a", "b"):
-            if not getattr(self, name) > 0:
-                raise ModelError(name, getattr(self, name), "must be positive")
+        check(self)
         x, z = self.grid.x, self.grid.z
         beside = max(z[1] - self.centre + self.b, self.centre + self.b - z[-2])
         if self.a > min(x[0], -x[-1]) - self.grid.spacing / 2 or beside > 0:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Interval
 from scipy import sparse
 
 from solver.errors import ModelError
 from solver.fem.surface import extract
+from solver.kinds import check
 from solver.mesh.edges import shape_derivatives, shape_functions
+from solver.parameters import Length
 from solver.rolling.rail.section import Section
 from solver.typing import Array
 
@@ -108,12 +112,13 @@ class PatchGrid:
     z: Array
     y: Array
     angle: Array
-    spacing: float
+    spacing: Length
     ahead: float
-    stations: int
+    stations: Annotated[int, Interval(ge=_FEWEST)]
 
     def __post_init__(self) -> None:
         """Raise `ModelError` for positions that are not a surface."""
+        check(self)
         m = len(self.z)
         if m < _FEWEST or not (np.diff(self.z) > 0).all():
             raise ModelError("z", self.z, f"must increase, {_FEWEST} positions or more")
@@ -122,10 +127,6 @@ class PatchGrid:
                 raise ModelError(name, getattr(self, name), f"must have {m} values, as z")
         if not (np.abs(self.angle) < np.pi / 2).all():
             raise ModelError("angle", self.angle, "must lie between -pi/2 and pi/2")
-        if not self.spacing > 0:
-            raise ModelError("spacing", self.spacing, "must be positive")
-        if self.stations < _FEWEST:
-            raise ModelError("stations", self.stations, f"must be at least {_FEWEST}")
 
     @property
     def x(self) -> Array:

@@ -10,14 +10,15 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.parameters import Pairs, described, pairs
+from solver.kinds import Checked, check
+from solver.parameters import Pairs, described
 from solver.parts import Parts
 from solver.typing import Array
 
 _XX = 0
 
 
-class SectionStress(ABC):
+class SectionStress(Checked, ABC):
     """A stress that does not change along x."""
 
     __slots__ = ()
@@ -84,6 +85,7 @@ class OverHeight(SectionStress):
 
     def __post_init__(self) -> None:
         """Raise `ModelError` unless there are points whose y rises."""
+        check(self)
         y, _ = self._points
         if not len(y) or (np.diff(y) <= 0).any():
             allowed = "must be given with over_height: points [y in mm, stress in MPa], y rising"
@@ -91,8 +93,7 @@ class OverHeight(SectionStress):
 
     @property
     def _points(self) -> Array:
-        given = pairs("stress_over_height", self.stress_over_height)
-        return np.reshape(np.array(given, dtype=float), (-1, 2)).T
+        return np.reshape(np.array(self.stress_over_height, dtype=float), (-1, 2)).T
 
     def stress(self, points: Array, area: Array) -> Array:
         """Return the stress of the table."""

@@ -13,6 +13,7 @@ from solver.errors import ModelError
 from solver.parameters import Fraction, Length, Other, Ratio, Stress, described
 from solver.rolling.scenes.hertz_ellipse import HertzEllipse, radii_of
 from solver.rolling.scenes.rail_parameters import PrismParameters
+from solver.rolling.scenes.wheel_parameters import check_given_shear
 
 ELEMENTS: Mapping[str, int] = {"draft": 4, "standard": 6, "fine": 10}
 """Elements per semi-axis of the elastic Hertz contact: across, along, and in depth for the shorter
@@ -89,6 +90,8 @@ class RacewayParameters(PrismParameters):
             value = getattr(self, name)
             if self.load == "hertz" and value != usual:
                 raise ModelError(name, value, f"must be {usual}: load = hertz has no wheel")
+        if self.load == "hertz":
+            check_given_shear(self)
         if not (self.ring > 0 or -self.ring > self.radius):
             allowed = f"must be positive, or below {-self.radius:g} for a hollow raceway"
             raise ModelError("ring_radius", self.ring_radius, allowed)

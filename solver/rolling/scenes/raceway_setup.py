@@ -171,8 +171,8 @@ class RolledRaceway:
             track_radius=p.ring,
         )
         return RollingPatch(
-            grid=track.grid, compliance=track.compliance, wheel=wheel, friction=p.friction,
-            load=p.under(ellipse.force),
+            grid=track.grid, compliance=track.compliance, wheel=wheel,
+            load=p.under(ellipse.force), **p.rubbing,
         )  # fmt: skip
 
 

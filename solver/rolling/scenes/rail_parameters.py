@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 from annotated_types import Interval, Unit
 
-from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
 from solver.parameters import Fraction, Other, described
 from solver.rolling.load import RollingLoad
@@ -20,17 +20,19 @@ from solver.rolling.scenes.wheel_parameters import (
     SamePoisson,
     Stiffness,
     Traction,
-    check_control,
+    check_traction,
     elasticity_of_wheel,
 )
-from solver.scenes.material_parameters import MaterialParameters
+from solver.scenes.material_parameters import ContactParameters
 
+ROUGH = {"friction": Other(0.0), "cohesion": Other(0.0), "friction_law": Other("coulomb")}
+"""What a creepage needs to have an effect."""
 _LOCKED = 1.0
 """Creepage of a wheel that does not turn."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PrismParameters(MaterialParameters):
+class PrismParameters(ContactParameters):
     """Passes, motion and elasticity of a wheel on a prism that yields (N, mm, MPa)."""
 
     passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "number of passes")
@@ -40,22 +42,20 @@ class PrismParameters(MaterialParameters):
     given_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
         0.0,
         "prescribed creepage 1 - w R / V of a wheel that turns by w and advances by V",
-        needs={"friction": Other(0.0)},
+        needs=ROUGH,
     )
     lateral_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
         0.0,
         "velocity of the axle along z over that along x, as by skew; the yaw of a wheel adds to it",
-        needs={"friction": Other(0.0)},
+        needs=ROUGH,
     )
     wheel_stiffness: Stiffness = described(1.0, STIFFNESS)
     wheel_poisson_ratio: SamePoisson = described("same", POISSON)
 
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
-        MaterialParameters.__post_init__(self)
-        if self.traction and not self.friction:
-            raise ModelError("traction", self.traction, "must be 0 without friction")
-        check_control(self.control, self.traction, self.given_creepage)
+        ContactParameters.__post_init__(self)
+        check_traction(self)
 
     @property
     def elasticity(self) -> Elasticity:
@@ -84,3 +84,11 @@ class PrismParameters(MaterialParameters):
             creepage=_LOCKED if locked else self.given_creepage,
             lateral_creepage=self.lateral_creepage,
         )
+
+    @property
+    def rubbing(self) -> Mapping[str, Any]:
+        """Friction and strength, as `RollingPatch` takes them."""
+        return {
+            "friction": self.friction_part,
+            "strength": self.material().shear_yield_stress,
+        }

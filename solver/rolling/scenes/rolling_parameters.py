@@ -15,7 +15,7 @@ from solver.parameters import Accuracy, Other, by_accuracy, described
 from solver.rolling.plane.lines import MOST_COLUMNS, window_elements
 from solver.rolling.scenes.schedule import Schedule
 from solver.rolling.scenes.sequence import block_of
-from solver.rolling.scenes.wheel_parameters import WheelParameters
+from solver.rolling.scenes.wheel_parameters import WheelParameters, check_given_shear
 
 ENDLESS: Literal["endless"] = "endless"
 """Value of `track` for steady passes."""
@@ -105,12 +105,8 @@ class RollingParameters(WheelParameters):
         prescribed = self.control == "creepage"
         if prescribed and self.load == "hertz":
             raise ModelError("control", self.control, "must be moment: load = hertz has no wheel")
-        if self.load == "hertz" and self.friction_law != "coulomb":
-            allowed = "must be coulomb: load = hertz prescribes the shear"
-            raise ModelError("friction_law", self.friction_law, allowed)
-        for name in ("shear_limit", "cohesion") if self.load == "hertz" else ():
-            if value := getattr(self, name):
-                raise ModelError(name, value, "must be 0: load = hertz prescribes the shear")
+        if self.load == "hertz":
+            check_given_shear(self)
         if self.element_size > self.half_width / 2:
             raise ModelError(
                 "element_size", self.element_size,

@@ -41,12 +41,8 @@ def block_of(
     ModelError
         naming the entry and its field, if a parameter is wrong or cannot differ between passes
     """
-    if not isinstance(sequence, tuple | list):
-        raise ModelError("sequence", sequence, "must be a list of tables")
     block: list[Any] = []
     for number, entry in enumerate(sequence):
-        if not isinstance(entry, Mapping):
-            raise ModelError(f"sequence[{number}]", entry, "must be a table")
         own: dict[str, Any] = dict(entry)
         try:
             times = _times(own.pop(_TIMES, 1))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from annotated_types import Interval, Unit
 
@@ -67,12 +67,7 @@ class WheelParameters(ContactParameters):
     def __post_init__(self) -> None:
         # zero-argument super() does not see the class that dataclass(slots=True) makes
         ContactParameters.__post_init__(self)
-        if self.traction and self.frictionless:
-            raise ModelError("traction", self.traction, "must be 0 without friction")
-        if self.friction_law != "coulomb" and self.traction not in (0.0, 1.0):
-            allowed = "must be 0 or 1 unless friction_law is coulomb: full slip is friction * force"
-            raise ModelError("traction", self.traction, allowed)
-        check_control(self.control, self.traction, self.given_creepage)
+        check_traction(self)
 
     @property
     def wheel_material(self) -> Material:
@@ -120,10 +115,22 @@ def elasticity_of_wheel(
     )
 
 
-def check_control(control: str, traction: float, given_creepage: float) -> None:
-    """Raise `ModelError` if both moment and creepage of a wheel are given, or the wrong one."""
-    prescribed = control == "creepage"
-    if prescribed and traction:
+def check_traction(parameters: Any) -> None:
+    """Raise `ModelError` if friction has no such traction, or for both moment and creepage."""
+    p, traction = parameters, parameters.traction
+    if traction and p.frictionless:
+        raise ModelError("traction", traction, "must be 0 without friction")
+    if p.friction_law != "coulomb" and traction not in (0.0, 1.0):
+        allowed = "must be 0 or 1 unless friction_law is coulomb: full slip is friction * force"
+        raise ModelError("traction", traction, allowed)
+    if p.control == "creepage" and traction:
         raise ModelError("traction", traction, "must be 0 with control = creepage")
-    if given_creepage and not prescribed:
-        raise ModelError("given_creepage", given_creepage, "needs control = creepage")
+    if p.given_creepage and p.control != "creepage":
+        raise ModelError("given_creepage", p.given_creepage, "needs control = creepage")
+
+
+def check_given_shear(parameters: Any) -> None:
+    """Raise `ModelError` for a friction law that a prescribed shear, in proportion, has not."""
+    for name, usual in (("friction_law", "coulomb"), ("shear_limit", 0), ("cohesion", 0)):
+        if (value := getattr(parameters, name)) != usual:
+            raise ModelError(name, value, f"must be {usual}: load = hertz prescribes the shear")

@@ -16,7 +16,7 @@ from solver.parts import declared
 from solver.rolling.load import RollingLoad
 from solver.rolling.rail.profiles.points import SectionMesh, as_points
 from solver.rolling.scenes.initial_stress import INITIAL_STRESS, SectionStress
-from solver.rolling.scenes.rail_parameters import PrismParameters
+from solver.rolling.scenes.rail_parameters import ROUGH, PrismParameters
 from solver.rolling.scenes.sequence import CUT, block_of, check_spreads, deviations
 
 ELEMENT_SIZE: Mapping[str, float] = {"draft": 2.0, "standard": 1.0, "fine": 0.5}
@@ -70,7 +70,7 @@ class WheelRailParameters(PrismParameters):
         0.0,
         "rotation of the wheel about the downward vertical over its velocity, beside the spin that "
         "the slope of the contact makes",
-        needs={"friction": Other(0.0)},
+        needs=ROUGH,
     )
     lateral_position: Annotated[float, Interval(ge=-30.0, le=30.0), Unit("mm")] = described(
         -4.0,
@@ -199,7 +199,7 @@ class WheelRailParameters(PrismParameters):
         if self.lateral_control == "force" and creepage:
             allowed = "must be 0 with lateral_control = force"
             raise ModelError("lateral_creepage", creepage, allowed)
-        if self.lateral_control == "force" and not self.friction:
+        if self.lateral_control == "force" and self.frictionless:
             allowed = "must be creepage without friction"
             raise ModelError("lateral_control", self.lateral_control, allowed)
 

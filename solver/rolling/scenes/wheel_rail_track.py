@@ -280,12 +280,11 @@ class RolledRail:
             return last[2]
         wheel, rolls = wheel_of(p), p.under(p.load)
         if last is not None and last[0] is track:
-            made = last[2].changed(wheel=wheel, friction=p.friction, load=rolls)
+            made = last[2].changed(wheel=wheel, load=rolls, **p.rubbing)
         else:
             made = RollingPatch(
-                grid=track.grid, compliance=track.compliance, wheel=wheel, friction=p.friction,
-                load=rolls,
-            )  # fmt: skip
+                grid=track.grid, compliance=track.compliance, wheel=wheel, load=rolls, **p.rubbing
+            )
         self._made = track, p, made
         return made
 

@@ -72,7 +72,8 @@ def _borne(p: RollingParameters) -> bool:
     """
     enough = p.hardening != "none" and p.hardening_ratio >= ENOUGH
     near = NEAR if enough else NEAR_LARGE
-    hardened = STRAINED * p.material().hardening_rule.modulus if enough else 0.0
+    linear = p.material().linear_hardening
+    hardened = STRAINED * linear.modulus if enough and linear else 0.0
     k = (p.yield_stress + hardened) / math.sqrt(3)
     shear = _sheared(p)
     if p.load == "contact":

@@ -134,7 +134,8 @@ def _positions(passed: Passed) -> np.ndarray:
 def _law(passed: Passed, own: RollingParameters) -> dict[str, float]:
     """Return how far stress and plastic strain are from the law, where material flows."""
     p, run = passed.parameters, passed.run
-    a, material = p.mesh_width, p.material()
+    a, linear = p.mesh_width, p.material().linear_hardening
+    assert linear is not None
     x, y = _positions(passed)
     x = x * passed.parameters.directions[len(passed.record.coordinates["pass"]) - 1]
     inside = (x < AHEAD * a) & (x > -BEHIND * a) & (y > -DEEP * a)
@@ -142,9 +143,9 @@ def _law(passed: Passed, own: RollingParameters) -> dict[str, float]:
     for name, state in (("yield loaded", run.loaded), ("yield left", run.unloaded)):
         stress, plastic = state.response.stress, state.response.state
         ep, total = plastic.plastic_strain, plastic.accumulated
-        relative = stress - 2 / 3 * material.kinematic_modulus * ep
+        relative = stress - 2 / 3 * linear.kinematic_modulus * ep
         relative[:3] -= relative[:3].mean(axis=0)
-        strength = material.yield_stress + material.isotropic_modulus * total
+        strength = linear.yield_stress + linear.isotropic_modulus * total
         beyond = np.sqrt(1.5 * (relative**2).sum(axis=0)) - strength
         size = max(1.0, p.youngs_modulus * float(np.abs(ep).max()) / p.yield_stress)
         at = inside if name == "yield loaded" else slice(None)

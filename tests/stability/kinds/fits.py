@@ -16,6 +16,7 @@ from solver import (
     Amplitude,
     Body,
     ContactPair,
+    Coulomb,
     Material,
     Model,
     Solution,
@@ -108,9 +109,9 @@ class Fit:
         hub = Body(name="hub", mesh=grid(R * np.geomspace(1, self.outer, 13), z), material=outside,
                    supports={} if pushed else {"bottom": "y", "top": "y"},
                    loads=(load,) if pushed else (), **given)  # fmt: skip
+        law = Coulomb(friction=self.friction, cohesion=self.cohesion * self.pressure)
         pair = ContactPair(
-            slave=("hub", "left"), master=("shaft", "right"), friction=self.friction,
-            cohesion=self.cohesion * self.pressure, gap=self.gap * R,
+            slave=("hub", "left"), master=("shaft", "right"), friction=law, gap=self.gap * R,
             interference=self.squeeze * R, amplitude=Amplitude(time, [0, 1, 1]),
         )  # fmt: skip
         stages = [Stage(name="fitted", target=1.0, steps=self.steps)]

@@ -134,7 +134,7 @@ def law(system: System, body: str, converged: Converged) -> dict[str, float]:
     part, response = system.full(body), system.response(body, converged)
     material, stress = part.body.material, response.stress
     plastic, accumulated = response.state.plastic_strain, response.state.accumulated
-    E, nu = material.youngs_modulus, material.poisson_ratio
+    E, nu = material.elasticity.youngs_modulus, material.elasticity.poisson_ratio
     strain = part.strain(system.displacement(body, converged.state))
     elastic = (1 + nu) / E * stress
     elastic[:3] -= nu / E * stress[:3].sum(axis=0)
@@ -148,10 +148,12 @@ def law(system: System, body: str, converged: Converged) -> dict[str, float]:
 
     excess = 0.0
     if not material.elastic:
-        relative = stress - 2 / 3 * material.kinematic_modulus * plastic
+        linear = material.linear_hardening
+        assert linear is not None
+        relative = stress - 2 / 3 * linear.kinematic_modulus * plastic
         relative[:3] -= relative[:3].mean(axis=0)
         mises = np.sqrt(1.5 * (relative**2).sum(axis=0))
-        strength = material.yield_stress + material.isotropic_modulus * accumulated
+        strength = material.yield_stress + linear.isotropic_modulus * accumulated
         excess = max(0.0, float((mises / strength).max()) - 1)
     return {
         "yield": excess,

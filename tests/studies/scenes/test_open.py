@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from solver import ModelError
-from solver.materials.chaboche import Chaboche
+from solver.materials import Chaboche
 from solver.scenes.material_parameters import ContactParameters
 from solver.scenes.punch import PunchParameters
 from studies import Study, StudyError

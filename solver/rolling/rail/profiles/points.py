@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.files import read_file
-from solver.parameters import Pairs, pairs
+from solver.kinds import require
+from solver.parameters import Pairs
 from solver.typing import Array
 
 _FEWEST = 4
@@ -54,9 +55,9 @@ def as_points(field: str, value: Any) -> Pairs:
     """
     with suppress(TypeError, ValueError):
         value = tuple(map(tuple, np.asarray(value, dtype=float).tolist()))
-    found = pairs(field, value)
-    checked_points(np.array(found).reshape(-1, 2).T, field)
-    return found
+    require(field, value, Pairs)
+    checked_points(np.array(value).reshape(-1, 2).T, field)
+    return cast("Pairs", value)
 
 
 def checked_points(points: Array, field: str = "points") -> Array:

@@ -15,7 +15,9 @@ import numpy as np
 from skfem import MeshQuad2
 
 from solver.errors import ModelError
+from solver.kinds import check
 from solver.mesh.lines import graded
+from solver.parameters import Coordinate, Length
 from solver.rolling.rail.profiles.patches import (
     even,
     halved,
@@ -63,19 +65,17 @@ class Zone:
         more rows are to be divided than there are
     """
 
-    at: float
-    half_width: float
-    depth: float
-    size: float
-    layer: float | None = None
+    at: Coordinate
+    half_width: Length
+    depth: Length
+    size: Length
+    layer: Length | None = None
     split: int = 0
 
     def __post_init__(self) -> None:
-        lengths = ["half_width", "depth", "size"] + ["layer"] * (self.layer is not None)
-        for name in lengths:
-            if not 0 < getattr(self, name) < math.inf:
-                raise ModelError(name, getattr(self, name), "must be positive [mm]")
-        for name, most in (("size", self.half_width), (lengths[-1], self.depth)):
+        check(self)
+        deepest = "size" if self.layer is None else "layer"
+        for name, most in (("size", self.half_width), (deepest, self.depth)):
             if getattr(self, name) > most:
                 raise ModelError(name, getattr(self, name), f"must be at most {most:g} [mm]")
         if not 0 <= self.split <= self._whole:
