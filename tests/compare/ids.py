@@ -134,7 +134,7 @@ def described(found: Any) -> list[Any]:
             ]
     digest = hashlib.sha256(json.dumps(ids).encode()).hexdigest()
     content = json.dumps(found.to_dict(), sort_keys=True)
-    return [found.id, found.size, found.counted, found.stage(), len(ids), digest, content]
+    return [found.id, found.size, found.stage(), len(ids), digest, content]
 
 
 def of_this_checkout() -> dict[str, Any]:

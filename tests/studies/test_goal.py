@@ -19,15 +19,14 @@ from residua.cli import main
 from solver.errors import ModelError
 from solver.results.record import Record
 from studies import Bounds, Store, Study, StudyError, StudyEvent, estimate, open_study, run_study
-from studies.definition.goal import Goal, Search, checked_goal
 from studies.definition.identity import solver_hash
 from studies.definition.neighbours import Neighbours
 from studies.execution.asking import Asking
-from studies.execution.goals import answers
 from studies.execution.limits import Limits
-from studies.execution.refined import refined
+from studies.execution.result import answered
 from studies.execution.run import _Work
 from studies.execution.task import PathTask, walk
+from studies.kinds.goal.search import Goal, Search, checked_goal
 from tests.studies.conftest import fake_study
 from tests.studies.fakes import FAKE, Canned, FakeParameters, Followed, numbers
 from tests.studies.killed import runs_before_a_kill
@@ -90,10 +89,7 @@ def search_here(study: Study, store: Store, most: int = 10**6) -> list[str]:
         goals.closed(asked.path.id)
     store.reconcile()
     store.save_study(study)
-    if study.goal:
-        answers(study, store, goals)
-    else:
-        refined(study, store, goals, anew=True)
+    answered(study, store, goals, anew=True)
     return computed
 
 
@@ -343,15 +339,15 @@ def test_a_shakedown_limit_below_an_undecided_run_has_a_warning(
 ) -> None:
     goal = {"find": "shakedown_limit", "parameter": "load_ratio", "between": [1.0, 3.0]}
     asked = Study.from_dict({"name": "limit", "scene": "raceway", "goal": goal})
-    assert asked.asks is not None
-    search = Search(asked.asks)
+    assert isinstance(asked.kind, Goal)
+    search = Search(asked.kind)
     while wanted := search.wants:
         scalars = {"shakedown_state": beyond if wanted[0] > 2.0 else 1}
         row = {"id": str(wanted[0]), "status": "ok", "scalars": scalars, "message": ""}
         search.tell(wanted[0], row)
     store.save_study(asked)
     asking = SimpleNamespace(places=[SimpleNamespace(program=search)])
-    found = answers(asked, store, cast("Asking", asking))
+    found = answered(asked, store, cast("Asking", asking), anew=True)
     with open_study(found.path) as dataset:
         assert dataset["status"].item() == "ok"
         assert ("undecided: the limit may be higher" in dataset["message"].item()) == doubtful
@@ -457,10 +453,10 @@ def test_a_study_with_a_goal_has_an_id_and_is_read_again() -> None:
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_estimate_is_the_most_that_the_search_may_take(store: Store, scene: str) -> None:
     asked = study(PRESSURE, scene=scene)
-    assert asked.asks is not None
+    assert isinstance(asked.kind, Goal)
     found = estimate(asked, store)
-    assert found.runs == found.to_compute == 4 * asked.asks.most[1]
-    assert found.paths == 4 * asked.asks.most[0]
+    assert found.runs == found.to_compute == 4 * asked.kind.most[1]
+    assert found.paths == 4 * asked.kind.most[0]
     assert len(search_here(asked, store)) <= found.runs
     with pytest.raises(StudyError, match="at most 10: use fewer values"):
         Bounds(runs=10).check_size(asked)

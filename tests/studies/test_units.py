@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from studies import Study, StudyError
-from studies.definition.goal import checked_goal
-from studies.definition.measured import checked_measured, content_of
 from studies.definition.parameters import parameters_of, read_values
-from studies.definition.refine import checked_refine
 from studies.errors import SceneError
+from studies.kinds.fit.measured import checked_measured, content_of
+from studies.kinds.goal.search import checked_goal
+from studies.kinds.refine.refinement import checked_refine
 from studies.scenes.description import Description
 from studies.scenes.registry import scene_named
 from studies.units import LONGEST, UnitError, converted, is_quantity

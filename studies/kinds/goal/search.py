@@ -24,19 +24,24 @@ performance preserving minmax optimality, ACM Trans. Math. Softw. 47(1), 5: ITP.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from solver.late import Late
 from solver.parameters import is_number
 from solver.scenes import Scene
+from studies.definition.cases import Case
 from studies.definition.parameters import Parameter, in_unit, parameters_of
 from studies.definition.place import Chooser
 from studies.definition.quantity import number_of_a_run
 from studies.definition.spaced import is_finite, rounded
+from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import NO_EQUILIBRIUM, SOLVED
 from studies.errors import StudyError, check_entries, one_of
+from studies.kinds.kind import Kind, Placed, Reading, Trial
 
 FOUND: Mapping[str, Mapping[str, Any]] = {
     "first_yield": {"of": "max_plastic_strain", "first_above": 0.0},
@@ -67,7 +72,7 @@ _SLACK = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Goal:
+class Goal(Kind):
     """What is asked for.
 
     Attributes
@@ -83,6 +88,15 @@ class Goal:
     branch : whether the parameter is the branch of its scene
     goes_on : whether a path of the scene goes on from any of its states (`Scene.goes_on`)
     """
+
+    name = "goal"
+    meaning = "what is searched at each place of the axes"
+    everywhere = True
+    rows = "answers"
+    counted = "searches"
+    example = "run_high"
+    answers = Late("studies.kinds.goal.answer:answers")
+    found = Late("studies.kinds.goal.shown:found")
 
     parameter: str
     of: str = ""
@@ -141,6 +155,62 @@ class Goal:
         more = math.ceil(max(0.0, math.log(width / self.tolerance, self.parts) - 1e-9))
         more += _SLACK if self.kind == "at" and self.parts == 2 else 0
         return 1 + more, first + 1 + more * (self.parts - 1)
+
+    @classmethod
+    def checked(cls, content: Any, scene: Scene, axes: Axes) -> Goal:
+        """Return the goal that a study asks for, see `checked_goal`."""
+        del axes
+        return checked_goal(content, scene)
+
+    @classmethod
+    def searched(cls, content: Mapping[str, Any]) -> Mapping[str, str]:
+        """Return the parameter that is searched, with its field."""
+        return {content["parameter"]: "goal.parameter"}
+
+    @property
+    def trial(self) -> Trial:
+        """The runs at the ends of the bracket."""
+        ends: Axes = {self.parameter: list(self.between)}
+        return Trial({}, ends, {f"sweep.{self.parameter}": "goal.between"})
+
+    @property
+    def value(self) -> str:
+        """The parameter that is searched."""
+        return self.parameter
+
+    @property
+    def expects(self) -> bool:
+        """Whether a search begins where its neighbours let expect the goal."""
+        return self.halves
+
+    def most_runs(self, places: int) -> int:
+        """Return the most runs of the searches at so many places."""
+        return places * self.most[1]
+
+    def stage(self, places: int, ended: int, told: str) -> str:
+        """Return how many searches have ended."""
+        return f"{ended} of {places} searches ended"
+
+    def programs(self, axes: Axes, read: Reading, allow: Sequence[str]) -> Iterator[Placed]:
+        """Yield a search for each place of the axes."""
+        for each in standings(axes):
+            at = [f"{axis} = {each.at[axis]}" for axis in axes]
+            yield Placed(at, each.sets, Search(self))
+
+    def longest(
+        self, cases: Iterable[Case], branch: str
+    ) -> Iterator[tuple[Case, Mapping[str, Any], list[Any]]]:
+        """Yield the paths of the longest searches, each to the largest value."""
+        rounds, runs = self.most
+        low, high = self.between
+        first, later, count = [high], [high], runs
+        if self.branch:
+            each = runs - rounds if self.goes_on else (runs - 2) // rounds + 1
+            later = [high] * (1 if self.goes_on else each - 1)
+            first, count = [low, *self.split(low, high, each), high], rounds
+        for case in cases:
+            for values in (first, *itertools.repeat(later, count - 1)):
+                yield case, {self.parameter: high}, values
 
     @property
     def content(self) -> dict[str, Any]:
@@ -324,6 +394,11 @@ class Search(Chooser):
     def limit(self) -> PathLimit:
         """What ends a loading path of this round."""
         return PathLimit(self.goal, self._rising)
+
+    @property
+    def largest(self) -> float:
+        """The upper end of the first bracket."""
+        return self.goal.between[1]
 
     def look(self, value: float) -> Look:
         """Return what the run of a value says."""

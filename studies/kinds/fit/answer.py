@@ -7,39 +7,32 @@ from typing import Any
 
 import numpy as np
 
-from studies.definition.certainty import Certainty, certainty
-from studies.definition.fit import FAILED, Fitting
 from studies.definition.identity import canonical
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK, STOPPED
-from studies.execution.asking import Asking
-from studies.execution.goals import attributes, written
+from studies.kinds.fit.certainty import Certainty, certainty
+from studies.kinds.fit.fitting import Fitting
+from studies.kinds.kind import Answers
+from studies.kinds.replayed import FAILED
 from studies.storage import dataset as layout
-from studies.storage.dataset import RunContent, Variable
-from studies.storage.held import Combined
-from studies.storage.store import Store
+from studies.storage.dataset import Variable
 
 NOT_FOUND = "not_converged"
 """Status of a fit that ended before it found the smallest sum."""
 
 
-def calibrated(study: Study, store: Store, asking: Asking) -> Combined:
-    """Write the data set of a fit, unless there is one with the same answer."""
-    program: Fitting = asking.places[0].program
+def answers(study: Study, programs: list[Fitting]) -> Answers:
+    """Return the answer of a fit."""
+    (program,) = programs
     answer = program.answer
     known = certainty(program.fit, answer) if answer and answer.jacobian is not None else None
     status, message = _outcome(program, known)
     rows = [row for row in program.rows.values() if row]
-    of = canonical([status, message, rows, sorted(program.refusals.values())])
-
-    def content() -> RunContent:
-        variables = _content(study, program, known, (status, message))
-        return RunContent(variables, attributes(study, "fit"))
-
-    anew = written(study, store, of, content)
-    failed = [] if status == OK else [("", status, message)]
-    path = store.dataset_path(study.id)
-    return Combined(path=path, counts={status: 1}, failed=failed, missing=(), anew=anew)
+    return Answers(
+        content=lambda _: _content(study, program, known, (status, message)),
+        outcomes=[("", status, message)],
+        of=canonical([status, message, rows, sorted(program.refusals.values())]),
+    )
 
 
 def _outcome(program: Fitting, known: Certainty | None) -> tuple[str, str]:
