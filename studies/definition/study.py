@@ -254,7 +254,7 @@ class Study(BaseModel):
         own = {"name": name, "scene": name_of(scene), "parameters": parameters, "sweep": axes}
         if kinds:
             kind, *others = kinds
-            found = kind.checked(content[kind.name], scene, axes)
+            found = kind.read(content[kind.name], scene, axes)
             own["choice"] = {kind.name: found.content}
             for name, field in kind.searched(found.content).items():
                 if name in fixed or name in owners(axes):
@@ -283,7 +283,7 @@ class Study(BaseModel):
     def kind(self) -> Kind:
         """What kind of study it is, with what chooses its runs."""
         for name, content in self.choice.items():
-            return KINDS[name].checked(content, self.problem, self.sweep)
+            return KINDS[name].read(content, self.problem, self.sweep)
         return SweepStudy()
 
     @cached_property

@@ -8,10 +8,11 @@ from typing import Any
 from studies.kinds.fit.fitting import Fit
 from studies.kinds.goal.search import Goal
 from studies.kinds.kind import Kind
+from studies.kinds.minimise.search import Minimise
 from studies.kinds.refine.refinement import Refine
 from studies.kinds.sweep import SweepStudy
 
-KINDS: Mapping[str, type[Kind]] = {each.name: each for each in (Goal, Refine, Fit)}
+KINDS: Mapping[str, type[Kind]] = {each.name: each for each in (Goal, Refine, Fit, Minimise)}
 """The kinds that choose their runs, by the entry of a study."""
 
 

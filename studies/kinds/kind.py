@@ -12,7 +12,7 @@ import itertools
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 from solver.late import Late
 from solver.scenes import Scene
@@ -22,6 +22,7 @@ from studies.definition.place import Chooser
 from studies.definition.points import Points
 from studies.definition.sweep import Axes
 from studies.definition.vocabulary import STOPPED
+from studies.errors import StudyError, check_entries
 
 Reading = Callable[[Collection[str]], Callable[[Mapping[str, Any]], Read]]
 """Returns what gives some variables of a run, by its row."""
@@ -69,7 +70,7 @@ class Kind:
 
     Attributes
     ----------
-    name, meaning : the entry of studies, and what it says
+    name, meaning, entries : the entry of studies, what it says, and the names in its table
     chooses : whether programs choose its runs by the outcomes of others
     everywhere : whether each place of its axes has runs of its own
     of_runs : whether its data set holds runs, not answers; if it chooses them, over ``point``
@@ -85,6 +86,7 @@ class Kind:
 
     __slots__ = ()
     name: ClassVar[str]
+    entries: ClassVar[tuple[str, ...]] = ()
     meaning: ClassVar[str] = ""
     chooses: ClassVar[bool] = True
     everywhere: ClassVar[bool] = False
@@ -100,7 +102,7 @@ class Kind:
     figure: ClassVar[Late | None] = None
 
     @classmethod
-    def checked(cls, content: Any, scene: Scene, axes: Axes) -> Kind:
+    def read(cls, content: Any, scene: Scene, axes: Axes) -> Self:
         """Return what the entry of a study says.
 
         Raises
@@ -108,6 +110,14 @@ class Kind:
         StudyError
             naming the entry, its value and what is allowed
         """
+        if not isinstance(content, Mapping):
+            raise StudyError(cls.name, content, "must be a table")
+        check_entries(cls.name, content, cls.entries)
+        return cls.checked(content, scene, axes)  # type: ignore[return-value]
+
+    @classmethod
+    def checked(cls, content: Mapping[str, Any], scene: Scene, axes: Axes) -> Kind:
+        """Return what a table without unknown names says; called by `read`."""
         raise NotImplementedError
 
     @classmethod

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ from solver.scenes import Scene
 from studies.definition.parameters import Parameter, parameters_of
 from studies.definition.spaced import SPACINGS, between, rounded
 from studies.errors import StudyError, one_of
+from studies.kinds.kind import Kind, Trial
 
 DIGITS = 6
 """Digits of a share of a range: runs are asked for at these places."""
@@ -47,6 +48,45 @@ class Free:
     def content(self) -> dict[str, Any]:
         """The range, as `checked_ranges` reads it."""
         return {"start": self.low, "stop": self.high, "spacing": self.spacing}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ranged(Kind):
+    """A kind of study that searches parameters within bounds.
+
+    Attributes
+    ----------
+    free : the parameters that are searched, by name
+    """
+
+    free: Mapping[str, Free]
+
+    @classmethod
+    def searched(cls, content: Mapping[str, Any]) -> Mapping[str, str]:
+        """Return the parameters that are searched, with their fields."""
+        return {name: f"{cls.name}.ranges.{name}" for name in content["ranges"]}
+
+    @property
+    def first(self) -> dict[str, float]:
+        """The first values."""
+        return {name: each.first for name, each in self.free.items()}
+
+    @property
+    def trial(self) -> Trial:
+        """The runs with the first values."""
+        names = {f"parameters.{name}": f"{self.name}.first.{name}" for name in self.free}
+        return Trial(self.first, {}, names)
+
+    def values_at(self, shares: Iterable[float]) -> tuple[float, ...]:
+        """Return the values at shares of the ranges."""
+        pairs = zip(self.free.values(), shares, strict=True)
+        return tuple(each.value(round(float(share), DIGITS)) for each, share in pairs)
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What `checked_ranges` reads."""
+        ranges = {name: each.content for name, each in self.free.items()}
+        return {"ranges": ranges, "first": self.first}
 
 
 def checked_ranges(entry: str, content: Mapping[str, Any], scene: Scene) -> dict[str, Free]:

@@ -24,7 +24,7 @@ from studies.execution.asking import Asking
 from studies.execution.result import answered
 from studies.execution.task import PathTask, walk
 from studies.kinds.fit.certainty import certainty
-from studies.kinds.fit.fitting import Fitted, Fitting, checked_fit
+from studies.kinds.fit.fitting import Fit, Fitted, Fitting
 from studies.kinds.fit.measured import checked_measured, pieces
 from studies.views.picking import run_file
 from tests.studies.conftest import write_study
@@ -156,7 +156,7 @@ def test_deviations_are_those_of_many_noisy_measurements() -> None:
     """The squared distances from the truth, by the covariance that is told, are chi-squared."""
     distance, count = 0.0, 8
     for seed in range(count):
-        asked = checked_fit({"measured": measured(0.02, seed), "ranges": RANGES}, SCENE, {})
+        asked = Fit.read({"measured": measured(0.02, seed), "ranges": RANGES}, SCENE, {})
         seen: dict[str, Line] = {}
         program = Fitting(asked, standings({}), lambda row, seen=seen: seen.get)
         while wanted := program.wants:
@@ -381,14 +381,14 @@ def test_a_study_with_a_fit_is_read_again_and_tells_its_cost(store: Store) -> No
 
 
 def test_the_content_of_a_fit_is_what_is_read() -> None:
-    asked = checked_fit({"measured": measured(0.01), "ranges": RANGES}, SCENE, {})
-    assert checked_fit(asked.content, SCENE, {}).content == asked.content
+    asked = Fit.read({"measured": measured(0.01), "ranges": RANGES}, SCENE, {})
+    assert Fit.read(asked.content, SCENE, {}).content == asked.content
 
 
 def test_deviations_that_are_not_told_are_those_of_the_differences() -> None:
     lines = [{key: each[key] for key in each if key != "sigma"} for each in measured(0.05)]
     told, free = (
-        checked_fit({"measured": each, "ranges": RANGES}, SCENE, {})
+        Fit.read({"measured": each, "ranges": RANGES}, SCENE, {})
         for each in (measured(0.05), lines)
     )
     jacobian = np.random.default_rng(0).normal(size=(len(told.values), 2))

@@ -26,7 +26,7 @@ from studies.execution.limits import Limits
 from studies.execution.result import answered
 from studies.execution.run import _Work
 from studies.execution.task import PathTask, walk
-from studies.kinds.goal.search import Goal, Search, checked_goal
+from studies.kinds.goal.search import Goal, Search
 from tests.studies.conftest import fake_study
 from tests.studies.fakes import FAKE, Canned, FakeParameters, Followed, numbers
 from tests.studies.killed import runs_before_a_kill
@@ -113,7 +113,7 @@ def test_a_search_finds_its_value_with_no_more_runs_than_it_says(parameter: str,
     random.seed(1)
     sign, taken = -1.0 if kind == "first_below" else 1.0, []
     asked = {"parameter": parameter, "of": "peak_contact_pressure", kind: 0.0}
-    goal = checked_goal(asked | {"within": 1e-3, "between": [0.1, 1.0]}, FAKE)
+    goal = Goal.read(asked | {"within": 1e-3, "between": [0.1, 1.0]}, FAKE, {})
     for _ in range(60):
         root, power = math.exp(random.uniform(math.log(0.1), 0.0)), random.choice([0.5, 1.0, 3.0])
 
@@ -133,21 +133,21 @@ def test_a_search_finds_its_value_with_no_more_runs_than_it_says(parameter: str,
 
 def test_a_search_of_whole_numbers_ends_at_neighbours() -> None:
     asked = {"parameter": "passes", "of": "peak_contact_pressure", "first_above": 0.0}
-    found = searched(checked_goal(asked | {"between": [1, 10]}, FAKE), lambda value: value - 6.5)
+    found = searched(Goal.read(asked | {"between": [1, 10]}, FAKE, {}), lambda value: value - 6.5)
     assert (found.low, found.high) == (6, 7)
     assert all(isinstance(value, int) for value in found.rows)
 
 
 def test_a_range_about_zero_is_divided_in_equal_steps() -> None:
     asked = {"parameter": "friction", "of": "peak_contact_pressure", "at": 0.0}
-    goal = checked_goal(asked | {"between": [0.0, 0.5], "within": 0.01}, FAKE)
+    goal = Goal.read(asked | {"between": [0.0, 0.5], "within": 0.01}, FAKE, {})
     found = searched(goal, lambda value: value - 1e-3)
     assert found.high - found.low <= 0.005 * 1.0001
     assert found.found == pytest.approx(1e-3, abs=1e-9)
 
 
 def test_no_equilibrium_is_beyond_and_told_apart() -> None:
-    goal = checked_goal(PRESSURE, FAKE)
+    goal = Goal.read(PRESSURE, FAKE, {})
     found = searched(goal, lambda value: None if value > 0.8 else 100.0 * value)
     assert found.reason == "limit_load"
     assert found.low <= 0.8 <= found.high
@@ -158,7 +158,7 @@ def test_no_equilibrium_is_beyond_and_told_apart() -> None:
 
 def test_a_bracket_that_is_halved_has_its_ends_on_trust_until_the_search_comes_to_one() -> None:
     asked = {"parameter": "friction", "of": "peak_contact_pressure", "first_above": 0.0}
-    goal = checked_goal(asked | {"between": [0.1, 0.4]}, FAKE)
+    goal = Goal.read(asked | {"between": [0.1, 0.4]}, FAKE, {})
     inside = searched(goal, lambda value: value - 0.25)
     assert (inside.reason, {0.1, 0.4} & inside.rows.keys()) == ("passed", set())
     for root, reason in ((0.05, "already"), (0.5, "never"), (0.1001, "passed")):
@@ -172,7 +172,7 @@ def test_a_bracket_that_is_halved_has_its_ends_on_trust_until_the_search_comes_t
 def test_a_search_begins_where_its_goal_is_expected(off: float) -> None:
     """Runs by the distance, in widths of the last bracket: two if it is less than half of one."""
     asked = {"parameter": "friction", "of": "peak_contact_pressure", "first_above": 0.0}
-    goal = checked_goal(asked | {"between": [0.1, 0.4]}, FAKE)
+    goal = Goal.read(asked | {"between": [0.1, 0.4]}, FAKE, {})
     found = searched(goal, lambda value: value - 0.2, 0.2 * 0.99**off)
     assert found.low <= 0.2 <= found.high <= found.low / (1.0 - 0.01001)
     most = {0.0: 2, 0.4: 2, -1.2: 2, 3.0: 6}
@@ -230,10 +230,10 @@ def test_the_farthest_place_comes_next_and_waits_for_the_nearest_of_lower_levels
 
 
 def test_a_run_that_fails_its_audit_is_before_the_limit_load_and_has_no_number() -> None:
-    limit = checked_goal({"find": "limit_load", "between": [0.1, 4.0]}, FAKE)
+    limit = Goal.read({"find": "limit_load", "between": [0.1, 4.0]}, FAKE, {})
     row = {"id": "a", "status": "audit_failed", "scalars": {"peak_contact_pressure": 1.0}}
     assert limit.seen(row, None).beyond is False
-    assert checked_goal(PRESSURE, FAKE).seen(row, True).beyond is None
+    assert Goal.read(PRESSURE, FAKE, {}).seen(row, True).beyond is None
     assert limit.seen(row | {"status": "error"}, None).beyond is None
 
 

@@ -28,21 +28,19 @@ import numpy as np
 from solver.late import Late
 from solver.parameters import is_number
 from solver.scenes import Scene
-from studies.definition.identity import canonical
 from studies.definition.line import Read
-from studies.definition.sweep import Axes, Standing, standings
+from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import SOLVED
-from studies.errors import StudyError, check_entries
+from studies.errors import StudyError
 from studies.kinds.fit.files import with_files
 from studies.kinds.fit.measured import MeasuredLine, Numbers, checked_measured, content_of
-from studies.kinds.kind import Kind, Placed, Reading, Trial
-from studies.kinds.ranges import DIGITS, Free, check_whole, checked_ranges
-from studies.kinds.replayed import Ends, Lacking, Replayed
+from studies.kinds.kind import Placed, Reading
+from studies.kinds.ranges import DIGITS, Ranged, check_whole, checked_ranges
+from studies.kinds.replayed import Ends, Evaluation, Lacking, Replayed
 
 NO_FIT = "is missing: tell what was measured, and the ranges"
 """What a command of fits says of a study without one."""
 
-_KEYS = ("measured", "ranges", "first", "step", "most")
 _TOLERANCE = 1e-3
 """Least change of the sum of squares, as a share of it, and of the shares of the ranges."""
 _WIDEST = 0.2
@@ -50,18 +48,18 @@ _WIDEST = 0.2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fit(Kind):
+class Fit(Ranged):
     """What is fitted.
 
     Attributes
     ----------
-    free : the parameters that are searched, by name
     measured : the measured lines
     step : step of the differences, as a share of the range
     most : largest number of runs
     """
 
     name = "fit"
+    entries = ("measured", "ranges", "first", "step", "most")
     meaning = "what was measured, and the parameters it searches"
     rows = "answer"
     counted = "fits"
@@ -70,15 +68,9 @@ class Fit(Kind):
     table = Late("studies.kinds.fit.shown:fit_table")
     figure = Late("studies.kinds.fit.figure:compared")
 
-    free: Mapping[str, Free]
     measured: list[MeasuredLine]
     step: float = 0.05
     most: int = 100
-
-    @property
-    def first(self) -> dict[str, float]:
-        """The first values."""
-        return {name: each.first for name, each in self.free.items()}
 
     @cached_property
     def values(self) -> Numbers:
@@ -98,24 +90,43 @@ class Fit(Kind):
         return float(np.sum(((seen - self.values) / self.sigma) ** 2)) / freedom
 
     @classmethod
-    def checked(cls, content: Any, scene: Scene, axes: Axes) -> Fit:
-        """Return the fit that a study asks for, see `checked_fit`."""
-        return checked_fit(content, scene, axes)
+    def checked(cls, content: Mapping[str, Any], scene: Scene, axes: Axes) -> Fit:
+        """Return the fit that a study asks for.
+
+        Parameters
+        ----------
+        content : ``measured``, see `checked_measured`; ``ranges`` and ``first`` values, see
+            `checked_ranges`; ``step`` and ``most``, see `Fit`
+        scene, axes : of the study
+        """
+        free = checked_ranges("fit", content, scene)
+        step, most = content.get("step", Fit.step), content.get("most", Fit.most)
+        if not is_number(step) or not 1e-4 <= step <= 0.5:
+            raise StudyError("fit.step", step, "must be a number >= 0.0001 and <= 0.5")
+        check_whole("fit.most", most, 10_000)
+        if "measured" not in content:
+            allowed = "is missing: name files of measured lines here, or with --measured"
+            raise StudyError("fit.measured", None, allowed)
+        every = standings(axes)
+        if (count := len(every) * (1 + len(free))) > most:
+            raise StudyError(
+                "fit.most", most, f"must be at least {count}, the runs of the first round"
+            )
+        lines = checked_measured(content["measured"], scene, {n for each in every for n in each.at})
+        for k, line in enumerate(lines):
+            if len(there := [each for each in every if each.has(line.at)]) != 1:
+                some = "; ".join(str(dict(each.at)) for each in (there or every)[:3])
+                allowed = f"must tell one run, and fits {len(there)}: {some}"
+                raise StudyError(f"fit.measured[{k}].at", dict(line.at), allowed)
+        if sum(len(each.values) for each in lines) < len(free):
+            allowed = f"must have as many values as there are parameters: {len(free)} at least"
+            raise StudyError("fit.measured", f"{len(lines)} lines", allowed)
+        return Fit(free=free, measured=lines, step=float(step), most=most)
 
     @classmethod
     def with_files(cls, content: Any, folder: Path, given: Sequence[Path]) -> Any:
         """Return the entry with the rows of measured lines in place of the names of files."""
         return with_files(content, folder, given)
-
-    @classmethod
-    def searched(cls, content: Mapping[str, Any]) -> Mapping[str, str]:
-        """Return the parameters that are searched, with their fields."""
-        return {name: f"fit.ranges.{name}" for name in content["ranges"]}
-
-    @property
-    def trial(self) -> Trial:
-        """The runs with the first values."""
-        return Trial(self.first, {}, {f"parameters.{n}": f"fit.first.{n}" for n in self.free})
 
     def most_runs(self, places: int) -> int:
         """Return the largest number of runs."""
@@ -129,19 +140,9 @@ class Fit(Kind):
 
     @property
     def content(self) -> dict[str, Any]:
-        """What `checked_fit` reads."""
-        return {
-            "measured": [content_of(each) for each in self.measured],
-            "ranges": {name: each.content for name, each in self.free.items()},
-            "first": self.first, "step": self.step, "most": self.most,
-        }  # fmt: skip
-
-
-class Evaluation(NamedTuple):
-    """A run of a fit: values of the parameters, and the position on the axes of the study."""
-
-    values: tuple[float, ...]
-    position: int
+        """What `checked` reads."""
+        lines = [content_of(each) for each in self.measured]
+        return {"measured": lines, **super().content, "step": self.step, "most": self.most}
 
 
 class Fitted(NamedTuple):
@@ -167,43 +168,21 @@ class Fitting(Replayed):
 
     Attributes
     ----------
-    fit : what is fitted
-    positions : the combinations of positions on the axes of the study
     read : gives the variables of a run, by its row
     answer : what it has found, or the best so far
     """
 
-    fit: Fit
-    positions: list[Standing]
+    asked: Fit
     read: Callable[[Mapping[str, Any]], Read]
     answer: Fitted | None = None
-    _numbers: dict[str, int] = field(default_factory=dict)
     _of: list[list[int]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._numbers = {_position(each.sets): k for k, each in enumerate(self.positions)}
         self._of = [
-            [k for k, line in enumerate(self.fit.measured) if each.has(line.at)]
+            [k for k, line in enumerate(self.asked.measured) if each.has(line.at)]
             for each in self.positions
         ]
         self.replay()
-
-    @property
-    def most(self) -> int:
-        """Largest number of runs."""
-        return self.fit.most
-
-    def sets(self, key: Evaluation) -> dict[str, Any]:
-        """Return the parameters that a run sets."""
-        own = dict(zip(self.fit.free, key.values, strict=True))
-        return {**self.positions[key.position].sets, **own}
-
-    def key(self, parameters: Mapping[str, Any]) -> Evaluation:
-        """Return the key of a run with these parameters."""
-        own = {name: parameters[name] for name in self.positions[0].sets}
-        return Evaluation(
-            tuple(parameters[name] for name in self.fit.free), self._numbers[_position(own)]
-        )
 
     def misfit(self, values: tuple[float, ...]) -> float:
         """Return the mean of the squared differences over sigma; NaN if it is not known."""
@@ -220,7 +199,7 @@ class Fitting(Replayed):
             return None
         read = self.read(row)
         try:
-            return [self.fit.measured[k].seen(read) for k in self._of[key.position]]
+            return [self.asked.measured[k].seen(read) for k in self._of[key.position]]
         except ValueError as error:
             self.refusals[key] = str(error)
             return None
@@ -229,15 +208,20 @@ class Fitting(Replayed):
         """Begin anew with what is known."""
         from scipy.optimize import least_squares
 
-        free = list(self.fit.free.values())
+        free = list(self.asked.free.values())
         first = np.array([each.share(each.first) for each in free]).round(DIGITS)
         self.answer = None
-        self._ask([self._values(first), *(self._values(each) for each in self._stepped(first))])
+        self._ask(
+            [
+                self.asked.values_at(first),
+                *(self.asked.values_at(each) for each in self._stepped(first)),
+            ]
+        )
         found = least_squares(
             self._differences, first, self._jacobian, bounds=(0.0, 1.0), x_scale=1.0,
-            ftol=_TOLERANCE, xtol=_TOLERANCE, gtol=1e-10, max_nfev=10 * self.fit.most,
+            ftol=_TOLERANCE, xtol=_TOLERANCE, gtol=1e-10, max_nfev=10 * self.asked.most,
         )  # fmt: skip
-        values = self._values(found.x)
+        values = self.asked.values_at(found.x)
         seen = self._all(values)
         assert seen is not None
         self.answer = Fitted(np.array(values), found.x.round(DIGITS), seen, found.jac)
@@ -245,14 +229,14 @@ class Fitting(Replayed):
             self.answer = self.answer._replace(jacobian=self._wide(self.answer))
 
     def _differences(self, shares: Numbers) -> Numbers:
-        values = self._values(shares)
+        values = self.asked.values_at(shares)
         seen = self._all(values)
         if seen is None:
             if self.answer is None:
                 keys = (Evaluation(values, k) for k in range(len(self.positions)))
                 why = next(self.refusals[key] for key in keys if key in self.refusals)
                 raise Ends(f"the run of the first values has no line: {why}")
-            return np.full(len(self.fit.values), np.nan)  # the method goes half as far
+            return np.full(len(self.asked.values), np.nan)  # the method goes half as far
         found = self._over_sigma(seen)
         best = self.answer
         if best is None or np.sum(found**2) < np.sum(self._over_sigma(best.seen) ** 2):
@@ -261,24 +245,26 @@ class Fitting(Replayed):
         return found
 
     def _jacobian(self, shares: Numbers, *_: Any) -> Numbers:
-        here = self._all(self._values(shares))
+        here = self._all(self.asked.values_at(shares))
         assert here is not None
         steps = self._stepped(shares)
-        self._ask([self._values(step) for step in steps])
+        self._ask([self.asked.values_at(step) for step in steps])
         columns = []
-        for k, name in enumerate(self.fit.free):
+        for k, name in enumerate(self.asked.free):
             at = float(shares[k].round(DIGITS))
             width = steps[k][k] - at
             for side in (1.0, -1.0):
                 step = shares.round(DIGITS)
                 step[k] = round(at + side * width, DIGITS)
                 inside = 0.0 <= step[k] <= 1.0
-                there = self._all(self._values(step)) if inside else None
+                there = self._all(self.asked.values_at(step)) if inside else None
                 if there is not None:
-                    columns.append((there - here) / (step[k] - at) / self.fit.sigma)
+                    columns.append((there - here) / (step[k] - at) / self.asked.sigma)
                     break
             else:
-                raise Ends(f"runs fail on both sides of {name} = {self._values(shares)[k]:.6g}")
+                raise Ends(
+                    f"runs fail on both sides of {name} = {self.asked.values_at(shares)[k]:.6g}"
+                )
         found = np.column_stack(columns)
         if self.answer is not None and np.array_equal(self.answer.seen, here):
             self.answer = self.answer._replace(jacobian=found)
@@ -293,19 +279,19 @@ class Fitting(Replayed):
         """
         assert answer.jacobian is not None
         here, found = answer.shares, answer.jacobian.copy()
-        sigma = np.sqrt(self.fit.spread(answer.seen) * np.diag(np.linalg.pinv(found.T @ found)))
+        sigma = np.sqrt(self.asked.spread(answer.seen) * np.diag(np.linalg.pinv(found.T @ found)))
         room = np.minimum(here, 1.0 - here)
-        widths = np.minimum(np.clip(2.0 * sigma, self.fit.step, _WIDEST), room).round(DIGITS)
+        widths = np.minimum(np.clip(2.0 * sigma, self.asked.step, _WIDEST), room).round(DIGITS)
         pairs = [
             [(here + side * width * unit).round(DIGITS) for side in (1.0, -1.0)]
             for width, unit in zip(widths, np.eye(len(here)), strict=True)
         ]
-        wide = [k for k, width in enumerate(widths) if width >= self.fit.step / 2.0]
-        self._ask([self._values(each) for k in wide for each in pairs[k]])
+        wide = [k for k, width in enumerate(widths) if width >= self.asked.step / 2.0]
+        self._ask([self.asked.values_at(each) for k in wide for each in pairs[k]])
         for k in wide:
-            ends = [self._all(self._values(each)) for each in pairs[k]]
+            ends = [self._all(self.asked.values_at(each)) for each in pairs[k]]
             if ends[0] is not None and ends[1] is not None:
-                found[:, k] = (ends[0] - ends[1]) / (2.0 * widths[k]) / self.fit.sigma
+                found[:, k] = (ends[0] - ends[1]) / (2.0 * widths[k]) / self.asked.sigma
         return found
 
     def _stepped(self, shares: Numbers) -> list[Numbers]:
@@ -313,15 +299,9 @@ class Fitting(Replayed):
         found = []
         for k in range(len(shares)):
             step = shares.round(DIGITS)
-            step[k] += self.fit.step if step[k] + self.fit.step <= 1.0 else -self.fit.step
+            step[k] += self.asked.step if step[k] + self.asked.step <= 1.0 else -self.asked.step
             found.append(step.round(DIGITS))
         return found
-
-    def _values(self, shares: Numbers) -> tuple[float, ...]:
-        free = self.fit.free.values()
-        return tuple(
-            each.value(round(float(s), DIGITS)) for each, s in zip(free, shares, strict=True)
-        )
 
     def _ask(self, every: list[tuple[float, ...]]) -> None:
         """Ask for the runs of several places together."""
@@ -330,7 +310,7 @@ class Fitting(Replayed):
     def _all(self, values: tuple[float, ...]) -> Numbers | None:
         """Return what runs say at all measured places; None if one of them failed."""
         self._ask([values])
-        found: list[Numbers] = [np.empty(0)] * len(self.fit.measured)
+        found: list[Numbers] = [np.empty(0)] * len(self.asked.measured)
         for k, of in enumerate(self._of):
             seen = self.known[Evaluation(values, k)]
             if seen is None:
@@ -340,50 +320,4 @@ class Fitting(Replayed):
         return np.concatenate(found)
 
     def _over_sigma(self, seen: Numbers) -> Numbers:
-        return (seen - self.fit.values) / self.fit.sigma
-
-
-def _position(sets: Mapping[str, Any]) -> str:
-    return canonical(list(sets.items()))
-
-
-def checked_fit(content: Any, scene: Scene, axes: Axes) -> Fit:
-    """Return the fit that a study asks for.
-
-    Parameters
-    ----------
-    content : ``measured``, see `checked_measured`; ``ranges``, for each parameter ``[lowest,
-        highest]`` or ``{start, stop, spacing}``; ``first`` values, by default the middles of the
-        ranges; ``step`` and ``most``, see `Fit`
-    scene : the scene
-    axes : of the sweep of the study
-
-    Raises
-    ------
-    StudyError
-        naming the entry, its value and what is allowed
-    """
-    if not isinstance(content, Mapping):
-        raise StudyError("fit", content, "must be a table")
-    check_entries("fit", content, _KEYS)
-    free = checked_ranges("fit", content, scene)
-    step, most = content.get("step", Fit.step), content.get("most", Fit.most)
-    if not is_number(step) or not 1e-4 <= step <= 0.5:
-        raise StudyError("fit.step", step, "must be a number >= 0.0001 and <= 0.5")
-    check_whole("fit.most", most, 10_000)
-    if "measured" not in content:
-        allowed = "is missing: name files of measured lines here, or with --measured"
-        raise StudyError("fit.measured", None, allowed)
-    every = standings(axes)
-    if (count := len(every) * (1 + len(free))) > most:
-        raise StudyError("fit.most", most, f"must be at least {count}, the runs of the first round")
-    lines = checked_measured(content["measured"], scene, {n for each in every for n in each.at})
-    for k, line in enumerate(lines):
-        if len(there := [each for each in every if each.has(line.at)]) != 1:
-            some = "; ".join(str(dict(each.at)) for each in (there or every)[:3])
-            allowed = f"must tell one run, and fits {len(there)}: {some}"
-            raise StudyError(f"fit.measured[{k}].at", dict(line.at), allowed)
-    if sum(len(each.values) for each in lines) < len(free):
-        allowed = f"must have as many values as there are parameters: {len(free)} at least"
-        raise StudyError("fit.measured", f"{len(lines)} lines", allowed)
-    return Fit(free=free, measured=lines, step=float(step), most=most)
+        return (seen - self.asked.values) / self.asked.sigma

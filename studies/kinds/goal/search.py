@@ -40,7 +40,7 @@ from studies.definition.quantity import number_of_a_run
 from studies.definition.spaced import is_finite, rounded
 from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import NO_EQUILIBRIUM, SOLVED
-from studies.errors import StudyError, check_entries, one_of
+from studies.errors import StudyError, one_of
 from studies.kinds.kind import Kind, Placed, Reading, Trial
 
 FOUND: Mapping[str, Mapping[str, Any]] = {
@@ -59,7 +59,6 @@ FAILED, REFUSED = "failed", "refused"
 even the last value is beyond; the first value is beyond; a run has no number; the scene refuses a
 value inside the bracket."""
 
-_KEYS = ("parameter", "find", "of", "at", "first_above", "first_below", "within", "between")
 _KINDS = ("at", "first_above", "first_below")
 _PARTS = 4
 """Parts into which a round of a loading path divides the bracket."""
@@ -90,6 +89,7 @@ class Goal(Kind):
     """
 
     name = "goal"
+    entries = ("parameter", "find", "of", "at", "first_above", "first_below", "within", "between")
     meaning = "what is searched at each place of the axes"
     everywhere = True
     rows = "answers"
@@ -157,10 +157,53 @@ class Goal(Kind):
         return 1 + more, first + 1 + more * (self.parts - 1)
 
     @classmethod
-    def checked(cls, content: Any, scene: Scene, axes: Axes) -> Goal:
-        """Return the goal that a study asks for, see `checked_goal`."""
-        del axes
-        return checked_goal(content, scene)
+    def checked(cls, content: Mapping[str, Any], scene: Scene, axes: Axes) -> Goal:
+        """Return the goal that a study asks for."""
+        if not content:
+            allowed = "is empty: needs between, and find or of with a threshold; or take it out"
+            raise StudyError("goal", {}, allowed)
+        known = parameters_of(scene)
+        name = content.get("parameter", scene.branch)
+        if not isinstance(name, str) or name not in known:
+            raise StudyError("goal.parameter", name, one_of(name, known))
+        given = dict(content)
+        if "find" in given:
+            found = given.pop("find")
+            if not isinstance(found, str) or found not in FOUND:
+                raise StudyError("goal.find", found, one_of(found, FOUND))
+            for key in given.keys() & {"of", *_KINDS}:
+                raise StudyError(
+                    f"goal.{key}", given[key], f"is what find = {found} says: keep one"
+                )
+            given |= FOUND[found]
+        kinds = [kind for kind in _KINDS if kind in given]
+        of = given.get("of", "")
+        if len(kinds) > 1 or bool(kinds) != bool(of):
+            allowed = f"needs of and one of {', '.join(_KINDS)}; or neither, for the limit load"
+            raise StudyError("goal", dict(content), allowed)
+        try:
+            low, high = _ends(given.get("between"), known[name])
+        except StudyError as error:
+            if "parameter" in given:
+                raise
+            allowed = f"{error.allowed}, of {name}, as goal.parameter is left out"
+            raise StudyError(error.field, error.value, allowed) from None
+        within = given.get("within", 0.01)
+        if not is_number(within) or not 1e-6 <= within <= 0.5:
+            raise StudyError("goal.within", within, "must be a number >= 1e-06 and <= 0.5")
+        return Goal(
+            parameter=name,
+            of=of,
+            kind=kinds[0] if kinds else "",
+            threshold=_threshold(f"goal.{kinds[0]}", given[kinds[0]], of, scene)
+            if kinds
+            else math.nan,
+            within=float(within),
+            between=(low, high),
+            whole=isinstance(low, int) and isinstance(high, int) and known[name].whole,
+            branch=name == scene.branch,
+            goes_on=name == scene.branch and scene.goes_on,
+        )
 
     @classmethod
     def searched(cls, content: Mapping[str, Any]) -> Mapping[str, str]:
@@ -214,7 +257,7 @@ class Goal(Kind):
 
     @property
     def content(self) -> dict[str, Any]:
-        """What `checked_goal` reads."""
+        """What `checked` reads."""
         asked = {"of": self.of, self.kind: self.threshold} if self.of else {}
         return {
             "parameter": self.parameter, **asked, "within": self.within,
@@ -481,60 +524,6 @@ class Search(Chooser):
         xt = xf + sigma * min(0.2 / (last - first) * (b - a) ** 2, abs(middle - xf))
         x = xt if abs(xt - middle) <= radius else middle - sigma * max(radius, 0.0)
         return self.goal.inside(self.low, self.high, [x])
-
-
-def checked_goal(content: Any, scene: Scene) -> Goal:
-    """Return the goal that a study asks for.
-
-    Raises
-    ------
-    StudyError
-        naming the entry, its value and what is allowed
-    """
-    if not isinstance(content, Mapping):
-        raise StudyError("goal", content, "must be a table")
-    if not content:
-        allowed = "is empty: needs between, and find or of with a threshold; or take it out"
-        raise StudyError("goal", {}, allowed)
-    check_entries("goal", content, _KEYS)
-    known = parameters_of(scene)
-    name = content.get("parameter", scene.branch)
-    if not isinstance(name, str) or name not in known:
-        raise StudyError("goal.parameter", name, one_of(name, known))
-    given = dict(content)
-    if "find" in given:
-        found = given.pop("find")
-        if not isinstance(found, str) or found not in FOUND:
-            raise StudyError("goal.find", found, one_of(found, FOUND))
-        for key in given.keys() & {"of", *_KINDS}:
-            raise StudyError(f"goal.{key}", given[key], f"is what find = {found} says: keep one")
-        given |= FOUND[found]
-    kinds = [kind for kind in _KINDS if kind in given]
-    of = given.get("of", "")
-    if len(kinds) > 1 or bool(kinds) != bool(of):
-        allowed = f"needs of and one of {', '.join(_KINDS)}; or neither, for the limit load"
-        raise StudyError("goal", dict(content), allowed)
-    try:
-        low, high = _ends(given.get("between"), known[name])
-    except StudyError as error:
-        if "parameter" in given:
-            raise
-        allowed = f"{error.allowed}, of {name}, as goal.parameter is left out"
-        raise StudyError(error.field, error.value, allowed) from None
-    within = given.get("within", 0.01)
-    if not is_number(within) or not 1e-6 <= within <= 0.5:
-        raise StudyError("goal.within", within, "must be a number >= 1e-06 and <= 0.5")
-    return Goal(
-        parameter=name,
-        of=of,
-        kind=kinds[0] if kinds else "",
-        threshold=_threshold(f"goal.{kinds[0]}", given[kinds[0]], of, scene) if kinds else math.nan,
-        within=float(within),
-        between=(low, high),
-        whole=isinstance(low, int) and isinstance(high, int) and known[name].whole,
-        branch=name == scene.branch,
-        goes_on=name == scene.branch and scene.goes_on,
-    )
 
 
 def _ends(content: Any, parameter: Parameter) -> tuple[float, float]:

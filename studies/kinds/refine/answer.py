@@ -15,6 +15,7 @@ from studies.kinds.refine.cells import ERROR
 from studies.kinds.refine.refinement import Refinement, Wanted
 from studies.storage import dataset as layout
 from studies.storage.dataset import Variable
+from studies.storage.runfile import described
 
 
 def answers(study: Study, programs: list[Refinement]) -> Answers:
@@ -36,12 +37,7 @@ def _beside(
     variables: dict[str, Variable] = {}
 
     def add(name: str, dims: str | list[str], values: Any, words: str, unit: str = "") -> None:
-        attrs = {"long_name": words} | ({"units": unit} if unit else {})
-        own = [dims] if isinstance(dims, str) else dims
-        array = np.asarray(values)
-        variables[name] = Variable(
-            tuple(own), array.reshape((1,) * (len(own) - 1) + array.shape), attrs
-        )
+        variables[name] = described(dims, values, words, unit)
 
     add("run", "point", np.array([case.id for case in cases], dtype=object), "id of the run")
     rounds = np.array([program.asked[each] + 1 for each in order], dtype=np.int32)

@@ -40,7 +40,7 @@ from studies.definition.quantity import RunNumber, checked_number
 from studies.definition.spaced import is_finite
 from studies.definition.sweep import MAXIMUM_RUNS, Axes, standings
 from studies.definition.vocabulary import OK, taken
-from studies.errors import StudyError, check_entries
+from studies.errors import StudyError
 from studies.kinds.kind import Kind, Placed, Reading
 from studies.kinds.ranges import check_whole
 from studies.kinds.refine.around import Around
@@ -50,7 +50,6 @@ STATES = SETTLED, FAILED, SMALLEST, MOST, OPEN = "settled", "failed", "smallest"
 """What became of a cell: its runs are as foreseen; all failed; it would be divided, but is as small
 as is allowed; or no runs were left; or the refinement was stopped."""
 
-_KEYS = ("of", "until", "most", "halvings")
 _UNTIL, _MOST, _HALVINGS = 0.02, 200, 5
 """Entries that are left out."""
 _MOST_AXES, _MOST_HALVINGS = 4, 20
@@ -73,6 +72,7 @@ class Refine(Kind):
     """
 
     name = "refine"
+    entries = ("of", "until", "most", "halvings")
     meaning = "numbers of the runs, between which it adds others"
     of_runs = True
     work = "refinement"
@@ -87,9 +87,42 @@ class Refine(Kind):
     axes: Mapping[str, Sequence[float]]
 
     @classmethod
-    def checked(cls, content: Any, scene: Scene, axes: Axes) -> Refine:
-        """Return the refinement that a study asks for, see `checked_refine`."""
-        return checked_refine(content, scene, axes)
+    def checked(cls, content: Mapping[str, Any], scene: Scene, axes: Axes) -> Refine:
+        """Return the refinement that a study asks for."""
+        of = content.get("of")
+        if isinstance(of, list | tuple):
+            numbers_of = [checked_number(f"refine.of[{k}]", one, scene) for k, one in enumerate(of)]
+        else:
+            numbers_of = [checked_number("refine.of", of, scene)]
+        names = [one.name for one in numbers_of]
+        if not names or len(set(names)) < len(names):
+            raise StudyError(
+                "refine.of", of, "must be a list of variables with one number a run, each once"
+            )
+        known = parameters_of(scene)
+        numbers = {
+            name: sorted(values)
+            for name, values in axes.items()
+            if isinstance(values, list) and name in known and all(map(is_number, values))
+        }
+        if not 1 <= len(numbers) <= _MOST_AXES or any(len(each) < 2 for each in numbers.values()):
+            allowed = (
+                f"needs 1 to {_MOST_AXES} axes of two numbers or more: the ends of their ranges"
+            )
+            raise StudyError("refine", dict(content), allowed)
+        units = {each.name: scene.known_quantities[each.of].units for each in numbers_of}
+        until = _until(content.get("until", _UNTIL), units)
+        most, halvings = content.get("most", _MOST), content.get("halvings", _HALVINGS)
+        check_whole("refine.most", most, MAXIMUM_RUNS)
+        check_whole("refine.halvings", halvings, _MOST_HALVINGS)
+        found = Refine(
+            of=tuple(numbers_of), until=until, most=most, halvings=halvings, axes=numbers
+        )
+        others = math.prod(len(values) for name, values in axes.items() if name not in numbers)
+        if found.first_round(others) > most:
+            allowed = f"must be at least {found.first_round(others)}, the runs of the first round"
+            raise StudyError("refine.most", most, allowed)
+        return found
 
     @property
     def value(self) -> str:
@@ -122,7 +155,7 @@ class Refine(Kind):
 
     @property
     def content(self) -> dict[str, Any]:
-        """What `checked_refine` reads."""
+        """What `checked` reads."""
         until = dict(self.until) if isinstance(self.until, Mapping) else self.until
         return {
             "of": [each.content for each in self.of], "until": until, "most": self.most,
@@ -529,49 +562,6 @@ def _within(cell: Cell, points: Sequence[Point]) -> set[int]:
 def _volume(cell: Cell) -> float:
     """Return the size of a cell as a share of its cell of the sweep."""
     return 0.5 ** sum(cell.halved)
-
-
-def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
-    """Return the refinement that a study asks for.
-
-    Raises
-    ------
-    StudyError
-        naming the entry, its value and what is allowed
-    """
-    if not isinstance(content, Mapping):
-        raise StudyError("refine", content, "must be a table")
-    check_entries("refine", content, _KEYS)
-    of = content.get("of")
-    if isinstance(of, list | tuple):
-        numbers_of = [checked_number(f"refine.of[{k}]", one, scene) for k, one in enumerate(of)]
-    else:
-        numbers_of = [checked_number("refine.of", of, scene)]
-    names = [one.name for one in numbers_of]
-    if not names or len(set(names)) < len(names):
-        raise StudyError(
-            "refine.of", of, "must be a list of variables with one number a run, each once"
-        )
-    known = parameters_of(scene)
-    numbers = {
-        name: sorted(values)
-        for name, values in axes.items()
-        if isinstance(values, list) and name in known and all(map(is_number, values))
-    }
-    if not 1 <= len(numbers) <= _MOST_AXES or any(len(each) < 2 for each in numbers.values()):
-        allowed = f"needs 1 to {_MOST_AXES} axes of two numbers or more: the ends of their ranges"
-        raise StudyError("refine", dict(content), allowed)
-    units = {each.name: scene.known_quantities[each.of].units for each in numbers_of}
-    until = _until(content.get("until", _UNTIL), units)
-    most, halvings = content.get("most", _MOST), content.get("halvings", _HALVINGS)
-    check_whole("refine.most", most, MAXIMUM_RUNS)
-    check_whole("refine.halvings", halvings, _MOST_HALVINGS)
-    found = Refine(of=tuple(numbers_of), until=until, most=most, halvings=halvings, axes=numbers)
-    others = math.prod(len(values) for name, values in axes.items() if name not in numbers)
-    if found.first_round(others) > most:
-        allowed = f"must be at least {found.first_round(others)}, the runs of the first round"
-        raise StudyError("refine.most", most, allowed)
-    return found
 
 
 def _until(until: Any, units: Mapping[str, str]) -> float | dict[str, float]:
