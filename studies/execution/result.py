@@ -8,6 +8,7 @@ from typing import Any
 
 from solver.files import appearing
 from studies.definition.identity import canonical
+from studies.definition.points import POINT
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK, SYMMETRIC
 from studies.execution.asking import Asking
@@ -71,12 +72,14 @@ def answered(study: Study, store: Store, asking: Asking, anew: bool) -> Combined
     entry = {study.kind.name: canonical(study.kind.content)}
     if found.points is not None:
         chosen = study.with_points(found.points)
-        beside = RunContent(found.content(list(chosen.cases())), entry)
+        ids = [case.id for case in chosen.cases()]
+        own = {"run": runfile.described(POINT, ids, "id of the run"), **found.content()}
+        beside = RunContent(own, entry)
         return result(chosen, store, complete=not anew, stopped=not asking.ended, beside=beside)
     path, made = store.dataset_path(study.id), Made(study, store)
     written = made.kept(_NAME, found.of) is None
     if written:
-        packed = runfile.packed(RunContent(found.content(()), _attributes(study) | entry))
+        packed = runfile.packed(RunContent(found.content(), _attributes(study) | entry))
         with needs_room(store.directory), appearing(path) as part:
             part.write_bytes(seal.sealed(f"dataset {study.id}", packed))
         made.note(_NAME, found.of, [path.name])

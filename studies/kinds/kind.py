@@ -53,13 +53,13 @@ class Answers:
 
     Attributes
     ----------
-    content : the variables of the data set, given the cases of its runs
+    content : the variables of the data set, besides those of its runs and their ids
     points : the runs that the data set holds; None if it holds answers
     outcomes : of each answer a run, the status and the message
     of : what the answers were made of
     """
 
-    content: Callable[[Sequence[Case]], Mapping[str, Any]]
+    content: Callable[[], Mapping[str, Any]]
     points: Points | None = None
     outcomes: Sequence[tuple[str, str, str]] = ()
     of: str = ""

@@ -63,6 +63,9 @@ class Replayed(Chooser):
     _wants: list[Evaluation] = field(default_factory=list, kw_only=True)
     _numbers: dict[str, int] = field(default_factory=dict, kw_only=True)
 
+    def __post_init__(self) -> None:
+        self.replay()
+
     @abstractmethod
     def search(self) -> None:
         """Begin anew: `ask` for runs, and take them from ``known``."""

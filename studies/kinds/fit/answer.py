@@ -30,7 +30,7 @@ def answers(study: Study, programs: list[Fitting]) -> Answers:
     status, message = _outcome(program, known)
     rows = [row for row in program.rows.values() if row]
     return Answers(
-        content=lambda _: _content(study, program, known, (status, message)),
+        content=lambda: _content(study, program, known, (status, message)),
         outcomes=[("", status, message)],
         of=canonical([status, message, rows, sorted(program.refusals.values())]),
     )

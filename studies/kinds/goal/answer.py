@@ -29,7 +29,7 @@ def answers(study: Study, searches: list[Search]) -> Answers:
     outcomes = [_outcome(study, search) for search in searches]
     runs = [[search.reason, list(search.rows.values())] for search in searches]
     return Answers(
-        content=lambda _: _content(study, searches, outcomes),
+        content=lambda: _content(study, searches, outcomes),
         outcomes=[
             (_run(search, search.high), *outcome)
             for search, outcome in zip(searches, outcomes, strict=True)

@@ -13,9 +13,6 @@ def answers(study: Study, programs: list[Minimising]) -> Answers:
     (program,) = programs
     state = program.reason or study.kind.ends[1]
     return Answers(
-        content=lambda cases: {
-            "run": described("point", [case.id for case in cases], "id of the run"),
-            "search_state": described((), state, "how the search ended"),
-        },
+        content=lambda: {"search_state": described((), state, "how the search ended")},
         points=[program.sets(key) for key, row in program.rows.items() if row],
     )

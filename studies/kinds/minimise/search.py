@@ -85,9 +85,6 @@ class Minimising(Replayed):
     asked: Minimise
     allow: Sequence[str]
 
-    def __post_init__(self) -> None:
-        self.replay()
-
     def seen(self, key: Evaluation, row: Mapping[str, Any]) -> list[float] | None:
         """Return the number, and how far each condition is broken; None of a run that failed."""
         names = [self.asked.of, *(each.name for each in self.asked.where)]

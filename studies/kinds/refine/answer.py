@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from studies.definition.cases import Case
 from studies.definition.study import Study
 from studies.definition.sweep import owners
 from studies.kinds.kind import Answers
@@ -24,14 +22,12 @@ def answers(study: Study, programs: list[Refinement]) -> Answers:
     ran = [each for each in program.asked if not isinstance(program.rows.get(each), str)]
     order = sorted(ran, key=lambda each: (program.asked[each], each))
     return Answers(
-        content=lambda cases: _beside(study, program, cases, order),
+        content=lambda: _beside(study, program, order),
         points=[program.sets(each) for each in order],
     )
 
 
-def _beside(
-    study: Study, program: Refinement, cases: Sequence[Case], order: list[Wanted]
-) -> dict[str, Variable]:
+def _beside(study: Study, program: Refinement, order: list[Wanted]) -> dict[str, Variable]:
     """Return what the data set has beside the runs."""
     scene, refine, cells = study.problem, program.refine, program.cells
     variables: dict[str, Variable] = {}
@@ -39,7 +35,6 @@ def _beside(
     def add(name: str, dims: str | list[str], values: Any, words: str, unit: str = "") -> None:
         variables[name] = described(dims, values, words, unit)
 
-    add("run", "point", np.array([case.id for case in cases], dtype=object), "id of the run")
     rounds = np.array([program.asked[each] + 1 for each in order], dtype=np.int32)
     add("round", "point", rounds, "round in which the run was asked for")
     for axis, name in enumerate(refine.axes):
