@@ -140,9 +140,10 @@ def described(found: Any) -> list[Any]:
 def of_this_checkout() -> dict[str, Any]:
     """Return what must not change of every study, or the error of one that is refused."""
     from studies import Study
+    from studies.definition.identity import solver_hash
     from studies.errors import StudyError
 
-    found: dict[str, Any] = {}
+    found: dict[str, Any] = {"": solver_hash()}
     shipped = [(path.stem, path) for path in sorted(Path("data/studies").glob("*.toml"))]
     every: list[tuple[str, Path | dict[str, Any]]] = [*shipped, *contents()]
     for name, given in every:
@@ -166,11 +167,17 @@ def of_checkout(folder: str) -> dict[str, Any]:
 def main(old: str, new: str) -> int:
     """Print what differs, and how many studies are equal; return 1 if some are not."""
     before, after = of_checkout(old), of_checkout(new)
-    differing = [name for name in before | after if before.get(name) != after.get(name)]
+    if before.pop("") != after.pop(""):
+        print(
+            "the sources that count in all ids differ (studies/definition/identity.py: solver_hash)"
+        )
+        return 1
+    both = before.keys() & after.keys()  # one of them may ship more
+    differing = sorted(name for name in both if before[name] != after[name])
     for name in differing:
-        print(f"{name}:\n  {before.get(name)}\n  {after.get(name)}")
-    accepted = sum(isinstance(each, list) for each in after.values())
-    print(f"{len(after)} studies, {accepted} accepted: {len(differing)} differ")
+        print(f"{name}:\n  {before[name]}\n  {after[name]}")
+    accepted = sum(isinstance(after[name], list) for name in both)
+    print(f"{len(both)} studies, {accepted} accepted: {len(differing)} differ")
     return bool(differing)
 
 
