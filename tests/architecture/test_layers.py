@@ -20,8 +20,9 @@ LAYERS = {
         "results.quantities", "audit", "results", "scenes", "rolling", "shipped",
     ),
     "studies": (
-        "units", "errors", "toml", "scratch", "scenes", "definition", "kinds", "study", "storage",
-        "kinds.answer", "execution", "views", "kinds.shown", "client",
+        "units", "errors", "toml", "scratch", "scenes", "definition", "kinds",
+        "definition.study", "storage", "kinds.*.answer", "execution", "views", "kinds.*.shown",
+        "client",
     ),
     "residua": (
         "neighbours", "status", "cost", "progress", "keys", "slurm", "commands",
@@ -48,9 +49,9 @@ def layer_of(module: str) -> str:
 
 PARTS = {
     "results.quantities": "results.quantities",
-    "definition.study": "study", "definition.files": "study",
-    "kinds.*.answer": "kinds.answer", "kinds.*.shown": "kinds.shown",
-    "kinds.*.figure": "kinds.shown",
+    "definition.study": "definition.study", "definition.files": "definition.study",
+    "kinds.*.answer": "kinds.*.answer", "kinds.*.shown": "kinds.*.shown",
+    "kinds.*.figure": "kinds.*.shown",
 }  # fmt: skip
 """Modules that are in a layer of their own; of kinds of study in every folder."""
 
