@@ -56,7 +56,7 @@ def _none(name: str) -> None:
 
 def _described(schema: dict[str, Any]) -> None:
     """Add entries that are not kept to the JSON Schema of a study."""
-    del schema["properties"]["choice"]
+    schema["properties"].pop("choice", None)
     kinds = {name: {"type": "object", "description": of.meaning} for name, of in KINDS.items()}
     schema["properties"] |= kinds | SCHEMAS | {EXTENDS: SCHEMA}
 

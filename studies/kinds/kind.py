@@ -180,5 +180,6 @@ class Kind:
         ------
         a place, the parameters that differ there, and the values of the branch
         """
-        for case in itertools.islice(itertools.cycle(list(cases)), self.most_runs(0)):
+        places = list(cases)
+        for case in itertools.islice(itertools.cycle(places), self.most_runs(len(places))):
             yield case, self.first, [case.values.get(branch)]

@@ -117,7 +117,8 @@ def test_a_condition_that_no_run_meets_is_reported(tmp_path: Path) -> None:
 
 def test_each_place_of_an_axis_has_a_minimum(tmp_path: Path) -> None:
     own = study(sweep={"hardening": ["none", "isotropic"]}, starts=1)
-    assert estimate(own, Store(tmp_path)).runs == own.size == 2 * 40
+    most = estimate(own, Store(tmp_path))
+    assert most.runs == most.to_compute == most.paths == own.size == 2 * 40
     outcome = run_study(own, Store(tmp_path), workers=0)
     with open_study(outcome.dataset) as dataset:
         least = dataset[OF].where(dataset[BOUND] < 0.25).groupby("hardening").min()

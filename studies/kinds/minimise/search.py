@@ -1,9 +1,6 @@
 """The smallest value of a number within bounds and under conditions, from several starts.
 
-References
-----------
-Ragonneau, T. M. and Zhang, Z. (2024), COBYQA, in `scipy.optimize.minimize`: quadratic models of
-number and conditions, without slopes; it goes around failed runs.
+By COBYQA (Ragonneau and Zhang 2024): quadratic models without slopes, which go around failed runs.
 """
 
 from __future__ import annotations
