@@ -24,12 +24,12 @@ def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
     from residua.cost import ALONE, Foreseen, dry_run
     from residua.progress import Progress
-    from studies.definition.fit import NO_FIT
     from studies.definition.study import Study
     from studies.execution.cluster import Access
     from studies.execution.forking import FORK_HERE, variables
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, run_study
+    from studies.kinds.fit.fitting import NO_FIT, Fit
     from studies.storage.store import Store
     from studies.views.report import prepare
     from studies.views.report import report as report_of
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
     store = Store(options.out)
     measured = getattr(options, "measured", ())
     study = Study.from_toml(options.study, measured, store.definition, store.scene)
-    if options.command is fit and not study.fit:
+    if options.command is fit and study.kind.name != Fit.name:
         raise StudyError("fit", None, NO_FIT)
     if options.dry_run:
         print(dry_run(study, store))

@@ -28,7 +28,7 @@ def dry_run(study: Study, store: Store) -> str:
     unknown = "not known"
     lines = {
         "runs": f"at most {found.runs}, of which some may be there"
-        if study.asks
+        if study.kind.chooses
         else f"{found.runs} in all, {found.to_compute} to compute",
         "loading paths": f"{found.paths} to walk",
         "unknowns": unknown if found.unknowns is None else f"at most {found.unknowns} a run",

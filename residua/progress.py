@@ -32,7 +32,7 @@ class Progress:
         self._stream = stream or sys.stderr
         self._bar = self._stream.isatty()
         cases = () if self._bar else study.cases()  # a bar names no runs
-        self._size, self._asks = study.size, study.asks is not None
+        self._size, self._asks = study.size, study.kind.chooses
         self._names = {case.id: _place(study, case) for case in cases}
         self._started = time.monotonic()
         self._begun: float | None = None

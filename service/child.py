@@ -42,7 +42,7 @@ def compute(order: Mapping[str, Any], outlet: Outlet, stop: threading.Event) -> 
         should_stop=stop.is_set,
     )
     outlet.send("outcome", {
-        "counts": outcome.counts, "counted": study.counted, "asked": outcome.asked,
+        "counts": outcome.counts, "counted": study.kind.counted, "asked": outcome.asked,
         "stage": outcome.stage,
     })  # fmt: skip
 

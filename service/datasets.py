@@ -21,10 +21,10 @@ from typing import Any
 from service.errors import Busy, Conflict, NotFound
 from service.job import Job, StudyState
 from service.jobs import Jobs
-from service.overview import chooses
 from service.turns import Beyond, Share
 from studies import Store, Study
 from studies.errors import FileDamaged, StoreFull
+from studies.kinds import kind_of
 from studies.scratch import scratch
 from studies.storage.seal import State, state_of
 from studies.storage.tiles import Tiles
@@ -127,7 +127,7 @@ class Datasets:
 
     async def _partial(self, job: Job, study: dict[str, Any], share: Share) -> Path:
         """Return the path of the data set of a study as it is now, or was a little before."""
-        if chooses(study):
+        if kind_of(study).chooses:
             raise NotFound(
                 f"no data set yet: what the study finds is known at its end, and it is {job.state}"
             )

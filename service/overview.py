@@ -20,6 +20,7 @@ from service.turns import Share
 from studies import Store
 from studies.definition.sweep import labels, positions
 from studies.definition.vocabulary import taken
+from studies.kinds import KINDS, kind_of
 from studies.storage.seal import state_of
 
 KEPT = 100
@@ -27,8 +28,6 @@ KEPT = 100
 
 PENDING = "pending"
 """Status of a run that is not in the catalogue."""
-CHOOSE = ("goal", "refine", "fit")
-"""Entries of studies that choose their runs."""
 WORDS: dict[str, Any] = {"note": "", "tags": [], "keep": "", "allow": []}
 """Other entries of studies, and what one has that has no such entry."""
 
@@ -91,7 +90,7 @@ class Details:
         counts = Counter[str]()
         for status, number in self.store.catalogue.counts(self.jobs.runs(job.id)).items():
             counts[taken(status, allow)] += number
-        asks = chooses(study)
+        asks = kind_of(study).chooses
         if not asks and (pending := job.size - sum(counts.values())):
             counts[PENDING] = pending
         axes = {name: labels(name, axis) for name, axis in study["sweep"].items()}
@@ -108,7 +107,7 @@ class Details:
             scene_name=scene_name(self.store, job.scene),
             parameters=study["parameters"],
             sweep=study["sweep"],
-            **{name: study.get(name, {}) for name in CHOOSE},
+            **{name: study.get(name, {}) for name in KINDS},
             **{name: study.get(name, usual) for name, usual in WORDS.items()},
             counts=counts,
             runs=[
@@ -123,11 +122,6 @@ class Details:
         )
 
 
-def chooses(study: Mapping[str, Any]) -> bool:
-    """Whether a study asks for runs by the outcomes of others: they do not fill its axes."""
-    return any(study.get(name) for name in CHOOSE)
-
-
 def point(axes: dict[str, list[Any]], position: int) -> dict[str, Any]:
     """Return the values on the axes of the run at ``position``; the last axis runs fastest."""
     index = np.unravel_index(position, [*map(len, axes.values())]) if axes else ()
@@ -135,9 +129,9 @@ def point(axes: dict[str, list[Any]], position: int) -> dict[str, Any]:
 
 
 def searched_at(study: Mapping[str, Any], parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Return where a study has asked for a run: on its axes, and of parameters it searches or fits.
+    """Return where a study has asked for a run: on its axes, and of parameters that it searches.
 
-    The runs of a refinement are between the values of its axes.
+    Runs may be between the values of the axes.
     """
     labelled = {
         name: each.at
@@ -145,8 +139,8 @@ def searched_at(study: Mapping[str, Any], parameters: Mapping[str, Any]) -> dict
         for each in positions(name, axis)
         if all(parameters.get(key) == value for key, value in each.sets.items())
     }
-    goal, fit = study.get("goal") or {}, study.get("fit") or {}
-    names = [*study["sweep"], *([goal["parameter"]] if goal else []), *fit.get("ranges", ())]
+    kind = kind_of(study)
+    names = [*study["sweep"], *kind.searched(study[kind.name])]
     places = {name: labelled.get(name, parameters.get(name)) for name in names}
     return {name: place for name, place in places.items() if place is not None}
 

@@ -77,7 +77,7 @@ def add(study_id: str, jobs: Jobs, store: Store, begun: bool = True) -> None:
     counts = store.outcomes(study.id)
     if not (counts or begun):
         return
-    if study.asks:
+    if study.kind.chooses:
         asked = store.asked(study)
         ended = asked is not None and all(store.run_path(run).is_file() for run in asked)
         stage = study.stage(study.expansion.size if ended else 0)
@@ -87,7 +87,7 @@ def add(study_id: str, jobs: Jobs, store: Store, begun: bool = True) -> None:
         there = (store.run_path(run).is_file() for run in study.run_ids())
         ended = not begun or sum(there) >= counts.total() - counts[MISSING]
     if counts and (ended or not begun):
-        jobs.finish(study.id, *verdict(counts, study.counted), standing=StudyState.ACCEPTED)
+        jobs.finish(study.id, *verdict(counts, study.kind.counted), standing=StudyState.ACCEPTED)
 
 
 class Mender:

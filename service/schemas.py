@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.job import StudyState
 from studies.definition.sweep import Axes
+from studies.kinds import KINDS
 
 ContentId = Annotated[
     str, Path(pattern="^[0-9a-f]{32}$", description="content id, 32 hexadecimal digits")
@@ -221,15 +222,21 @@ class StudyRun(BaseModel):
     at: dict[str, Any] = Field(description="its values, or labels, on the axes of the sweep")
 
 
+def _with_kinds(schema: dict[str, Any]) -> None:
+    """Add the entries of kinds of study to the JSON Schema of a study."""
+    for name, kind in KINDS.items():
+        schema["properties"][name] = {"type": "object", "description": kind.meaning}
+        schema["required"].append(name)
+
+
 class StudyDetail(StudySummary):
     """A study with its definition and a page of its runs."""
+
+    model_config = ConfigDict(extra="allow", json_schema_extra=_with_kinds)
 
     scene_name: str = Field(description="name of its scene, also of a posted one; else empty")
     parameters: dict[str, Any]
     sweep: Axes
-    goal: dict[str, Any] = Field(description="what is searched at each place of the axes")
-    refine: dict[str, Any] = Field(description="numbers of the runs, between which it adds others")
-    fit: dict[str, Any] = Field(description="what was measured, and the parameters it searches")
     note: str = Field(description="what its author wrote of it")
     tags: list[str]
     keep: str = Field(description="``fields`` where the runs keep the fields at the nodes")

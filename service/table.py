@@ -16,7 +16,7 @@ import numpy as np
 
 from service.job import Job
 from service.jobs import Jobs
-from service.overview import PENDING, chooses, searched_at
+from service.overview import PENDING, searched_at
 from service.scenes import scene_of
 from service.turns import Share
 from solver.scenes import Scene
@@ -24,6 +24,7 @@ from studies import Store
 from studies.definition.parameters import parameters_of
 from studies.definition.sweep import labels, linked_values
 from studies.definition.vocabulary import STATUSES, taken
+from studies.kinds import kind_of
 from studies.storage.dataset import axis_attributes
 from studies.storage.seal import state_of
 from studies.views.figures import group_of
@@ -66,7 +67,7 @@ class Tables:
         study, runs = self.jobs.study(job.id), self.jobs.runs(job.id)
         scene = scene_of(self.store, job.scene)
         axes = {name: labels(name, axis) for name, axis in study["sweep"].items()}
-        asks, allow = chooses(study), study.get("allow", [])
+        asks, allow = kind_of(study).chooses, study.get("allow", [])
         outcome, said = (np.full(len(runs), text, dtype=object) for text in (PENDING, ""))
         numbers: dict[str, np.ndarray] = {}
         asked: dict[str, list[Any]] = {}

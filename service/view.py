@@ -95,11 +95,11 @@ class ViewedFolder:
         if not (counts := self.store.outcomes(study_id)):  # it was deleted or damaged
             return
         study = Study.known(self.jobs.study(study_id), self.store.scene)
-        if study.asks:
+        if study.kind.chooses:
             asked = self.store.asked(study) or ()
             self.jobs.asked(study_id, sorted(asked), study.stage(study.expansion.size))
             job = self.jobs.get(study_id)
-        end, message = verdict(counts, study.counted)
+        end, message = verdict(counts, study.kind.counted)
         self._put(job, state=end, message=message, progress=100.0)
 
     def _follow(self, study_id: str) -> None:

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from studies.execution.function import sweep
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
+    from studies.kinds.fit.shown import fit
     from studies.storage.store import Store
     from studies.views.differing import Difference, diff
-    from studies.views.fits import fit
     from studies.views.grids import to_grid
     from studies.views.predict import predict
     from studies.views.reading import open_netcdf, open_study
@@ -52,7 +52,7 @@ _HOMES = {
     "StudyOutcome": "execution.run",
     "diff": "views.differing",
     "estimate": "execution.estimate",
-    "fit": "views.fits",
+    "fit": "kinds.fit.shown",
     "open_netcdf": "views.reading",
     "open_study": "views.reading",
     "own_workers": "execution.cluster",

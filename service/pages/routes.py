@@ -49,6 +49,7 @@ from service.schemas import ContentId, Health, StudyFilter, Window
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
+from studies.kinds import kind_of
 from studies.scenes.registry import known_names
 from studies.storage.seal import State, state_of
 from studies.views.table import MESSAGE, RUN, STATUS, RunTable, varied
@@ -143,7 +144,7 @@ async def study_page(
     """Show a study: what it found, numbers over its sweep, one of its runs, a part of its table."""
     study = json.loads(await details.get(study_id, Window(limit=1), reading))
     found = None
-    if overview.chooses(study):
+    if kind_of(study).chooses:
         with suppress(Busy, NotFound):  # it is there at the end
             found = await reading.read(_found, tables.jobs.get(study_id), datasets)
     table = await tables.get(study_id, reading)
@@ -175,10 +176,12 @@ def _study(
 ) -> Response:
     scene = scene_of(store, study["scene"])
     query = dict(request.query_params)
+    kind = kind_of(study)
+    entry = study.get(kind.name, {})
     numbers = [each.name for each in chosen.usual(table)]
     number = query.get("number", "")
     if number not in numbers:
-        asked = study["goal"].get("of", "")
+        asked = entry.get("of", "")
         number = asked if asked in numbers else next(iter(numbers), "")
     at = chosen.chosen_run(table, query.get("run", ""), number)
 
@@ -210,11 +213,10 @@ def _study(
         csv=f"?{csv}" if csv else "",
         live=study["status"] in POLLED,
         found=found,
-        chooses=overview.chooses(study),
+        chooses=kind.chooses,
         data={
             "id": study["id"],
-            "sought": study["goal"].get("parameter")
-            or next(iter(study["fit"].get("ranges", {})), ""),
+            "sought": next(iter(kind.searched(entry)), ""),
             "found": found.marks if found else [],
             "live": study["status"] in POLLED,
             "number": number,

@@ -295,7 +295,7 @@ async def tell_fit(
 def _fitted(job: Job, jobs: Jobs, datasets: Datasets) -> dict[str, Any]:
     """Return what `tell_fit` tells."""
     from studies import open_netcdf  # xarray takes half a second to import
-    from studies.views.fits import told
+    from studies.kinds.fit.shown import told
 
     if not jobs.study(job.id).get("fit"):
         raise StudyError("fit", job.name, "is a study without a fit: submit one with an entry fit")

@@ -36,7 +36,7 @@ class Extended(NamedTuple):
 
     Attributes
     ----------
-    name, scene, parameters, sweep, goal : as those of `Study`
+    name, scene, parameters, sweep, choice : as those of `Study`
     fixed : all parameters that are not swept
     """
 
@@ -44,7 +44,7 @@ class Extended(NamedTuple):
     scene: str
     parameters: Mapping[str, Any]
     sweep: Axes
-    goal: Mapping[str, Any]
+    choice: Mapping[str, Any]
     fixed: Mapping[str, Any]
 
 
@@ -69,13 +69,12 @@ def extended(content: Mapping[str, Any], base: Extended, known: Mapping[str, Par
     if not added:
         raise StudyError(EXTENDS, base.name, "nothing is added: give axes, points or a sample")
     rest = {key: value for key, value in content.items() if key not in _ADDED}
-    goal = {"goal": base.goal} if base.goal else {}
     axes = _with_points(base, added) if any(map(is_points, added.values())) else dict(base.sweep)
     for name, axis in added.items():
         if not is_points(axis):
             axes[name] = _longer(name, axis, base)
     fixed = {key: value for key, value in base.parameters.items() if key not in owners(axes)}
-    return goal | rest | {"scene": base.scene, "parameters": fixed, "sweep": axes}
+    return {**base.choice, **rest, "scene": base.scene, "parameters": fixed, "sweep": axes}
 
 
 _ADDED = (EXTENDS, "points", "sample", "sweep", "parameters", "scene")
@@ -97,7 +96,7 @@ def _longer(name: str, axis: list[Any] | dict[str, Any], base: Extended) -> Any:
         if (other := owners(base.sweep).get(name)) is not None:
             allowed = f"is set by {other} of {base.name}, which is extended: add to {other}"
             raise StudyError(field, axis, allowed)
-        before = [base.fixed[name]] if name in base.fixed else []  # of a goal it is no parameter
+        before = [base.fixed[name]] if name in base.fixed else []  # what is searched is not fixed
     assert isinstance(before, list)
     seen = {canonical(value) for value in before}
     values = [*before, *(value for value in axis if canonical(value) not in seen)]

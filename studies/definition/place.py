@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import math
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -14,9 +15,12 @@ from studies.definition.points import POINT
 from studies.definition.sweep import Axes
 from studies.definition.vocabulary import KEEP, NO_EQUILIBRIUM, SOLVED
 
+Limit = Callable[[Mapping[str, Any]], bool]
+"""Whether a run is the last one of its path that is needed; they come in increasing order."""
+
 
 class Chooser(Protocol):
-    """What asks for runs until it ends: the search for a goal, or a refinement.
+    """What asks for runs until it ends, such as a search.
 
     What it asks for depends only on the runs that it has asked for, and not on the order in which
     they end. One that begins anew therefore asks for the same runs, which are in the store.
@@ -58,7 +62,12 @@ class Chooser(Protocol):
         return False
 
     @property
-    def limit(self) -> Any:
+    def largest(self) -> float:
+        """A bound on the values that it asks for on a path that goes on."""
+        return math.inf
+
+    @property
+    def limit(self) -> Limit | None:
         """What tells the last run that is needed on a loading path; None if all are."""
         return None
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from solver.scenes import Scene
 from studies.definition.line import Read, picked
+from studies.definition.parameters import in_unit
+from studies.definition.spaced import is_finite
 from studies.errors import StudyError, check_entries, nearest, one_of
 
 _LARGEST = {"largest": np.max, "smallest": np.min}
@@ -122,3 +126,42 @@ def checked_number(field: str, content: Any, scene: Scene) -> RunNumber:
     if not found.whole and found.name in quantities:
         raise StudyError(field, content, f"would be named {found.name}, as another variable is")
     return found
+
+
+class Condition(NamedTuple):
+    """A condition on a number of a run: above or below a limit."""
+
+    name: str
+    sign: str
+    limit: float
+
+    @property
+    def text(self) -> str:
+        """The condition, as `checked_condition` and tables of runs read it."""
+        return f"{self.name} {self.sign} {self.limit!r}"
+
+    def over(self, value: float) -> float:
+        """Return how far a value is beyond the limit: positive if it breaks the condition."""
+        return value - self.limit if self.sign[0] == "<" else self.limit - value
+
+
+CONDITION = re.compile(r"\s*(?P<name>\w+)\s*(?P<sign><=|>=|!=|<|>|=)\s*(?P<value>.*?)\s*")
+
+
+def checked_condition(field: str, text: Any, scene: Scene) -> Condition:
+    """Return a condition on a variable with one number a run, such as ``"rigid_shift < 20 um"``.
+
+    Raises
+    ------
+    StudyError
+        naming ``field``, the condition and what is allowed
+    """
+    found = CONDITION.fullmatch(text) if isinstance(text, str) else None
+    if found is None or found["sign"][0] not in "<>":
+        raise StudyError(field, text, "must be NAME < NUMBER, with <, <=, > or >=")
+    number_of_a_run(field, found["name"], scene)
+    given = in_unit(scene.known_quantities[found["name"]].units, found["value"], field)
+    with suppress(ValueError):
+        if is_finite(limit := float(given)):
+            return Condition(found["name"], found["sign"], limit)
+    raise StudyError(field, text, "must end with a finite number")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -22,13 +23,10 @@ from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
 from studies.definition.extending import EXTENDS, SCHEMA, Extended, extended
 from studies.definition.files import read_study
-from studies.definition.fit import Fit, checked_fit
-from studies.definition.goal import Goal, checked_goal
 from studies.definition.identity import content_id
 from studies.definition.labels import checked_labels
 from studies.definition.parameters import build, parameters_of
 from studies.definition.points import ENTRIES, POINT, SCHEMAS, Points, with_points
-from studies.definition.refine import Refine, checked_refine
 from studies.definition.sweep import (
     Axes,
     checked_axes,
@@ -41,6 +39,9 @@ from studies.definition.sweep import (
 )
 from studies.definition.vocabulary import taken
 from studies.errors import StudyError, one_of
+from studies.kinds import KINDS
+from studies.kinds.kind import Kind
+from studies.kinds.sweep import SweepStudy
 from studies.scenes.names import in_use
 from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
 
@@ -55,7 +56,9 @@ def _none(name: str) -> None:
 
 def _described(schema: dict[str, Any]) -> None:
     """Add entries that are not kept to the JSON Schema of a study."""
-    schema["properties"] |= SCHEMAS | {EXTENDS: SCHEMA}
+    schema["properties"].pop("choice", None)
+    kinds = {name: {"type": "object", "description": of.meaning} for name, of in KINDS.items()}
+    schema["properties"] |= kinds | SCHEMAS | {EXTENDS: SCHEMA}
 
 
 class Study(BaseModel):
@@ -75,12 +78,8 @@ class Study(BaseModel):
     keep : ``fields`` keeps the fields at all nodes in the file of each run
     allow : ``large_strain`` makes runs outside small-strain theory count as ok (see `taken`); it
         includes what the scene allows
-    goal : parameter, threshold and bracket of a value that is searched at each place of the axes
-        (`studies.definition.goal`); empty if the runs are those of the axes
-    refine : numbers by which runs are chosen within the ranges of the axes, and how closely
-        (`studies.definition.refine`); empty if the runs are those of the axes
-    fit : measured lines, and bounds of the parameters with which runs come closest to them
-        (`studies.definition.fit`); empty if the runs are those of the axes
+    choice : what chooses the runs: what the study says under the name of a kind of `KINDS`, by this
+        name; empty if the runs are those of the axes
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_described)
@@ -93,9 +92,7 @@ class Study(BaseModel):
     tags: list[str] = Field(default_factory=list)
     keep: Literal["", "fields"] = ""
     allow: list[Literal["large_strain"]] = Field(default_factory=list)
-    goal: dict[str, Any] = Field(default_factory=dict)
-    refine: dict[str, Any] = Field(default_factory=dict)
-    fit: dict[str, Any] = Field(default_factory=dict)
+    choice: dict[str, dict[str, Any]] = Field(default_factory=dict, exclude=True)
     _problem: Scene = PrivateAttr()
 
     @classmethod
@@ -179,13 +176,15 @@ class Study(BaseModel):
             allowed = "must be a study file, or name or id of a study of the output directory"
             raise StudyError(EXTENDS, named, allowed)
         base = cls.known(theirs, scenes, studies)
-        if base.asks and not base.goal:
+        if not base.kind.everywhere:
             raise StudyError(EXTENDS, base.name, "chooses its runs itself: extend another study")
         own = content.get("scene", base.scene)
         if own != base.scene and name_of(scene_named(own, scenes)) != base.scene:
             allowed = f"must be that of {base.name}, which is extended, or left out"
             raise StudyError("scene", own, allowed)
-        before = Extended(base.name, base.scene, base.parameters, base.sweep, base.goal, base.fixed)
+        before = Extended(
+            base.name, base.scene, base.parameters, base.sweep, base.choice, base.fixed
+        )
         full: dict[str, Any] = extended(content, before, parameters_of(base.problem))
         return full
 
@@ -197,30 +196,28 @@ class Study(BaseModel):
         StudyError
             for combinations that the scene refuses, or parameters that change nothing
         """
-        if isinstance(self.asks, Fit):
-            try:
-                Expansion(self.problem, self.parameters | self.asks.first, self.sweep).check()
-            except StudyError as error:
-                own = {f"parameters.{name}": f"fit.first.{name}" for name in self.asks.free}
-                raise error.renamed(lambda field: own.get(field, field)) from None
-            return self
-        if not isinstance(self.asks, Goal):
-            self.expansion.check()
-            return self
-        ends: Axes = {self.asks.parameter: list(self.asks.between)}
+        fixed, axes, fields = self.kind.trial
+        runs = self.expansion
+        if fixed or axes:
+            runs = Expansion(self.problem, {**self.parameters, **fixed}, self.sweep | axes)
         try:
-            Expansion(self.problem, self.parameters, self.sweep | ends).check()
+            runs.check()
         except StudyError as error:
-            own_axis = f"sweep.{self.asks.parameter}"
-            raise error.renamed(lambda field: field.replace(own_axis, "goal.between")) from None
+
+            def told(field: str) -> str:
+                head, bracket, rest = field.partition("[")
+                return fields.get(head, head) + bracket + rest
+
+            raise error.renamed(told) from None
         return self
 
     @model_validator(mode="before")
     @classmethod
     def _check(cls, content: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+        known_entries = [*cls.model_fields.keys() - {"choice"}, *KINDS, *ENTRIES]
         for key in content:
-            if key not in cls.model_fields and key not in ENTRIES:
-                raise StudyError(str(key), content[key], one_of(key, [*cls.model_fields, *ENTRIES]))
+            if key not in known_entries:
+                raise StudyError(str(key), content[key], one_of(key, known_entries))
         context = info.context if info.context is not None else {}
         scene = scene_named(content.get("scene"), context.get("scenes", nothing))
         context["found"] = scene
@@ -228,11 +225,16 @@ class Study(BaseModel):
         fixed = checked_table("parameters", content.get("parameters", {}), known)
         axes = checked_axes(with_points(content, known), known)
         _check_names(scene, axes)
-        over_points = "refine" in content or POINT in axes
-        own_points = over_points and scene.places and scene.places(build(scene, {})).points
-        if own_points and "refine" in content:
-            allowed = "the runs of this scene have a dimension `point`, that of a refinement"
-            raise StudyError("refine", content["refine"], allowed)
+        kinds = [kind for name, kind in KINDS.items() if name in content]
+        of_runs = [kind.name for kind in kinds if kind.of_runs]
+        own_points = (
+            (of_runs or POINT in axes)
+            and scene.places is not None
+            and scene.places(build(scene, {})).points
+        )
+        if own_points and of_runs:
+            allowed = "the runs of this scene have a dimension `point`, that of the runs chosen"
+            raise StudyError(of_runs[0], content[of_runs[0]], allowed)
         if own_points:
             allowed = (
                 "the runs of this scene have a dimension of this name, the points of the scene "
@@ -250,34 +252,27 @@ class Study(BaseModel):
         }
         labels = checked_labels(content) | ({"allow": [*scene.allow]} if scene.allow else {})
         own = {"name": name, "scene": name_of(scene), "parameters": parameters, "sweep": axes}
-        if "goal" in content:
-            goal = checked_goal(content["goal"], scene)
-            other = "parameters" if goal.parameter in fixed else owners(axes).get(goal.parameter)
-            if other is not None:
-                where = "parameters" if goal.parameter in fixed else f"sweep.{other}"
-                allowed = f"is what the goal searches: take it out of {where}"
-                raise StudyError("goal.parameter", goal.parameter, allowed)
-            own["goal"] = goal.content
-        if "refine" in content:
-            if "goal" in content:
-                allowed = "chooses the runs, and so does the goal: keep one"
-                raise StudyError("refine", content["refine"], allowed)
-            own["refine"] = checked_refine(content["refine"], scene, axes).content
-        if "fit" in content:
-            if others := own.keys() & {"goal", "refine"}:
-                allowed = f"chooses the runs, and so does {next(iter(others))}: keep one"
-                raise StudyError("fit", "a table", allowed)
-            fit = checked_fit(content["fit"], scene, axes)
-            for name in fit.free.keys() & {*fixed, *owners(axes)}:
-                where = "parameters" if name in fixed else f"sweep.{owners(axes)[name]}"
-                allowed = f"is what the fit searches: take it out of {where}"
-                raise StudyError(f"fit.ranges.{name}", content["fit"]["ranges"][name], allowed)
-            own["fit"] = fit.content
+        if kinds:
+            kind, *others = kinds
+            found = kind.read(content[kind.name], scene, axes)
+            own["choice"] = {kind.name: found.content}
+            for name, field in kind.searched(found.content).items():
+                if name in fixed or name in owners(axes):
+                    where = "parameters" if name in fixed else f"sweep.{owners(axes)[name]}"
+                    allowed = f"is what the {kind.name} searches: take it out of {where}"
+                    value = reduce(getitem, field.split(".")[1:], found.content)
+                    raise StudyError(field, value, allowed)
+            for other in others:
+                allowed = f"chooses the runs, and so does the {kind.name}: keep one"
+                raise StudyError(other.name, content[other.name], allowed)
+            context["kind"] = found
         return own | labels
 
     def model_post_init(self, context: Any) -> None:
         """Store the scene that was found."""
         self._problem = context["found"] if context else scene_named(self.scene)
+        if context and "kind" in context:
+            self.__dict__["kind"] = context["kind"]
 
     @property
     def problem(self) -> Scene:
@@ -285,20 +280,15 @@ class Study(BaseModel):
         return self._problem
 
     @cached_property
-    def asks(self) -> Goal | Refine | Fit | None:
-        """What chooses the runs by the outcomes of others: goals, a refinement, or a fit."""
-        if self.fit:
-            return checked_fit(self.fit, self.problem, self.sweep)
-        if self.refine:
-            return checked_refine(self.refine, self.problem, self.sweep)
-        return checked_goal(self.goal, self.problem) if self.goal else None
+    def kind(self) -> Kind:
+        """What kind of study it is, with what chooses its runs."""
+        for name, content in self.choice.items():
+            return KINDS[name].read(content, self.problem, self.sweep)
+        return SweepStudy()
 
     @cached_property
     def expansion(self) -> Expansion:
-        """The runs, built when they are requested; of a goal the places of the axes.
-
-        Of a refinement they are corners of its cells.
-        """
+        """The runs, built when they are requested; if it chooses them, the places of the axes."""
         return Expansion(self.problem, self.parameters, self.sweep)
 
     @cached_property
@@ -315,7 +305,7 @@ class Study(BaseModel):
         }
         source = self.expansion.source
         labels = checked_labels(self.model_dump(include={"note", "tags", "keep", "allow"}))
-        beside = [each for each in (labels, self.goal, self.refine, self.fit) if each]
+        beside = [each for each in (labels, *self.choice.values()) if each]
         return content_id("study", self.name, self.scene, self.fixed, axes, source, *beside)
 
     @property
@@ -324,8 +314,7 @@ class Study(BaseModel):
         known = parameters_of(self.problem)
         swept = {
             *owners(self.sweep),
-            *([self.asks.parameter] if isinstance(self.asks, Goal) else []),
-            *(self.asks.free if isinstance(self.asks, Fit) else ()),
+            *self.kind.searched(self.choice.get(self.kind.name, {})),
         }
         defaults = {name: p.default for name, p in known.items() if name not in swept}
         return defaults | self.parameters
@@ -343,39 +332,30 @@ class Study(BaseModel):
     @property
     def size(self) -> int:
         """Number of runs; of a study that chooses them the largest possible one."""
-        if isinstance(self.asks, Refine | Fit):
-            return self.asks.most
-        return self.expansion.size * (self.asks.most[1] if self.asks else 1)
-
-    @property
-    def counted(self) -> str:
-        """What the numbers by status at its end count."""
-        return "searches" if self.goal else "fits" if self.fit else "runs"
+        return self.kind.most_runs(self.expansion.size)
 
     def stage(self, ended: int = 0, told: str = "") -> str:
         """Return how far a study that chooses its runs is, as text; empty for others.
 
         Parameters
         ----------
-        ended : number of its programs that have ended, such as the searches of a goal
-        told : what the program of a refinement or of a fit tells
+        ended : number of its programs that have ended
+        told : what its program tells, if it has one
         """
-        if self.goal:
-            return f"{ended} of {self.expansion.size} searches ended"
-        return ("ended" if ended else told or f"at most {self.size} runs") if self.asks else ""
+        return self.kind.stage(self.expansion.size, ended, told)
 
     def run_ids(self) -> Iterator[str]:
         """Yield the ids of the runs, in the order of `cases`, without building the cases.
 
         Those of a study that chooses its runs are not known: there are none.
         """
-        return iter(()) if self.asks else self.expansion.run_ids()
+        return iter(()) if self.kind.chooses else self.expansion.run_ids()
 
     def cases(self) -> Iterator[Case]:
         """Yield the runs of the study, the last axis fastest; none is kept in memory.
 
-        Those of a study with a goal have the default of its parameter: they tell the places. Those
-        of a refinement are corners of its cells.
+        Of a study that chooses its runs they are the places of its axes, with the defaults of the
+        parameters that it searches.
         """
         return self.expansion.cases()
 
@@ -395,16 +375,15 @@ class Study(BaseModel):
     def with_points(self, points: Points) -> Self:
         """Return this study with other runs under its id: those that it has chosen."""
         content = self.to_dict() | {"sweep": {POINT: points}}
-        del content["refine"]
+        del content[self.kind.name]
         chosen = self.known(content, lambda name: self.problem)
         chosen.__dict__["id"] = self.id
         return chosen
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `from_dict` reads."""
-        return self.model_dump(exclude_defaults=True) | self.model_dump(
-            include={"parameters", "sweep"}
-        )
+        whole = self.model_dump(include={"parameters", "sweep"})
+        return self.model_dump(exclude_defaults=True) | whole | self.choice
 
 
 def _check_names(scene: Scene, axes: Axes) -> None:

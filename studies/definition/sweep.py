@@ -8,6 +8,7 @@ same parameters. The runs are all combinations of positions.
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -68,6 +69,34 @@ def positions(name: str, axis: list[Any] | LinkedAxis) -> Iterator[Position]:
     else:
         for k, value in enumerate(axis):
             yield Position(value, {name: value}, f"sweep.{name}[{k}]")
+
+
+class Standing(NamedTuple):
+    """A combination of positions on the axes of a study.
+
+    Attributes
+    ----------
+    sets : the parameters that it sets
+    at : the positions by axis, what they set, and the name of a point
+    """
+
+    sets: Mapping[str, Any]
+    at: Mapping[str, Any]
+
+    def has(self, at: Mapping[str, Any]) -> bool:
+        """Whether it is at these positions; those of other dimensions do not count."""
+        return all(self.at[name] == value for name, value in at.items() if name in self.at)
+
+
+def standings(axes: Axes) -> list[Standing]:
+    """Return all combinations of positions, the last axis fastest."""
+    found = []
+    for every in itertools.product(*(positions(name, axis) for name, axis in axes.items())):
+        sets = {name: value for each in every for name, value in each.sets.items()}
+        at = {name: each.at for name, each in zip(axes, every, strict=True)}
+        named = [{CASE: each.case} for each in every if each.case is not None]
+        found.append(Standing(sets, {**sets, **at, **(named[0] if named else {})}))
+    return found
 
 
 _TEXT = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,79}")

@@ -1,15 +1,15 @@
-"""The runs of a study that chooses them by the outcomes of others: a goal, a refinement or a fit.
+"""The runs of a study that chooses them by the outcomes of others.
 
-The searches at the places of the axes go on each by itself; a refinement, and a fit, is one program
-at one place: as soon as it is known what is needed next, it is handed to the workers. A search
-along a path that goes on is the task of one worker, which asks for its runs itself.
+Its programs go on each by itself: as soon as it is known what one needs next, it is handed to the
+workers. A program along a path that goes on is the task of one worker, which asks for its runs
+itself.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Container, Iterator, Mapping
-from copy import deepcopy
+from collections.abc import Collection, Container, Iterator, Mapping, Sequence
+from copy import copy, deepcopy
 from dataclasses import replace
 from functools import partial
 from itertools import takewhile
@@ -18,13 +18,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from studies.definition.cases import Case, LoadingPath
-from studies.definition.fit import Fit, Fitting, standings
-from studies.definition.goal import Goal, PathLimit, Search
 from studies.definition.line import Line, Read
-from studies.definition.place import Place
-from studies.definition.refine import Refinement
+from studies.definition.place import Limit, Place
 from studies.definition.study import Study
-from studies.definition.sweep import owners
 from studies.storage import runfile
 from studies.storage.store import Store
 
@@ -40,7 +36,7 @@ class Asked(NamedTuple):
     """
 
     path: LoadingPath
-    limit: PathLimit | None
+    limit: Limit | None
     place: Place[Any] | None
     whole: str
 
@@ -56,7 +52,7 @@ class Asking:
 
     Attributes
     ----------
-    places : the programs with their runs: of a goal in the order of the cases of the study
+    places : the programs with their runs, in the order of `Kind.programs`
     """
 
     def __init__(
@@ -67,14 +63,17 @@ class Asking:
         since: int = 0,
     ) -> None:
         self._study, self._store = study, store
-        self._at: list[list[str]] = []
+        self._at: list[Sequence[str]] = []
         self.places: list[Place[Any]] = []
-        for at, fixed, program in _programs(study, store):
+        kind = study.kind
+        for at, fixed, program in kind.programs(
+            study.sweep, lambda names: partial(_read, store, names), study.allow
+        ):
             self._at.append(at)
             self.places.append(
                 Place(
                     scene=study.problem,
-                    fixed=study.parameters | fixed,
+                    fixed={**study.parameters, **fixed},
                     program=program,
                     keep=study.keep,
                     resume=resume,
@@ -87,7 +86,7 @@ class Asking:
         self._ready: deque[Asked] = deque()
         self._neighbours: Neighbours | None = None
         self._after: dict[int, list[int]] = {}
-        if isinstance(study.asks, Goal) and study.asks.halves:
+        if kind.expects:
             from studies.definition.neighbours import Neighbours  # loads scipy
 
             self._neighbours = Neighbours([place.fixed for place in self.places])
@@ -159,7 +158,7 @@ class Asking:
         ids = [case.id for case in takewhile(lambda case: case.id in there, cases)]
         if not ids or len(ids) == len(cases) or asked.limit is None:
             return bool(ids) and len(ids) == len(cases)
-        rows, limit = self._store.sound(ids), replace(asked.limit)
+        rows, limit = self._store.sound(ids), copy(asked.limit)
         return any(limit(rows[each]) for each in ids if each in rows)
 
     def place(self, path: str) -> Place[Any]:
@@ -250,26 +249,6 @@ class Asking:
         self._done[number] = program.progress
         if program.reason:
             self._open.discard(number)
-
-
-def _programs(study: Study, store: Store) -> Iterator[tuple[list[str], dict[str, Any], Any]]:
-    """Yield the programs of a study: where each is, as text, what is fixed there, and itself."""
-    swept = owners(study.sweep)
-    if isinstance(study.asks, Goal):
-        for case in study.cases():
-            at = [f"{axis} = {value}" for axis, value in study.place(case).items()]
-            yield at, {name: case.values[name] for name in swept}, Search(study.asks)
-    elif isinstance(study.asks, Fit):
-        names = {name for line in study.asks.measured for name in (line.of, line.over)}
-        yield [], {}, Fitting(study.asks, standings(study.sweep), partial(_read, store, names))
-    elif study.asks:
-        branches = {
-            tuple(study.place(case)[axis] for axis in study.axes if axis not in study.asks.axes):
-            {name: case.values[name] for name in swept if name not in study.asks.axes}
-            for case in study.cases()
-        }  # fmt: skip
-        read = partial(_read, store, {each.of for each in study.asks.of})
-        yield [], {}, Refinement(study.asks, list(branches.values()), read, study.allow)
 
 
 def _read(store: Store, names: Collection[str], row: Mapping[str, Any]) -> Read:

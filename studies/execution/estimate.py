@@ -15,10 +15,7 @@ from solver.errors import ModelError
 from solver.memory import most_kept
 from solver.scenes import Effort, Scene
 from studies.definition.cases import LoadingPath
-from studies.definition.fit import Fit
-from studies.definition.goal import Goal
 from studies.definition.parameters import build
-from studies.definition.refine import Refine
 from studies.definition.study import Study
 from studies.definition.sweep import run_count
 from studies.definition.vocabulary import OK, SOLVED
@@ -26,6 +23,7 @@ from studies.errors import StudyError
 from studies.execution.bundles import most_together, setup_of
 from studies.execution.limits import LOADED
 from studies.execution.pace import pace_of
+from studies.kinds import kind_of
 from studies.storage.store import Store
 
 _PER_RUN, _PER_SETUP = 0.5, 1.0
@@ -44,10 +42,7 @@ _BATCH = 500
 class Estimate:
     """The cost of a study. All numbers except `runs` are for the runs that the store lacks.
 
-    Of a study with a goal they are the most that it may cost: the longest possible searches, with
-    every run as expensive as the one of the largest value. Of a refinement too: the largest number
-    of runs, each on a path of its own to the largest values of the axes; and of a fit, each
-    with the first values.
+    Of a study that chooses its runs they are the most that it may cost: see `Kind.longest`.
 
     Attributes
     ----------
@@ -112,7 +107,7 @@ class Bounds:
         StudyError
             naming the bound, and the setting that holds it
         """
-        if content.get("refine") or content.get("fit"):  # its axes are no runs
+        if not kind_of(content).everywhere:  # its axes are no runs
             return
         runs = run_count(content)
         self._refuse("runs", runs)
@@ -271,8 +266,8 @@ def _shared(each: list[list[float]]) -> float:
 def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any]]]:
     """Yield each path that lacks runs, and the values of its branch parameter that it lacks."""
     branch = study.problem.branch
-    if study.asks:
-        yield from _longest(study, study.asks)
+    if study.kind.chooses:
+        yield from _longest(study)
         return
     paths = study.paths()
     while batch := list(itertools.islice(paths, _BATCH)):
@@ -285,45 +280,20 @@ def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any
 
 def _asked(study: Study) -> Iterator[tuple[LoadingPath, list[Any]]]:
     """Yield the loading paths of a study, and the values of its branch parameter on each."""
-    if study.asks:
-        yield from _longest(study, study.asks)
+    if study.kind.chooses:
+        yield from _longest(study)
         return
     for path in study.paths():
         yield path, [case.values.get(study.problem.branch) for case in path.cases]
 
 
-def _longest(study: Study, asks: Goal | Refine | Fit) -> Iterator[tuple[LoadingPath, list[Any]]]:
-    """Yield the loading paths of the longest possible searches, or refinement, and their values."""
-    branch = study.problem.branch
-    if isinstance(asks, Refine):
-        last = {name: values[-1] for name, values in asks.axes.items()}
-        places = [case for case in study.cases() if case.values == {**case.values, **last}]
-        for place in itertools.islice(itertools.cycle(places), asks.most):
-            path = LoadingPath(place.id, build(study.problem, place.values), (place,))
-            yield path, [place.values.get(branch)]
-        return
-    if isinstance(asks, Fit):
-        for place in itertools.islice(itertools.cycle(list(study.cases())), asks.most):
-            path = LoadingPath(
-                place.id, build(study.problem, dict(place.values) | asks.first), (place,)
-            )
-            yield path, [place.values.get(branch)]
-        return
-    goal = asks
-    rounds, runs = goal.most
-    low, high = goal.between
-    for place in study.cases():
-        values = {**place.values, goal.parameter: high}
-        path = LoadingPath(place.id, build(study.problem, values), (place,))
-        if goal.branch and goal.goes_on:
-            yield path, [low, *goal.split(low, high, runs - rounds), high]
-            yield from itertools.repeat((path, [high]), rounds - 1)
-        elif goal.branch:
-            each = (runs - 2) // rounds
-            yield path, [low, *goal.split(low, high, each + 1), high]
-            yield from itertools.repeat((path, [high] * each), rounds - 1)
-        else:
-            yield from itertools.repeat((path, [high]), runs)
+def _longest(study: Study) -> Iterator[tuple[LoadingPath, list[Any]]]:
+    """Yield the loading paths of the most runs that a study may ask for, and their values."""
+    for place, sets, values in study.kind.longest(study.cases(), study.problem.branch):
+        yield (
+            LoadingPath(place.id, build(study.problem, {**place.values, **sets}), (place,)),
+            values,
+        )
 
 
 def _file_size(scene: str, keep: str, store: Store, unknowns: int = 0) -> float:

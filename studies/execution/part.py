@@ -119,7 +119,7 @@ class _PartWork:
     def done(self, begin: float) -> PartOutcome:
         """Go through all units, from a place between 0 and 1 on, until none can be claimed."""
         claims = Claims(self.store.directory / "claims")
-        asking = Asking(self.study, self.store, resume=True) if self.study.asks else None
+        asking = Asking(self.study, self.store, resume=True) if self.study.kind.chooses else None
         units = self._units(asking)
         first = round(begin * len(units))
         left, moved = units[first:] + units[:first], True

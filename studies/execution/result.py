@@ -1,14 +1,24 @@
-"""The data set of a study: combined, or kept if it was made of the same runs."""
+"""The data set of a study: of its runs or of answers, or kept if it was made of the same."""
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
+from typing import Any
 
+from solver.files import appearing
+from studies.definition.identity import canonical
+from studies.definition.points import POINT
 from studies.definition.study import Study
-from studies.definition.vocabulary import OK
+from studies.definition.vocabulary import OK, SYMMETRIC
+from studies.execution.asking import Asking
+from studies.kinds.kind import Answers
+from studies.storage import runfile, seal
 from studies.storage.dataset import RunContent
 from studies.storage.held import Combined, held
 from studies.storage.made import Made
+from studies.storage.provenance import provenance
+from studies.storage.room import needs_room
 from studies.storage.store import Store
 
 _NAME = "data set"
@@ -48,3 +58,39 @@ def result(
     of, _ = held(study, store)
     made.note(_NAME, of, [combined.path.name])
     return combined
+
+
+def answered(study: Study, store: Store, asking: Asking, anew: bool) -> Combined:
+    """Write what a study has found that chooses its runs, unless there is a data set of the same.
+
+    Parameters
+    ----------
+    study, store, asking : the study, its store, and what it has asked for
+    anew : whether runs were computed
+    """
+    found: Answers = study.kind.answers(study, [place.program for place in asking.places])
+    entry = {study.kind.name: canonical(study.kind.content)}
+    if found.points is not None:
+        chosen = study.with_points(found.points)
+        ids = [case.id for case in chosen.cases()]
+        own = {"run": runfile.described(POINT, ids, "id of the run"), **found.content()}
+        beside = RunContent(own, entry)
+        return result(chosen, store, complete=not anew, stopped=not asking.ended, beside=beside)
+    path, made = store.dataset_path(study.id), Made(study, store)
+    written = made.kept(_NAME, found.of) is None
+    if written:
+        packed = runfile.packed(RunContent(found.content(), _attributes(study) | entry))
+        with needs_room(store.directory), appearing(path) as part:
+            part.write_bytes(seal.sealed(f"dataset {study.id}", packed))
+        made.note(_NAME, found.of, [path.name])
+    counts = dict(Counter(status for _, status, _ in found.outcomes))
+    failed = [outcome for outcome in found.outcomes if outcome[1] != OK]
+    return Combined(path=path, counts=counts, failed=failed, missing=(), anew=written)
+
+
+def _attributes(study: Study) -> dict[str, Any]:
+    """Return the attributes of a data set of answers."""
+    attrs = provenance(study.name, study.problem, study.fixed)
+    words = {"note": study.note, "tags": " ".join(study.tags)}
+    attrs |= {key: text for key, text in words.items() if text}
+    return {**attrs, "id": study.id, SYMMETRIC: 0}

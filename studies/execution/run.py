@@ -23,14 +23,11 @@ from studies.definition.vocabulary import KEEP, OK, SOLVED
 from studies.errors import StoreFull, StudyError, Unusable
 from studies.execution.asking import Asking
 from studies.execution.bundles import Bundle, bundles
-from studies.execution.calibrated import calibrated
 from studies.execution.cluster import Access, connect, own_workers
 from studies.execution.estimate import memory_needed
-from studies.execution.goals import answers
 from studies.execution.limits import Limits
 from studies.execution.proof import Proof, proof_of
-from studies.execution.refined import refined
-from studies.execution.result import result
+from studies.execution.result import answered, result
 from studies.execution.task import PathTask, walk
 from studies.execution.watch import Waiting
 from studies.storage.store import Store
@@ -63,7 +60,7 @@ class StudyEvent:
     fraction : fraction of this path that is done, 0 to 1
     run, status, message : id, status and message of the run, or the reason of waiting
     place : of a study that chooses its runs, where the run is and the round of what asked for it
-    stage : of a study with a goal, how many of its searches have ended
+    stage : of a study that chooses its runs, how far it is
     """
 
     kind: str
@@ -87,8 +84,8 @@ class StudyOutcome:
     counts : number of runs by status in the data set, with ``missing``
     failed : (run id, status, message) of every run that is neither ``ok`` nor ``missing``
     computed : ids of the runs computed this time
-    asked, stage : of a study with a goal, ids of the runs that its searches have asked for, and
-        how many of these have ended
+    asked, stage : of a study that chooses its runs, ids of those that it has asked for, and how
+        far it is
     dataset : the combined data set
     anew : whether the data set was written; it is kept if it was made of the same runs
     wall_seconds : duration
@@ -186,7 +183,7 @@ def run_study(
         _answering(access)
     with store.writing():
         store.save_study(study)
-        asking = Asking(study, store, resume, since) if study.asks else None
+        asking = Asking(study, store, resume, since) if study.kind.chooses else None
         wanted: set[str] = set()
         ids = study.run_ids()
         while some := list(islice(ids, _BATCH)):
@@ -205,12 +202,7 @@ def run_study(
                 work.compute(workers, access, stop)
         if asking:
             stopped, anew = work.lacks, bool(work.computed)
-            if study.goal:
-                combined = answers(study, store, asking)
-            elif study.fit:
-                combined = calibrated(study, store, asking)
-            else:
-                combined = refined(study, store, asking, anew)
+            combined = answered(study, store, asking, anew)
         else:
             stopped = stop_requested and work.lacks
             combined = result(study, store, complete=not wanted, stopped=stopped)

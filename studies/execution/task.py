@@ -14,9 +14,8 @@ from solver.memory import release
 from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
-from studies.definition.goal import PathLimit, Search
 from studies.definition.identity import loaded, solver_hash
-from studies.definition.place import Place
+from studies.definition.place import Limit, Place
 from studies.definition.study import Study
 from studies.errors import StoreFull, StudyError, without_folders
 from studies.execution.proof import Proof, Unfit
@@ -48,7 +47,7 @@ class PathTask:
     stale : by id, the time of change [ns] of files that the study replaces; a file with another
         time was written by a worker that died on this task, and is kept
     limit : tells the run behind which no other of its path is needed; None if all are
-    place : of a path that goes on, the place whose search asks for its runs: the path has no cases
+    place : of a path that goes on, the place whose program asks for its runs: the path has no cases
     code : digests of the scene's modules that the process which made this task has loaded; a worker
         with others refuses it too
     """
@@ -60,8 +59,8 @@ class PathTask:
     keep: str = ""
     proof: Proof | None = None
     stale: Mapping[str, int] = field(default_factory=dict)
-    limit: PathLimit | None = None
-    place: Place[Search] | None = None
+    limit: Limit | None = None
+    place: Place[Any] | None = None
     code: Mapping[str, str] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -157,7 +156,7 @@ def _walk(
     should_stop: Callable[[], bool],
 ) -> None:
     """Compute those runs of a loading path that are not stored; see `walk`."""
-    follows = {} if task.place is None else {"follows": True}  # the path of a search goes on
+    follows = {} if task.place is None else {"follows": True}  # its path goes on
 
     def keep(row: dict[str, Any]) -> None:
         with contextlib.suppress(Exception):  # the file has the row too
@@ -221,26 +220,26 @@ def _walk(
 def _follow(
     task: PathTask,
     path: LoadingPath,
-    place: Place[Search],
+    place: Place[Any],
     store: Store,
     keep: Callable[[dict[str, Any]], None],
     monitor: Callable[[float], None],
 ) -> None:
-    """Compute the runs that a search asks for, one after the other, on one path; see `walk`."""
-    search, owed = place.program, deque[Case]()
+    """Compute the runs that a program asks for, one after the other, on one path; see `walk`."""
+    program, owed = place.program, deque[Case]()
 
     def known(row: dict[str, Any]) -> None:
         place.hear(row)
         keep(row)
 
     def lacking() -> Case | None:
-        while wanted := search.wants:
+        while wanted := program.wants:
             (case,) = place.runs(wanted[:1]).cases()
             row = store.found(case.id) if store.run_path(case.id).exists() else None
             if row is not None and place.stands(row):
                 known(row)
             elif refusal := place.refusal(wanted[0]):
-                search.refuse(wanted[0], refusal)  # the study's own search finds the same
+                program.refuse(wanted[0], refusal)  # the study's own one finds the same
             else:
                 return case
         return None
@@ -249,12 +248,11 @@ def _follow(
         while case := lacking():
             monitor(0.0)
             owed.append(case)
-            yield search.wants[0]
+            yield program.wants[0]
 
     reason = NO_RECORD
     try:
-        largest = search.goal.between[1]
-        for record in task.scene.follow(path.parameters, values(), largest, monitor):
+        for record in task.scene.follow(path.parameters, values(), program.largest, monitor):
             known(_written(store, task, owed.popleft(), record))
     except (StopAsked, StoreFull, StudyError):
         raise

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from threading import Lock
@@ -24,6 +24,19 @@ _ORDER = "variables"
 """Attribute with the names of the variables in order, except those of the mesh; netCDF loses the
 order in memory."""
 _LOCK = Lock()
+
+
+def described(
+    dims: str | Sequence[str], values: Any, words: str, unit: str = ""
+) -> layout.Variable:
+    """Return values over dimensions with their meaning and unit; those left out are of size one."""
+    over = (dims,) if isinstance(dims, str) else tuple(dims)
+    array = np.asarray(values)
+    array = array.astype(object) if array.dtype.kind == "U" else array
+    attrs = {"long_name": words} | ({"units": unit} if unit else {})
+    return layout.Variable(
+        over, array.reshape((1,) * (len(over) - array.ndim) + array.shape), attrs
+    )
 
 
 def sealed(run: layout.RunContent) -> bytes:

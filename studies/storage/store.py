@@ -36,9 +36,7 @@ from solver.results.record import Record
 from solver.scenes import Scene
 from studies.definition.cases import Case
 from studies.definition.identity import is_id
-from studies.definition.refine import OPEN
 from studies.definition.study import Study
-from studies.definition.vocabulary import STOPPED
 from studies.errors import CatalogueDamaged, FileDamaged, StoreFull, StudyError, Unusable
 from studies.scenes.file_scene import FileScene
 from studies.scenes.registry import known_names
@@ -217,7 +215,7 @@ class Store:
 
         What it has asked for is known at its end. Until then all runs of its scene count.
         """
-        if not study.asks:
+        if not study.kind.chooses:
             return set(study.run_ids())
         asked = self.asked(study)
         if asked is not None:
@@ -232,8 +230,8 @@ class Store:
         import h5py
 
         with suppress(FileDamaged), h5py.File(self.dataset(study.id), "r") as file:
-            ended, runs = ("cell_state", "run") if study.refine else ("message", "tried_run")
-            if not {STOPPED, OPEN} & set(file[ended].asstr()[...].ravel()):
+            standing, unended, runs = study.kind.ends
+            if unended not in set(file[standing].asstr()[...].ravel()):
                 return {each for each in file[runs].asstr()[...].ravel() if each}
         return None
 

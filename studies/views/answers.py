@@ -73,7 +73,7 @@ def answer(
         as `predict`; if ``of`` is a line or a map, ``within`` is no number >= 0, or the study has
         what a search found in place of runs
     """
-    if study.goal or study.fit:
+    if not study.kind.of_runs:
         allowed = "has what a search found, not runs: predict tells numbers of runs"
         raise StudyError("study", study.name, allowed)
     axes = sweep_axes(dataset)

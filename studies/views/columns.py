@@ -89,3 +89,8 @@ def aligned(lines: Sequence[Sequence[str]], right: int | None = None) -> str:
         ).rstrip()
         for line in lines
     )
+
+
+def plain(name: str) -> str:
+    """Return a name in words."""
+    return name.replace("_", " ")

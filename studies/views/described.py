@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from solver.scenes import Scene
-from studies.definition.fit import Fit
 from studies.definition.parameters import read_values
 from studies.definition.study import Study
 from studies.scenes.registry import beside, scene_named
@@ -39,5 +38,4 @@ def _named(what: str) -> tuple[Scene, dict[str, Any]]:
     if not what.endswith(".toml") or _OF_STUDIES.isdisjoint(read_toml(path, "file")):
         return scene_named(what, beside(Path())), {}
     study = Study.from_toml(path)
-    first = study.asks.first if isinstance(study.asks, Fit) else {}
-    return study.problem, dict(next(study.cases()).values) | first
+    return study.problem, {**next(study.cases()).values, **study.kind.first}

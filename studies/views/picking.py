@@ -177,13 +177,13 @@ def file_of(
     StudyError
         if there is no such run, or the study has searched
     """
-    if study.goal or study.fit:
-        such = "run_high" if study.goal else "tried_run"
+    if not study.kind.of_runs:
         path = str(store.dataset_path(study.id))
+        such = study.kind.example
         allowed = f"holds what a search found: give the file of a run, such as that of {such}"
         raise StudyError("path", path, allowed)
     run = one_run(dataset, selection)
-    if "run" in run:  # of a refinement, which chose its runs
+    if "run" in run:  # its study chose the runs
         return store.run_path(str(run["run"].item()))
     index = tuple(int(positions(dataset[axis], run[axis].item())[0]) for axis in study.axes)
     return store.run_path(next(case.id for case in study.cases() if case.index == index))

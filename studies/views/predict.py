@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from studies.definition.cells import ERROR, KINK, edges, weights
 from studies.definition.points import POINT
-from studies.definition.quantity import RunNumber
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError, one_of
+from studies.kinds.refine.cells import ERROR, KINK, edges, weights
 from studies.storage.frame import SETS
 from studies.toml import CASE
 from studies.views.by_content import by_content
@@ -115,8 +113,7 @@ def _names(dataset: xr.Dataset, of: str | Sequence[str] | None) -> list[str]:
     every = {str(name): each for name, each in dataset.data_vars.items()}
     floats = [n for n, v in every.items() if v.dtype.kind == "f" and v.dims[: len(axes)] == axes]
     numbers = [name for name in floats if every[name].dims == axes]
-    entries = json.loads(dataset.attrs.get("refine", "{}")).get("of", [])
-    refined = [each if isinstance(each, str) else RunNumber(**each).name for each in entries]
+    refined = [name.removeprefix(ERROR) for name in every if name.startswith(ERROR)]
     names = [of] if isinstance(of, str) else list(of or refined or numbers)
     for name in names:
         if name not in floats:

@@ -272,7 +272,7 @@ def _progress(file: Path) -> str:
         return f"{file.parent.name}: its {file.name} cannot be read"
     if study is None or study.id != file.parent.name:
         return f"{name}: begun with another version of the solver"
-    if study.asks:
-        return f"{study.name}: the {'refinement' if study.refine else 'search'} has not ended"
+    if study.kind.chooses:
+        return f"{study.name}: the {study.kind.work} has not ended"
     finished = sum(store.run_path(run_id).is_file() for run_id in study.run_ids())
     return f"{study.name}: {finished} of {study.size} runs finished"

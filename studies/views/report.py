@@ -10,13 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from solver.files import read_file
-from studies.definition.fit import Fit
-from studies.definition.goal import Goal
-from studies.definition.refine import Refine
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError
 from studies.execution.run import StudyOutcome
+from studies.kinds.kind import Kind
 from studies.storage.made import Made
 from studies.storage.store import Store
 
@@ -67,12 +65,8 @@ def report(study: Study, store: Store, outcome: StudyOutcome) -> Report:
 
     with open_study(outcome.dataset) as dataset:
         text = _text(study, outcome, dataset)
-        field = _one_value(study.asks)
-        if study.fit:
-            drawn = _compared(dataset)
-        else:
-            kept = outcome.dataset if study.keep else None
-            drawn = _found(field, dataset) if field else _drawn(dataset, kept)
+        kept = outcome.dataset if study.keep else None
+        drawn = _found(study.kind, dataset) if study.kind.chooses else _drawn(dataset, kept)
         files = made.write(_NAME, of, {_TEXT: text.encode(), **drawn})
     return Report(text, files, anew=True)
 
@@ -80,15 +74,13 @@ def report(study: Study, store: Store, outcome: StudyOutcome) -> Report:
 def _text(study: Study, outcome: StudyOutcome, dataset: xr.Dataset) -> str:
     from studies.views.tables import messages, runs_table
 
-    size, what = dataset["status"].size, "answers" if study.goal else "runs"
-    if study.fit:
-        from studies.views.fits import fit_table
-
-        what, table = "answer", fit_table(dataset) + "\n"
+    size, kind = dataset["status"].size, study.kind
+    if kind.table:
+        table = kind.table(dataset) + "\n"
     else:
         table = runs_table(dataset) + "\n" if size <= SHOWN else ""
     counts = ", ".join(f"{number} {status}" for status, number in outcome.counts.items())
-    ended = f"{study.name}: {size} {what} ({counts}{_warned(dataset)})"
+    ended = f"{study.name}: {size} {kind.rows} ({counts}{_warned(dataset)})"
     note = f"\nnote: {study.note}\n" if study.note else ""
     return f"{table}{messages(dataset)}{note}\n{ended}\n"
 
@@ -123,27 +115,15 @@ def _drawn(dataset: xr.Dataset, path: Path | None) -> dict[str, bytes]:
     return {f"{field}_xx.png": png(drawn)}
 
 
-def _one_value(asks: Goal | Refine | Fit | None) -> str:
-    """Return what a study is asked for that has one value a place; empty if it is nothing."""
-    if asks is None or isinstance(asks, Fit):
-        return ""
-    return asks.parameter if isinstance(asks, Goal) else asks.of[0].name
-
-
-def _found(parameter: str, dataset: xr.Dataset) -> dict[str, bytes]:
-    """Draw what was found over the sweep; nothing if it cannot be drawn."""
+def _found(kind: Kind, dataset: xr.Dataset) -> dict[str, bytes]:
+    """Draw what was found; nothing if it cannot be drawn."""
     from studies.views.plots.saved import png
     from studies.views.plots.sweep import sweep_figure
 
+    if kind.figure:
+        figure = kind.figure(dataset)
+        return {f"{kind.name}.png": png(figure)} if figure else {}
     try:
-        return {f"{parameter}.png": png(sweep_figure(dataset, parameter))}
+        return {f"{kind.value}.png": png(sweep_figure(dataset, kind.value))}
     except StudyError:
         return {}
-
-
-def _compared(dataset: xr.Dataset) -> dict[str, bytes]:
-    """Draw what was fitted over what was measured; nothing if there is no answer."""
-    from studies.views.plots.fit import fit_figure
-    from studies.views.plots.saved import png
-
-    return {"fit.png": png(fit_figure(dataset))} if dataset["fitted"].notnull().all() else {}

@@ -16,6 +16,7 @@ import numpy as np
 
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
+from studies.definition.quantity import CONDITION
 from studies.definition.vocabulary import STATUSES
 from studies.errors import StudyError, nearest, one_of
 from studies.storage.dataset import attributes_of
@@ -25,7 +26,6 @@ _COMPARED: Mapping[str, Callable[[Any, Any], Any]] = {
     "<=": operator.le, ">=": operator.ge, "!=": operator.ne, "<": operator.lt, ">": operator.gt,
     "=": operator.eq,
 }  # fmt: skip
-_CONDITION = re.compile(r"\s*(?P<name>\w+)\s*(?P<sign><=|>=|!=|<|>|=)\s*(?P<value>.*?)\s*")
 
 SAME = 1e-9
 """Relative difference below which a number is the one that a query names."""
@@ -134,7 +134,7 @@ class RunTable:
             if it is no condition, there is no such column, the two cannot be compared, or it names
             a word that no run has; a status that no run has is one all the same
         """
-        match = _CONDITION.fullmatch(condition)
+        match = CONDITION.fullmatch(condition)
         if match is None:
             allowed = "must be NAME<VALUE, with <, <=, >, >=, = or !="
             raise StudyError("where", condition, allowed)

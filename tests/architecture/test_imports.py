@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
+from studies.kinds import KINDS
 from tests.architecture.sources import PACKAGES, ROOT, imported, modules
 
 DATA = {"dask", "distributed", "xarray", "h5netcdf", "h5py", "netCDF4", "zarr", "pandas"}
@@ -37,8 +39,22 @@ def test_two_modules_of_studies_import_dask() -> None:
 
 
 def test_what_draws_is_in_its_folder() -> None:
-    users = {Path(m).parent for m, names in imports("studies").items() if "matplotlib" in names}
-    assert users == {Path("studies/views/plots")}
+    users = {Path(m) for m, names in imports("studies").items() if "matplotlib" in names}
+    of_kinds = {path for path in users if path.match("studies/kinds/*/figure.py")}
+    assert {path.parent for path in users - of_kinds} == {Path("studies/views/plots")}
+
+
+def test_a_kind_of_study_is_known_in_its_folder_alone() -> None:
+    """Others know `Kind` and the list; what fits parameters, and predicts in cells, has a name."""
+    of_kinds = re.compile(rf"studies\.kinds\.(?:{'|'.join(KINDS)})\b")
+    texts = {
+        path.as_posix(): (ROOT / path).read_text() for each in PACKAGES for path in modules(each)
+    }
+    users = {path for path, text in texts.items() if of_kinds.search(text)}
+    assert {path for path in users if not path.startswith("studies/kinds/")} == {
+        "residua/commands.py", "service/routes/studies.py", "studies/__init__.py",
+        "studies/views/predict.py",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(

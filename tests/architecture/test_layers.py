@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import graphlib
 from collections.abc import Iterator
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
@@ -19,8 +20,9 @@ LAYERS = {
         "results.quantities", "audit", "results", "scenes", "rolling", "shipped",
     ),
     "studies": (
-        "units", "errors", "toml", "scratch", "scenes", "definition", "storage",
-        "execution", "views", "client",
+        "units", "errors", "toml", "scratch", "scenes", "definition", "kinds",
+        "definition.study", "storage", "kinds.*.answer", "execution", "views", "kinds.*.shown",
+        "client",
     ),
     "residua": (
         "neighbours", "status", "cost", "progress", "keys", "slurm", "commands",
@@ -38,10 +40,20 @@ def layer_of(module: str) -> str:
     """First part of a module's name below its package; nothing for the package itself.
 
     The declarations of quantities are a layer of their own, below the audit, which reads them and
-    no other code of results.
+    no other code of results. A study and its files know the kinds of study, which name what writes
+    and shows their results as text.
     """
     below = module.partition(".")[2]
-    return below if below == "results.quantities" else below.partition(".")[0]
+    return next((PARTS[own] for own in PARTS if fnmatch(below, own)), below.partition(".")[0])
+
+
+PARTS = {
+    "results.quantities": "results.quantities",
+    "definition.study": "definition.study", "definition.files": "definition.study",
+    "kinds.*.answer": "kinds.*.answer", "kinds.*.shown": "kinds.*.shown",
+    "kinds.*.figure": "kinds.*.shown",
+}  # fmt: skip
+"""Modules that are in a layer of their own; of kinds of study in every folder."""
 
 
 def targets(source: str, known: set[str]) -> set[str]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from studies import Study
+from tests.compare import ids
 from tests.compare.__main__ import computed, jobs
 from tests.compare.changes import HUNG, LIMIT, compared
 from tests.compare.worker import named, sampled
@@ -85,8 +86,15 @@ def test_every_study_and_every_family_is_compared_in_a_fixed_choice() -> None:
 def test_the_choice_of_a_study_has_runs_of_the_study(file: Path) -> None:
     study = Study.from_toml(file)
     choice = sampled(study, 2)
-    assert choice.asks or choice.size == 2
+    assert choice.kind.chooses or choice.size == 2
     assert {*choice.run_ids()} <= {*study.run_ids()}
+
+
+def test_studies_whose_ids_are_compared_are_of_many_kinds_in_a_fixed_choice() -> None:
+    found = dict(ids.contents())
+    assert found == dict(ids.contents())
+    entries = {entry for each in found.values() for entry in each}
+    assert {"goal", "refine", "fit", "points", "sample", "extends", "keep", "allow"} < entries
 
 
 def test_runs_are_named_alike_in_any_order_and_with_other_parameters() -> None:

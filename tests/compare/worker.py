@@ -44,7 +44,7 @@ def of_study(file: str, most: int) -> Computed:
 
 def sampled(study: Any, most: int) -> Any:
     """Return a study with a seeded choice of its runs, unless it is small or chooses them."""
-    if study.goal or study.refine or study.fit or study.size <= most:
+    if study.size <= most or not next(study.run_ids(), None):
         return study
     cases: list[Mapping[str, Any]] = [case.values for case in study.cases()]
     swept = [name for name in cases[0] if any(case[name] != cases[0][name] for case in cases)]

@@ -355,6 +355,25 @@ def test_a_goal_is_estimated_searched_and_answered(service: Server) -> None:
     assert cells[:2] == ["A", "0"] and {"0.6", f"{low[0]:.4g}", f"{high[0]:.4g}"} <= {*cells[:9]}
 
 
+def test_a_minimum_is_estimated_searched_and_shown(service: Server) -> None:
+    """Of the fake scene the largest plastic strain is the load ratio."""
+    asked = {
+        "of": "max_plastic_strain", "where": "max_plastic_strain > 0.3", "starts": 1, "most": 12,
+        "ranges": {"load_ratio": [0.2, 1.0]},
+    }  # fmt: skip
+    study = fake_study("least") | {"minimise": asked, "sweep": {}}
+    assert service.client.post("/estimate", json=study).json()["runs"] == 12
+    study_id = service.post(study)
+    detail = service.finished(study_id)
+    assert detail["minimise"]["where"] == ["max_plastic_strain > 0.3"]
+    assert {each["at"].keys() == {"load_ratio"} for each in detail["runs"]} == {True}
+    page = service.client.get(f"/ui/studies/{study_id}").text
+    marks = json.loads(re.search(r'"found": (\[.*?\]\}\])', page)[1])
+    assert 0.3 < marks[0]["load_ratio"][0] < 0.32
+    refused = service.client.post("/studies", json=study | {"minimise": {**asked, "where": "a"}})
+    assert refused.json()["errors"][0]["field"] == "minimise.where"
+
+
 def test_a_goal_that_is_not_reached_fails_with_the_reason(service: Server) -> None:
     goal = {"of": "max_plastic_strain", "at": 5.0, "between": [0.2, 1.0]}
     detail = service.finished(service.post(fake_study("far") | {"goal": goal, "sweep": {}}))

@@ -9,7 +9,7 @@ import pytest
 
 from studies import Store, Study, StudyError
 from studies.definition.files import read_study
-from studies.definition.goal import checked_goal
+from studies.kinds.goal.search import Goal
 from tests.studies.conftest import compute_here
 from tests.studies.fakes import FAKE
 
@@ -100,7 +100,7 @@ def test_a_goal_is_searched_at_more_places() -> None:
     base = {"name": "base", "scene": "fake", "goal": goal, "sweep": {"friction": [0.0, 0.4]}}
     study = more(base, sweep={"friction": [0.2]})
     assert study.axes["friction"] == [0.0, 0.2, 0.4]
-    assert study.goal == checked_goal(goal, FAKE).content
+    assert study.choice["goal"] == Goal.read(goal, FAKE, {}).content
     with pytest.raises(StudyError, match="is what the goal searches"):
         more(base, sweep={"load_ratio": [0.2]})
 

@@ -17,14 +17,15 @@ from residua.cli import main
 from solver.errors import ModelError
 from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, estimate, fit, open_study, run_study
-from studies.definition.certainty import certainty
-from studies.definition.fit import Fitted, Fitting, checked_fit, standings
 from studies.definition.identity import solver_hash
 from studies.definition.line import Line
-from studies.definition.measured import checked_measured, pieces
+from studies.definition.sweep import standings
 from studies.execution.asking import Asking
-from studies.execution.calibrated import calibrated
+from studies.execution.result import answered
 from studies.execution.task import PathTask, walk
+from studies.kinds.fit.certainty import certainty
+from studies.kinds.fit.fitting import Fit, Fitted, Fitting
+from studies.kinds.fit.measured import checked_measured, pieces
 from studies.views.picking import run_file
 from tests.studies.conftest import write_study
 from tests.studies.fakes import FAKE, Canned
@@ -126,7 +127,7 @@ def fit_here(study: Study, store: Store, most: int = 10**6) -> list[str]:
             break
     store.reconcile()
     store.save_study(study)
-    calibrated(study, store, asking)
+    answered(study, store, asking, anew=True)
     return computed
 
 
@@ -155,7 +156,7 @@ def test_deviations_are_those_of_many_noisy_measurements() -> None:
     """The squared distances from the truth, by the covariance that is told, are chi-squared."""
     distance, count = 0.0, 8
     for seed in range(count):
-        asked = checked_fit({"measured": measured(0.02, seed), "ranges": RANGES}, SCENE, {})
+        asked = Fit.read({"measured": measured(0.02, seed), "ranges": RANGES}, SCENE, {})
         seen: dict[str, Line] = {}
         program = Fitting(asked, standings({}), lambda row, seen=seen: seen.get)
         while wanted := program.wants:
@@ -365,8 +366,8 @@ def test_a_parameter_is_searched_or_given_and_one_thing_chooses_the_runs() -> No
         lines = [measured()[0] | {"at": {"slope": 3.0}}]
         study(lines, sweep={"slope": [3.0, 4.0]})
     goal = {"parameter": "angle", "find": "limit_load", "between": [1.0, 2.0]}
-    content = {"name": "bar", "goal": goal, "fit": study().fit}
-    with pytest.raises(StudyError, match="chooses the runs, and so does goal: keep one"):
+    content = {"name": "bar", "goal": goal, "fit": study().choice["fit"]}
+    with pytest.raises(StudyError, match="chooses the runs, and so does the goal: keep one"):
         Study.from_dict(content, SCENE)
 
 
@@ -380,14 +381,14 @@ def test_a_study_with_a_fit_is_read_again_and_tells_its_cost(store: Store) -> No
 
 
 def test_the_content_of_a_fit_is_what_is_read() -> None:
-    asked = checked_fit({"measured": measured(0.01), "ranges": RANGES}, SCENE, {})
-    assert checked_fit(asked.content, SCENE, {}).content == asked.content
+    asked = Fit.read({"measured": measured(0.01), "ranges": RANGES}, SCENE, {})
+    assert Fit.read(asked.content, SCENE, {}).content == asked.content
 
 
 def test_deviations_that_are_not_told_are_those_of_the_differences() -> None:
     lines = [{key: each[key] for key in each if key != "sigma"} for each in measured(0.05)]
     told, free = (
-        checked_fit({"measured": each, "ranges": RANGES}, SCENE, {})
+        Fit.read({"measured": each, "ranges": RANGES}, SCENE, {})
         for each in (measured(0.05), lines)
     )
     jacobian = np.random.default_rng(0).normal(size=(len(told.values), 2))
@@ -461,23 +462,23 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
     file.write_text(FAKE_FIT.format(seconds=0.0, mark=""))
     (tmp_path / "b.csv").write_text("contact_half_width [mm]; sigma\n50,5; 0,5\n51; 0,5\n")
     one = Study.from_toml(file, [tmp_path / "b.csv"])
-    assert one.fit["measured"] == [
+    assert one.choice["fit"]["measured"] == [
         {"of": "contact_half_width", "values": [50.5, 51.0], "sigma": [0.5, 0.5]}
     ]
     (tmp_path / "b.csv").write_text("contact_half_width [cm]; sigma [um]\n5,05; 500\n5.1; 500\n")
-    assert Study.from_toml(file, [tmp_path / "b.csv"]).fit == one.fit
+    assert Study.from_toml(file, [tmp_path / "b.csv"]).choice["fit"] == one.choice["fit"]
     (tmp_path / "p.csv").write_text(PRESSURE)
     two = Study.from_toml(file, [tmp_path / "b.csv", tmp_path / "p.csv@stage=loaded"])
-    assert [line.get("at") for line in two.fit["measured"]] == [None, {"stage": "loaded"}]
+    assert [line.get("at") for line in two.choice["fit"]["measured"]] == [None, {"stage": "loaded"}]
     named = file.with_name("named.toml")
     named.write_text(f'points = [{{ case = "007", half_width = 40.0 }}]\n{file.read_text()}')
     tested = Study.from_toml(named, [tmp_path / "p.csv@stage=loaded,case=007"])
-    assert tested.fit["measured"][0]["at"] == {"stage": "loaded", "case": "007"}
+    assert tested.choice["fit"]["measured"][0]["at"] == {"stage": "loaded", "case": "007"}
     (folder := tmp_path / "a@b=1").mkdir()
     (folder / "p.csv").write_text(PRESSURE)
     for place, at in (("", None), ("@stage=loaded", {"stage": "loaded"})):
         inside = Study.from_toml(file, [folder / f"p.csv{place}"])
-        assert inside.fit["measured"][0].get("at") == at
+        assert inside.choice["fit"]["measured"][0].get("at") == at
     with pytest.raises(StudyError, match="must be FILE, or FILE@NAME=VALUE"):
         Study.from_toml(file, [tmp_path / "p.csv@stage=loaded,pass"])
     with pytest.raises(StudyError, match=r"fit\.measured\[0\]\.at\.longest"):

@@ -19,15 +19,14 @@ from residua.cli import main
 from solver.errors import ModelError
 from solver.results.record import Record
 from studies import Bounds, Store, Study, StudyError, StudyEvent, estimate, open_study, run_study
-from studies.definition.goal import Goal, Search, checked_goal
 from studies.definition.identity import solver_hash
 from studies.definition.neighbours import Neighbours
 from studies.execution.asking import Asking
-from studies.execution.goals import answers
 from studies.execution.limits import Limits
-from studies.execution.refined import refined
+from studies.execution.result import answered
 from studies.execution.run import _Work
 from studies.execution.task import PathTask, walk
+from studies.kinds.goal.search import Goal, Search
 from tests.studies.conftest import fake_study
 from tests.studies.fakes import FAKE, Canned, FakeParameters, Followed, numbers
 from tests.studies.killed import runs_before_a_kill
@@ -90,10 +89,7 @@ def search_here(study: Study, store: Store, most: int = 10**6) -> list[str]:
         goals.closed(asked.path.id)
     store.reconcile()
     store.save_study(study)
-    if study.goal:
-        answers(study, store, goals)
-    else:
-        refined(study, store, goals, anew=True)
+    answered(study, store, goals, anew=True)
     return computed
 
 
@@ -117,7 +113,7 @@ def test_a_search_finds_its_value_with_no_more_runs_than_it_says(parameter: str,
     random.seed(1)
     sign, taken = -1.0 if kind == "first_below" else 1.0, []
     asked = {"parameter": parameter, "of": "peak_contact_pressure", kind: 0.0}
-    goal = checked_goal(asked | {"within": 1e-3, "between": [0.1, 1.0]}, FAKE)
+    goal = Goal.read(asked | {"within": 1e-3, "between": [0.1, 1.0]}, FAKE, {})
     for _ in range(60):
         root, power = math.exp(random.uniform(math.log(0.1), 0.0)), random.choice([0.5, 1.0, 3.0])
 
@@ -137,21 +133,21 @@ def test_a_search_finds_its_value_with_no_more_runs_than_it_says(parameter: str,
 
 def test_a_search_of_whole_numbers_ends_at_neighbours() -> None:
     asked = {"parameter": "passes", "of": "peak_contact_pressure", "first_above": 0.0}
-    found = searched(checked_goal(asked | {"between": [1, 10]}, FAKE), lambda value: value - 6.5)
+    found = searched(Goal.read(asked | {"between": [1, 10]}, FAKE, {}), lambda value: value - 6.5)
     assert (found.low, found.high) == (6, 7)
     assert all(isinstance(value, int) for value in found.rows)
 
 
 def test_a_range_about_zero_is_divided_in_equal_steps() -> None:
     asked = {"parameter": "friction", "of": "peak_contact_pressure", "at": 0.0}
-    goal = checked_goal(asked | {"between": [0.0, 0.5], "within": 0.01}, FAKE)
+    goal = Goal.read(asked | {"between": [0.0, 0.5], "within": 0.01}, FAKE, {})
     found = searched(goal, lambda value: value - 1e-3)
     assert found.high - found.low <= 0.005 * 1.0001
     assert found.found == pytest.approx(1e-3, abs=1e-9)
 
 
 def test_no_equilibrium_is_beyond_and_told_apart() -> None:
-    goal = checked_goal(PRESSURE, FAKE)
+    goal = Goal.read(PRESSURE, FAKE, {})
     found = searched(goal, lambda value: None if value > 0.8 else 100.0 * value)
     assert found.reason == "limit_load"
     assert found.low <= 0.8 <= found.high
@@ -162,7 +158,7 @@ def test_no_equilibrium_is_beyond_and_told_apart() -> None:
 
 def test_a_bracket_that_is_halved_has_its_ends_on_trust_until_the_search_comes_to_one() -> None:
     asked = {"parameter": "friction", "of": "peak_contact_pressure", "first_above": 0.0}
-    goal = checked_goal(asked | {"between": [0.1, 0.4]}, FAKE)
+    goal = Goal.read(asked | {"between": [0.1, 0.4]}, FAKE, {})
     inside = searched(goal, lambda value: value - 0.25)
     assert (inside.reason, {0.1, 0.4} & inside.rows.keys()) == ("passed", set())
     for root, reason in ((0.05, "already"), (0.5, "never"), (0.1001, "passed")):
@@ -176,7 +172,7 @@ def test_a_bracket_that_is_halved_has_its_ends_on_trust_until_the_search_comes_t
 def test_a_search_begins_where_its_goal_is_expected(off: float) -> None:
     """Runs by the distance, in widths of the last bracket: two if it is less than half of one."""
     asked = {"parameter": "friction", "of": "peak_contact_pressure", "first_above": 0.0}
-    goal = checked_goal(asked | {"between": [0.1, 0.4]}, FAKE)
+    goal = Goal.read(asked | {"between": [0.1, 0.4]}, FAKE, {})
     found = searched(goal, lambda value: value - 0.2, 0.2 * 0.99**off)
     assert found.low <= 0.2 <= found.high <= found.low / (1.0 - 0.01001)
     most = {0.0: 2, 0.4: 2, -1.2: 2, 3.0: 6}
@@ -234,10 +230,10 @@ def test_the_farthest_place_comes_next_and_waits_for_the_nearest_of_lower_levels
 
 
 def test_a_run_that_fails_its_audit_is_before_the_limit_load_and_has_no_number() -> None:
-    limit = checked_goal({"find": "limit_load", "between": [0.1, 4.0]}, FAKE)
+    limit = Goal.read({"find": "limit_load", "between": [0.1, 4.0]}, FAKE, {})
     row = {"id": "a", "status": "audit_failed", "scalars": {"peak_contact_pressure": 1.0}}
     assert limit.seen(row, None).beyond is False
-    assert checked_goal(PRESSURE, FAKE).seen(row, True).beyond is None
+    assert Goal.read(PRESSURE, FAKE, {}).seen(row, True).beyond is None
     assert limit.seen(row | {"status": "error"}, None).beyond is None
 
 
@@ -343,15 +339,15 @@ def test_a_shakedown_limit_below_an_undecided_run_has_a_warning(
 ) -> None:
     goal = {"find": "shakedown_limit", "parameter": "load_ratio", "between": [1.0, 3.0]}
     asked = Study.from_dict({"name": "limit", "scene": "raceway", "goal": goal})
-    assert asked.asks is not None
-    search = Search(asked.asks)
+    assert isinstance(asked.kind, Goal)
+    search = Search(asked.kind)
     while wanted := search.wants:
         scalars = {"shakedown_state": beyond if wanted[0] > 2.0 else 1}
         row = {"id": str(wanted[0]), "status": "ok", "scalars": scalars, "message": ""}
         search.tell(wanted[0], row)
     store.save_study(asked)
     asking = SimpleNamespace(places=[SimpleNamespace(program=search)])
-    found = answers(asked, store, cast("Asking", asking))
+    found = answered(asked, store, cast("Asking", asking), anew=True)
     with open_study(found.path) as dataset:
         assert dataset["status"].item() == "ok"
         assert ("undecided: the limit may be higher" in dataset["message"].item()) == doubtful
@@ -457,10 +453,10 @@ def test_a_study_with_a_goal_has_an_id_and_is_read_again() -> None:
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_estimate_is_the_most_that_the_search_may_take(store: Store, scene: str) -> None:
     asked = study(PRESSURE, scene=scene)
-    assert asked.asks is not None
+    assert isinstance(asked.kind, Goal)
     found = estimate(asked, store)
-    assert found.runs == found.to_compute == 4 * asked.asks.most[1]
-    assert found.paths == 4 * asked.asks.most[0]
+    assert found.runs == found.to_compute == 4 * asked.kind.most[1]
+    assert found.paths == 4 * asked.kind.most[0]
     assert len(search_here(asked, store)) <= found.runs
     with pytest.raises(StudyError, match="at most 10: use fewer values"):
         Bounds(runs=10).check_size(asked)

@@ -24,11 +24,11 @@ from studies import (
     predict,
     run_study,
 )
-from studies.definition.around import between
-from studies.definition.cells import weights
 from studies.definition.quantity import RunNumber
-from studies.definition.refine import Refine, Refinement, Wanted
 from studies.execution.asking import Asking
+from studies.kinds.refine.around import between
+from studies.kinds.refine.cells import weights
+from studies.kinds.refine.refinement import Refine, Refinement, Wanted
 from tests.studies.fakes import FAKE, Canned, FakeParameters, bare, record
 from tests.studies.killed import runs_before_a_kill
 from tests.studies.test_goal import search_here

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from studies import Study, StudyError
-from studies.definition.goal import checked_goal
-from studies.definition.measured import checked_measured, content_of
 from studies.definition.parameters import parameters_of, read_values
-from studies.definition.refine import checked_refine
 from studies.errors import SceneError
+from studies.kinds.fit.measured import checked_measured, content_of
+from studies.kinds.goal.search import Goal
+from studies.kinds.refine.refinement import Refine
 from studies.scenes.description import Description
 from studies.scenes.registry import scene_named
 from studies.units import LONGEST, UnitError, converted, is_quantity
@@ -203,14 +203,14 @@ PUNCH = scene_named("punch")
 
 def test_what_chooses_runs_has_units_of_the_numbers_that_it_compares() -> None:
     goal = {"of": "peak_residual_tension", "between": [0.1, 0.9]}
-    found = [checked_goal(goal | {"at": each}, PUNCH) for each in (1500, "1.5 GPa")]
+    found = [Goal.read(goal | {"at": each}, PUNCH, {}) for each in (1500, "1.5 GPa")]
     assert found[0] == found[1]
     refine = {"of": ["peak_residual_tension", "contact_half_width"]}
     axes: Any = {"load_ratio": [0.5, 0.9]}
     until = {"peak_residual_tension": 5.0, "contact_half_width": 0.0254}, {
         "peak_residual_tension": "0.005 GPa", "contact_half_width": "0.001 in",
     }  # fmt: skip
-    refined = [checked_refine(refine | {"until": each}, PUNCH, axes) for each in until]
+    refined = [Refine.read(refine | {"until": each}, PUNCH, axes) for each in until]
     assert refined[0] == refined[1]
     line = {"of": "residual_profile", "over": "depth", "places": [0, 25.4], "values": [-50, 20],
             "sigma": 2.0, "at": {"component": "xx"}}  # fmt: skip
@@ -223,13 +223,13 @@ def test_what_chooses_runs_has_units_of_the_numbers_that_it_compares() -> None:
     ("check", "told"),
     [
         (
-            lambda: checked_goal(
-                {"of": "peak_residual_tension", "at": "3 mm", "between": [0.1, 0.9]}, PUNCH
+            lambda: Goal.read(
+                {"of": "peak_residual_tension", "at": "3 mm", "between": [0.1, 0.9]}, PUNCH, {}
             ),
             "goal.at = '3 mm': must be a number in MPa; mm is a length",
         ),
         (
-            lambda: checked_refine(
+            lambda: Refine.read(
                 {"of": "contact_half_width", "until": {"contact_half_width": "1 N"}}, PUNCH,
                 {"load_ratio": [0.5, 0.9]},
             ),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from studies import Store, Study, open_study
+from studies.kinds.goal.search import Goal
 from tests.studies.test_goal import search_here
 
 ROOT = Path(__file__).parents[2]
@@ -45,8 +46,8 @@ def test_a_path_that_goes_on_gives_each_run_as_if_it_were_alone(tmp_path: Path) 
     mesh = {"smallest_element": 0.05, "growth": 1.8, "friction": 0.3}
     content = {"name": "punch", "scene": "punch", "parameters": mesh, "goal": goal}
     study, store = Study.from_dict(content), Store(tmp_path / "out")
-    assert study.asks is not None
-    assert study.asks.goes_on
+    assert isinstance(study.kind, Goal)
+    assert study.kind.goes_on
     computed = search_here(study, store)
     assert len(computed) <= 6
     with open_study(tmp_path / "out") as dataset:

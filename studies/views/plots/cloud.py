@@ -17,7 +17,7 @@ from studies.views.picking import only_numbers, sweep_axes
 from studies.views.plots.captions import capitalised, named, setting, short_label, words, wrapped
 from studies.views.plots.curves import label_values
 from studies.views.plots.legends import MOST_LINES, add_head, colours_of, is_number
-from studies.views.plots.runs import Kind, absent, known_values, style_of
+from studies.views.plots.runs import RunMark, absent, known_values, style_of
 
 _PANEL, _ABREAST = (3.2, 2.9), 3
 """Width and height of a panel [in]; number of panels beside one another."""
@@ -68,7 +68,9 @@ def cloud_figure(dataset: xr.Dataset, field: str, points: str) -> Figure:
             label = ", ".join(
                 named(str(each.name), each.item(), each.attrs.get("units", "")) for each in places
             )  # without a label, matplotlib's begins with "_"
-            for each in _draw(axes, one, field, name, Kind(name=label, marker="o", colour=colour)):
+            for each in _draw(
+                axes, one, field, name, RunMark(name=label, marker="o", colour=colour)
+            ):
                 legend.setdefault(str(each.get_label()), each)
         axes.set_xlabel(capitalised(short_label(dataset[name])))
         axes.grid(color="0.92")
@@ -88,7 +90,7 @@ def cloud_figure(dataset: xr.Dataset, field: str, points: str) -> Figure:
     return sheet
 
 
-def _draw(axes: Axes, runs: xr.Dataset, field: str, name: str, kind: Kind) -> list[Line2D]:
+def _draw(axes: Axes, runs: xr.Dataset, field: str, name: str, kind: RunMark) -> list[Line2D]:
     """Draw the runs of a panel over a parameter; return marks for the legend."""
     values, across = known_values(runs, field).to_numpy(), runs[name]
     x = across.to_numpy()

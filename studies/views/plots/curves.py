@@ -23,7 +23,7 @@ from studies.views.plots.captions import (
     wrapped,
 )
 from studies.views.plots.legends import MOST_LINES, add_legend, is_number
-from studies.views.plots.runs import Kind, absent, known_values, standing, style_of
+from studies.views.plots.runs import RunMark, absent, known_values, standing, style_of
 
 _MARKS = "osD^vPh*"
 _SIZE = (8.0, 4.6)
@@ -70,7 +70,7 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
     numeric = is_number(across)
     x = across.to_numpy() if numeric else np.arange(across.size)
     values = known_values(dataset, field)
-    missing: dict[Kind, list[float]] = {}
+    missing: dict[RunMark, list[float]] = {}
     for at, mark in zip(np.ndindex(*(each.size for each in others)), cycle(_MARKS), strict=False):
         own = {str(each.dims[0]): i for each, i in zip(others, at, strict=True)}
         line, status = (each.isel(own).squeeze() for each in (values, dataset["status"]))

@@ -30,7 +30,7 @@ POINTS = 8.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Kind:
+class RunMark:
     """Runs that are drawn with the same mark."""
 
     name: str
@@ -55,16 +55,16 @@ class Kind:
 class Style:
     """Style of values: flags by kind; numbers, if there are no flags, by colour."""
 
-    flags: Mapping[int, Kind]
+    flags: Mapping[int, RunMark]
     norm: Normalize
     colours: str
 
 
-_FAILED = Kind(name="failed or missing", marker="x")
+_FAILED = RunMark(name="failed or missing", marker="x")
 _ABSENT = {
-    OK: Kind(name="no value", marker="."),
-    "limit_load": Kind(name="no equilibrium", marker="s", filled=False),
-    OUTSIDE_THEORY: Kind(name="outside small-strain theory", marker="^", filled=False),
+    OK: RunMark(name="no value", marker="."),
+    "limit_load": RunMark(name="no equilibrium", marker="s", filled=False),
+    OUTSIDE_THEORY: RunMark(name="outside small-strain theory", marker="^", filled=False),
 }
 """Marks of runs without a value by status; all others have `_FAILED`."""
 
@@ -135,7 +135,7 @@ def style_of(dataset: xr.Dataset, field: str) -> Style:
         raise StudyError("field", field, "has no value in the runs selected")
     low, high = float(known.min()), float(known.max())
     kinds = {
-        value: Kind(name=words(name), marker=marker, colour=colour)
+        value: RunMark(name=words(name), marker=marker, colour=colour)
         for (value, name), (marker, colour) in zip(
             flags(dataset[field]).items(), _CATEGORIES, strict=False
         )
@@ -146,7 +146,7 @@ def style_of(dataset: xr.Dataset, field: str) -> Style:
     return Style(flags=kinds, norm=Normalize(low, high), colours="viridis")
 
 
-def absent(known: np.ndarray, status: np.ndarray) -> dict[Kind, np.ndarray]:
+def absent(known: np.ndarray, status: np.ndarray) -> dict[RunMark, np.ndarray]:
     """Return for each reason that occurs the runs without a value, as arrays of bool."""
     found = {_ABSENT.get(name, _FAILED): np.zeros_like(known) for name in STATUSES}
     for name in STATUSES:

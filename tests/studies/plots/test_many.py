@@ -14,11 +14,11 @@ from matplotlib.figure import Figure
 
 from solver.scenes.scene import Scene
 from studies import StudyError
+from studies.kinds.fit.figure import fit_figure
 from studies.scenes.description import Description
 from studies.scenes.scene import file_scene
 from studies.views.differing import Change, Difference
 from studies.views.plots.differing import difference_figure
-from studies.views.plots.fit import fit_figure
 from studies.views.plots.picture import picture
 from studies.views.plots.sensitivity import sensitivity_figure
 from studies.views.plots.setup import setup_figure

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.definition.cells import Cell, Known, Misses, Point, edges
+from studies.kinds.refine.cells import Cell, Known, Misses, Point, edges
 
 _NEAR = 1.0 + 1e-9
 """Factor on a distance within which all runs of this distance are found."""

@@ -24,19 +24,24 @@ performance preserving minmax optimality, ACM Trans. Math. Softw. 47(1), 5: ITP.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from solver.late import Late
 from solver.parameters import is_number
 from solver.scenes import Scene
+from studies.definition.cases import Case
 from studies.definition.parameters import Parameter, in_unit, parameters_of
 from studies.definition.place import Chooser
 from studies.definition.quantity import number_of_a_run
 from studies.definition.spaced import is_finite, rounded
+from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import NO_EQUILIBRIUM, SOLVED
-from studies.errors import StudyError, check_entries, one_of
+from studies.errors import StudyError, one_of
+from studies.kinds.kind import Kind, Placed, Reading, Trial
 
 FOUND: Mapping[str, Mapping[str, Any]] = {
     "first_yield": {"of": "max_plastic_strain", "first_above": 0.0},
@@ -54,7 +59,6 @@ FAILED, REFUSED = "failed", "refused"
 even the last value is beyond; the first value is beyond; a run has no number; the scene refuses a
 value inside the bracket."""
 
-_KEYS = ("parameter", "find", "of", "at", "first_above", "first_below", "within", "between")
 _KINDS = ("at", "first_above", "first_below")
 _PARTS = 4
 """Parts into which a round of a loading path divides the bracket."""
@@ -67,7 +71,7 @@ _SLACK = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Goal:
+class Goal(Kind):
     """What is asked for.
 
     Attributes
@@ -83,6 +87,16 @@ class Goal:
     branch : whether the parameter is the branch of its scene
     goes_on : whether a path of the scene goes on from any of its states (`Scene.goes_on`)
     """
+
+    name = "goal"
+    entries = ("parameter", "find", "of", "at", "first_above", "first_below", "within", "between")
+    meaning = "what is searched at each place of the axes"
+    everywhere = True
+    rows = "answers"
+    counted = "searches"
+    example = "run_high"
+    answers = Late("studies.kinds.goal.answer:answers")
+    found = Late("studies.kinds.goal.shown:found")
 
     parameter: str
     of: str = ""
@@ -142,9 +156,108 @@ class Goal:
         more += _SLACK if self.kind == "at" and self.parts == 2 else 0
         return 1 + more, first + 1 + more * (self.parts - 1)
 
+    @classmethod
+    def checked(cls, content: Mapping[str, Any], scene: Scene, axes: Axes) -> Goal:
+        """Return the goal that a study asks for."""
+        if not content:
+            allowed = "is empty: needs between, and find or of with a threshold; or take it out"
+            raise StudyError("goal", {}, allowed)
+        known = parameters_of(scene)
+        name = content.get("parameter", scene.branch)
+        if not isinstance(name, str) or name not in known:
+            raise StudyError("goal.parameter", name, one_of(name, known))
+        given = dict(content)
+        if "find" in given:
+            found = given.pop("find")
+            if not isinstance(found, str) or found not in FOUND:
+                raise StudyError("goal.find", found, one_of(found, FOUND))
+            for key in given.keys() & {"of", *_KINDS}:
+                raise StudyError(
+                    f"goal.{key}", given[key], f"is what find = {found} says: keep one"
+                )
+            given |= FOUND[found]
+        kinds = [kind for kind in _KINDS if kind in given]
+        of = given.get("of", "")
+        if len(kinds) > 1 or bool(kinds) != bool(of):
+            allowed = f"needs of and one of {', '.join(_KINDS)}; or neither, for the limit load"
+            raise StudyError("goal", dict(content), allowed)
+        try:
+            low, high = _ends(given.get("between"), known[name])
+        except StudyError as error:
+            if "parameter" in given:
+                raise
+            allowed = f"{error.allowed}, of {name}, as goal.parameter is left out"
+            raise StudyError(error.field, error.value, allowed) from None
+        within = given.get("within", 0.01)
+        if not is_number(within) or not 1e-6 <= within <= 0.5:
+            raise StudyError("goal.within", within, "must be a number >= 1e-06 and <= 0.5")
+        return Goal(
+            parameter=name,
+            of=of,
+            kind=kinds[0] if kinds else "",
+            threshold=_threshold(f"goal.{kinds[0]}", given[kinds[0]], of, scene)
+            if kinds
+            else math.nan,
+            within=float(within),
+            between=(low, high),
+            whole=isinstance(low, int) and isinstance(high, int) and known[name].whole,
+            branch=name == scene.branch,
+            goes_on=name == scene.branch and scene.goes_on,
+        )
+
+    @classmethod
+    def searched(cls, content: Mapping[str, Any]) -> Mapping[str, str]:
+        """Return the parameter that is searched, with its field."""
+        return {content["parameter"]: "goal.parameter"}
+
+    @property
+    def trial(self) -> Trial:
+        """The runs at the ends of the bracket."""
+        ends: Axes = {self.parameter: list(self.between)}
+        return Trial({}, ends, {f"sweep.{self.parameter}": "goal.between"})
+
+    @property
+    def value(self) -> str:
+        """The parameter that is searched."""
+        return self.parameter
+
+    @property
+    def expects(self) -> bool:
+        """Whether a search begins where its neighbours let expect the goal."""
+        return self.halves
+
+    def most_runs(self, places: int) -> int:
+        """Return the most runs of the searches at so many places."""
+        return places * self.most[1]
+
+    def stage(self, places: int, ended: int, told: str) -> str:
+        """Return how many searches have ended."""
+        return f"{ended} of {places} searches ended"
+
+    def programs(self, axes: Axes, read: Reading, allow: Sequence[str]) -> Iterator[Placed]:
+        """Yield a search for each place of the axes."""
+        for each in standings(axes):
+            at = [f"{axis} = {each.at[axis]}" for axis in axes]
+            yield Placed(at, each.sets, Search(self))
+
+    def longest(
+        self, cases: Iterable[Case], branch: str
+    ) -> Iterator[tuple[Case, Mapping[str, Any], list[Any]]]:
+        """Yield the paths of the longest searches, each to the largest value."""
+        rounds, runs = self.most
+        low, high = self.between
+        first, later, count = [high], [high], runs
+        if self.branch:
+            each = runs - rounds if self.goes_on else (runs - 2) // rounds + 1
+            later = [high] * (1 if self.goes_on else each - 1)
+            first, count = [low, *self.split(low, high, each), high], rounds
+        for case in cases:
+            for values in (first, *itertools.repeat(later, count - 1)):
+                yield case, {self.parameter: high}, values
+
     @property
     def content(self) -> dict[str, Any]:
-        """What `checked_goal` reads."""
+        """What `checked` reads."""
         asked = {"of": self.of, self.kind: self.threshold} if self.of else {}
         return {
             "parameter": self.parameter, **asked, "within": self.within,
@@ -325,6 +438,11 @@ class Search(Chooser):
         """What ends a loading path of this round."""
         return PathLimit(self.goal, self._rising)
 
+    @property
+    def largest(self) -> float:
+        """The upper end of the first bracket."""
+        return self.goal.between[1]
+
     def look(self, value: float) -> Look:
         """Return what the run of a value says."""
         return self.goal.seen(self.rows[value], self._rising)
@@ -406,60 +524,6 @@ class Search(Chooser):
         xt = xf + sigma * min(0.2 / (last - first) * (b - a) ** 2, abs(middle - xf))
         x = xt if abs(xt - middle) <= radius else middle - sigma * max(radius, 0.0)
         return self.goal.inside(self.low, self.high, [x])
-
-
-def checked_goal(content: Any, scene: Scene) -> Goal:
-    """Return the goal that a study asks for.
-
-    Raises
-    ------
-    StudyError
-        naming the entry, its value and what is allowed
-    """
-    if not isinstance(content, Mapping):
-        raise StudyError("goal", content, "must be a table")
-    if not content:
-        allowed = "is empty: needs between, and find or of with a threshold; or take it out"
-        raise StudyError("goal", {}, allowed)
-    check_entries("goal", content, _KEYS)
-    known = parameters_of(scene)
-    name = content.get("parameter", scene.branch)
-    if not isinstance(name, str) or name not in known:
-        raise StudyError("goal.parameter", name, one_of(name, known))
-    given = dict(content)
-    if "find" in given:
-        found = given.pop("find")
-        if not isinstance(found, str) or found not in FOUND:
-            raise StudyError("goal.find", found, one_of(found, FOUND))
-        for key in given.keys() & {"of", *_KINDS}:
-            raise StudyError(f"goal.{key}", given[key], f"is what find = {found} says: keep one")
-        given |= FOUND[found]
-    kinds = [kind for kind in _KINDS if kind in given]
-    of = given.get("of", "")
-    if len(kinds) > 1 or bool(kinds) != bool(of):
-        allowed = f"needs of and one of {', '.join(_KINDS)}; or neither, for the limit load"
-        raise StudyError("goal", dict(content), allowed)
-    try:
-        low, high = _ends(given.get("between"), known[name])
-    except StudyError as error:
-        if "parameter" in given:
-            raise
-        allowed = f"{error.allowed}, of {name}, as goal.parameter is left out"
-        raise StudyError(error.field, error.value, allowed) from None
-    within = given.get("within", 0.01)
-    if not is_number(within) or not 1e-6 <= within <= 0.5:
-        raise StudyError("goal.within", within, "must be a number >= 1e-06 and <= 0.5")
-    return Goal(
-        parameter=name,
-        of=of,
-        kind=kinds[0] if kinds else "",
-        threshold=_threshold(f"goal.{kinds[0]}", given[kinds[0]], of, scene) if kinds else math.nan,
-        within=float(within),
-        between=(low, high),
-        whole=isinstance(low, int) and isinstance(high, int) and known[name].whole,
-        branch=name == scene.branch,
-        goes_on=name == scene.branch and scene.goes_on,
-    )
 
 
 def _ends(content: Any, parameter: Parameter) -> tuple[float, float]:

@@ -7,39 +7,33 @@ from typing import Any
 
 import numpy as np
 
-from studies.definition.certainty import Certainty, certainty
-from studies.definition.fit import FAILED, Fitting
 from studies.definition.identity import canonical
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK, STOPPED
-from studies.execution.asking import Asking
-from studies.execution.goals import attributes, written
+from studies.kinds.fit.certainty import Certainty, certainty
+from studies.kinds.fit.fitting import Fitting
+from studies.kinds.kind import Answers
+from studies.kinds.replayed import FAILED
 from studies.storage import dataset as layout
-from studies.storage.dataset import RunContent, Variable
-from studies.storage.held import Combined
-from studies.storage.store import Store
+from studies.storage.dataset import Variable
+from studies.storage.runfile import described
 
 NOT_FOUND = "not_converged"
 """Status of a fit that ended before it found the smallest sum."""
 
 
-def calibrated(study: Study, store: Store, asking: Asking) -> Combined:
-    """Write the data set of a fit, unless there is one with the same answer."""
-    program: Fitting = asking.places[0].program
+def answers(study: Study, programs: list[Fitting]) -> Answers:
+    """Return the answer of a fit."""
+    (program,) = programs
     answer = program.answer
-    known = certainty(program.fit, answer) if answer and answer.jacobian is not None else None
+    known = certainty(program.asked, answer) if answer and answer.jacobian is not None else None
     status, message = _outcome(program, known)
     rows = [row for row in program.rows.values() if row]
-    of = canonical([status, message, rows, sorted(program.refusals.values())])
-
-    def content() -> RunContent:
-        variables = _content(study, program, known, (status, message))
-        return RunContent(variables, attributes(study, "fit"))
-
-    anew = written(study, store, of, content)
-    failed = [] if status == OK else [("", status, message)]
-    path = store.dataset_path(study.id)
-    return Combined(path=path, counts={status: 1}, failed=failed, missing=(), anew=anew)
+    return Answers(
+        content=lambda: _content(study, program, known, (status, message)),
+        outcomes=[("", status, message)],
+        of=canonical([status, message, rows, sorted(program.refusals.values())]),
+    )
 
 
 def _outcome(program: Fitting, known: Certainty | None) -> tuple[str, str]:
@@ -48,7 +42,7 @@ def _outcome(program: Fitting, known: Certainty | None) -> tuple[str, str]:
         return MISSING, STOPPED
     bounds = [
         f"{name} is at its {'lowest' if share <= 0.0 else 'highest'} value"
-        for name, share in zip(program.fit.free, program.answer.shares, strict=True)
+        for name, share in zip(program.asked.free, program.answer.shares, strict=True)
         if not 1e-4 < share < 1.0 - 1e-4
     ] if program.answer else []  # fmt: skip
     told = [program.message, known.warning if known else "", *bounds]
@@ -59,16 +53,12 @@ def _outcome(program: Fitting, known: Certainty | None) -> tuple[str, str]:
 def _content(
     study: Study, program: Fitting, known: Certainty | None, outcome: tuple[str, str]
 ) -> dict[str, Variable]:
-    scene, fit, answer = study.problem, program.fit, program.answer
+    scene, fit, answer = study.problem, program.asked, program.answer
     names, count = list(fit.free), len(fit.free)
     variables: dict[str, Variable] = {}
 
     def add(name: str, dims: tuple[str, ...], values: Any, words: str, unit: str = "") -> None:
-        attrs = {"long_name": words} | ({"units": unit} if unit else {})
-        array = np.asarray(values)
-        variables[name] = Variable(
-            dims, array.astype(object) if array.dtype.kind == "U" else array, attrs
-        )
+        variables[name] = described(dims, values, words, unit)
 
     for name, text in zip(("status", "message"), outcome, strict=True):
         variables[name] = Variable((), np.array(text, dtype=object), layout.attributes_of(name))
@@ -115,7 +105,7 @@ def _content(
 def _add_tried(add: Any, program: Fitting) -> None:
     """Add the runs of the fit, in the order in which they were asked for."""
     keys = [key for key, row in program.rows.items() if row or key in program.refusals]
-    for k, name in enumerate(program.fit.free):
+    for k, name in enumerate(program.asked.free):
         values = np.array([key.values[k] for key in keys], dtype=float)
         add(f"tried_{name}", ("tried",), values, f"{name.replace('_', ' ')} of the runs")
     misfits = np.array([program.misfit(key.values) for key in keys], dtype=float)

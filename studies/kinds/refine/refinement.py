@@ -25,28 +25,31 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from solver.late import Late
 from solver.parameters import is_number
 from solver.scenes import Scene
-from studies.definition.around import Around
-from studies.definition.cells import KINK, Cell, Point, edges
+from studies.definition.cases import Case
 from studies.definition.line import Read
 from studies.definition.parameters import in_unit, parameters_of
 from studies.definition.place import Chooser
 from studies.definition.quantity import RunNumber, checked_number
 from studies.definition.spaced import is_finite
-from studies.definition.sweep import MAXIMUM_RUNS, Axes
+from studies.definition.sweep import MAXIMUM_RUNS, Axes, standings
 from studies.definition.vocabulary import OK, taken
-from studies.errors import StudyError, check_entries
+from studies.errors import StudyError
+from studies.kinds.kind import Kind, Placed, Reading
+from studies.kinds.ranges import check_whole
+from studies.kinds.refine.around import Around
+from studies.kinds.refine.cells import KINK, Cell, Point, edges
 
 STATES = SETTLED, FAILED, SMALLEST, MOST, OPEN = "settled", "failed", "smallest", "most", "open"
 """What became of a cell: its runs are as foreseen; all failed; it would be divided, but is as small
 as is allowed; or no runs were left; or the refinement was stopped."""
 
-_KEYS = ("of", "until", "most", "halvings")
 _UNTIL, _MOST, _HALVINGS = 0.02, 200, 5
 """Entries that are left out."""
 _MOST_AXES, _MOST_HALVINGS = 4, 20
@@ -55,7 +58,7 @@ _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Refine:
+class Refine(Kind):
     """What is asked for.
 
     Attributes
@@ -68,15 +71,91 @@ class Refine:
     axes : values of the axes that are numbers, in increasing order
     """
 
+    name = "refine"
+    entries = ("of", "until", "most", "halvings")
+    meaning = "numbers of the runs, between which it adds others"
+    of_runs = True
+    work = "refinement"
+    ends = ("cell_state", OPEN, "run")
+    answers = Late("studies.kinds.refine.answer:answers")
+    found = Late("studies.kinds.refine.shown:found")
+
     of: tuple[RunNumber, ...]
     until: float | Mapping[str, float]
     most: int
     halvings: int
     axes: Mapping[str, Sequence[float]]
 
+    @classmethod
+    def checked(cls, content: Mapping[str, Any], scene: Scene, axes: Axes) -> Refine:
+        """Return the refinement that a study asks for."""
+        of = content.get("of")
+        if isinstance(of, list | tuple):
+            numbers_of = [checked_number(f"refine.of[{k}]", one, scene) for k, one in enumerate(of)]
+        else:
+            numbers_of = [checked_number("refine.of", of, scene)]
+        names = [one.name for one in numbers_of]
+        if not names or len(set(names)) < len(names):
+            raise StudyError(
+                "refine.of", of, "must be a list of variables with one number a run, each once"
+            )
+        known = parameters_of(scene)
+        numbers = {
+            name: sorted(values)
+            for name, values in axes.items()
+            if isinstance(values, list) and name in known and all(map(is_number, values))
+        }
+        if not 1 <= len(numbers) <= _MOST_AXES or any(len(each) < 2 for each in numbers.values()):
+            allowed = (
+                f"needs 1 to {_MOST_AXES} axes of two numbers or more: the ends of their ranges"
+            )
+            raise StudyError("refine", dict(content), allowed)
+        units = {each.name: scene.known_quantities[each.of].units for each in numbers_of}
+        until = _until(content.get("until", _UNTIL), units)
+        most, halvings = content.get("most", _MOST), content.get("halvings", _HALVINGS)
+        check_whole("refine.most", most, MAXIMUM_RUNS)
+        check_whole("refine.halvings", halvings, _MOST_HALVINGS)
+        found = Refine(
+            of=tuple(numbers_of), until=until, most=most, halvings=halvings, axes=numbers
+        )
+        others = math.prod(len(values) for name, values in axes.items() if name not in numbers)
+        if found.first_round(others) > most:
+            allowed = f"must be at least {found.first_round(others)}, the runs of the first round"
+            raise StudyError("refine.most", most, allowed)
+        return found
+
+    @property
+    def value(self) -> str:
+        """The first number that is refined."""
+        return self.of[0].name
+
+    def most_runs(self, places: int) -> int:
+        """Return the largest number of runs."""
+        del places
+        return self.most
+
+    def programs(self, axes: Axes, read: Reading, allow: Sequence[str]) -> Iterator[Placed]:
+        """Yield the refinement."""
+        branches = {
+            tuple(each.at[axis] for axis in axes if axis not in self.axes):
+            {name: value for name, value in each.sets.items() if name not in self.axes}
+            for each in standings(axes)
+        }  # fmt: skip
+        reading = read({each.of for each in self.of})
+        yield Placed([], {}, Refinement(self, list(branches.values()), reading, allow))
+
+    def longest(
+        self, cases: Iterable[Case], branch: str
+    ) -> Iterator[tuple[Case, Mapping[str, Any], list[Any]]]:
+        """Yield as many paths as there may be runs, each to the largest values of the axes."""
+        last = {name: values[-1] for name, values in self.axes.items()}
+        places = [case for case in cases if case.values == {**case.values, **last}]
+        for case in itertools.islice(itertools.cycle(places), self.most):
+            yield case, {}, [case.values.get(branch)]
+
     @property
     def content(self) -> dict[str, Any]:
-        """What `checked_refine` reads."""
+        """What `checked` reads."""
         until = dict(self.until) if isinstance(self.until, Mapping) else self.until
         return {
             "of": [each.content for each in self.of], "until": until, "most": self.most,
@@ -91,7 +170,7 @@ class Refine:
                 low, high = zip(*box, strict=True)
                 yield Cell(low, high, branch, (0,) * len(box))
 
-    def first(self, branches: int) -> int:
+    def first_round(self, branches: int) -> int:
         """Return the number of runs of the first round."""
         cells = self.cells(branches)
         return len({(cell.branch, point) for cell in cells for point in cell.points})
@@ -485,48 +564,6 @@ def _volume(cell: Cell) -> float:
     return 0.5 ** sum(cell.halved)
 
 
-def checked_refine(content: Any, scene: Scene, axes: Axes) -> Refine:
-    """Return the refinement that a study asks for.
-
-    Raises
-    ------
-    StudyError
-        naming the entry, its value and what is allowed
-    """
-    if not isinstance(content, Mapping):
-        raise StudyError("refine", content, "must be a table")
-    check_entries("refine", content, _KEYS)
-    of = content.get("of")
-    if isinstance(of, list | tuple):
-        numbers_of = [checked_number(f"refine.of[{k}]", one, scene) for k, one in enumerate(of)]
-    else:
-        numbers_of = [checked_number("refine.of", of, scene)]
-    names = [one.name for one in numbers_of]
-    if not names or len(set(names)) < len(names):
-        raise StudyError(
-            "refine.of", of, "must be a list of variables with one number a run, each once"
-        )
-    known = parameters_of(scene)
-    numbers = {
-        name: sorted(values)
-        for name, values in axes.items()
-        if isinstance(values, list) and name in known and all(map(is_number, values))
-    }
-    if not 1 <= len(numbers) <= _MOST_AXES or any(len(each) < 2 for each in numbers.values()):
-        allowed = f"needs 1 to {_MOST_AXES} axes of two numbers or more: the ends of their ranges"
-        raise StudyError("refine", dict(content), allowed)
-    units = {each.name: scene.known_quantities[each.of].units for each in numbers_of}
-    until = _until(content.get("until", _UNTIL), units)
-    most = _whole("most", content.get("most", _MOST), MAXIMUM_RUNS)
-    halvings = _whole("halvings", content.get("halvings", _HALVINGS), _MOST_HALVINGS)
-    found = Refine(of=tuple(numbers_of), until=until, most=most, halvings=halvings, axes=numbers)
-    others = math.prod(len(values) for name, values in axes.items() if name not in numbers)
-    if found.first(others) > most:
-        allowed = f"must be at least {found.first(others)}, the runs of the first round"
-        raise StudyError("refine.most", most, allowed)
-    return found
-
-
 def _until(until: Any, units: Mapping[str, str]) -> float | dict[str, float]:
     if is_number(until) and 1e-6 <= until <= 1.0:
         return float(until)
@@ -536,9 +573,3 @@ def _until(until: Any, units: Mapping[str, str]) -> float | dict[str, float]:
         return {name: float(own[name]) for name in units}
     allowed = "must be a share of the range, >= 1e-06 and <= 1, or a number > 0 for each of `of`"
     raise StudyError("refine.until", until, allowed)
-
-
-def _whole(name: str, value: Any, most: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-        raise StudyError(f"refine.{name}", value, f"must be an integer >= 1 and <= {most}")
-    return value

@@ -20,6 +20,11 @@ _ABREAST = 4
 _LINE, _MARKS = "#D55E00", "0.35"
 
 
+def compared(dataset: xr.Dataset) -> Figure | None:
+    """Return `fit_figure`; None if there is no answer."""
+    return fit_figure(dataset) if dataset["fitted"].notnull().all() else None
+
+
 def fit_figure(dataset: xr.Dataset) -> Figure:
     """Return two panels for each measured line: it and the run with the values found, differences.
 

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from studies.definition.fit import Fit, Fitted
-from studies.definition.measured import Numbers
+from studies.kinds.fit.fitting import Fit, Fitted
+from studies.kinds.fit.measured import Numbers
 
 _CONDITION = 30.0
 """Condition index from which parameters cannot be told apart (reference, section 3.2)."""

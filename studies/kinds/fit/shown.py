@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
-from studies.definition.fit import NO_FIT
 from studies.definition.study import Study
 from studies.errors import StudyError
 from studies.execution.run import run_study
+from studies.kinds.fit.fitting import NO_FIT, Fit
 from studies.storage.store import Store
-from studies.views.columns import aligned, or_none, value_text
+from studies.views.columns import aligned, or_none, unit_text, value_text
+from studies.views.found import Found
 from studies.views.reading import open_study
 
 _ENDS = {"value": "", "sigma": "_sigma", "lowest": "_low", "highest": "_high"}
@@ -34,23 +36,23 @@ def fit(study: Study | Mapping[str, Any], store: Store, **options: Any) -> xr.Da
         if the study has no fit, or as `run_study` does
     """
     own = study if isinstance(study, Study) else Study.from_dict(study, options.pop("scene", None))
-    if not own.fit:
+    if own.kind.name != Fit.name:
         raise StudyError("fit", None, NO_FIT)
     return open_study(run_study(own, store, **options).dataset)
 
 
-def told(found: xr.Dataset) -> dict[str, Any]:
+def told(dataset: xr.Dataset) -> dict[str, Any]:
     """Return what was found as JSON has it, without the lines over which it was fitted."""
-    names = [str(name) for name in found["parameter"].to_numpy()]
+    names = [str(name) for name in dataset["parameter"].to_numpy()]
     parameters: dict[str, dict[str, Any]] = {
-        name: {key: or_none(found[f"{name}{end}"].item()) for key, end in _ENDS.items()}
+        name: {key: or_none(dataset[f"{name}{end}"].item()) for key, end in _ENDS.items()}
         for name in names
     }
-    for name, row in zip(names, found["correlation"].to_numpy().tolist(), strict=True):
-        parameters[name]["unit"] = found[name].attrs.get("units", "")
+    for name, row in zip(names, dataset["correlation"].to_numpy().tolist(), strict=True):
+        parameters[name]["unit"] = dataset[name].attrs.get("units", "")
         parameters[name]["correlation"] = dict(zip(names, map(or_none, row), strict=True))
     about = ("status", "message", "condition", "misfit", "runs")
-    return {key: or_none(found[key].item()) for key in about} | {"parameters": parameters}
+    return {key: or_none(dataset[key].item()) for key in about} | {"parameters": parameters}
 
 
 def fit_rows(dataset: xr.Dataset) -> list[list[str]]:
@@ -66,6 +68,25 @@ def measures(dataset: xr.Dataset) -> str:
     """Return how well the fit tells its parameters, and what it took."""
     names = ("condition", "misfit", "runs")
     return ", ".join(f"{name} {value_text(dataset[name].item())}" for name in names)
+
+
+def found(dataset: xr.Dataset, _: Mapping[str, Any]) -> Found:
+    """Return the parameters of a fit with what is known of them."""
+    headings, *rows = fit_rows(dataset)
+    place = {}
+    for name in map(str, dataset["parameter"].to_numpy()):
+        value, sigma = dataset[name].item(), dataset[f"{name}_sigma"].item()
+        ends = (None, None) if np.isnan(sigma) else (value - sigma, value + sigma)
+        place[name] = (value, *ends)
+    return Found(
+        about=[f"{measures(dataset)}; marks are drawn with one sigma."],
+        warning=str(dataset["message"].item()),
+        headings=headings,
+        units=[""] * len(headings),
+        rows=[[*row[:-1], unit_text(row[-1])] for row in rows],
+        words=1,
+        marks=[] if any(np.isnan(value) for value, *_ in place.values()) else [place],
+    )
 
 
 def fit_table(dataset: xr.Dataset) -> str:

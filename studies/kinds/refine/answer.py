@@ -6,52 +6,35 @@ from typing import Any
 
 import numpy as np
 
-from studies.definition.cases import Case
-from studies.definition.cells import ERROR
-from studies.definition.identity import canonical
-from studies.definition.refine import Refinement, Wanted
 from studies.definition.study import Study
 from studies.definition.sweep import owners
-from studies.execution.asking import Asking
-from studies.execution.result import result
+from studies.kinds.kind import Answers
+from studies.kinds.refine.cells import ERROR
+from studies.kinds.refine.refinement import Refinement, Wanted
 from studies.storage import dataset as layout
-from studies.storage.dataset import RunContent, Variable
-from studies.storage.held import Combined
-from studies.storage.store import Store
+from studies.storage.dataset import Variable
+from studies.storage.runfile import described
 
 
-def refined(study: Study, store: Store, asking: Asking, anew: bool) -> Combined:
-    """Write the data set of a refinement, unless there is one of the same runs.
-
-    Parameters
-    ----------
-    study, store, asking : the study, its store, and what it has asked for
-    anew : whether runs were computed
-    """
-    program: Refinement = asking.places[0].program
+def answers(study: Study, programs: list[Refinement]) -> Answers:
+    """Return the runs of a refinement over ``point``, and its cells with the errors left."""
+    (program,) = programs
     ran = [each for each in program.asked if not isinstance(program.rows.get(each), str)]
     order = sorted(ran, key=lambda each: (program.asked[each], each))
-    chosen = study.with_points([program.sets(each) for each in order])
-    beside = _beside(study, program, list(chosen.cases()), order)
-    return result(chosen, store, complete=not anew, stopped=not asking.ended, beside=beside)
+    return Answers(
+        content=lambda: _beside(study, program, order),
+        points=[program.sets(each) for each in order],
+    )
 
 
-def _beside(
-    study: Study, program: Refinement, cases: list[Case], order: list[Wanted]
-) -> RunContent:
+def _beside(study: Study, program: Refinement, order: list[Wanted]) -> dict[str, Variable]:
     """Return what the data set has beside the runs."""
     scene, refine, cells = study.problem, program.refine, program.cells
     variables: dict[str, Variable] = {}
 
     def add(name: str, dims: str | list[str], values: Any, words: str, unit: str = "") -> None:
-        attrs = {"long_name": words} | ({"units": unit} if unit else {})
-        own = [dims] if isinstance(dims, str) else dims
-        array = np.asarray(values)
-        variables[name] = Variable(
-            tuple(own), array.reshape((1,) * (len(own) - 1) + array.shape), attrs
-        )
+        variables[name] = described(dims, values, words, unit)
 
-    add("run", "point", np.array([case.id for case in cases], dtype=object), "id of the run")
     rounds = np.array([program.asked[each] + 1 for each in order], dtype=np.int32)
     add("round", "point", rounds, "round in which the run was asked for")
     for axis, name in enumerate(refine.axes):
@@ -75,4 +58,4 @@ def _beside(
             numbers = [np.nan if each is None else each[k] for each in map(program.number, order)]
             add(name, over, numbers, f"what is refined of {number.of}", unit)
         add(f"{ERROR}{name}", "cell", left, f"error of {name} that is left in the cell", unit)
-    return RunContent(variables, {"refine": canonical(study.refine)})
+    return variables

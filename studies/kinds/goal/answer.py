@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from solver.files import appearing
 from solver.results.shakedown import ShakedownState
 from studies.definition.cases import Case
-from studies.definition.goal import ALREADY, FAILED, NEVER, PASSED, REFUSED, Search
 from studies.definition.identity import canonical
 from studies.definition.study import Study
 from studies.definition.vocabulary import (
@@ -20,48 +17,25 @@ from studies.definition.vocabulary import (
     NO_EQUILIBRIUM,
     OK,
     STOPPED,
-    SYMMETRIC,
 )
-from studies.execution.asking import Asking
+from studies.kinds.goal.search import ALREADY, FAILED, NEVER, PASSED, REFUSED, Search
+from studies.kinds.kind import Answers
 from studies.storage import dataset as layout
-from studies.storage import runfile, seal
-from studies.storage.dataset import RunContent, Variable
-from studies.storage.held import Combined
-from studies.storage.made import Made
-from studies.storage.provenance import provenance
-from studies.storage.room import needs_room
-from studies.storage.store import Store
-
-_NAME = "data set"
+from studies.storage.dataset import Variable
 
 
-def answers(study: Study, store: Store, asking: Asking) -> Combined:
-    """Write the data set of a study with a goal, unless there is one with the same answers."""
-    searches = [place.program for place in asking.places]
+def answers(study: Study, searches: list[Search]) -> Answers:
+    """Return an answer for each place of the axes."""
     outcomes = [_outcome(study, search) for search in searches]
     runs = [[search.reason, list(search.rows.values())] for search in searches]
-    of = canonical([outcomes, runs])
-    counts = Counter(status for status, _ in outcomes)
-    failed = [
-        (_run(search, search.high), *outcome)
-        for search, outcome in zip(searches, outcomes, strict=True)
-        if outcome[0] != OK
-    ]
-    anew = written(study, store, of, lambda: _content(study, searches, outcomes))
-    path = store.dataset_path(study.id)
-    return Combined(path=path, counts=dict(counts), failed=failed, missing=(), anew=anew)
-
-
-def written(study: Study, store: Store, of: str, content: Callable[[], RunContent]) -> bool:
-    """Write a data set of answers, unless there is one made of the same, ``of``; tell whether."""
-    path, made = store.dataset_path(study.id), Made(study, store)
-    if made.kept(_NAME, of):
-        return False
-    packed = runfile.packed(content())
-    with needs_room(store.directory), appearing(path) as part:
-        part.write_bytes(seal.sealed(f"dataset {study.id}", packed))
-    made.note(_NAME, of, [path.name])
-    return True
+    return Answers(
+        content=lambda: _content(study, searches, outcomes),
+        outcomes=[
+            (_run(search, search.high), *outcome)
+            for search, outcome in zip(searches, outcomes, strict=True)
+        ],
+        of=canonical([outcomes, runs]),
+    )
 
 
 def _outcome(study: Study, search: Search) -> tuple[str, str]:
@@ -115,8 +89,10 @@ def _run(search: Search, value: float) -> str:
     return str(search.rows[value]["id"]) if value in search.rows else ""
 
 
-def _content(study: Study, found: list[Search], outcomes: list[tuple[str, str]]) -> RunContent:
-    """Return the content of the data set of the answers.
+def _content(
+    study: Study, found: list[Search], outcomes: list[tuple[str, str]]
+) -> dict[str, Variable]:
+    """Return the variables of the data set of the answers.
 
     Its dimensions are those that a data set of the runs would have, without the parameter that was
     searched; and ``tried``, the runs of each search in increasing order of the parameter.
@@ -155,15 +131,7 @@ def _content(study: Study, found: list[Search], outcomes: list[tuple[str, str]])
         words = {"long_name": f"id of the run at the {end} end"}
         add(f"run_{end}", [_run(each, getattr(each, end)) for each in searches], object, words)
     variables |= _tried(searches, tuple(axes), shape, {**unit, **beside})
-    return RunContent(variables, attributes(study, "goal"))
-
-
-def attributes(study: Study, entry: str) -> dict[str, Any]:
-    """Return the attributes of a data set of answers, with an entry of the study as text."""
-    attrs = provenance(study.name, study.problem, study.fixed)
-    words = {"note": study.note, "tags": " ".join(study.tags)}
-    attrs |= {key: text for key, text in words.items() if text}
-    return {**attrs, entry: canonical(getattr(study, entry)), "id": study.id, SYMMETRIC: 0}
+    return variables
 
 
 def _tried(

@@ -1,0 +1,1 @@
+"""A fit: the values of parameters with which runs come closest to what was measured."""

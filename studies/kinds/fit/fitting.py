@@ -1,0 +1,323 @@
+"""Calibration: the values of parameters with which runs come closest to what was measured.
+
+The sum of squared differences over standard deviations is made smallest by a trust region method
+within bounds. Each evaluation is a run, or one for each position on the axes of the study; those of
+the differences for the Jacobian matrix are asked for together. After each answer the method begins
+anew with what is known: what it asks for next depends only on the runs that it has asked for, so
+that one that is taken up after a crash asks for the same runs.
+
+References
+----------
+Branch, M. A., Coleman, T. F. and Li, Y. (1999), A subspace, interior, and conjugate gradient method
+for large-scale bound-constrained minimization problems, SIAM J. Sci. Comput. 21: the method of
+`scipy.optimize.least_squares`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from solver.late import Late
+from solver.parameters import is_number
+from solver.scenes import Scene
+from studies.definition.line import Read
+from studies.definition.sweep import Axes, standings
+from studies.definition.vocabulary import SOLVED
+from studies.errors import StudyError
+from studies.kinds.fit.files import with_files
+from studies.kinds.fit.measured import MeasuredLine, Numbers, checked_measured, content_of
+from studies.kinds.kind import Placed, Reading
+from studies.kinds.ranges import DIGITS, Ranged, check_whole, checked_ranges
+from studies.kinds.replayed import Ends, Evaluation, Lacking, Replayed
+
+NO_FIT = "is missing: tell what was measured, and the ranges"
+"""What a command of fits says of a study without one."""
+
+_TOLERANCE = 1e-3
+"""Least change of the sum of squares, as a share of it, and of the shares of the ranges."""
+_WIDEST = 0.2
+"""Widest difference to either side for the standard deviations, as a share of the range."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit(Ranged):
+    """What is fitted.
+
+    Attributes
+    ----------
+    measured : the measured lines
+    step : step of the differences, as a share of the range
+    most : largest number of runs
+    """
+
+    name = "fit"
+    entries = ("measured", "ranges", "first", "step", "most")
+    meaning = "what was measured, and the parameters it searches"
+    rows = "answer"
+    counted = "fits"
+    answers = Late("studies.kinds.fit.answer:answers")
+    found = Late("studies.kinds.fit.shown:found")
+    table = Late("studies.kinds.fit.shown:fit_table")
+    figure = Late("studies.kinds.fit.figure:compared")
+
+    measured: list[MeasuredLine]
+    step: float = 0.05
+    most: int = 100
+
+    @cached_property
+    def values(self) -> Numbers:
+        """Measured values of all lines."""
+        return np.concatenate([each.values for each in self.measured])
+
+    @cached_property
+    def sigma(self) -> Numbers:
+        """Their standard deviations."""
+        return np.concatenate([each.sigma for each in self.measured])
+
+    def spread(self, seen: Numbers) -> float:
+        """Return the variance of differences over sigma if some sigma were not given; else 1."""
+        freedom = len(self.values) - len(self.free)
+        if freedom <= 0 or all(each.told for each in self.measured):
+            return 1.0
+        return float(np.sum(((seen - self.values) / self.sigma) ** 2)) / freedom
+
+    @classmethod
+    def checked(cls, content: Mapping[str, Any], scene: Scene, axes: Axes) -> Fit:
+        """Return the fit that a study asks for.
+
+        Parameters
+        ----------
+        content : ``measured``, see `checked_measured`; ``ranges`` and ``first`` values, see
+            `checked_ranges`; ``step`` and ``most``, see `Fit`
+        scene, axes : of the study
+        """
+        free = checked_ranges("fit", content, scene)
+        step, most = content.get("step", Fit.step), content.get("most", Fit.most)
+        if not is_number(step) or not 1e-4 <= step <= 0.5:
+            raise StudyError("fit.step", step, "must be a number >= 0.0001 and <= 0.5")
+        check_whole("fit.most", most, 10_000)
+        if "measured" not in content:
+            allowed = "is missing: name files of measured lines here, or with --measured"
+            raise StudyError("fit.measured", None, allowed)
+        every = standings(axes)
+        if (count := len(every) * (1 + len(free))) > most:
+            raise StudyError(
+                "fit.most", most, f"must be at least {count}, the runs of the first round"
+            )
+        lines = checked_measured(content["measured"], scene, {n for each in every for n in each.at})
+        for k, line in enumerate(lines):
+            if len(there := [each for each in every if each.has(line.at)]) != 1:
+                some = "; ".join(str(dict(each.at)) for each in (there or every)[:3])
+                allowed = f"must tell one run, and fits {len(there)}: {some}"
+                raise StudyError(f"fit.measured[{k}].at", dict(line.at), allowed)
+        if sum(len(each.values) for each in lines) < len(free):
+            allowed = f"must have as many values as there are parameters: {len(free)} at least"
+            raise StudyError("fit.measured", f"{len(lines)} lines", allowed)
+        return Fit(free=free, measured=lines, step=float(step), most=most)
+
+    @classmethod
+    def with_files(cls, content: Any, folder: Path, given: Sequence[Path]) -> Any:
+        """Return the entry with the rows of measured lines in place of the names of files."""
+        return with_files(content, folder, given)
+
+    def most_runs(self, places: int) -> int:
+        """Return the largest number of runs."""
+        del places
+        return self.most
+
+    def programs(self, axes: Axes, read: Reading, allow: Sequence[str]) -> Iterator[Placed]:
+        """Yield the program of the fit."""
+        names = {name for line in self.measured for name in (line.of, line.over)}
+        yield Placed([], {}, Fitting(self, standings(axes), read(names)))
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What `checked` reads."""
+        lines = [content_of(each) for each in self.measured]
+        return {"measured": lines, **super().content, "step": self.step, "most": self.most}
+
+
+class Fitted(NamedTuple):
+    """What a fit has found.
+
+    Attributes
+    ----------
+    values, shares : (n_parameters,) of the parameters, and of their ranges
+    seen : (n_values,) what the runs say at the measured places
+    jacobian : (n_values, n_parameters) of what the runs say over sigma, by the shares, here or
+        where the last step began; None if it is not known
+    """
+
+    values: Numbers
+    shares: Numbers
+    seen: Numbers
+    jacobian: Numbers | None
+
+
+@dataclass(slots=True)
+class Fitting(Replayed):
+    """The program of a fit; see `studies.definition.place.Chooser`.
+
+    Attributes
+    ----------
+    read : gives the variables of a run, by its row
+    answer : what it has found, or the best so far
+    """
+
+    asked: Fit
+    read: Callable[[Mapping[str, Any]], Read]
+    answer: Fitted | None = None
+    _of: list[list[int]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._of = [
+            [k for k, line in enumerate(self.asked.measured) if each.has(line.at)]
+            for each in self.positions
+        ]
+        self.replay()
+
+    def misfit(self, values: tuple[float, ...]) -> float:
+        """Return the mean of the squared differences over sigma; NaN if it is not known."""
+        try:
+            seen = self._all(values)
+        except (Lacking, Ends):
+            return math.nan
+        return math.nan if seen is None else float(np.mean(self._over_sigma(seen) ** 2))
+
+    def seen(self, key: Evaluation, row: Mapping[str, Any]) -> list[Numbers] | None:
+        """Return what a run says at the measured places of its lines; None if it failed."""
+        if row["status"] not in SOLVED:
+            self.refusals[key] = ": ".join(filter(None, (row["status"], row["message"])))
+            return None
+        read = self.read(row)
+        try:
+            return [self.asked.measured[k].seen(read) for k in self._of[key.position]]
+        except ValueError as error:
+            self.refusals[key] = str(error)
+            return None
+
+    def search(self) -> None:
+        """Begin anew with what is known."""
+        from scipy.optimize import least_squares
+
+        free = list(self.asked.free.values())
+        first = np.array([each.share(each.first) for each in free]).round(DIGITS)
+        self.answer = None
+        self._ask(
+            [
+                self.asked.values_at(first),
+                *(self.asked.values_at(each) for each in self._stepped(first)),
+            ]
+        )
+        found = least_squares(
+            self._differences, first, self._jacobian, bounds=(0.0, 1.0), x_scale=1.0,
+            ftol=_TOLERANCE, xtol=_TOLERANCE, gtol=1e-10, max_nfev=10 * self.asked.most,
+        )  # fmt: skip
+        values = self.asked.values_at(found.x)
+        seen = self._all(values)
+        assert seen is not None
+        self.answer = Fitted(np.array(values), found.x.round(DIGITS), seen, found.jac)
+        with suppress(Ends):  # no runs are left: narrow differences tell less well
+            self.answer = self.answer._replace(jacobian=self._wide(self.answer))
+
+    def _differences(self, shares: Numbers) -> Numbers:
+        values = self.asked.values_at(shares)
+        seen = self._all(values)
+        if seen is None:
+            if self.answer is None:
+                keys = (Evaluation(values, k) for k in range(len(self.positions)))
+                why = next(self.refusals[key] for key in keys if key in self.refusals)
+                raise Ends(f"the run of the first values has no line: {why}")
+            return np.full(len(self.asked.values), np.nan)  # the method goes half as far
+        found = self._over_sigma(seen)
+        best = self.answer
+        if best is None or np.sum(found**2) < np.sum(self._over_sigma(best.seen) ** 2):
+            last = best.jacobian if best else None
+            self.answer = Fitted(np.array(values), shares.round(DIGITS), seen, last)
+        return found
+
+    def _jacobian(self, shares: Numbers, *_: Any) -> Numbers:
+        here = self._all(self.asked.values_at(shares))
+        assert here is not None
+        steps = self._stepped(shares)
+        self._ask([self.asked.values_at(step) for step in steps])
+        columns = []
+        for k, name in enumerate(self.asked.free):
+            at = float(shares[k].round(DIGITS))
+            width = steps[k][k] - at
+            for side in (1.0, -1.0):
+                step = shares.round(DIGITS)
+                step[k] = round(at + side * width, DIGITS)
+                inside = 0.0 <= step[k] <= 1.0
+                there = self._all(self.asked.values_at(step)) if inside else None
+                if there is not None:
+                    columns.append((there - here) / (step[k] - at) / self.asked.sigma)
+                    break
+            else:
+                raise Ends(
+                    f"runs fail on both sides of {name} = {self.asked.values_at(shares)[k]:.6g}"
+                )
+        found = np.column_stack(columns)
+        if self.answer is not None and np.array_equal(self.answer.seen, here):
+            self.answer = self.answer._replace(jacobian=found)
+        return found
+
+    def _wide(self, answer: Fitted) -> Numbers:
+        """Return the Jacobian matrix of central differences over what the parameters may be.
+
+        That is two standard deviations to both sides. What a change of the mesh makes turns the
+        columns of narrow differences apart: parameters that are nearly alike in what was measured
+        would seem to be better known than they are. A column stays where runs fail, or at a bound.
+        """
+        assert answer.jacobian is not None
+        here, found = answer.shares, answer.jacobian.copy()
+        sigma = np.sqrt(self.asked.spread(answer.seen) * np.diag(np.linalg.pinv(found.T @ found)))
+        room = np.minimum(here, 1.0 - here)
+        widths = np.minimum(np.clip(2.0 * sigma, self.asked.step, _WIDEST), room).round(DIGITS)
+        pairs = [
+            [(here + side * width * unit).round(DIGITS) for side in (1.0, -1.0)]
+            for width, unit in zip(widths, np.eye(len(here)), strict=True)
+        ]
+        wide = [k for k, width in enumerate(widths) if width >= self.asked.step / 2.0]
+        self._ask([self.asked.values_at(each) for k in wide for each in pairs[k]])
+        for k in wide:
+            ends = [self._all(self.asked.values_at(each)) for each in pairs[k]]
+            if ends[0] is not None and ends[1] is not None:
+                found[:, k] = (ends[0] - ends[1]) / (2.0 * widths[k]) / self.asked.sigma
+        return found
+
+    def _stepped(self, shares: Numbers) -> list[Numbers]:
+        """Return the places of the differences: forward, or backward at the upper bounds."""
+        found = []
+        for k in range(len(shares)):
+            step = shares.round(DIGITS)
+            step[k] += self.asked.step if step[k] + self.asked.step <= 1.0 else -self.asked.step
+            found.append(step.round(DIGITS))
+        return found
+
+    def _ask(self, every: list[tuple[float, ...]]) -> None:
+        """Ask for the runs of several places together."""
+        self.ask([Evaluation(values, k) for values in every for k in range(len(self.positions))])
+
+    def _all(self, values: tuple[float, ...]) -> Numbers | None:
+        """Return what runs say at all measured places; None if one of them failed."""
+        self._ask([values])
+        found: list[Numbers] = [np.empty(0)] * len(self.asked.measured)
+        for k, of in enumerate(self._of):
+            seen = self.known[Evaluation(values, k)]
+            if seen is None:
+                return None
+            for line, own in zip(of, seen, strict=True):
+                found[line] = own
+        return np.concatenate(found)
+
+    def _over_sigma(self, seen: Numbers) -> Numbers:
+        return (seen - self.asked.values) / self.asked.sigma

@@ -1,0 +1,1 @@
+"""A goal: the value of a parameter at which a number of the runs passes a threshold."""

@@ -1,0 +1,62 @@
+"""What a goal has found: an answer at each place of the axes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from studies.views.columns import or_none, plain, value_text
+from studies.views.found import Found, Mark
+from studies.views.picking import sweep_axes, sweep_coordinates
+from studies.views.tables import run_cells
+
+
+def found(dataset: xr.Dataset, goal: Mapping[str, Any]) -> Found:
+    """Return the answers as `runs_table` has them, each with the reason of its end."""
+    cells, name = run_cells(dataset), goal["parameter"]
+    said = [str(each) for each in dataset["message"].to_numpy().ravel()]
+    more = ["reason"] if any(said) else []
+    at = cells.words
+    rows = [
+        [*row[:at], *([text] if more else []), *row[at:]]
+        for row, text in zip(cells.rows, said, strict=True)
+    ]
+    low, high = map(value_text, goal["between"])
+    within = f"bracket at most {value_text(100.0 * goal['within'])} % of its upper end"
+    return Found(
+        about=[f"The {plain(name)} from {low} to {high} at which {_reached(goal)}; {within}."],
+        headings=[*cells.headings[:at], *more, *cells.headings[at:]],
+        units=[*cells.units[:at], *([""] if more else []), *cells.units[at:]],
+        rows=rows,
+        words=at + len(more),
+        marks=_places(dataset, name),
+    )
+
+
+def _reached(goal: Mapping[str, Any]) -> str:
+    """Return in words when a goal is reached."""
+    if not goal.get("of"):
+        return "there is no equilibrium any more"
+    words = {"at": "is", "first_above": "is above", "first_below": "is below"}
+    kind = next(each for each in words if each in goal)
+    return f"{plain(goal['of'])} {words[kind]} {value_text(goal[kind])}"
+
+
+def _places(dataset: xr.Dataset, name: str) -> list[Mark]:
+    """Return where the answers of a goal are: on the axes, and of the parameter searched."""
+    axes = sweep_coordinates(dataset)
+    at = {each: dataset[each].to_numpy() for each in axes}
+    ends = [dataset[f"{name}{end}"].to_numpy() for end in ("", "_low", "_high")]
+    marks: list[Mark] = []
+    for index in np.ndindex(ends[0].shape):
+        value, low, high = (each[index].item() for each in ends)
+        if np.isnan(value):
+            continue
+        place = dict(zip(sweep_axes(dataset), index, strict=True))
+        own = {each: values[place[axes[each]]].item() for each, values in at.items()}
+        fixed: dict[str, tuple[Any, Any, Any]] = {k: (v, None, None) for k, v in own.items()}
+        marks.append(fixed | {name: (value, or_none(low), or_none(high))})
+    return marks

@@ -1,0 +1,185 @@
+"""What a kind of study is: what it asks for, the programs that choose its runs, what it has found.
+
+A `SweepStudy` has the runs of its axes. All other kinds have an entry of their own in a study,
+which a subclass of `Kind` checks and holds, and programs (`studies.definition.place.Chooser`) that
+ask for runs. Run, estimate, task, store, views and service know no more of a kind than this. A kind
+imports nothing that reads or draws results: its functions of results may be `Late`.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple, Self
+
+from solver.late import Late
+from solver.scenes import Scene
+from studies.definition.cases import Case
+from studies.definition.line import Read
+from studies.definition.place import Chooser
+from studies.definition.points import Points
+from studies.definition.sweep import Axes
+from studies.definition.vocabulary import STOPPED
+from studies.errors import StudyError, check_entries
+
+Reading = Callable[[Collection[str]], Callable[[Mapping[str, Any]], Read]]
+"""Returns what gives some variables of a run, by its row."""
+
+
+class Placed(NamedTuple):
+    """What asks for runs, and where: texts of its place on the axes, and the parameters there."""
+
+    at: Sequence[str]
+    fixed: Mapping[str, Any]
+    chooser: Chooser
+
+
+class Trial(NamedTuple):
+    """Runs of a study that are checked before it begins: what they set besides the sweep.
+
+    ``fields`` has the entries of the study that mistakes name, by those of the runs.
+    """
+
+    fixed: Mapping[str, Any]
+    axes: Axes
+    fields: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answers:
+    """What a study has found, of which its data set is made.
+
+    Attributes
+    ----------
+    content : the variables of the data set, besides those of its runs and their ids
+    points : the runs that the data set holds; None if it holds answers
+    outcomes : of each answer a run, the status and the message
+    of : what the answers were made of
+    """
+
+    content: Callable[[], Mapping[str, Any]]
+    points: Points | None = None
+    outcomes: Sequence[tuple[str, str, str]] = ()
+    of: str = ""
+
+
+class Kind:
+    """A kind of study, and of a study what its entry says.
+
+    Attributes
+    ----------
+    name, meaning, entries : the entry of studies, what it says, and the names in its table
+    chooses : whether programs choose its runs by the outcomes of others
+    everywhere : whether each place of its axes has runs of its own
+    of_runs : whether its data set holds runs, not answers; if it chooses them, over ``point``
+    rows, counted, work : what a report, the numbers by status and a message call its results, these
+        by status, and its work
+    example : the variable of its data set that has the id of a run worth opening
+    ends : the variable of its data set that tells whether it has ended, the word of what has not,
+        and the variable of the ids of runs
+    answers : (study, its choosers) -> `Answers`
+    found : (data set, entry) -> `studies.views.found.Found`
+    table, figure : (data set) -> text, or figure, of its report; None for those of runs
+    """
+
+    __slots__ = ()
+    name: ClassVar[str]
+    entries: ClassVar[tuple[str, ...]] = ()
+    meaning: ClassVar[str] = ""
+    chooses: ClassVar[bool] = True
+    everywhere: ClassVar[bool] = False
+    of_runs: ClassVar[bool] = False
+    rows: ClassVar[str] = "runs"
+    counted: ClassVar[str] = "runs"
+    work: ClassVar[str] = "search"
+    example: ClassVar[str] = "tried_run"
+    ends: ClassVar[tuple[str, str, str]] = ("message", STOPPED, "tried_run")
+    answers: ClassVar[Late]
+    found: ClassVar[Late]
+    table: ClassVar[Late | None] = None
+    figure: ClassVar[Late | None] = None
+
+    @classmethod
+    def read(cls, content: Any, scene: Scene, axes: Axes) -> Self:
+        """Return what the entry of a study says.
+
+        Raises
+        ------
+        StudyError
+            naming the entry, its value and what is allowed
+        """
+        if not isinstance(content, Mapping):
+            raise StudyError(cls.name, content, "must be a table")
+        check_entries(cls.name, content, cls.entries)
+        return cls.checked(content, scene, axes)  # type: ignore[return-value]
+
+    @classmethod
+    def checked(cls, content: Mapping[str, Any], scene: Scene, axes: Axes) -> Kind:
+        """Return what a table without unknown names says; called by `read`."""
+        raise NotImplementedError
+
+    @classmethod
+    def with_files(cls, content: Any, folder: Path, given: Sequence[Path]) -> Any:
+        """Return the entry with what is in files beside the study, or in those that are given."""
+        return content
+
+    @classmethod
+    def searched(cls, content: Mapping[str, Any]) -> Mapping[str, str]:
+        """Return the parameters that programs set besides the axes, with their fields."""
+        return {}
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What `checked` reads."""
+        raise NotImplementedError
+
+    @property
+    def first(self) -> Mapping[str, Any]:
+        """The parameters with which it begins at a place of the axes."""
+        return {}
+
+    @property
+    def trial(self) -> Trial:
+        """The runs that are checked."""
+        return Trial({}, {}, {})
+
+    @property
+    def value(self) -> str:
+        """A number that its data set has for each place or run, to be drawn; empty if none."""
+        return ""
+
+    @property
+    def expects(self) -> bool:
+        """Whether programs begin where their neighbours' ``found`` lets `expected` be."""
+        return False
+
+    def most_runs(self, places: int) -> int:
+        """Return the largest number of runs, with so many places on the axes."""
+        raise NotImplementedError
+
+    def stage(self, places: int, ended: int, told: str) -> str:
+        """Return how far it is, as text: see `Study.stage`."""
+        return "ended" if ended else told or f"at most {self.most_runs(places)} runs"
+
+    def programs(self, axes: Axes, read: Reading, allow: Sequence[str]) -> Iterator[Placed]:
+        """Yield what asks for the runs of a study with these axes, and entry ``allow``."""
+        raise NotImplementedError
+
+    def longest(
+        self, cases: Iterable[Case], branch: str
+    ) -> Iterator[tuple[Case, Mapping[str, Any], list[Any]]]:
+        """Yield the loading paths that cost most.
+
+        Parameters
+        ----------
+        cases, branch : the places of the axes, and the branch parameter of the scene
+
+        Yields
+        ------
+        a place, the parameters that differ there, and the values of the branch
+        """
+        places = list(cases)
+        for case in itertools.islice(itertools.cycle(places), self.most_runs(len(places))):
+            yield case, self.first, [case.values.get(branch)]

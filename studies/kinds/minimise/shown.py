@@ -1,0 +1,33 @@
+"""What a minimum has found: its best runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import xarray as xr
+
+from studies.errors import StudyError
+from studies.views.best import best_runs
+from studies.views.columns import unit_text, value_text
+from studies.views.found import Found
+
+
+def found(dataset: xr.Dataset, asked: Mapping[str, Any]) -> Found:
+    """Return the best runs that meet the conditions, and mark the first."""
+    try:
+        best, warning = best_runs(dataset, asked["of"], asked["where"], lowest=True, count=5), ""
+    except StudyError as error:
+        best, warning = [], error.allowed
+    names = list(best[0]) if best else []
+    where = "".join(f", {each}" for each in asked["where"])
+    state = dataset["search_state"].item()
+    return Found(
+        about=[f"Least {asked['of']}{where}: {dataset.sizes['point']} runs, {state}."],
+        warning=warning,
+        headings=names,
+        units=[unit_text(dataset[name].attrs.get("units")) for name in names],
+        rows=[list(map(value_text, run.values())) for run in best],
+        words=0,
+        marks=[{name: (run[name], None, None) for name in asked["ranges"]} for run in best[:1]],
+    )

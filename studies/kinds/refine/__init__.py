@@ -1,0 +1,1 @@
+"""A refinement: runs only where the numbers of a study are not as expected."""

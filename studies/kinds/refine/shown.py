@@ -1,0 +1,43 @@
+"""What a refinement has found: the errors that it has left in its cells."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from studies.kinds.refine.cells import ERROR
+from studies.views.columns import plain, unit_text, value_text
+from studies.views.found import Found
+
+
+def found(dataset: xr.Dataset, refine: Mapping[str, Any]) -> Found:
+    """Return the errors that a refinement has left in its cells."""
+    count = Counter(dataset["cell_state"].to_numpy().astype(str).tolist())
+    states = ", ".join(f"{number} {state}" for state, number in count.most_common())
+    numbers = [n.removeprefix(ERROR) for n in map(str, dataset.data_vars) if ERROR in n]
+    rows = []
+    for name in numbers:
+        left, values = dataset[f"{ERROR}{name}"].max().item(), dataset[name]
+        width = values.max().item() - values.min().item()
+        unit = unit_text(values.attrs.get("units"))
+        share = 100.0 * left / width if width > 0.0 else np.nan
+        rows.append([plain(name), value_text(left), unit, value_text(share)])
+    until = refine["until"]
+    if isinstance(until, Mapping):
+        miss = ", ".join(f"{plain(name)} by {value_text(each)}" for name, each in until.items())
+    else:
+        miss = f"a number by {value_text(100.0 * until)} % of its range"
+    return Found(
+        about=[
+            f"{dataset.sizes['cell']} cells: {states}.",
+            f"A cell is divided where its runs miss {miss} or more.",
+        ],
+        headings=["number", "largest error left", "unit", "of its range"],
+        units=["", "", "", "%"],
+        rows=rows,
+        words=1,
+    )
