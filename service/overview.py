@@ -59,19 +59,27 @@ class Details:
         self.kept: OrderedDict[tuple[str, int, int], Detail] = OrderedDict()
 
     async def get(self, study_id: str, window: Window, share: Share) -> bytes:
-        """Return a study, with those of its runs that are in ``window``, in a caller's turn."""
+        """Return a study, with those of its runs that are in ``window``, in a caller's turn.
+
+        Who waits while another caller looks at the same study takes no slot.
+        """
         requested = time.monotonic()
         key = study_id, window.limit, window.offset
         detail = self.kept.setdefault(key, Detail())
         self.kept.move_to_end(key)
         try:
-            async with share.turn() as turn, detail.one:
-                if detail.looked < requested:
-                    await turn.here(self._look, study_id, window, detail)
+            while detail.looked < requested:
+                async with detail.one:
+                    pass
+                async with share.turn() as turn:
+                    if detail.looked < requested and not detail.one.locked():
+                        async with detail.one:
+                            await turn.here(self._look, study_id, window, detail)
             return detail.content
         finally:
-            if not detail.content:
-                self.kept.pop(key, None)
+            if not detail.content:  # unless another caller looks, or has begun anew
+                if self.kept.get(key) is detail and not detail.one.locked():
+                    del self.kept[key]
             elif len(self.kept) > KEPT:
                 self.kept.popitem(last=False)
 

@@ -74,8 +74,8 @@ class Settings(BaseSettings):
     reader_seconds: float = Field(
         default=30.0,
         gt=0,
-        description="processor time in a minute for what is computed for a key, and as much for "
-        "what is read; also the longest of reading a scene [s]",
+        description="processor time in a minute for what is read for a key, as much for what is "
+        "computed, and as much for what is combined; also the longest of reading a scene [s]",
     )
     connections: int = Field(default=500, ge=1, description="most connections at a time")
     arrival_seconds: float = Field(

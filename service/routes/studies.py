@@ -16,7 +16,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import WithJsonSchema
 
 from service import maps, overview
-from service.datasets import Datasets
+from service.datasets import GONE, Datasets
 from service.dependencies import (
     TheCombining,
     TheComputing,
@@ -33,7 +33,7 @@ from service.dependencies import (
     TheStore,
     in_turn,
 )
-from service.errors import REFUSED, Conflict, NotFound, QueueLost
+from service.errors import REFUSED, Busy, Conflict, NotFound, QueueLost
 from service.files import NETCDF, UNCHANGED, netcdf, tagged, unchanged
 from service.history import log_of
 from service.job import Job
@@ -332,14 +332,17 @@ async def tile(
     seal of the data set; the parts themselves have none. A key whose time is used waits for them.
     """
     reading, combining = (replace(each, patient=True) for each in (reading, combining))
-    tiles = await datasets.tiles(job, reading, combining)
-    headers = tagged((await reading.here(digest, tiles.path), key))
-    if known := unchanged(request, headers):
-        return known
     try:
-        content = await reading.read(tiles.content, key)
-    except LookupError as error:
-        raise Conflict(str(error)) from None
+        tiles = await datasets.tiles(job, reading, combining)
+        headers = tagged((await reading.here(digest, tiles.path), key))
+        if known := unchanged(request, headers):
+            return known
+        try:
+            content = await reading.read(tiles.content, key)
+        except LookupError as error:
+            raise Conflict(str(error)) from None
+    except FileNotFoundError:
+        raise Busy(GONE) from None
     if content is None:
         raise NotFound("nothing is stored under this key")
     kind = "application/json" if key.endswith(METADATA) else MEDIA_TYPE

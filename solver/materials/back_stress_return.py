@@ -22,6 +22,8 @@ _ROUNDING = 8 * float(np.finfo(float).eps)
 _SMALL = 1e-10
 """Ratio up to which a point counts as solved when further steps do not lessen the residual."""
 _MAX_ITERATIONS = 100
+_BLOCK = 300
+"""Points that are solved together: their arrays stay in the cache of the processor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,6 +176,14 @@ def general_return(
     If no solution is found, dp is NaN and the increment does not converge.
     """
     n, count = s.shape
+    if count > _BLOCK:
+        blocks = (slice(first, first + _BLOCK) for first in range(0, count, _BLOCK))
+        steps = (
+            general_return(s[:, at], back[..., at], accumulated[at], rules, curve, G)
+            for at in blocks
+        )
+        return FlowStep(*(np.concatenate(each, axis=-1) for each in zip(*steps, strict=True)))
+
     scale, xi = von_mises(s), s - back.sum(axis=0)
     q = von_mises(xi)
     growth = q - curve.flow_stress(accumulated)

@@ -9,7 +9,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field
 from multiprocessing import resource_tracker
@@ -30,6 +30,9 @@ _APPEARS = 60.0
 
 _LATE = 3.0
 """Seconds after which it is reported that a scheduler has not answered."""
+
+_LOOKS = 0.2
+"""Seconds after which an interrupt is noticed while workers start."""
 
 _ABSENT = 30.0
 """Seconds without a sign of life of a worker started here until it is replaced."""
@@ -225,8 +228,12 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
 
         # An interrupt while the thread itself starts would leave a thread that nobody waits for.
         starter.submit(int).result()
+        starting = starter.submit(start)
+        # An interrupt that arrives just before the wait does not end it: so this looks again.
+        while wait([starting], timeout=_LOOKS).not_done:
+            pass
         try:
-            cluster = starter.submit(start).result()
+            cluster = starting.result()
         except RuntimeError as error:  # as where a thread of the script asks for them
             raise RuntimeError(
                 "worker processes did not start; they import the calling script again, so it "

@@ -332,11 +332,14 @@ class Rules:
         return Own(found if len(self.axis("s")) else np.nan, LIMIT * found)
 
     def half_width(self) -> Own:
-        """Half-width within its bounds: the edge of contact is found from gaps."""
+        """Middle of its bounds, which allow half of their distance.
+
+        The edge of contact is found from gaps.
+        """
         found = self._acting(self.view.loaded)
-        own = np.clip(self.record.scalars["contact_half_width"], found.least, found.most)
+        own, aside = (found.most + found.least) / 2, (found.most - found.least) / 2
         limit = MEASURED if found.measured else LIMIT
-        return Own(own if len(self.axis("s")) else np.nan, limit * found.most)
+        return Own(own if len(self.axis("s")) else np.nan, aside + limit * found.most)
 
     # -- extremes ---------------------------------------------------------------------------------
 

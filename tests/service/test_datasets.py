@@ -21,6 +21,7 @@ from fastapi.testclient import TestClient
 
 from service import datasets
 from service.app import create_app
+from service.keys import Keys, Scope
 from service.settings import Settings
 from service.turns import Share, Turns, beyond
 from studies import Store, open_study
@@ -34,11 +35,11 @@ AXES = {"load_ratio": [0.3, 0.9], "hardening": ["none", "isotropic"]}
 class Running:
     """A service that computes nothing, with a study of which a half has been computed."""
 
-    def __init__(self, home: Path) -> None:
+    def __init__(self, home: Path, **settings: Any) -> None:
         self.study, self.store = fake_study(sweep=AXES), Store(home / "out")
         self.half = fake_study(sweep=AXES | {"hardening": ["none"]})
         compute_here(self.half, self.store)
-        self.app = create_app(Settings(data=self.store.directory))
+        self.app = create_app(Settings(data=self.store.directory, **settings))
         self.jobs = self.app.state.jobs
         self.jobs.accept(self.study.id, self.study.to_dict(), self.study.run_ids())
         self.jobs.take()
@@ -126,7 +127,7 @@ def test_one_that_took_long_stays_though_others_were_asked_for_meanwhile(
     ended, turns = threading.Event(), Turns(2)
 
     def combined(content: dict[str, Any], *given: Any) -> None:
-        assert content["name"] != later.name or ended.wait(10.0)
+        assert content["name"] != later.name or ended.wait(60.0)
         made(content, *given)
 
     async def current(study_id: str) -> Path:
@@ -188,6 +189,38 @@ def test_keys_of_a_zarr_store_are_chunks_or_nothing(running: Running) -> None:
         "..%2f..%2fdataset.nc", "x/c/" + "9" * 400, ".zgroup", "x/c/\ud800",
     ):  # fmt: skip
         assert get(key.encode("utf-8", "surrogatepass").decode("latin-1")).status_code == 404, key
+
+
+def test_parts_of_a_data_set_wait_for_the_budget_and_say_if_it_is_gone_then(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = Keys(tmp_path / "out").add("anna", Scope.READ)
+    running, waited = Running(tmp_path, require_keys=True), list[str]()
+    running.client.headers["authorization"] = f"Bearer {text}"
+    state, chunk = running.app.state, f"{running.url}/zarr/residual_stress/c/0/0/0/0/0/0"
+
+    def spend() -> None:
+        for turns in (state.reading, state.combining):
+            turns.charge("anna", 60.0)
+
+    async def refilled(turns: Turns, caller: str) -> None:
+        waited.append(caller)
+        turns.refilled.clear()
+        if gone:
+            for path in state.datasets.folder.iterdir():
+                path.unlink()
+
+    monkeypatch.setattr(Turns, "_refilled", refilled)
+    for gone in (False, True):
+        spend()
+        assert running.dataset().status_code == 429
+        answer = running.client.get(chunk)
+        if gone:
+            assert answer.status_code == 503 and "ask again" in answer.json()["detail"]
+            assert "retry-after" in answer.headers
+        else:
+            assert answer.status_code == 200 and "anna" in waited
+    state.datasets.close()
 
 
 def test_the_last_chunk_of_texts_is_as_long_as_the_others(tmp_path: Path) -> None:

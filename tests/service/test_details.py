@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -64,6 +65,37 @@ def test_one_look_serves_all_who_asked_before_it(details: Counted) -> None:
     assert 4 <= details.looks <= 8
 
 
+def test_who_waits_while_another_caller_looks_takes_no_slot(details: Counted) -> None:
+    """Nor does the answer go that is being looked up, if one who waits for it leaves."""
+    began, answered = threading.Event(), threading.Event()
+    look_up = details._look_up
+
+    def slow(job: Job, window: Window) -> StudyDetail:
+        if window.offset == 0:
+            began.set()
+            assert answered.wait(20.0), "another page waits for this one"
+        return look_up(job, window)
+
+    details._look_up = slow  # type: ignore[method-assign]
+
+    async def three() -> None:
+        turns = Turns(2, 60.0)
+        anna = asyncio.create_task(details.get("a", Window(), Share(turns, "anna")))
+        await asyncio.to_thread(began.wait)
+        bert = asyncio.create_task(details.get("a", Window(), Share(turns, "bert")))
+        for _ in range(20):
+            await asyncio.sleep(0)  # it has got where it waits
+        other = await details.get("a", Window(offset=1), Share(turns, "cora"))
+        bert.cancel()
+        await asyncio.wait([bert])
+        assert ("a", 100, 0) in details.kept
+        answered.set()
+        assert status(other) == status(await anna) == "running"
+
+    asyncio.run(three())
+    assert not details.kept["a", 100, 0].one.locked()
+
+
 def test_what_has_not_changed_is_not_looked_up(details: Counted) -> None:
     async def twice() -> None:
         first = await details.get("a", Window(), anyone())
@@ -76,7 +108,8 @@ def test_what_has_not_changed_is_not_looked_up(details: Counted) -> None:
 def test_who_asks_after_a_change_sees_it_although_others_look_already(details: Counted) -> None:
     async def change() -> None:
         before = asyncio.create_task(details.get("a", Window(), anyone()))
-        await asyncio.sleep(0.03)  # its look has begun
+        while not details.looks:
+            await asyncio.sleep(0.001)
         details.jobs.finish("a", StudyState.FAILED, "why")
         assert status(await details.get("a", Window(), anyone())) == "failed"
         assert status(await before) in ("running", "failed")

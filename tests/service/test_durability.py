@@ -208,7 +208,7 @@ def test_a_temporary_folder_that_a_kill_leaves_is_removed_at_the_next_start(
     for each in (mortal.process, *family):
         each.kill()
     mortal.process.wait()
-    psutil.wait_procs(family, timeout=10)
+    psutil.wait_procs(family, timeout=60)
     assert left == set(temporary.iterdir())
     mortal.start()
     assert not left & set(temporary.iterdir())

@@ -107,8 +107,8 @@ def test_head_is_get_without_the_body(service: Server, path: str) -> None:
 
 
 def test_head_of_an_event_stream_ends(service: Server) -> None:
-    study_id = service.post(fake_study("endless", seconds=5.0))
-    head = service.client.head(f"/studies/{study_id}/events", timeout=4.0)
+    study_id = service.post(fake_study("endless", seconds=10.0))
+    head = service.client.head(f"/studies/{study_id}/events", timeout=15.0)
     assert head.status_code == 200
     assert head.headers["content-type"].startswith("text/event-stream")
     service.client.delete(f"/studies/{study_id}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import psutil
@@ -17,22 +16,17 @@ def large_study(name: str, paths: int = 60, seconds: float = 0.5, **more: Any) -
     return study | more
 
 
-def seconds_for(server: Server, study: dict[str, Any]) -> float:
-    """Return how long a study takes from its submission to its end."""
-    started = time.monotonic()
-    assert server.finished(server.post(study))["status"] == "successful"
-    return time.monotonic() - started
-
-
 def test_a_small_study_does_not_wait_for_the_end_of_a_large_one(lively: Server) -> None:
     large = lively.post(large_study("large"))
     wait_until(lambda: lively.study(large)["progress"] > 0)
     small = fake_study("small")
     small["sweep"] = {"load_ratio": [0.75]}
-    assert seconds_for(lively, small) < 15.0
+    assert lively.finished(lively.post(small))["status"] == "successful"
     assert lively.study(large)["status"] == "running"
     assert lively.study(large)["progress"] < 90.0
     lively.client.delete(f"/studies/{large}")
+    # Gone for good: a lost queue would have it computed to its end.
+    wait_until(lambda: lively.client.delete(f"/studies/{large}?purge=true").status_code == 204)
 
 
 def test_what_two_studies_share_is_computed_once(lively: Server) -> None:
@@ -78,7 +72,7 @@ def test_a_lost_queue_is_made_anew_from_the_studies(lively: Server) -> None:
     done, failed = lively.post(fake_study("done")), lively.post(fake_study("f", behaviour="limit"))
     ends = {study_id: lively.finished(study_id) for study_id in (done, failed)}
     ended = len(lively.computed())
-    running = lively.post(large_study("running", paths=30, seconds=0.25))
+    running = lively.post(large_study("running", paths=12, seconds=0.25))
     wait_until(lambda: lively.study(running)["progress"] > 0)
     queue = lively.data / "jobs.sqlite"
     queue.unlink()
@@ -91,10 +85,9 @@ def test_a_lost_queue_is_made_anew_from_the_studies(lively: Server) -> None:
         found = lively.study(study_id)
         for part in ("status", "message", "counts", "runs", "sweep"):
             assert found[part] == end[part]
-    assert lively.finished(running)["counts"] == {"ok": 30}
-    # A study that was stopped before its data set was written is computed as well.
-    more = [line for line in lively.computed()[ended:] if '"seconds": 0.5' not in line]
-    assert len([line for line in more if '"seconds": 0.25' in line]) == len(more) <= 30 + 2
+    assert lively.finished(running)["counts"] == {"ok": 12}
+    more = lively.computed()[ended:]
+    assert len([line for line in more if '"seconds": 0.25' in line]) == len(more) <= 12 + 2
 
 
 def test_a_study_that_nobody_computes_says_so(mortal: Server) -> None:

@@ -30,7 +30,7 @@ def freeze(
     """Sleep, or stop the process as a debugger would; `task` says which."""
     if task[0] == "freeze":
         report({"pid": os.getpid()})
-        time.sleep(0.2)  # the report is on its way
+        time.sleep(1.0)  # the report is on its way
         os.kill(os.getpid(), signal.SIGSTOP)
     nap(task[1], report, should_stop)
 

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
+from typing import Self
 
+import dask
+import distributed
 import pytest
 
+from studies.execution import cluster
+from studies.execution.cluster import own_workers
 from tests.architecture.sources import ROOT
 
 pytestmark = pytest.mark.processes
@@ -81,3 +88,39 @@ def test_a_process_of_ours_with_one_thread_is_forked_without_its_files(
         "parent": "program.py" if forked else "-c",
         "cwd of the server": "/",
     }
+
+
+def test_workers_end_though_ctrl_c_comes_while_they_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their start ends after the caller has reacted; their folder is there until they have ended.
+
+    The signal is noted by another thread, as if it had come just before the caller waits.
+    """
+    ended: list[bool] = []
+    reacted = threading.Event()
+
+    def interrupted(*_: object) -> None:
+        reacted.set()
+        raise KeyboardInterrupt
+
+    class Starting:
+        def __init__(self, **_: object) -> None:
+            self.folder = Path(dask.config.get("temporary-directory"))
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
+            signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+            self.reacted = reacted.wait(60.0)
+
+        def __enter__(self) -> Self:
+            return self
+
+        def __exit__(self, *error: object) -> None:
+            ended.append(self.reacted and self.folder.is_dir())
+
+    monkeypatch.setattr(distributed, "LocalCluster", Starting)
+    monkeypatch.setattr(cluster, "prepare_workers", lambda: "spawn")
+    before = signal.signal(signal.SIGINT, interrupted)
+    try:
+        with pytest.raises(KeyboardInterrupt), own_workers(1):
+            pytest.fail("they had started")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert ended == [True]

@@ -257,7 +257,7 @@ def test_a_path_that_takes_too_long_is_ended_though_it_reports(two: Access) -> N
 
 def test_time_in_the_queue_does_not_count(two: Access) -> None:
     with Grid(two) as grid:
-        limits = Limits(stall_seconds=1.5, path_seconds=1.5)
+        limits = Limits(stall_seconds=3.0, path_seconds=3.0)
         ends = [e for e in grid.run(nap, [0.7] * 10, never, limits) if isinstance(e, Finished)]
     assert [end.error for end in ends] == [None] * 10
 

@@ -66,7 +66,7 @@ def test_a_killed_parent_leaves_only_whole_runs_and_its_workers_die(
         family = psutil.Process(parent.pid).children(recursive=True)
         parent.send_signal(signal.SIGKILL)
         parent.wait()
-    _, alive = psutil.wait_procs(family, timeout=10)
+    _, alive = psutil.wait_procs(family, timeout=60)
     assert alive == []
     done = finished(store)
     assert 2 <= len(done) < RUNS
@@ -155,7 +155,7 @@ def test_ctrl_c_stops_cleanly(slow: tuple[Study, Store, Path], tmp_path: Path) -
     with start(study, store.directory, tmp_path) as parent:
         wait_until(lambda: len(finished(store)) >= 2)
         os.killpg(parent.pid, signal.SIGINT)  # a terminal sends it to the workers as well
-        output, errors = parent.communicate(timeout=20)
+        output, errors = parent.communicate(timeout=60)
     assert parent.returncode == 130
     assert "missing" in output
     assert "Traceback" not in output + errors

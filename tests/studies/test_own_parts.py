@@ -40,7 +40,7 @@ value = -420.0
 
 [loading]
 factor = 1.0
-step = 0.01
+step = 0.05
 
 [outputs.strain]
 of = "plastic_strain"
