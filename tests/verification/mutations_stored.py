@@ -526,7 +526,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "residual stress of layers without zz": _passed(times(Layers, "stress", 0.9), STORED),
     "the first pass told as the last": _passed(
-        instead(solver.rolling.scenes.rolling_setup, "passes", first_pass_last), STORED
+        instead(solver.rolling.scenes.rolling_setup, "profiles", first_pass_last), STORED
     ),
     "shear of a wheel against its way": _passed(
         instead(SteadyTractions, "along", part_times(1, -1.0)),
