@@ -256,8 +256,10 @@ def pressure_lines(law: FrictionLaw, n: int, strength: float) -> BoundLines:
     Raises
     ------
     ModelError
-        naming the law, if it asks for slip or plastic strain
+        naming the law, if it asks for slip or plastic strain; naming its shear limit, if the body
+        is elastic, of infinite strength
     """
+    law.check_bodies(elastic=bool(np.isinf(strength)))
 
     def nothing() -> Array:
         allowed = "must not depend on slip or plastic strain on a track without ends"

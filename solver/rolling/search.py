@@ -77,11 +77,18 @@ def search(
         law: Law, rolls: RollingLoad, guess: Array | None, parts: int | None, tolerance: float
     ) -> Pass[S]:
         nonlocal start
-        found = passing(
-            track, law, load.changed(load=rolls), before, guess, start=start, parts=parts,
-            tolerance=tolerance, budget=budget,
-        )  # fmt: skip
-        start = found.loading.start
+        own = rolls is load.load
+        try:
+            found = passing(
+                track, law, load.changed(load=rolls), before, guess, start=start, parts=parts,
+                tolerance=tolerance, budget=budget,
+            )  # fmt: skip
+        except Spins as spins:
+            if own and law is material:
+                raise
+            raise NotConverged(str(spins)) from spins  # an easier pass proves nothing
+        if own:  # the contact of another load may be far from that of this one
+            start = found.loading.start
         return found
 
     def exactly(rolls: RollingLoad, guess: Array | None = None) -> Pass[S]:

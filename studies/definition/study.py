@@ -78,8 +78,7 @@ class Study(BaseModel):
     keep : ``fields`` keeps the fields at all nodes in the file of each run
     allow : ``large_strain`` makes runs outside small-strain theory count as ok (see `taken`); it
         includes what the scene allows
-    choice : what chooses the runs: what the study says under the name of a kind of `KINDS`, by this
-        name; empty if the runs are those of the axes
+    choice : the entry of a kind of `KINDS`, by the name of the kind; empty for a plain sweep
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_described)
@@ -260,7 +259,8 @@ class Study(BaseModel):
                 if name in fixed or name in owners(axes):
                     where = "parameters" if name in fixed else f"sweep.{owners(axes)[name]}"
                     allowed = f"is what the {kind.name} searches: take it out of {where}"
-                    value = reduce(getitem, field.split(".")[1:], found.content)
+                    given = {**found.content, **content[kind.name]}
+                    value = reduce(getitem, field.split(".")[1:], given)
                     raise StudyError(field, value, allowed)
             for other in others:
                 allowed = f"chooses the runs, and so does the {kind.name}: keep one"

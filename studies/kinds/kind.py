@@ -182,4 +182,4 @@ class Kind:
         """
         places = list(cases)
         for case in itertools.islice(itertools.cycle(places), self.most_runs(len(places))):
-            yield case, self.first, [case.values.get(branch)]
+            yield case, self.first, [{**case.values, **self.first}.get(branch)]

@@ -115,6 +115,20 @@ def test_a_condition_that_no_run_meets_is_reported(tmp_path: Path) -> None:
     assert not found.marks
 
 
+def test_a_search_of_one_run_lists_it_without_a_mark(tmp_path: Path) -> None:
+    run_study(study(where=[], starts=1, most=1), Store(tmp_path), workers=0)
+    found, _ = found_in(tmp_path)
+    assert len(found.rows) == 1
+    assert not found.marks
+
+
+@pytest.mark.processes
+def test_a_search_that_is_stopped_before_its_first_run_has_a_data_set(tmp_path: Path) -> None:
+    stopped = run_study(study(), Store(tmp_path), workers=1, should_stop=lambda: True)
+    assert stopped.stopped
+    assert set(stopped.counts) == {"missing"}
+
+
 def test_each_place_of_an_axis_has_a_minimum(tmp_path: Path) -> None:
     own = study(sweep={"hardening": ["none", "isotropic"]}, starts=1)
     most = estimate(own, Store(tmp_path))

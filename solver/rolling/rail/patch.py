@@ -92,7 +92,8 @@ class RollingPatch(PatchLoad):
     def changed(self, **changes: Any) -> Self:
         """See `PassingLoad`; influences of tractions are shared with a wheel of this elasticity."""
         other = replace(self, **changes)
-        if other.wheel.elasticity == self.wheel.elasticity:
+        same = other.grid is self.grid and other.compliance is self.compliance
+        if same and other.wheel.elasticity == self.wheel.elasticity:
             vars(other)["_influence"] = self._influence
         return other
 

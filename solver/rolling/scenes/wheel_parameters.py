@@ -123,6 +123,9 @@ def check_traction(parameters: Any) -> None:
     if p.friction_law != "coulomb" and traction not in (0.0, 1.0):
         allowed = "must be 0 or 1 unless friction_law is coulomb: full slip is friction * force"
         raise ModelError("traction", traction, allowed)
+    if traction not in (0.0, 1.0) and not p.friction:
+        allowed = "must be 0 or 1 without a coefficient of friction: full slip is friction * force"
+        raise ModelError("traction", traction, allowed)
     if p.control == "creepage" and traction:
         raise ModelError("traction", traction, "must be 0 with control = creepage")
     if p.given_creepage and p.control != "creepage":

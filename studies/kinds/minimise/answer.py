@@ -14,5 +14,5 @@ def answers(study: Study, programs: list[Minimising]) -> Answers:
     state = program.reason or study.kind.ends[1]
     return Answers(
         content=lambda: {"search_state": described((), state, "how the search ended")},
-        points=[program.sets(key) for key, row in program.rows.items() if row],
+        points=[program.sets(key) for key in program.rows if key not in program.refusals],
     )

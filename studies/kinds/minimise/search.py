@@ -25,7 +25,7 @@ _RADII = {"initial_tr_radius": 0.2, "final_tr_radius": 0.01}  # of trust: shares
 
 @dataclass(frozen=True, kw_only=True)
 class Minimise(Ranged):
-    """What is minimised: ``of``, where conditions hold, with at most so many runs at each place."""
+    """What is minimised: ``of``, where conditions hold, with ``most`` runs times the places."""
 
     name = "minimise"
     entries = ("of", "where", "ranges", "first", "starts", "most")

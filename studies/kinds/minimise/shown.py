@@ -29,5 +29,6 @@ def found(dataset: xr.Dataset, asked: Mapping[str, Any]) -> Found:
         units=[unit_text(dataset[name].attrs.get("units")) for name in names],
         rows=[list(map(value_text, run.values())) for run in best],
         words=0,
-        marks=[{name: (run[name], None, None) for name in asked["ranges"]} for run in best[:1]],
+        # a run alone has no axis to mark it on
+        marks=[{n: (run[n], None, None) for n in asked["ranges"]} for run in best[:1] if names[1:]],
     )
