@@ -46,7 +46,6 @@ LARGE = (
     "between: it is written when the study ends. Until then read the numbers of all runs in "
     "/studies/{id}/table.csv, and single runs in /runs/{run}.nc"
 )
-GONE = "the data set was made again, or deleted, while this request waited: ask again"
 AGAIN = "the data set was lost or damaged, and is made again from the runs: ask later"
 
 

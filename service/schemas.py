@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.job import StudyState
 from studies.definition.sweep import Axes
-from studies.kinds import KINDS
+from studies.kinds import DESCRIBED
 
 ContentId = Annotated[
     str, Path(pattern="^[0-9a-f]{32}$", description="content id, 32 hexadecimal digits")
@@ -224,9 +224,8 @@ class StudyRun(BaseModel):
 
 def _with_kinds(schema: dict[str, Any]) -> None:
     """Add the entries of kinds of study to the JSON Schema of a study."""
-    for name, kind in KINDS.items():
-        schema["properties"][name] = {"type": "object", "description": kind.meaning}
-        schema["required"].append(name)
+    schema["properties"] |= DESCRIBED
+    schema["required"] += DESCRIBED
 
 
 class StudyDetail(StudySummary):

@@ -16,7 +16,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import WithJsonSchema
 
 from service import maps, overview
-from service.datasets import GONE, Datasets
+from service.datasets import Datasets
 from service.dependencies import (
     TheCombining,
     TheComputing,
@@ -342,7 +342,8 @@ async def tile(
         except LookupError as error:
             raise Conflict(str(error)) from None
     except FileNotFoundError:
-        raise Busy(GONE) from None
+        gone = "the data set was made again, or deleted, while this request waited: ask again"
+        raise Busy(gone) from None
     if content is None:
         raise NotFound("nothing is stored under this key")
     kind = "application/json" if key.endswith(METADATA) else MEDIA_TYPE

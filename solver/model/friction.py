@@ -250,8 +250,10 @@ def lines_of(law: FrictionLaw, at: ContactPlaces) -> BoundLines:
     return found
 
 
-def pressure_lines(law: FrictionLaw, n: int, strength: float) -> BoundLines:
+def pressure_lines(friction: float | FrictionLaw, n: int, strength: float) -> BoundLines:
     """Return the lines of a law that depends on pressure alone, at n places of one strength [MPa].
+
+    A coefficient is Coulomb's law.
 
     Raises
     ------
@@ -259,6 +261,7 @@ def pressure_lines(law: FrictionLaw, n: int, strength: float) -> BoundLines:
         naming the law, if it asks for slip or plastic strain; naming its shear limit, if the body
         is elastic, of infinite strength
     """
+    law = law_of(friction)
     law.check_bodies(elastic=bool(np.isinf(strength)))
 
     def nothing() -> Array:

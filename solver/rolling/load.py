@@ -11,6 +11,9 @@ import numpy as np
 
 from solver.typing import Array
 
+FULL_SLIP = 1.0
+"""Creepage of a wheel that does not turn: all of its contact slips."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RollingLoad:
@@ -46,7 +49,9 @@ class RollingLoad:
         """The load with a creepage at which all of the contact slips, if it has a moment."""
         if not self.drive:
             return self
-        return replace(self, drive=None, creepage=self.creepage + float(np.sign(self.drive)))
+        return replace(
+            self, drive=None, creepage=self.creepage + FULL_SLIP * float(np.sign(self.drive))
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

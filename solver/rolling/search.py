@@ -77,17 +77,17 @@ def search(
         law: Law, rolls: RollingLoad, guess: Array | None, parts: int | None, tolerance: float
     ) -> Pass[S]:
         nonlocal start
-        own = rolls is load.load
+        given = rolls is load.load
         try:
             found = passing(
                 track, law, load.changed(load=rolls), before, guess, start=start, parts=parts,
                 tolerance=tolerance, budget=budget,
             )  # fmt: skip
         except Spins as spins:
-            if own and law is material:
+            if given and law is material:
                 raise
             raise NotConverged(str(spins)) from spins  # an easier pass proves nothing
-        if own:  # the contact of another load may be far from that of this one
+        if given:  # the contact of another load may be far from that of this one
             start = found.loading.start
         return found
 

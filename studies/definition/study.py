@@ -39,7 +39,7 @@ from studies.definition.sweep import (
 )
 from studies.definition.vocabulary import taken
 from studies.errors import StudyError, one_of
-from studies.kinds import KINDS
+from studies.kinds import DESCRIBED, KINDS
 from studies.kinds.kind import Kind
 from studies.kinds.sweep import SweepStudy
 from studies.scenes.names import in_use
@@ -57,8 +57,7 @@ def _none(name: str) -> None:
 def _described(schema: dict[str, Any]) -> None:
     """Add entries that are not kept to the JSON Schema of a study."""
     schema["properties"].pop("choice", None)
-    kinds = {name: {"type": "object", "description": of.meaning} for name, of in KINDS.items()}
-    schema["properties"] |= kinds | SCHEMAS | {EXTENDS: SCHEMA}
+    schema["properties"] |= DESCRIBED | SCHEMAS | {EXTENDS: SCHEMA}
 
 
 class Study(BaseModel):

@@ -77,7 +77,7 @@ class Kind:
     rows, counted, work : what a report, the numbers by status and a message call its results, these
         by status, and its work
     example : the variable of its data set that has the id of a run worth opening
-    ends : the variable of its data set that tells whether it has ended, the word of what has not,
+    ends : the variable of its data set that says whether it has ended, the word of what has not,
         and the variable of the ids of runs
     answers : (study, its choosers) -> `Answers`
     found : (data set, entry) -> `studies.views.found.Found`

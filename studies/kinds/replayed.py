@@ -49,7 +49,7 @@ class Replayed(Chooser):
     positions : the combinations of positions on the axes of the study
     rows : the rows of the runs, in the order in which they were asked for; None while one lacks
     known : what `seen` has returned of them; None of those that failed
-    refusals : what the scene says of runs that it refuses, and why others tell nothing
+    refusals : what the scene says of runs that it refuses, and why others have no result
     reason, message : why it has ended
     """
 
@@ -72,7 +72,7 @@ class Replayed(Chooser):
 
     @abstractmethod
     def seen(self, key: Evaluation, row: Mapping[str, Any]) -> Any:
-        """Return what a run tells; None if it failed."""
+        """Return the result of a run; None if it failed."""
 
     @property
     def most(self) -> int:

@@ -26,5 +26,5 @@ class SweepStudy(Kind):
         return places
 
     def stage(self, places: int, ended: int, told: str) -> str:
-        """Return nothing: its progress tells."""
+        """Return nothing: its progress says all."""
         return ""

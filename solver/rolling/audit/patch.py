@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.audit.pairs import COARSE, GAP, OVERLAP, PRESSED, STILL
 from solver.materials.law import Law
-from solver.model.friction import law_of, pressure_lines
+from solver.model.friction import pressure_lines
 from solver.rolling.audit.flow import largest
 from solver.rolling.rail.friction_cone import NORMAL, TANGENTS
 from solver.rolling.rail.half_space import half_space
@@ -85,7 +85,7 @@ class AuditedPatch:
         if not isinstance(self._load, RollingPatch):
             return {}
         shear = np.linalg.norm(self._local[..., TANGENTS], axis=-1)
-        lines = pressure_lines(law_of(self._load.friction), 1, self._law.shear_yield_stress)
+        lines = pressure_lines(self._load.friction, 1, self._law.shear_yield_stress)
         bound = lines.least(self._pressure.ravel()).reshape(self._pressure.shape)
         gap = self._effects[..., NORMAL]
         pressed = np.where(self._closed, self._normal, 0.0)

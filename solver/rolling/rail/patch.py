@@ -27,7 +27,8 @@ import numpy as np
 
 from solver.errors import ModelError, NoContact, Spins, WindowTooSmall
 from solver.linear.threads import one_thread
-from solver.model.friction import BoundLines, FrictionLaw, law_of, pressure_lines
+from solver.model.friction import BoundLines, FrictionLaw, pressure_lines
+from solver.rolling.load import FULL_SLIP
 from solver.rolling.rail.friction_cone import (
     NORMAL,
     OPEN,
@@ -50,8 +51,6 @@ _PRESSED = 0.5
 For a ball in contact over a radius a it is 0.5 at the edge (K.L. Johnson, 1985, section 4.2)."""
 UPSTREAM = (1.5, -2.0, 0.5)
 """Weights of the slip at a station, at the one before and at the second before."""
-_SLIDES = 1.0
-"""Creepage at which all of a contact slips."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,7 +99,7 @@ class RollingPatch(PatchLoad):
     @cached_property
     def _lines(self) -> BoundLines:
         """Friction bound of every point; see `pressure_lines`."""
-        return pressure_lines(law_of(self.friction), 1, self.strength)
+        return pressure_lines(self.friction, 1, self.strength)
 
     @cached_property
     def _influence(self) -> Influence:
@@ -306,7 +305,7 @@ class RollingPatch(PatchLoad):
         size = float(np.hypot(*wanted))
         if not size:
             return
-        along, across = _SLIDES * wanted / size
+        along, across = FULL_SLIP * wanted / size
         slides = replace(
             load, drive=None, lateral_force=None, creepage=load.creepage + float(along),
             lateral_creepage=load.lateral_creepage + float(across),

@@ -118,7 +118,7 @@ def section_of(own: RacewayGeometry) -> Section:
     """Return the meshed section of a raceway, held at its foot."""
     return Section(
         raceway_mesh(2 * own.block, own.block, own.zone, own.groove),
-        own.material,
+        own.elastic,
         supports={"foot": "xyz"},
     )
 

@@ -10,7 +10,7 @@ from annotated_types import Interval, Unit
 
 from solver.materials.elasticity import Elasticity
 from solver.parameters import Fraction, Other, described
-from solver.rolling.load import RollingLoad
+from solver.rolling.load import FULL_SLIP, RollingLoad
 from solver.rolling.scenes.wheel_parameters import (
     CONTROL,
     POISSON,
@@ -27,8 +27,6 @@ from solver.scenes.material_parameters import ContactParameters
 
 ROUGH = {"friction": Other(0.0), "cohesion": Other(0.0), "friction_law": Other("coulomb")}
 """What a creepage needs to have an effect."""
-_LOCKED = 1.0
-"""Creepage of a wheel that does not turn."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +79,7 @@ class PrismParameters(ContactParameters):
         return RollingLoad(
             force=force,
             drive=None if locked or self.control == "creepage" else drive,
-            creepage=_LOCKED if locked else self.given_creepage,
+            creepage=FULL_SLIP if locked else self.given_creepage,
             lateral_creepage=self.lateral_creepage,
         )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -80,7 +81,7 @@ def _weak(law: Law) -> bool:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PrismGeometry:
+class PrismGeometry(ABC):
     """All that the set-up of a prism depends on; runs with equal geometry share it.
 
     Attributes
@@ -101,12 +102,12 @@ class PrismGeometry:
     reach: float
 
     @property
+    @abstractmethod
     def elements(self) -> int:
         """Number of elements of the zone."""
-        raise NotImplementedError
 
     @property
-    def material(self) -> Elasticity:
+    def elastic(self) -> Elasticity:
         """Elastic constants."""
         E, nu = self.elasticity
         return Elasticity(youngs_modulus=E, poisson_ratio=nu)

@@ -25,7 +25,7 @@ from solver.results.shakedown import ShakedownState
 from solver.results.tractions import PrescribedTractions, SurfaceTractions
 from solver.results.view import View
 from solver.rolling.audit.plane import audit_pass
-from solver.rolling.load import PassingLoad, RollingLoad
+from solver.rolling.load import FULL_SLIP, PassingLoad, RollingLoad
 from solver.rolling.passing import Pass, SolveBudget
 from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.rolling import rolling
@@ -140,7 +140,7 @@ def load_on(track: Track, run: RollingParameters, parameters: RollingParameters)
         load=RollingLoad(
             force=p.force,
             drive=None if p.guided else p.traction * friction * p.force,
-            creepage=1.0 if p.traction == 1.0 else p.given_creepage,
+            creepage=FULL_SLIP if p.traction == 1.0 else p.given_creepage,
         ),
     )
 

@@ -202,7 +202,7 @@ def section_of(own: RailGeometry) -> Section:
     spring = own.foundation / (rail.foot if isinstance(rail, MeshedRail) else _FOOT)
     return Section(
         mesh_of(own).mesh,
-        own.material,
+        own.elastic,
         springs={"foot": (spring, spring, spring)},
     )
 

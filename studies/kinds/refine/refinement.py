@@ -150,8 +150,7 @@ class Refine(Kind):
         """Yield as many paths as there may be runs, each to the largest values of the axes."""
         last = {name: values[-1] for name, values in self.axes.items()}
         places = [case for case in cases if case.values == {**case.values, **last}]
-        for case in itertools.islice(itertools.cycle(places), self.most):
-            yield case, {}, [case.values.get(branch)]
+        return Kind.longest(self, places, branch)
 
     @property
     def content(self) -> dict[str, Any]:
