@@ -57,3 +57,14 @@ def test_a_worker_loads_what_a_run_needs_before_it_is_forked_and_nothing_else(
     assert not [name for name in after if name.startswith(ROLLING)]
     first, last = ({name.partition(".")[0] for name in names} for names in (before, after))
     assert last - first <= sys.stdlib_module_names
+
+
+@pytest.mark.processes
+def test_what_knows_all_quantities_has_loaded_no_compiled_loops() -> None:
+    program = (
+        "import sys, solver.shipped; from solver.results.quantities import QUANTITIES; "
+        "print('cycle' in QUANTITIES, 'moving_load' in QUANTITIES, 'numba' in sys.modules)"
+    )
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout.split() == ["True", "False", "False"]

@@ -72,8 +72,13 @@ def cpu_seconds(process: psutil.Process) -> float:
 
 
 def megabytes(process: psutil.Process) -> float:
-    """Return the memory of a process that no other one shares [MB]."""
-    return process.memory_full_info().uss / 1e6
+    """Return the memory of a process that holds no file [MB].
+
+    Pages of libraries count for no process: they become those of one process alone when the last
+    other one that has loaded the library ends.
+    """
+    memory = process.memory_info()
+    return (memory.rss - memory.shared) / 1e6
 
 
 def restarted(server: Server, **settings: str) -> None:

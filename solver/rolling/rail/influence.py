@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, njit
 
+from solver.late import late
 from solver.typing import Array, Ints
+
+(between,) = late("rolling.kernels", "between")
 
 
 class Influence:
@@ -47,26 +49,4 @@ class Influence:
         rows : (len(at), 3) weights of the effects' components
         columns : (len(by), 3) components of the values
         """
-        return _between(self._blocks, at, rows, by, columns)
-
-
-@njit(
-    (float64[:, :, :, :, ::1], int64[::1], float64[:, ::1], int64[::1], float64[:, ::1]), cache=True
-)
-def _between(
-    blocks: Array, at: Ints, rows: Array, by: Ints, columns: Array
-) -> Array:  # pragma: no cover - compiled
-    length, m = blocks.shape[:2]
-    out = np.empty((len(at), len(by)))
-    for i in range(len(at)):
-        station, vertex = divmod(at[i], m)
-        for j in range(len(by)):
-            other, source = divmod(by[j], m)
-            block = blocks[(station - other) % length, vertex, source]
-            value = 0.0
-            for a in range(3):
-                if rows[i, a] != 0.0:
-                    for b in range(3):
-                        value += rows[i, a] * block[a, b] * columns[j, b]
-            out[i, j] = value
-    return out
+        return between(self._blocks, at, rows, by, columns)

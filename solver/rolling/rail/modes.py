@@ -24,10 +24,10 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import float32, float64, njit
 from scipy import sparse
 
 from solver.errors import ModelError
+from solver.late import late
 from solver.linear import solvers as linear
 from solver.linear.schur import Elimination, with_block
 from solver.linear.solvers import Factors
@@ -37,6 +37,8 @@ from solver.typing import Array, Bools, Ints
 _ORDER = (0, 1, 2, 4, *I_COMPONENTS)
 """Mandel components inside: those that carry i come last."""
 _PLAIN = len(_ORDER) - len(I_COMPONENTS)
+
+(weighted,) = late("rolling.kernels", "weighted")
 
 
 class ZoneResponse(NamedTuple):
@@ -215,7 +217,7 @@ class Modes:
         ----------
         nodal : (waves, 2, m) nodal forces, as for `solved` [N/mm]
         """
-        amplitudes = _weighted(nodal, self.columns)  # (waves, 2, n_rows)
+        amplitudes = weighted(nodal, self.columns)  # (waves, 2, n_rows)
         return self._rows_at_stations(amplitudes.reshape(-1, len(self.along)).T)
 
     def moved_by(self, forces: Array) -> Array:
@@ -332,27 +334,6 @@ class Modes:
         """Return the displacements (n_rows, window) of amplitudes (n_rows, 2 waves)."""
         plain, carrying = self._back
         return np.where(self.along[:, None], amplitudes @ carrying, amplitudes @ plain)
-
-
-@njit(
-    [float64[:, :, ::1](kind[:, :, ::1], float64[:, :, ::1]) for kind in (float32, float64)],
-    cache=True,
-)
-def _weighted(forces: Array, columns: Array) -> Array:  # pragma: no cover - compiled
-    """Return sums (waves, k, n) of columns (waves, m, n), times forces (waves, k, m).
-
-    Columns of nodes without force, most of them, are not read.
-    """
-    waves, count, size = forces.shape
-    out = np.zeros((waves, count, columns.shape[2]))
-    for wave in range(waves):
-        for node in range(size):
-            for k in range(count):
-                force = forces[wave, k, node]
-                if force != 0.0:
-                    for row in range(columns.shape[2]):
-                        out[wave, k, row] += force * columns[wave, node, row]
-    return out
 
 
 def superposed(

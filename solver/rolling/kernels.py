@@ -1,0 +1,287 @@
+"""Loops compiled by numba: flow of a material along rows, and sums over the stations of a track.
+
+The types of all arguments are fixed, so that importing this module compiles all that is ever used,
+or reads what an earlier import compiled; `make setup` does this. Their users import it at the first
+call: numba and the compiled code take 110 MB, which a process that does not roll does not need.
+
+Rows of points: every row starts with the state before the pass and takes the strains of its points
+one after the other. The derivative is propagated in the same way. The law is that of
+`radial_return`, von Mises with linear isotropic and kinematic hardening, written in deviators.
+
+Strains have n = 4 components in two dimensions and 6 in three. The loops take n from the length
+of a tuple, not from the shape of an array: a tuple's length is part of its type, so that loops over
+components are compiled for each n, and unrolled. The return is inlined, which halves the time.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import float32, float64, int64, njit, types
+
+from solver.materials.radial_return import SQRT23
+
+_PLANE = (0, 0, 0, 0)
+"""One entry for each component in two dimensions."""
+_LINE, _TABLE = float64[::1], float64[:, ::1]
+_ROWS, _STEPS = float64[:, :, ::1], float64[:, :, :, ::1]
+_EACH = tuple(types.UniTuple(int64, n) for n in (4, 6))
+
+
+@njit(cache=True, inline="always")
+def _trial(strain, plastic, accumulated, law, step, each):  # type: ignore[no-untyped-def]
+    """Return the norm of the trial stress, and by how much it is beyond the yield surface.
+
+    `step` receives the trial stress.
+    """
+    n = len(each)
+    double_shear, kappa, Hi, _, Re = law
+    mean = (strain[0] + strain[1] + strain[2]) / 3.0
+    size = 0.0
+    for k in range(n):
+        trial = double_shear * (strain[k] - (mean if k < 3 else 0.0)) - kappa * plastic[k]
+        step[k] = trial
+        size += trial * trial
+    size = math.sqrt(size)
+    return size, size - SQRT23 * (Re + Hi * accumulated)
+
+
+@njit(cache=True, inline="always")
+def _return(strain, plastic, accumulated, law, step, each):  # type: ignore[no-untyped-def]
+    """Update `plastic` (n,) by an increment to `strain`; return the accumulated strain.
+
+    `step` (n + 2,) receives the flow direction, the multiplier and the norm of the trial stress.
+    """
+    n = len(each)
+    size, beyond = _trial(strain, plastic, accumulated, law, step, each)
+    step[n + 1] = size
+    if beyond <= 0.0:
+        step[n] = 0.0
+        return accumulated
+    gamma = beyond / law[3]
+    step[n] = gamma
+    for k in range(n):
+        step[k] /= size
+        plastic[k] += gamma * step[k]
+    return accumulated + SQRT23 * gamma
+
+
+@njit(cache=True, inline="always")
+def _return_along(strain, plastic, accumulated, law, step, each):  # type: ignore[no-untyped-def]
+    """Update the derivatives `plastic` (n,) and `accumulated` by the same increment."""
+    n = len(each)
+    gamma = step[n]
+    if gamma == 0.0:
+        return accumulated
+    double_shear, kappa, Hi, modulus, _ = law
+    mean = (strain[0] + strain[1] + strain[2]) / 3.0
+    trial = np.empty(n)
+    along = 0.0
+    for k in range(n):
+        trial[k] = double_shear * (strain[k] - (mean if k < 3 else 0.0)) - kappa * plastic[k]
+        along += step[k] * trial[k]
+    grows = (along - SQRT23 * Hi * accumulated) / modulus
+    turn = gamma / step[n + 1]
+    for k in range(n):
+        plastic[k] += grows * step[k] + turn * (trial[k] - along * step[k])
+    return accumulated + SQRT23 * grows
+
+
+@njit([(_ROWS, _TABLE, _LINE, _LINE, _STEPS, each) for each in _EACH], cache=True)
+def flow(strain, plastic, accumulated, law, steps, each):  # type: ignore[no-untyped-def]
+    """Let material flow along rows.
+
+    From one column to the next strain grows in equal increments. If the state at both ends is
+    within the yield surface, which is convex, all increments are elastic.
+
+    Parameters
+    ----------
+    strain : (n_rows, n_columns + 1, n) Mandel, downstream; the first column is before the pass
+    plastic, accumulated : (n_rows, n) and (n_rows,), before the pass
+    law : 2 G, 2 G + 2/3 Hk, Hi, 2 G + 2/3 H, Re [MPa]
+    steps : (n_rows, n_columns, parts, n + 2) zeros, for the increments from one column to the next;
+        receives what `flow_along` needs
+    each : a tuple with n entries, see above
+
+    Returns
+    -------
+    plastic strain (n_rows, n_columns, n) and accumulated strain (n_rows, n_columns) at the columns
+    """
+    n = len(each)
+    n_rows, n_columns, parts = steps.shape[:3]
+    flowed = np.empty((n_rows, n_columns, n))
+    total = np.empty((n_rows, n_columns))
+    now, e, trial = np.empty(n), np.empty(n), np.empty(n)
+    for row in range(n_rows):
+        now[:] = plastic[row]
+        a = accumulated[row]
+        inside = _trial(strain[row, 0], now, a, law, trial, each)[1] <= 0.0
+        for column in range(n_columns):
+            elastic = _trial(strain[row, column + 1], now, a, law, trial, each)[1] <= 0.0
+            if not (inside and elastic):
+                for part in range(parts):
+                    share = (part + 1.0) / parts
+                    for k in range(n):
+                        before = strain[row, column, k]
+                        e[k] = before + share * (strain[row, column + 1, k] - before)
+                    a = _return(e, now, a, law, steps[row, column, part], each)
+            inside = True
+            flowed[row, column] = now
+            total[row, column] = a
+    return flowed, total
+
+
+@njit([(_ROWS, _LINE, _STEPS, each) for each in _EACH], cache=True)
+def flow_along(strain, law, steps, each):  # type: ignore[no-untyped-def]
+    """Return the changes of the results of `flow` for a change of strain.
+
+    Parameters
+    ----------
+    strain : (n_rows, n_columns, n) change of strain at the columns; upstream it is zero
+    steps : from `flow`
+    each : a tuple with n entries, see above
+
+    Returns
+    -------
+    changes of plastic strain (n_rows, n_columns, n) and accumulated strain (n_rows, n_columns)
+    """
+    n = len(each)
+    n_rows, n_columns, parts = steps.shape[:3]
+    flowed = np.empty((n_rows, n_columns, n))
+    total = np.empty((n_rows, n_columns))
+    now, e = np.empty(n), np.empty(n)
+    for row in range(n_rows):
+        now[:] = 0.0
+        a = 0.0
+        for column in range(n_columns):
+            for part in range(parts):
+                if steps[row, column, part, n] == 0.0:
+                    continue
+                share = (part + 1.0) / parts
+                for k in range(n):
+                    before = strain[row, column - 1, k] if column else 0.0
+                    e[k] = before + share * (strain[row, column, k] - before)
+                a = _return_along(e, now, a, law, steps[row, column, part], each)
+            flowed[row, column] = now
+            total[row, column] = a
+    return flowed, total
+
+
+@njit((_TABLE, _LINE, _LINE, float64), cache=True)
+def close(plastic, accumulated, law, bulk):  # type: ignore[no-untyped-def]
+    """Return the state of rows behind the load, where no stress acts on planes y = const.
+
+    The strains along x and z return to zero. If the unloaded stress of a row is outside the yield
+    surface, the row flows. This is the residual state of a half-plane, with 4 components: of the
+    strains only yy and xy follow from stress.
+
+    Parameters
+    ----------
+    plastic, accumulated : (n_rows, 4) and (n_rows,) at the last column
+    law : as for `flow`
+    bulk : bulk modulus [MPa]
+
+    Returns
+    -------
+    plastic (n_rows, 4), accumulated (n_rows,), steps (n_rows, 6), inverses (n_rows, 2, 2) : the
+    last two for `close_along`
+    """
+    double_shear = law[0]
+    n_rows = len(plastic)
+    flowed, total = plastic.copy(), accumulated.copy()
+    steps, inverses = np.zeros((n_rows, 6)), np.zeros((n_rows, 2, 2))
+    e, now = np.zeros(4), np.empty(4)
+    along, unit = np.empty(4), np.zeros(4)
+    share = (bulk - double_shear / 3.0) / (bulk + 2.0 * double_shear / 3.0)
+    jacobian = np.empty((2, 2))
+    for row in range(n_rows):
+        e[1] = plastic[row, 1] + share * (plastic[row, 0] + plastic[row, 2])
+        e[3] = plastic[row, 3]
+        for _ in range(30):
+            now[:] = plastic[row]
+            total[row] = _return(e, now, accumulated[row], law, steps[row], _PLANE)
+            normal = bulk * e[1] + double_shear * (e[1] * 2.0 / 3.0 - now[1])
+            shear = double_shear * (e[3] - now[3])
+            for column in range(2):
+                at = 1 if column == 0 else 3
+                unit[:] = 0.0
+                unit[at] = 1.0
+                along[:] = 0.0
+                _return_along(unit, along, 0.0, law, steps[row], _PLANE)
+                whole = bulk + double_shear * 2.0 / 3.0 if column == 0 else 0.0
+                jacobian[0, column] = whole - double_shear * along[1]
+                jacobian[1, column] = (double_shear if column == 1 else 0.0) - double_shear * along[
+                    3
+                ]
+            inverses[row] = np.linalg.inv(jacobian)
+            if abs(normal) + abs(shear) < 1e-11 * law[4]:
+                break
+            e[1] -= inverses[row, 0, 0] * normal + inverses[row, 0, 1] * shear
+            e[3] -= inverses[row, 1, 0] * normal + inverses[row, 1, 1] * shear
+        flowed[row] = now
+    return flowed, total, steps, inverses
+
+
+@njit((_TABLE, _LINE, _LINE, _TABLE, _ROWS), cache=True)
+def close_along(plastic, accumulated, law, steps, inverses):  # type: ignore[no-untyped-def]
+    """Return the change of the plastic strain (n_rows, 4) of `close`.
+
+    `plastic` (n_rows, 4) and `accumulated` (n_rows,) are the changes at the last column.
+    """
+    double_shear = law[0]
+    out = np.empty_like(plastic)
+    e, now = np.zeros(4), np.empty(4)
+    for row in range(len(plastic)):
+        e[:] = 0.0
+        now[:] = plastic[row]
+        _return_along(e, now, accumulated[row], law, steps[row], _PLANE)
+        normal, shear = -double_shear * now[1], -double_shear * now[3]
+        e[1] = -(inverses[row, 0, 0] * normal + inverses[row, 0, 1] * shear)
+        e[3] = -(inverses[row, 1, 0] * normal + inverses[row, 1, 1] * shear)
+        now[:] = plastic[row]
+        _return_along(e, now, accumulated[row], law, steps[row], _PLANE)
+        out[row] = now
+    return out
+
+
+@njit(
+    (float64[:, :, :, :, ::1], int64[::1], float64[:, ::1], int64[::1], float64[:, ::1]), cache=True
+)
+def between(blocks, at, rows, by, columns):  # type: ignore[no-untyped-def]
+    """Return the effects of combinations of values on others; see `Influence.between`."""
+    length, m = blocks.shape[:2]
+    out = np.empty((len(at), len(by)))
+    for i in range(len(at)):
+        station, vertex = divmod(at[i], m)
+        for j in range(len(by)):
+            other, source = divmod(by[j], m)
+            block = blocks[(station - other) % length, vertex, source]
+            value = 0.0
+            for a in range(3):
+                if rows[i, a] != 0.0:
+                    for b in range(3):
+                        value += rows[i, a] * block[a, b] * columns[j, b]
+            out[i, j] = value
+    return out
+
+
+@njit(
+    [float64[:, :, ::1](kind[:, :, ::1], float64[:, :, ::1]) for kind in (float32, float64)],
+    cache=True,
+)
+def weighted(forces, columns):  # type: ignore[no-untyped-def]
+    """Return sums (waves, k, n) of columns (waves, m, n), times forces (waves, k, m).
+
+    Columns of nodes without force, most of them, are not read.
+    """
+    waves, count, size = forces.shape
+    out = np.zeros((waves, count, columns.shape[2]))
+    for wave in range(waves):
+        for node in range(size):
+            for k in range(count):
+                force = forces[wave, k, node]
+                if force != 0.0:
+                    for row in range(columns.shape[2]):
+                        out[wave, k, row] += force * columns[wave, node, row]
+    return out
