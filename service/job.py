@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 import sqlite3
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import Any
 
-from studies.storage.database import checksum
-
-log = logging.getLogger(__name__)
-
-UNREADABLE = "its row in the queue cannot be read: post the study again"
+from studies.storage.database import WrongContent
 
 
 class StudyState(StrEnum):
@@ -47,7 +42,6 @@ class Job:
     priority : the study with the greater priority is computed first
     submitted, started, finished : ISO 8601, UTC
     turn : the greater was accepted or retried later
-    digest : checksum of the text of the study
     bytes : estimated size of the runs that it lacked, and of its data set
     stage : of a study that chooses its runs, how far it is; empty for others
     """
@@ -66,29 +60,27 @@ class Job:
     started: str | None
     finished: str | None
     turn: int
-    digest: int
     bytes: float
     stage: str
 
 
 COLUMNS = tuple(each.name for each in fields(Job))
-"""Columns of the table beside the text of the study and the checksum of these."""
+"""Columns of the table besides the text of the study."""
 
 
-def job_of(row: sqlite3.Row) -> Job | None:
-    """Return the job of a row of the table; None if the row is not what was written."""
-    *values, known = row
-    if checksum(values) != known:
-        log.error("%s: %s", row["id"], UNREADABLE)
-        return None
-    return Job(**{**dict(zip(COLUMNS, values, strict=True)), "state": StudyState(row["state"])})
+def job_of(row: sqlite3.Row) -> Job:
+    """Return the job of a row of the table; raise `WrongContent` if it has no known state."""
+    try:
+        values = {name: row[name] for name in COLUMNS}
+        return Job(**{**values, "state": StudyState(row["state"])})
+    except ValueError as error:
+        raise WrongContent(f"the row of study {row['id']!r} is damaged: {error}") from None
 
 
 def row_of(job: Job) -> list[Any]:
-    """Return the row of a job: its columns, and their checksum."""
+    """Return the row of a job, without the text of the study."""
     values = [getattr(job, name) for name in COLUMNS]
-    plain = [str(each) if isinstance(each, StudyState) else each for each in values]
-    return [*plain, checksum(plain)]
+    return [str(each) if isinstance(each, StudyState) else each for each in values]
 
 
 def wanted(
@@ -106,9 +98,9 @@ def wanted(
     tag : one of the tags of its study
     text : a part of its name or note, in capitals or not
     """
-    tagged = "json_valid(study) AND ? IN (SELECT value FROM json_each(study, '$.tags'))"
-    noted = "CASE WHEN json_valid(study) THEN json_extract(study, '$.note') END"
-    said = f"instr(lower(name || ' ' || COALESCE({noted}, '')), lower(?))"
+    tagged = "? IN (SELECT value FROM json_each(study, '$.tags'))"
+    noted = "COALESCE(json_extract(study, '$.note'), '')"
+    said = f"instr(lower(name || ' ' || {noted}), lower(?))"
     conditions = {"state = ?": state, "name = ?": name, "scene = ?": scene, tagged: tag, said: text}
     clauses = [clause for clause, value in conditions.items() if value is not None]
     values = [str(value) for value in conditions.values() if value is not None]

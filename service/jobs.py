@@ -2,8 +2,7 @@
 
 The state of a study is in its row alone. Routes write the requests of users into it (accept,
 dismiss, retry); the runner reads these, and writes the results. After a crash the service reads
-the remaining work from it. Each row has a checksum; one that cannot be read does not affect others.
-The ids of runs have none: they are made from content, and one that is wrong has no file.
+the remaining work from it. A queue that cannot be read is made again from the studies.
 """
 
 from __future__ import annotations
@@ -21,11 +20,11 @@ from typing import Any
 
 from service import schema
 from service.errors import Busy, Conflict, NotFound, QueueLost
-from service.job import COLUMNS, UNREADABLE, Job, StudyState, job_of, row_of, wanted
-from studies.storage.database import Database, check, checksum
+from service.job import COLUMNS, Job, StudyState, job_of, row_of, wanted
+from studies.storage.database import Database, WrongContent, check
 
-ALL = ", ".join((*COLUMNS, "checksum"))
-MARKS = ", ".join("?" * len(ALL.split(",")))
+ALL = ", ".join(COLUMNS)
+MARKS = ", ".join("?" * len(COLUMNS))
 NEXT_TURN = "SELECT COALESCE(MAX(turn), 0) + 1 FROM job"
 BEGUN = {"state": StudyState.RUNNING, "message": "", "finished": None}
 SHARED = """SELECT 1 FROM run AS mine JOIN run AS theirs ON theirs.run = mine.run
@@ -46,7 +45,7 @@ class Jobs(Database):
 
     Parameters
     ----------
-    path : the file; created, or converted to the current form, when the queue is opened
+    path : the file; created when the queue is opened
     longest : largest number of waiting studies; None for any number
     """
 
@@ -56,13 +55,12 @@ class Jobs(Database):
         new = not path.exists()
         with self.transaction("BEGIN IMMEDIATE", mode="rwc" if new else "rw") as connection:
             schema.prepare(connection, new)
-            check(connection)
+            _check(connection)
 
     def check(self) -> None:
         """Raise `QueueLost` if the file is missing or damaged; the whole file is read."""
         with self.transaction("BEGIN") as connection:
-            connection.execute("SELECT 1 FROM job, run LIMIT 1")
-            check(connection)
+            _check(connection)
         self.damaged = False
 
     def accept(
@@ -83,30 +81,26 @@ class Jobs(Database):
         far it is. ``size`` is what it will write [bytes]. Raise `Busy` if too many wait.
         """
         with self.transaction() as connection:
-            with suppress(NotFound, Conflict):
-                self._study(connection, job_id)
+            with suppress(NotFound):
                 return self.read(connection, job_id), False
             (waiting,) = connection.execute(
                 "SELECT COUNT(*) FROM job WHERE state = ?", (StudyState.ACCEPTED,)
             ).fetchone()
             if self.longest is not None and waiting >= self.longest:
                 raise Busy(f"{waiting} studies wait already, the largest number: post it later")
-            connection.execute("DELETE FROM job WHERE id = ?", (job_id,))  # an unreadable row
-            connection.execute("DELETE FROM run WHERE job = ?", (job_id,))
             count = connection.executemany(
                 "INSERT INTO run VALUES (?, ?, ?)",
                 ((job_id, position, run) for position, run in enumerate(runs)),
             ).rowcount
-            text = json.dumps(study)
             job = Job(
                 id=job_id, name=study["name"], scene=study["scene"], size=max(count, most, 0),
                 state=StudyState.ACCEPTED, message="", progress=0.0, since=0, stood="",
                 priority=priority, submitted=now(), started=None, finished=None,
-                turn=connection.execute(NEXT_TURN).fetchone()[0], digest=checksum([text]),
-                bytes=float(size), stage=stage,
+                turn=connection.execute(NEXT_TURN).fetchone()[0], bytes=float(size), stage=stage,
             )  # fmt: skip
             connection.execute(
-                f"INSERT INTO job ({ALL}, study) VALUES ({MARKS}, ?)", [*row_of(job), text]
+                f"INSERT INTO job ({ALL}, study) VALUES ({MARKS}, ?)",
+                [*row_of(job), json.dumps(study)],
             )
             tell(connection, job)
             return job, True
@@ -143,7 +137,10 @@ class Jobs(Database):
     def study(self, job_id: str) -> dict[str, Any]:
         """Return the study of a job as ``Study.to_dict`` gave it."""
         with self.transaction("BEGIN") as connection:
-            return self._study(connection, job_id)
+            row = connection.execute("SELECT study FROM job WHERE id = ?", (job_id,)).fetchone()
+            if row is None:
+                raise unknown(job_id)
+            return _content(row)
 
     def runs(self, job_id: str, limit: int = -1, offset: int = 0) -> list[str]:
         """Return the ids of a job's runs in the order of its cases, or one page of them."""
@@ -177,14 +174,14 @@ class Jobs(Database):
                 f"SELECT {ALL} FROM job {where} ORDER BY turn DESC LIMIT ? OFFSET ?",
                 (*values, limit, offset),
             )
-            return [job for job in map(job_of, rows) if job], total
+            return [*map(job_of, rows)], total
 
     def ended(self) -> list[Job]:
         """Return the jobs that have ended, the oldest end first."""
         rows = self.rows(
             f"SELECT {ALL} FROM job WHERE finished IS NOT NULL ORDER BY finished, turn"
         )
-        return [job for job in map(job_of, rows) if job and job.state.final]
+        return [job for job in map(job_of, rows) if job.state.final]
 
     def states(self) -> dict[str, int]:
         """Return the number of jobs by state, without states that no job has."""
@@ -219,12 +216,7 @@ class Jobs(Database):
             for row in waiting:
                 if any(connection.execute(each, (row["id"], others)).fetchone() for each in BOTH):
                     continue
-                try:
-                    job = self.read(connection, row["id"])
-                except NotFound:
-                    end = (StudyState.FAILED, UNREADABLE, row["id"])
-                    connection.execute("UPDATE job SET state = ?, message = ? WHERE id = ?", end)
-                    continue
+                job = self.read(connection, row["id"])
                 if job.state is StudyState.RUNNING:
                     return job
                 return put(connection, job, **BEGUN, started=now())
@@ -311,23 +303,31 @@ class Jobs(Database):
             connection.text_factory = lambda text: text.decode(errors="replace")
             yield connection
 
-    def _study(self, connection: sqlite3.Connection, job_id: str) -> dict[str, Any]:
-        row = connection.execute("SELECT study FROM job WHERE id = ?", (job_id,)).fetchone()
-        if row is None:
-            raise unknown(job_id)
-        if checksum([row["study"]]) != self.read(connection, job_id).digest:
-            raise Conflict(UNREADABLE)
-        study: dict[str, Any] = json.loads(row["study"])
-        return study
-
     @staticmethod
     def read(connection: sqlite3.Connection, job_id: str) -> Job:
         """Return a job in the transaction of a connection; raise `NotFound`."""
         row = connection.execute(f"SELECT {ALL} FROM job WHERE id = ?", (job_id,)).fetchone()
-        job = job_of(row) if row else None
-        if job is None:
+        if row is None:
             raise unknown(job_id)
-        return job
+        return job_of(row)
+
+
+def _check(connection: sqlite3.Connection) -> None:
+    """Read the whole file; raise an error of the database if it is damaged."""
+    connection.execute("SELECT 1 FROM job, run, told, layout LIMIT 1")
+    check(connection)
+    for row in connection.execute(f"SELECT {ALL}, study FROM job"):
+        job_of(row)
+        _content(row)
+
+
+def _content(row: sqlite3.Row) -> dict[str, Any]:
+    """Return the study of a row; raise `WrongContent` if its text is damaged."""
+    try:
+        study: dict[str, Any] = json.loads(row["study"])
+    except ValueError as error:
+        raise WrongContent(f"the text of a study is damaged: {error}") from None
+    return study
 
 
 def put(connection: sqlite3.Connection, job: Job, **changes: Any) -> Job:

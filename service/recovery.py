@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
 
-from service.errors import Conflict, NotFound, QueueLost
+from service.errors import NotFound, QueueLost
 from service.job import StudyState, verdict
 from service.jobs import Jobs
 from studies import FileDamaged, Store
@@ -107,7 +107,7 @@ class Mender:
         self._look_at(self.jobs, lambda: self._mend_queue(computed))
         self._look_at(self.store.catalogue, self.store.reconcile)
         for study_id in computed:
-            with suppress(Conflict, NotFound):
+            with suppress(NotFound):
                 self.store.save_definition(study_id, self.jobs.study(study_id))
 
     def _look_at(self, file: Database, mend: Callable[[], None]) -> None:

@@ -166,7 +166,7 @@ class Keeper:
         Return the number of bytes freed. Raise `Conflict` if it is waiting or running, or its
         process has not ended yet.
         """
-        with self._ended(study_id) as queue, suppress(NotFound):  # its row cannot be read
+        with self._ended(study_id) as queue:
             job = self.jobs.read(queue, study_id)
             put(queue, job, state=StudyState.DISMISSED, message=DELETED)
         elsewhere = self._needed_elsewhere()
@@ -249,11 +249,9 @@ class Keeper:
     def _ended(self, study_id: str) -> Iterator[sqlite3.Connection]:
         """Give a transaction in which a study has ended, and cannot begin again."""
         with self.jobs.transaction() as queue:
-            row = queue.execute("SELECT state FROM job WHERE id = ?", (study_id,)).fetchone()
-            if row is None:
-                raise NotFound(f"no study has the id {study_id}")
-            if row["state"] in ("accepted", "running"):
-                raise Conflict(f"the study is {row['state']}: dismiss it first, then delete it")
+            state = self.jobs.read(queue, study_id).state
+            if not state.final:
+                raise Conflict(f"the study is {state}: dismiss it first, then delete it")
             if self.computes(study_id):
                 raise Conflict("the work on the study is being stopped: delete it a little later")
             yield queue

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from service import processes
-from service.errors import Conflict, NotFound, QueueLost
+from service.errors import NotFound, QueueLost
 from service.job import Job, StudyState, verdict
 from service.jobs import Jobs
 from service.pool import Pool, PoolAway
@@ -199,8 +199,6 @@ class Runner:
             return Attempt(progress, reason=str(error), patient=True)
         except OSError as error:
             return Attempt(progress, reason=f"its process cannot be started: {error.strerror}")
-        except Conflict as error:  # its row is damaged
-            return Attempt(progress, reason=str(error), hopeless=True)
         attempt, reported, stage = Attempt(progress), (progress, ""), (0, "")
         events = asyncio.create_task(follow(child, attempt))
         try:

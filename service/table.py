@@ -61,7 +61,7 @@ class Tables:
         """Return a study, and all on which its table depends."""
         job = self.jobs.get(study_id)
         asked = job.state, job.stage  # its runs may not all be known yet
-        return job, (job.turn, job.size, job.digest, asked, state_of(self.store.catalogue.path))
+        return job, (job.turn, job.size, asked, state_of(self.store.catalogue.path))
 
     def _made(self, job: Job) -> RunTable:
         study, runs = self.jobs.study(job.id), self.jobs.runs(job.id)

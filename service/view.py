@@ -24,7 +24,7 @@ from fastapi import FastAPI
 
 from service.app import assembled
 from service.connections import limited
-from service.errors import Conflict, NotFound
+from service.errors import NotFound
 from service.job import Job, StudyState, verdict
 from service.jobs import Jobs, forget, put
 from service.processes import share_arenas
@@ -104,7 +104,7 @@ class ViewedFolder:
 
     def _follow(self, study_id: str) -> None:
         """Write how far a study is that has no data set yet."""
-        with suppress(Conflict, NotFound):
+        with suppress(NotFound):
             job, runs = self.jobs.get(study_id), self.jobs.runs(study_id)
             times = self.store.modified(runs).values()
             fresh = max(times, default=0) / 1e9 > time.time() - FRESH

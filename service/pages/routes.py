@@ -34,7 +34,7 @@ from service.dependencies import (
     TheTables,
     in_turn,
 )
-from service.errors import Busy, Conflict, NotFound
+from service.errors import Busy, NotFound
 from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.pages import study as chosen
@@ -126,8 +126,8 @@ def studies_page(
 
 
 def _said(jobs: Jobs, job: Job) -> Mapping[str, Any]:
-    """Return the study of a job; nothing if it cannot be read, or has just been deleted."""
-    with suppress(Conflict, NotFound):
+    """Return the study of a job; nothing if it has just been deleted."""
+    with suppress(NotFound):
         return jobs.study(job.id)
     return {}
 

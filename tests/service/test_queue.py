@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sqlite3
 import time
@@ -16,26 +15,16 @@ import pytest
 
 from service.errors import Busy, Conflict, NotFound, QueueLost
 from service.history import log_of
-from service.job import StudyState, row_of
+from service.job import StudyState
 from service.jobs import Jobs, forget
 from service.recovery import open_queue
-from studies import Store, StoreBusy, Study, StudyError
-from studies.storage.database import checksum
+from studies import Store, StoreBusy, Study
 from studies.storage.lock import lock
 from studies.storage.seal import seal
 from tests.studies.test_goal import search_here
 
 STUDY = {"name": "a", "scene": "fake", "parameters": {}, "sweep": {}}
-
-FIRST_FORM = """
-CREATE TABLE job (
-    id TEXT PRIMARY KEY, study TEXT NOT NULL, runs TEXT NOT NULL, size INTEGER NOT NULL,
-    state TEXT NOT NULL, message TEXT NOT NULL, progress REAL NOT NULL, again INTEGER NOT NULL,
-    submitted TEXT NOT NULL, started TEXT, finished TEXT, turn INTEGER NOT NULL
-);
-CREATE INDEX job_turn ON job (turn);
-"""
-"""Tables of the queue as the first versions of the service made them."""
+STEPS = {"name": "a", "scene": "punch", "parameters": {"load_ratio": 1.0}}
 
 
 @pytest.fixture
@@ -109,55 +98,39 @@ def test_no_more_studies_wait_than_may(tmp_path: Path) -> None:
     assert jobs.accept("c", STUDY, ["run"])[1] is True
 
 
-def spoil(jobs: Jobs, job_id: str, **values: object) -> None:
+def spoil(jobs: Jobs, job_id: str, column: str, value: object) -> None:
     """Write nonsense into the row of a job."""
     with closing(sqlite3.connect(jobs.path)) as connection, connection:
-        for column, value in values.items():
-            connection.execute(f"UPDATE job SET {column} = ? WHERE id = ?", (value, job_id))
+        connection.execute(f"UPDATE job SET {column} = ? WHERE id = ?", (value, job_id))
 
 
-def test_a_flipped_byte_in_a_text_hides_only_its_row(jobs: Jobs) -> None:
-    for name in "ab":
-        jobs.accept(name, STUDY, [name])
+@pytest.mark.parametrize("nonsense", [("state", "odd"), ("state", b"\xff"), ("study", "{")])
+def test_a_row_that_cannot_be_read_is_damage_of_the_queue(
+    tmp_path: Path, nonsense: tuple[str, object]
+) -> None:
+    store, study = Store(tmp_path), Study.from_dict(STEPS)
+    store.save_study(study)
+    jobs, (column, value) = open_queue(tmp_path / "jobs.sqlite", store, None), nonsense
+    spoil(jobs, study.id, column, value)
+    with pytest.raises(QueueLost, match="damaged"):
+        jobs.check()
+    (job,), _ = open_queue(jobs.path, store, None).page(limit=9, offset=0)
+    assert (job.id, job.state) == (study.id, StudyState.ACCEPTED)
+    assert (tmp_path / "unreadable" / "jobs.sqlite").exists()
+
+
+@pytest.mark.parametrize("form", [0, 4, 99])
+def test_a_queue_of_another_form_is_set_aside_and_made_anew(tmp_path: Path, form: int) -> None:
+    store, study = Store(tmp_path), Study.from_dict(STEPS)
+    store.save_study(study)
+    jobs = open_queue(tmp_path / "jobs.sqlite", store, None)
     with closing(sqlite3.connect(jobs.path)) as connection, connection:
-        connection.execute("UPDATE job SET state = CAST(x'ff6363' AS TEXT) WHERE id = 'a'")
-    assert [job.id for job in jobs.page(limit=9, offset=0)[0]] == ["b"]
-    assert taken(jobs) == "b"
-
-
-def test_a_study_that_is_not_what_was_posted_can_be_posted_again(jobs: Jobs) -> None:
-    jobs.accept("a", STUDY, ["x"])
-    for other in ("{", json.dumps(STUDY | {"name": "b"})):
-        spoil(jobs, "a", study=other)
-        with pytest.raises(Conflict, match="post the study again"):
-            jobs.study("a")
-        assert jobs.accept("a", STUDY, ["x"])[1] is True
-        assert jobs.study("a") == STUDY
-
-
-@pytest.mark.parametrize(
-    "nonsense",
-    [
-        {"size": "many"},
-        {"progress": b"\xff"},
-        {"name": "b"},
-        {"state": "odd"},
-        {"state": "successful"},
-        {"since": 1},
-        {"checksum": 0},
-    ],
-)
-def test_a_bad_row_hides_only_itself(jobs: Jobs, nonsense: dict[str, object]) -> None:
-    for name in "abc":
-        jobs.accept(name, STUDY, [name])
-    spoil(jobs, "a", **nonsense)
-    assert [job.id for job in jobs.page(limit=9, offset=0)[0]] == ["c", "b"]
-    assert taken(jobs) == "b"
-    assert taken(jobs, "b") == "c"
-    with pytest.raises(NotFound):
-        jobs.get("a")
-    assert jobs.accept("a", STUDY, ["a"])[1] is True
-    assert taken(jobs, "b", "c") == "a"
+        connection.execute(f"PRAGMA user_version = {form}")
+    with pytest.raises(QueueLost, match=f"it has form {form}, not"):
+        Jobs(jobs.path)
+    (job,), _ = open_queue(jobs.path, store, None).page(limit=9, offset=0)
+    assert (job.id, job.state) == (study.id, StudyState.ACCEPTED)
+    assert (tmp_path / "unreadable" / "jobs.sqlite").exists()
 
 
 def test_a_queue_that_is_gone_is_not_made_anew_behind_the_back_of_its_users(jobs: Jobs) -> None:
@@ -188,9 +161,6 @@ def test_a_queue_with_one_damaged_page_is_made_anew(tmp_path: Path) -> None:
     path.write_bytes(content)
     assert open_queue(path, Store(tmp_path), None).page(limit=9, offset=0) == ([], 0)
     assert (tmp_path / "unreadable" / "jobs.sqlite").read_bytes() == content
-
-
-STEPS = {"name": "a", "scene": "punch", "parameters": {"load_ratio": 1.0}}
 
 
 @pytest.mark.parametrize("damage", ["deleted", "overwritten", "emptied", "directory"])
@@ -260,39 +230,10 @@ def test_a_retry_that_is_computed_forgets_its_old_end_in_a_queue_made_anew(
     assert jobs.dismiss(study.id).state is left
 
 
-def test_a_queue_of_the_first_form_is_brought_into_todays(tmp_path: Path) -> None:
-    path = tmp_path / "jobs.sqlite"
-    with closing(sqlite3.connect(path)) as connection, connection:
-        connection.executescript(FIRST_FORM)
-        row = ("a", json.dumps(STUDY), '["x", "y"]', 2, "failed", "m", 50.0, 0, "t", None, "u", 3)
-        connection.execute(f"INSERT INTO job VALUES ({', '.join('?' * 12)})", row)
-    jobs = Jobs(path)
-    job = jobs.get("a")
-    assert (job.name, job.scene, job.size, job.state) == ("a", "fake", 2, StudyState.FAILED)
-    assert (jobs.runs("a"), jobs.study("a")) == (["x", "y"], STUDY)
-    assert Jobs(path).get("a") == job
-
-
-def test_a_queue_without_checksums_gets_them(tmp_path: Path) -> None:
-    jobs = Jobs(tmp_path / "jobs.sqlite")
-    before, _ = jobs.accept("a", STUDY, ["x", "y"], 3)
-    with closing(sqlite3.connect(jobs.path)) as connection, connection:
-        for column in ("digest", "stage", "checksum"):
-            connection.execute(f"ALTER TABLE job DROP COLUMN {column}")
-        connection.execute("PRAGMA user_version = 1")
-    again = Jobs(jobs.path)
-    assert (again.get("a"), again.study("a"), again.runs("a")) == (before, STUDY, ["x", "y"])
-
-
-def test_a_queue_of_before_keeps_turns_of_layouts_until_their_study_is_deleted(
-    tmp_path: Path,
-) -> None:
+def test_turns_of_layouts_are_kept_until_their_study_is_deleted(tmp_path: Path) -> None:
     jobs = Jobs(tmp_path / "jobs.sqlite")
     for name in "ab":
         jobs.accept(name, STUDY, [name])
-    with closing(sqlite3.connect(jobs.path)) as connection, connection:
-        connection.execute("DROP TABLE layout")
-    jobs = Jobs(jobs.path)
     for turns in ([0, 0, 1], [2, 2, 3], [4, 4, 5]):
         assert [jobs.layout_turn("a", layout) for layout in "xxy"] == turns
     assert jobs.layout_turn("b", "x") == 0
@@ -300,24 +241,6 @@ def test_a_queue_of_before_keeps_turns_of_layouts_until_their_study_is_deleted(
         forget(connection, "a")
     jobs = Jobs(jobs.path)
     assert [jobs.layout_turn(name, "y") for name in "ab"] == [0, 1]
-
-
-def test_a_damaged_row_of_an_earlier_form_stays_damaged(tmp_path: Path) -> None:
-    jobs = Jobs(tmp_path / "jobs.sqlite")
-    before = [jobs.accept(name, STUDY, [name])[0] for name in "ab"]
-    with closing(sqlite3.connect(jobs.path)) as connection, connection:
-        connection.execute("ALTER TABLE job DROP COLUMN bytes")
-        connection.execute("ALTER TABLE job DROP COLUMN stage")
-        for job in before:
-            *values, _, _, _ = row_of(job)
-            found = (checksum(values), job.id)
-            connection.execute("UPDATE job SET checksum = ? WHERE id = ?", found)
-        connection.execute("UPDATE job SET message = 'other' WHERE id = 'b'")
-        connection.execute("PRAGMA user_version = 2")
-    again = Jobs(jobs.path)
-    assert again.get("a") == before[0]
-    with pytest.raises(NotFound):
-        again.get("b")
 
 
 def test_of_two_studies_that_choose_runs_in_a_scene_one_waits(jobs: Jobs) -> None:
@@ -356,14 +279,6 @@ def test_a_search_without_the_service_is_found_when_it_starts(tmp_path: Path) ->
         assert job.stage == "0 of 1 searches ended"
         asked_for = StudyState.ACCEPTED if damaged else StudyState.FAILED
         assert job.state is asked_for, "nobody posted it to the queue that was there"
-
-
-def test_a_queue_of_a_later_form_is_left_alone(tmp_path: Path) -> None:
-    path = tmp_path / "jobs.sqlite"
-    with closing(sqlite3.connect(path)) as connection, connection:
-        connection.execute("PRAGMA user_version = 99")
-    with pytest.raises(StudyError, match="a later version of the service has made it"):
-        Jobs(path)
 
 
 def test_a_dismissed_retry_of_a_successful_study_leaves_it_successful(jobs: Jobs) -> None:

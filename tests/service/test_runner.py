@@ -6,13 +6,11 @@ import asyncio
 import json
 import os
 import signal
-import sqlite3
 import subprocess
 import sys
 import tempfile
 import time
 from asyncio.subprocess import PIPE, Process
-from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -145,26 +143,6 @@ def test_a_study_that_waits_too_long_for_workers_is_given_up(tmp_path: Path) -> 
     job, orders = carried_out(tmp_path, [AWAY], patience_seconds=0.2)
     assert len(orders) >= 2
     assert job.state is StudyState.FAILED and "the store is busy" in job.message
-
-
-def test_a_study_that_is_no_json_fails_and_holds_nobody_back(tmp_path: Path) -> None:
-    jobs = Jobs(tmp_path / "jobs.sqlite")
-    for name in ("bad", "good"):
-        jobs.accept(name, {"name": name, "scene": "fake"}, [name])
-    with closing(sqlite3.connect(jobs.path)) as connection, connection:
-        connection.execute("UPDATE job SET study = '{' WHERE id = 'bad'")
-    settings = Settings(data=tmp_path, poll_seconds=0.01, scheduler="tcp://127.0.0.1:1")
-    runner = Runner(settings, jobs, Pool(settings, Starter(0)), Starter(0), lambda _: None)
-
-    async def work() -> None:
-        async with asyncio.timeout(30.0), runner.working():
-            while not jobs.get("bad").state.final:
-                await asyncio.sleep(0.01)
-
-    asyncio.run(work())
-    assert jobs.get("bad").state is StudyState.FAILED
-    assert "cannot be read" in jobs.get("bad").message
-    assert jobs.get("good").state is StudyState.RUNNING
 
 
 def test_what_the_next_study_needs_is_loaded_while_there_is_none(

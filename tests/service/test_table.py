@@ -18,7 +18,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
-from service.errors import Conflict
+from service.errors import NotFound
 from service.jobs import Jobs
 from service.pages.form import as_toml, study_of
 from service.pages.run import audited
@@ -317,13 +317,13 @@ def test_a_program_to_copy_has_no_text_of_the_address(seen: Seen) -> None:
     assert program.startswith("dataset.") and "import" not in program
 
 
-def test_a_study_that_cannot_be_read_leaves_the_list(
+def test_a_study_that_has_just_been_deleted_leaves_the_list(
     seen: Seen, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def damaged(self: Jobs, job_id: str) -> dict:
-        raise Conflict("its row cannot be read")
+    def gone(self: Jobs, job_id: str) -> dict:
+        raise NotFound(f"no study has the id {job_id}")
 
-    monkeypatch.setattr(Jobs, "study", damaged)
+    monkeypatch.setattr(Jobs, "study", gone)
     answer = seen.client.get("/ui")
     assert answer.status_code == 200 and seen.id in answer.text
 
