@@ -44,7 +44,13 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("path", type=_path, metavar="RUN|DIR")
     _study(one)
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
-    one.add_argument("--vtu", type=_path, required=True, metavar="FOLDER", help="where they go")
+    one.add_argument(
+        "--vtu", type=_path, metavar="FOLDER", help="fields at the nodes, for ParaView"
+    )
+    one.add_argument("--csv", type=_path, metavar="FILE", help="a line for each value of --field")
+    one.add_argument("--field", help="a map or lines, such as residual_stress")
+    one.add_argument("--component", help="of a tensor; default: the first")
+    one.add_argument("--stage", help="of a map; default: the last")
 
     one = add("serve", commands.serve)
     one.add_argument("--host", help="default: 127.0.0.1; with another one callers need API keys")

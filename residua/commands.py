@@ -17,6 +17,8 @@ from residua.status import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
 from studies.errors import StudyError
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from studies.definition.study import Study
 
 
@@ -302,23 +304,39 @@ def sensitivity(options: argparse.Namespace) -> int:
 
 
 def export(options: argparse.Namespace) -> int:
-    """Write the fields at the nodes of a run (keep = "fields") as files for ParaView."""
+    """Write a map or lines of a run as CSV, or its fields at the nodes for ParaView."""
+    from studies.views.picking import run_file, sweep_axes
+    from studies.views.reading import open_netcdf
+
+    if (options.vtu is None) == (options.csv is None):
+        raise StudyError("--csv, --vtu", None, "give one of them, with where it goes")
+    with open_netcdf(run_file(options.path, _selection(options.select))) as run:
+        if options.vtu is not None:
+            print(f"wrote {_written_nodes(run, options.vtu)}")
+            return OK
+        from studies.views.shown import points_csv
+
+        one = run.isel(dict.fromkeys(sweep_axes(run), 0))
+        pieces = points_csv(one, options.field, options.component, options.stage)
+        with _written("--csv", options.csv) as part, part.open("wb") as file:
+            file.writelines(pieces)
+    print(f"wrote {options.csv}")
+    return OK
+
+
+def _written_nodes(run: xr.Dataset, folder: Path) -> Path:
+    """Write the fields at the nodes of a run, and return the file that lists them."""
     from solver.errors import ModelError
     from solver.results.export import write_vtu
     from studies.storage.ugrid import read
-    from studies.views.picking import run_file
-    from studies.views.reading import open_netcdf
 
-    with open_netcdf(run_file(options.path, _selection(options.select))) as run:
-        fields = read(run)
     try:
-        print(f"wrote {write_vtu(fields, options.vtu)}")
+        return write_vtu(read(run), folder)
     except ModelError as error:
-        raise StudyError("--vtu", str(options.vtu), error.allowed) from None
+        raise StudyError("--vtu", str(folder), error.allowed) from None
     except OSError as error:
         allowed = f"cannot be written: {error.strerror}"
-        raise StudyError("--vtu", str(options.vtu), allowed) from None
-    return OK
+        raise StudyError("--vtu", str(folder), allowed) from None
 
 
 def serve(options: argparse.Namespace) -> int:

@@ -150,6 +150,12 @@ async def fields(
     return await reading.read(outlined, store.run_path(run["id"]))
 
 
+@router.get(
+    "/runs/{run_id}/values.csv",
+    name="values_of_points",
+    tags=["runs"],
+    responses={200: {"content": {FORMS["csv"].media_type: {}}}, **UNCHANGED, **REFUSED},
+)
 @router.get("/runs/{run_id}/values", tags=["runs"], responses={**OCTETS, **UNCHANGED, **REFUSED})
 async def values(
     run: TheRun,
@@ -163,17 +169,22 @@ async def values(
 ) -> Response:
     """Return a map, or lines, of a run as octets: the coordinates, then the values over them.
 
-    With `minus`, the map of another run is subtracted at the points of this one.
+    In CSV there is a line for each value: its coordinates, then the value. With `minus`, the map of
+    another run is subtracted at the points of this one.
     """
     if minus and await reading.here(store.run, minus) is None:
         raise StudyError("minus", minus, "must be the id of a run")
     files = [store.run_path(each) for each in (run["id"], minus) if each]
     digests = await reading.here(lambda: [*map(digest, files)])
-    headers = tagged((solver.__version__, digests, field, component, stage))
+    table = request.scope["path"].endswith(".csv")
+    headers = tagged((solver.__version__, digests, field, component, stage, table))
     if known := unchanged(request, headers):
         return known
-    found = await reading.read(read, files, field, component, stage)
-    return Response(found, media_type=MEDIA_TYPE, headers=dict(headers))
+    found = await reading.read(read, files, field, component, stage, table)
+    if not table:
+        return Response(found, media_type=MEDIA_TYPE, headers=dict(headers))
+    named = {"content-disposition": f'attachment; filename="{field}.csv"'}
+    return Response(found, media_type=FORMS["csv"].media_type, headers={**headers, **named})
 
 
 def outlined(path: Path) -> dict[str, list[dict[str, Any]]]:
@@ -184,20 +195,26 @@ def outlined(path: Path) -> dict[str, list[dict[str, Any]]]:
         return outline(dataset)
 
 
-def read(files: list[Path], field: str, component: str | None, stage: str | None) -> bytes:
-    """Return a map or lines of the first run as octets, less those of the second if there is one.
+def read(
+    files: list[Path], field: str, component: str | None, stage: str | None, table: bool
+) -> bytes:
+    """Return a map or lines of the first run, less the map of the second if there is one.
+
+    They are octets, or a ``table`` as CSV.
 
     Raises
     ------
     StudyError
         if the run has no such field, component or stage
     """
-    from studies.views.shown import shown
+    from studies.views.shown import points_csv, shown
 
     with ExitStack() as stack:
         runs = [stack.enter_context(opened(path)) for path in files]
-        found = shown(runs[0], field, component, stage, *runs[1:])
-        return octets(*found, kind="<f4")
+        asked = field, component, stage, *runs[1:]
+        if table:
+            return b"".join(points_csv(runs[0], *asked))
+        return octets(*shown(runs[0], *asked), kind="<f4")
 
 
 @contextmanager

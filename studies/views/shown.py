@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ import xarray as xr
 from solver.tensors import AXES
 from studies.errors import StudyError
 from studies.views.columns import unit_text
+from studies.views.picking import flags
 from studies.views.plots.captions import DISTANCE
 from studies.views.plots.fields import (
     check_field,
@@ -25,6 +26,8 @@ from studies.views.plots.fields import (
     usual_field,
 )
 from studies.views.plots.mapped import mapped
+from studies.views.table import Column
+from studies.views.written import as_csv
 
 _NOTHING = {"MPa": 1e-3, "mm": 1e-9}
 """Largest value of lines that are only rounding, by unit."""
@@ -98,6 +101,35 @@ def shown(
         name = "stage" if stage is not None else "minus"
         raise StudyError(name, stage or field, f"is for maps, and {field} is lines: leave it out")
     return _lines(run, field, component)
+
+
+def points_csv(run: xr.Dataset, *asked: Any) -> Iterator[bytes]:
+    """Yield `shown` as CSV with a line for each value: where it is, then the value."""
+    columns = _columns(run, shown(run, *asked))
+    yield from as_csv(columns, np.arange(len(columns[-1].values)))
+
+
+def _columns(run: xr.Dataset, found: Shown) -> list[Column]:
+    head, values = found.head, found.arrays[found.head["name"]]
+    axes = [head["up"], head["across"]] if "up" in head else [*head["over"], head["along"]]
+    at = np.nonzero(~np.isnan(values.astype(float)))
+    columns = []
+    for axis, size, places in zip(axes, values.shape, at, strict=True):
+        known = axis.get("labels") or found.arrays.get(axis["name"], range(size))
+        columns.append(_column(axis, np.asarray(known)[places], {}))
+    places = columns[::-1] if "up" in head else columns  # x before y
+    return [*places, _column(head, values[at], flags(run[head["name"]]))]
+
+
+def _column(of: Mapping[str, Any], values: np.ndarray, words: Mapping[int, str]) -> Column:
+    return Column(
+        name=of["name"],
+        words=of.get("words", of["name"]),
+        unit=of["unit"],
+        group="point",
+        flags=words,
+        values=values.astype(float if values.dtype.kind in "fiu" else object),
+    )
 
 
 def _map(

@@ -83,6 +83,30 @@ def test_a_map_is_a_picture_that_need_not_be_sent_twice(
     assert other.status_code == 200
 
 
+def test_a_map_and_its_difference_are_sent_as_csv(
+    service: Server, runs: list[dict[str, Any]]
+) -> None:
+    own, other = runs[0]["id"], runs[1]["id"]
+    asked = {"field": "residual_stress"}
+    whole = service.client.get(f"/runs/{own}/values.csv", params=asked)
+    assert whole.headers["content-type"].startswith("text/csv")
+    names, *lines = whole.text.splitlines()
+    assert names == "x,y,residual_stress"
+    place, value = (lines[0].rpartition(",")[k] for k in (0, 2))
+    with xr.open_dataset(io.BytesIO(service.client.get(f"/runs/{own}.nc").content)) as run:
+        stress = run["residual_stress"].squeeze(drop=True).isel(component=0)
+        x, y = map(float, place.split(","))
+        assert float(stress.sel(x=x, y=y)) == float(value)
+        assert len(lines) == int(stress.notnull().sum())
+    known = {"if-none-match": whole.headers["etag"]}
+    again = service.client.get(f"/runs/{own}/values.csv", params=asked, headers=known)
+    assert again.status_code == 304
+    less = service.client.get(f"/runs/{own}/values.csv", params=asked | {"minus": other})
+    assert less.text.splitlines()[1] != lines[0] and less.headers["etag"] != whole.headers["etag"]
+    none = service.client.get(f"/runs/{own}/values.csv", params={"field": "friction"})
+    assert none.status_code == 422 and none.json()["errors"][0]["field"] == "field"
+
+
 @pytest.mark.parametrize(
     ("query", "field", "allowed"),
     [

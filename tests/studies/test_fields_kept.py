@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import meshio
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -130,6 +131,46 @@ def test_a_run_is_written_for_paraview(kept: tuple[Study, Store], tmp_path: Path
         loaded = run["mesh_stress_yy"].isel(time=0)
         np.testing.assert_array_equal(mesh.point_data["stress_yy"], loaded)
         assert float(loaded.min()) < -100.0
+
+
+def test_a_map_and_lines_are_written_as_csv(kept: tuple[Study, Store], tmp_path: Path) -> None:
+    out = tmp_path / "points.csv"
+    with open_netcdf(run_of(kept)) as dataset:
+        run = dataset.isel(dict.fromkeys(dataset["status"].dims, 0))
+        fields = {
+            "residual_stress": run["residual_stress"].sel(component="yy", drop=True),
+            "contact_pressure": run["contact_pressure"],
+        }
+        for field, values in fields.items():
+            asked = ["--field", field, *(["--component", "yy"] if "y" in values.dims else [])]
+            assert main(["export", str(run_of(kept)), "--csv", str(out), *asked]) == 0
+            found = pd.read_csv(out)
+            places = [*found.columns[:-1]]
+            assert places == (["x", "y"] if "y" in values.dims else ["stage", "s"])
+            if "x" in found:  # half of the bodies was computed, and all of it is drawn
+                assert len(found) == 2 * (found["x"] > 0.0).sum()
+                found = found[found["x"] > 0.0]
+            assert len(found) == int(values.notnull().sum()) > 10
+            right = values.to_series().dropna()
+            index = found.set_index([*right.index.names])[field]
+            pd.testing.assert_series_equal(index.sort_index(), right.sort_index())
+
+
+@pytest.mark.parametrize(
+    ("asked", "text"),
+    [
+        ([], "--csv, --vtu"),
+        (["--csv", "a", "--vtu", "b"], "--csv, --vtu"),
+        (["--csv", "a", "--field", "friction"], "field = 'friction': must be one of"),
+        (["--csv", "a", "--field", "contact_pressure", "--stage", "loaded"], "is for maps"),
+    ],
+)
+def test_what_cannot_be_exported_is_refused(
+    kept: tuple[Study, Store], capsys: pytest.CaptureFixture[str], asked: list[str], text: str
+) -> None:
+    assert main(["export", str(run_of(kept)), *asked]) == 2
+    assert text in capsys.readouterr().err
+    assert not Path("a").exists()
 
 
 def test_a_run_of_a_study_is_found_by_its_place(kept: tuple[Study, Store], tmp_path: Path) -> None:
