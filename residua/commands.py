@@ -17,8 +17,6 @@ from residua.status import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
 from studies.errors import StudyError
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from studies.definition.study import Study
 
 
@@ -314,18 +312,18 @@ def export(options: argparse.Namespace) -> int:
         if options.vtu is not None:
             print(f"wrote {_written_nodes(run, options.vtu)}")
             return OK
-        from studies.views.shown import points_csv
+        from studies.views.shown import shown
 
         one = run.isel(dict.fromkeys(sweep_axes(run), 0))
-        pieces = points_csv(one, options.field, options.component, options.stage)
+        found = shown(one, options.field, options.component, options.stage)
         with _written("--csv", options.csv) as part, part.open("wb") as file:
-            file.writelines(pieces)
+            file.writelines(found.as_csv())
     print(f"wrote {options.csv}")
     return OK
 
 
-def _written_nodes(run: xr.Dataset, folder: Path) -> Path:
-    """Write the fields at the nodes of a run, and return the file that lists them."""
+def _written_nodes(run: Any, folder: Path) -> Path:
+    """Write the fields at the nodes of a run (a data set), and return the file that lists them."""
     from solver.errors import ModelError
     from solver.results.export import write_vtu
     from studies.storage.ugrid import read

@@ -207,14 +207,12 @@ def read(
     StudyError
         if the run has no such field, component or stage
     """
-    from studies.views.shown import points_csv, shown
+    from studies.views.shown import shown
 
     with ExitStack() as stack:
         runs = [stack.enter_context(opened(path)) for path in files]
-        asked = field, component, stage, *runs[1:]
-        if table:
-            return b"".join(points_csv(runs[0], *asked))
-        return octets(*shown(runs[0], *asked), kind="<f4")
+        found = shown(runs[0], field, component, stage, *runs[1:])
+        return b"".join(found.as_csv()) if table else octets(found.head, found.arrays, kind="<f4")
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,11 +39,29 @@ class Shown(NamedTuple):
     Attributes
     ----------
     head : what they are: meaning, unit, labels of the dimensions that are no coordinates
-    arrays : the coordinates, and the values over them, by name; NaN where there is no value
+    values : NaN where there is no value
+    places : names of their coordinates, which are those of the last dimensions
     """
 
     head: dict[str, Any]
-    arrays: dict[str, np.ndarray]
+    values: xr.DataArray
+    places: tuple[Hashable, ...]
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The coordinates, and the values over them, by name."""
+        field, values = self.head["name"], self.values
+        return {str(n): values[n].to_numpy() for n in self.places} | {field: values.to_numpy()}
+
+    def as_csv(self) -> Iterator[bytes]:
+        """Yield a line for each value: where it is, then the value."""
+        values = self.values
+        names = [*values.dims[: -len(self.places)], *self.places]
+        there = values.notnull().to_numpy()
+        at = [values[name].broadcast_like(values).transpose(*values.dims) for name in names]
+        columns = [_point(each, str(each.name), there) for each in at]
+        own = _point(values, self.head["name"], there)
+        yield from as_csv([*columns, own], np.arange(there.sum()))
 
 
 def outline(run: xr.Dataset) -> dict[str, list[dict[str, Any]]]:
@@ -103,35 +121,6 @@ def shown(
     return _lines(run, field, component)
 
 
-def points_csv(run: xr.Dataset, *asked: Any) -> Iterator[bytes]:
-    """Yield `shown` as CSV with a line for each value: where it is, then the value."""
-    columns = _columns(run, shown(run, *asked))
-    yield from as_csv(columns, np.arange(len(columns[-1].values)))
-
-
-def _columns(run: xr.Dataset, found: Shown) -> list[Column]:
-    head, values = found.head, found.arrays[found.head["name"]]
-    axes = [head["up"], head["across"]] if "up" in head else [*head["over"], head["along"]]
-    at = np.nonzero(~np.isnan(values.astype(float)))
-    columns = []
-    for axis, size, places in zip(axes, values.shape, at, strict=True):
-        known = axis.get("labels") or found.arrays.get(axis["name"], range(size))
-        columns.append(_column(axis, np.asarray(known)[places], {}))
-    places = columns[::-1] if "up" in head else columns  # x before y
-    return [*places, _column(head, values[at], flags(run[head["name"]]))]
-
-
-def _column(of: Mapping[str, Any], values: np.ndarray, words: Mapping[int, str]) -> Column:
-    return Column(
-        name=of["name"],
-        words=of.get("words", of["name"]),
-        unit=of["unit"],
-        group="point",
-        flags=words,
-        values=values.astype(float if values.dtype.kind in "fiu" else object),
-    )
-
-
 def _map(
     run: xr.Dataset, field: str, component: str | None, stage: str | None, minus: xr.Dataset | None
 ) -> Shown:
@@ -158,8 +147,7 @@ def _map(
         "note": "" if minus is not None else drawn.note,
         "edge": edge if edge > 0.0 and across == "x" else None,
     }
-    arrays = {across: values[across], up: values[up], field: values.transpose(up, across)}
-    return Shown(head, {name: each.to_numpy() for name, each in arrays.items()})
+    return Shown(head, values.transpose(up, across), (across, up))
 
 
 def _lines(run: xr.Dataset, field: str, component: str | None) -> Shown:
@@ -178,7 +166,21 @@ def _lines(run: xr.Dataset, field: str, component: str | None) -> Shown:
         "along": _axis(values, at),
         "over": [_labels(values, name) for name in others],
     }
-    return Shown(head, {at: values[at].to_numpy(), field: values.to_numpy()})
+    return Shown(head, values, (at,))
+
+
+def _point(values: xr.DataArray, name: str, there: np.ndarray) -> Column:
+    """Return the column of a table of points."""
+    words, own = str(values.attrs.get("long_name", name)), values.to_numpy()[there]
+    kind = float if own.dtype.kind in "fiu" else object
+    return Column(
+        name=name,
+        words=words,
+        unit=_unit(values),
+        group="point",
+        flags=flags(values),
+        values=own.astype(kind),
+    )
 
 
 def _described(run: xr.Dataset, name: str) -> dict[str, Any]:

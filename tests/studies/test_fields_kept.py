@@ -134,26 +134,30 @@ def test_a_run_is_written_for_paraview(kept: tuple[Study, Store], tmp_path: Path
 
 
 def test_a_map_and_lines_are_written_as_csv(kept: tuple[Study, Store], tmp_path: Path) -> None:
-    out = tmp_path / "points.csv"
+    def exported(field: str, *more: str) -> pd.DataFrame:
+        out = tmp_path / "points.csv"
+        assert main(["export", str(run_of(kept)), "--csv", str(out), "--field", field, *more]) == 0
+        return pd.read_csv(out)
+
     with open_netcdf(run_of(kept)) as dataset:
         run = dataset.isel(dict.fromkeys(dataset["status"].dims, 0))
-        fields = {
-            "residual_stress": run["residual_stress"].sel(component="yy", drop=True),
-            "contact_pressure": run["contact_pressure"],
-        }
-        for field, values in fields.items():
-            asked = ["--field", field, *(["--component", "yy"] if "y" in values.dims else [])]
-            assert main(["export", str(run_of(kept)), "--csv", str(out), *asked]) == 0
-            found = pd.read_csv(out)
-            places = [*found.columns[:-1]]
-            assert places == (["x", "y"] if "y" in values.dims else ["stage", "s"])
-            if "x" in found:  # half of the bodies was computed, and all of it is drawn
-                assert len(found) == 2 * (found["x"] > 0.0).sum()
-                found = found[found["x"] > 0.0]
-            assert len(found) == int(values.notnull().sum()) > 10
-            right = values.to_series().dropna()
-            index = found.set_index([*right.index.names])[field]
-            pd.testing.assert_series_equal(index.sort_index(), right.sort_index())
+        stress = run["map_mises"].sel(stage="loaded", drop=True)
+        found = exported("map_mises", "--stage", "loaded")
+        assert [*found] == ["x", "y", "map_mises"]
+        assert len(found) == 2 * int(stress.notnull().sum()), "of the half that is drawn too"
+        own = found[found["x"] > 0.0]
+        at = {name: xr.DataArray(own[name].to_numpy(), dims="point") for name in ("x", "y")}
+        np.testing.assert_array_equal(stress.sel(at), own["map_mises"])
+        assert own["map_mises"].max() > 10.0
+
+        pressure = run["contact_pressure"].transpose("contact", "stage", "s")
+        found = exported("contact_pressure")
+        assert [*found] == ["contact", "stage", "distance", "contact_pressure"]
+        distance = run["contact_s"].broadcast_like(pressure).transpose(*pressure.dims)
+        there = pressure.notnull().to_numpy()
+        for name, right in (("contact_pressure", pressure), ("distance", distance)):
+            np.testing.assert_array_equal(found[name], right.to_numpy()[there])
+        assert {*found["stage"]} == {*run["stage"].to_numpy()}
 
 
 @pytest.mark.parametrize(
