@@ -28,6 +28,7 @@ class FinishedRun:
     tractions : pressure and shear on its lower body
     outcome : the result of its program
     check : function that returns the audit of a complete run
+    doubts : warnings about parameters that look like mistakes, see `Model.doubts`
     notes : messages to the user about the computation
     singular : singular points, near which numbers depend on the mesh
     beside : function that returns the fields of further bodies at the same stages
@@ -38,6 +39,7 @@ class FinishedRun:
     tractions: SurfaceTractions
     outcome: Outcome
     check: Callable[[], Audit]
+    doubts: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     singular: tuple[SingularPoint, ...] = ()
     beside: Callable[[], MeshFields] | None = None

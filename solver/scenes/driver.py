@@ -35,7 +35,7 @@ def record(scene: Scene, run: FinishedRun) -> Record:
     if not run.complete:
         limit = isinstance(run.outcome.error, LimitLoad)
         status = Status.LIMIT_LOAD if limit else Status.NOT_CONVERGED
-        messages = (*run.notes, str(run.outcome.error))
+        messages = (*run.doubts, *run.notes, str(run.outcome.error))
         return _labelled(scene, run, status, messages, cost)
     check = run.check()
     status = Status.OUTSIDE_THEORY if check.outside else Status.OK
@@ -45,7 +45,7 @@ def record(scene: Scene, run: FinishedRun) -> Record:
     values = {**cost, **figures, **_merged(run, (singular_points, outlines, *scene.outputs))}
     if check.violations:
         status = Status.AUDIT_FAILED
-    messages = check.violations + check.outside + run.notes + check.warnings + own
+    messages = run.doubts + check.violations + check.outside + run.notes + check.warnings + own
     return replace(
         _labelled(scene, run, status, messages, values),
         mesh=partial(mesh_fields, run.samples.fields, states, run.beside),
@@ -136,7 +136,8 @@ def by_increments(
             outcome=outcome,
             check=check,
             singular=system.model.singular,
-            notes=(*system.model.doubts, *notes),
+            doubts=system.model.doubts,
+            notes=notes,
         )
 
 

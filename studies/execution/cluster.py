@@ -275,11 +275,15 @@ def _kept(cluster: LocalCluster, workers: int) -> Iterator[None]:
         keeper.join()
 
 
-def connect(access: Access) -> Client:
+def connect(access: Access, patience: float | None = None) -> Client:
     """Return a client of a scheduler.
 
-    It must answer within Dask's ``distributed.comm.timeouts.connect`` (30 s, if nothing is set); a
-    message says soon that it has not.
+    A message says soon that it has not answered.
+
+    Parameters
+    ----------
+    patience : seconds within which it must answer, if they are less than Dask's setting
+        ``distributed.comm.timeouts.connect`` (30 s, if nothing is set)
 
     Raises
     ------
@@ -288,6 +292,8 @@ def connect(access: Access) -> Client:
     GridLost
         when no scheduler answers
     """
+    import dask
+    from dask.utils import parse_timedelta
     from distributed import Client, Security
     from distributed.comm.addressing import get_address_host_port
 
@@ -310,7 +316,10 @@ def connect(access: Access) -> Client:
     try:
         get_address_host_port(access.address)  # a refused client closes badly
         with _reported_if_late(f"no scheduler answers at {access.address} yet: waiting"):
-            return Client(access.address, security=security, set_as_default=False)
+            usual = parse_timedelta(dask.config.get("distributed.comm.timeouts.connect"))
+            within = usual if patience is None else min(patience, usual)
+            given = {"timeout": within, "security": security, "set_as_default": False}
+            return Client(access.address, **given)
     except (OSError, ValueError) as error:
         raise GridLost(f"no scheduler answers at {access.address}: {error}") from error
 

@@ -75,10 +75,11 @@ class Grid:
     Parameters
     ----------
     access : to the scheduler
+    patience : see `connect`
     """
 
-    def __init__(self, access: Access) -> None:
-        self._client = connect(access)
+    def __init__(self, access: Access, patience: float | None = None) -> None:
+        self._client = connect(access, patience)
 
     def __enter__(self) -> Self:
         return self

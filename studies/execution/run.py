@@ -180,7 +180,7 @@ def run_study(
     if alone:
         limits.check_without_workers()
     if access and not store.directory.exists():
-        _answering(access)
+        _answering(access, limits.patience)
     with store.writing():
         store.save_study(study)
         asking = Asking(study, store, resume, since) if study.kind.chooses else None
@@ -220,9 +220,9 @@ def run_study(
     )
 
 
-def _answering(access: Access) -> None:
+def _answering(access: Access, patience: float | None) -> None:
     """Raise `GridLost` if a scheduler does not answer, before a directory is made."""
-    with connect(access):
+    with connect(access, patience):
         pass
 
 
@@ -260,7 +260,7 @@ class _Work:
                 own = own_workers(count, self.limits.memory, need)
                 access = opening.enter_context(own)
                 tasks = chain(first, tasks)
-            grid = opening.enter_context(Grid(access))
+            grid = opening.enter_context(Grid(access, self.limits.patience))
 
             def leave() -> bool:
                 return bool(unwritable) or stop()

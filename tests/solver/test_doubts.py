@@ -92,7 +92,8 @@ def run(name: str, **given: object) -> Record:
 )
 def test_a_run_of_a_scene_tells_it_in_its_message(name: str, given: dict[str, object]) -> None:
     doubted = run(name, youngs_modulus=195.0, **given)
-    assert "youngs_modulus = 195: 195000 MPa was probably meant" in doubted.message
+    first = doubted.message.partition(";")[0]
+    assert "youngs_modulus = 195: 195000 MPa was probably meant" in first
 
 
 @pytest.mark.parametrize("gap", [0.02, 1.0])

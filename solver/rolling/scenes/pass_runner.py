@@ -180,7 +180,7 @@ class _Path:
                 error=self._reported(),
             ),
             check=check,
-            notes=doubts({view.profile_body: passes.law}),
+            doubts=doubts({view.profile_body: passes.law}),
             beside=beside,
         )
 
