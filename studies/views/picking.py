@@ -116,9 +116,20 @@ def one_run(dataset: xr.Dataset, selection: Mapping[str, str | float] | None = N
 
 
 def runs_over(
-    dataset: xr.Dataset, axis: str, selection: Mapping[str, str | float], field: str
+    dataset: xr.Dataset,
+    axis: str,
+    selection: Mapping[str, str | float],
+    field: str,
+    along: str | None = None,
 ) -> xr.Dataset:
     """Return the run that `one_run` selects for each value of an axis; failed runs are left out.
+
+    Parameters
+    ----------
+    dataset, selection : as for `one_run`
+    axis : axis of the sweep
+    field : variable whose grids are made one, see `_aligned`
+    along : dimension along which its lines go
 
     Raises
     ------
@@ -133,14 +144,48 @@ def runs_over(
     chosen = chosen.isel({axis: np.flatnonzero(chosen["status"] == OK)})
     own = [str(name) for name in chosen[field].dims]
     own = [name for name in own if name in chosen.coords and name not in chosen.indexes]
-    unlike = [name for name in own if not _same(chosen[name], axis)]
-    if unlike:
-        allowed = f"changes {', '.join(unlike)}: these runs have no place in common"
-        raise StudyError("over", axis, allowed)
+    for name in [name for name in own if not _same(chosen[name], axis)]:
+        own.remove(name)
+        chosen = _aligned(chosen, axis, name, field, along)
     for name in own:
         grid = chosen[name].isel({axis: 0}) if axis in chosen[name].dims else chosen[name]
         chosen = chosen.drop_vars(name).assign_coords({name: (name, grid.to_numpy(), grid.attrs)})
     return own_grid(chosen, own)
+
+
+def _aligned(runs: xr.Dataset, axis: str, name: str, field: str, along: str | None) -> xr.Dataset:
+    """Return runs whose grids differ over one that they have in common.
+
+    Along lines these are the places of all runs, with values that are linear between those of each:
+    a line is drawn as over its own places. Other places are named by their fraction of the whole.
+
+    Raises
+    ------
+    StudyError
+        if there is no such grid
+    """
+    grid = runs[name]
+    if name != along:
+        fraction = runs.get(f"{name}{FRACTION}")
+        if fraction is None:
+            allowed = f"changes {name}: these runs have no place in common"
+            raise StudyError("over", axis, allowed)
+        return runs.drop_vars([name, fraction.name]).assign_coords({name: fraction.variable})
+    common = np.unique(grid.to_numpy()[grid.notnull().to_numpy()])
+
+    def on_common(places: np.ndarray, values: np.ndarray) -> np.ndarray:
+        there = ~np.isnan(places)
+        found: np.ndarray = np.interp(
+            common, places[there], values[there], left=np.nan, right=np.nan
+        )
+        return found
+
+    values = xr.apply_ufunc(
+        on_common, grid, runs[field], input_core_dims=[[name], [name]],
+        output_core_dims=[[name]], exclude_dims={name}, vectorize=True, keep_attrs=True,
+    )  # fmt: skip
+    found = runs.drop_dims(name).assign({field: values.assign_attrs(runs[field].attrs)})
+    return found.assign_coords({name: xr.Variable(name, common, grid.attrs)})
 
 
 def _same(grid: xr.DataArray, axis: str) -> bool:

@@ -10,8 +10,9 @@ from typing import Any
 import xarray as xr
 
 from solver.errors import ModelError
+from solver.parameters import unmet
 from solver.tensors import AXES
-from studies.definition.parameters import defaults, parameters_of, plain
+from studies.definition.parameters import build, defaults, parameters_of, plain
 from studies.scenes.registry import scene_of
 from studies.storage.frame import FRACTION
 from studies.views.columns import counted
@@ -96,12 +97,12 @@ def setting(run: xr.Dataset) -> str:
     """Return the scene and what distinguishes this run from others, in words.
 
     These are its values on the axes of the sweep, and the parameters that differ from the scene's
-    defaults. The two-dimensional state is always named.
+    defaults. The two-dimensional state is always named. Parameters without an effect are left out.
     """
     scene = run.attrs["scene"]
     known = parameters_of(scene_of(run.attrs))
     given: Mapping[str, Any] = json.loads(run.attrs["parameters"])
-    usual = _usual(run, given)
+    usual, idle = _usual(run, given)
     plane = given.get("state")
     state = [words(plane)] if isinstance(plane, str) and "state" not in run.coords else []
     place = [
@@ -111,7 +112,7 @@ def setting(run: xr.Dataset) -> str:
             each.attrs.get("units", ""),
         )
         for name, each in run.coords.items()
-        if each.ndim == 0 and not str(name).endswith(FRACTION)
+        if each.ndim == 0 and not str(name).endswith(FRACTION) and name not in idle
     ]
     others = [
         named(name, value, known[name].unit)
@@ -119,14 +120,18 @@ def setting(run: xr.Dataset) -> str:
         if name in known
         and name not in run.coords
         and value not in (None, usual[name])
+        and name not in idle
         and not (state and name == "state")
     ]
     parts = [scene, *state, *place, *others]
     return f"{_STAY}· ".join(part.replace(" ", _STAY) for part in parts)
 
 
-def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the default parameters of a run; for several runs, the defaults that they declare."""
+def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> tuple[dict[str, Any], set[str]]:
+    """Return the default parameters of a run, and the names of those without an effect in it.
+
+    For several runs these are the defaults that they declare.
+    """
     scene = scene_of(run.attrs)
     known = parameters_of(scene)
     swept = {
@@ -134,10 +139,12 @@ def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:
         for name, each in run.coords.items()
         if name in known and each.ndim == 0
     }
+    own = {name: value for name, value in {**given, **swept}.items() if name in known}
     try:
-        return defaults(scene, {**given, **swept})
+        usual, parameters = defaults(scene, own), build(scene, own)
     except ModelError:  # the parameters are consistent only with the swept values
-        return {name: parameter.default for name, parameter in known.items()}
+        return {name: parameter.default for name, parameter in known.items()}, set()
+    return usual, {name for name in known if unmet(parameters, name)}
 
 
 def short_number(value: float, digits: int = 4) -> str:
@@ -154,8 +161,8 @@ def wrapped(text: str, width: float, points: int) -> str:
 
 
 def _text(value: Any, unit: str) -> str:
-    number = f"{value:g}" if isinstance(value, int | float) else words(counted(value))
-    return number if unit in {"", "1"} else f"{number} {unit}"
+    text = f"{value:g}" if isinstance(value, int | float) else words(counted(value))
+    return text if unit in {"", "1"} or isinstance(value, str) else f"{text} {unit}"
 
 
 def _measured(name: str, variable: xr.DataArray) -> str:

@@ -192,7 +192,11 @@ def _part(
     swept, own = sweep_coordinates(dataset), _own(dataset, field, against)
     _known(selection, [*swept, *own])
     chosen = {name: selection[name] for name in swept if name in selection}
-    run = one_run(dataset, chosen) if over is None else runs_over(dataset, over, chosen, field)
+    if over is None:
+        run = one_run(dataset, chosen)
+    else:
+        along = line_axis(dataset[field], sweep_axes(dataset))
+        run = runs_over(dataset, over, chosen, field, along)
     return run.isel(
         {name: positions(run[name], selection[name]) for name in own if name in selection}
     )

@@ -137,14 +137,34 @@ def test_lines_of_several_runs_lie_over_one_axis() -> None:
         picture(dataset, "contact_pressure", over="colour")
 
 
-def test_runs_with_different_grids_are_not_laid_over_each_other() -> None:
+def test_lines_of_runs_with_grids_of_their_own_lie_over_their_own_places() -> None:
     dataset = swept().rename(s="place").drop_vars("place").rename(place="s")
+    own = np.outer([1.0, 2.0, 3.0], np.arange(5.0))
     dataset = dataset.assign_coords(
         s_fraction=("s", np.linspace(0.0, 1.0, 5)),
-        s=(("load_ratio", "s"), np.outer([1.0, 2.0, 3.0], np.arange(5.0))),
+        s=(("load_ratio", "s"), own, {"units": "mm"}),
     )
-    with pytest.raises(StudyError, match="changes s: these runs have no place in common"):
-        picture(dataset, "contact_pressure", over="load_ratio")
+    values = dataset["contact_pressure"].isel(friction=-1, hardening=0)
+    for k, line in enumerate(lines_of(picture(dataset, "contact_pressure", over="load_ratio"))):
+        x, y = np.transpose(points(line))
+        assert x[-1] == own[k, -1]
+        np.testing.assert_allclose(np.interp(own[k], x, y), values.isel(load_ratio=k))
+        np.testing.assert_allclose(y, np.interp(x, own[k], values.isel(load_ratio=k)))
+
+
+def test_other_places_that_differ_are_named_by_their_fraction() -> None:
+    dataset = swept(loads=[0.2, 0.4], frictions=[0.1], laws=["none"])
+    weights = xr.DataArray([1.0, 2.0], dims="station")
+    dataset["residual_profile"] = dataset["contact_pressure"] * weights
+    dataset = dataset.assign_coords(
+        station_fraction=("station", [-1.0, 1.0]),
+        station=(("load_ratio", "station"), [[-3.0, 3.0], [-4.0, 4.0]]),
+    )
+    sheet = picture(dataset, "residual_profile", over="load_ratio")
+    assert legend_of(sheet) == ["0.2, -1", "0.2, 1", "0.4, -1", "0.4, 1"]
+    missing = dataset.drop_vars("station_fraction")
+    with pytest.raises(StudyError, match="changes station: these runs have no place in common"):
+        picture(missing, "residual_profile", over="load_ratio")
 
 
 def test_the_resolution_is_that_of_the_file(tmp_path: Path) -> None:
@@ -170,8 +190,8 @@ def test_lines_are_laid_over_each_other_where_another_axis_changes_the_grid() ->
     figure = picture(dataset, "contact_pressure", over="load_ratio")
     assert len(lines_of(figure)) == 3
     assert max(line.get_xdata().max() for line in lines_of(figure)) == grids[-1, -1]
-    with pytest.raises(StudyError, match="changes s"):
-        picture(dataset, "contact_pressure", over="friction")
+    figure = picture(dataset, "contact_pressure", over="friction")
+    assert [line.get_xdata().max() for line in lines_of(figure)] == list(grids[:, -1])
 
 
 def test_lines_over_an_axis_are_selected_on_grids_that_another_one_moves() -> None:
