@@ -10,6 +10,7 @@ import numpy as np
 from solver.audit.plain import LEAST, PlainBody, load_factor
 from solver.contact.state import Converged
 from solver.contact.system import System
+from solver.fem.discretisation import Discretisation
 from solver.fem.dofs import vectors
 from solver.fem.fields import elastic_energy
 from solver.fem.rigid import RigidPart
@@ -38,7 +39,7 @@ class AuditedBody:
     @property
     def meshed(self) -> bool:
         """Whether the body is not condensed: the system solves for all of its nodes."""
-        return self.part.meshed
+        return isinstance(self.part, Discretisation)
 
     @cached_property
     def _law(self) -> Law:

@@ -41,8 +41,11 @@ from solver.audit.theory import Neglected
 from solver.contact.candidates import no_candidates
 from solver.contact.state import Converged, State
 from solver.contact.system import System
+from solver.fem.discretisation import Discretisation
 from solver.fem.frame import turning
 from solver.fem.rigid import RigidPart
+from solver.fem.substructure import Substructure
+from solver.linear.schur import Eliminated
 from solver.loading.step import newton_step
 from solver.materials.elasticity import Elasticity
 from solver.tensors import SQRT2, to_tensor
@@ -141,7 +144,7 @@ class _Deformed:
         self.name, state = plain.body.name, converged.state
         self.number, self.part = system.part(self.name), plain.part
         self.elasticity, self.stiffness = plain.body.law.elasticity, plain.body.law.stiffness(4)
-        meshed = system.parts[self.number].meshed
+        meshed = isinstance(system.parts[self.number], Discretisation)
         response = (
             converged.responses[self.number] if meshed else system.response(self.name, converged)
         )
@@ -203,7 +206,9 @@ class _Joined:
         own, begun = [np.zeros(part.n) for part in parts], []
         for k, (body, each) in enumerate(zip(self._bodies, strains, strict=True)):
             force = -body.part.undeformed.internal_force(body.stiffness @ each)
-            begun.append(parts[body.number].begin(force if forces is None else force - forces[k]))
+            part, force = parts[body.number], force if forces is None else force - forces[k]
+            condensed = part.begin(force) if isinstance(part, Substructure) else None
+            begun.append(condensed or Eliminated(force, lambda u: u))
             own[body.number] = begun[-1].condensed
         operators = [each.elastic for each in self._system.operators]
         links = self._links

@@ -115,11 +115,14 @@ def turned(system: System, converged: Converged) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _motion(system: System, name: str, converged: Converged) -> RigidMotion:
-    number = system.part(name)
-    part = system.parts[number]
+def _rigid(system: System, name: str) -> RigidPart:
+    part = system.parts[system.part(name)]
     assert isinstance(part, RigidPart)
-    return part.motion_of(converged.state.u[number])
+    return part
+
+
+def _motion(system: System, name: str, converged: Converged) -> RigidMotion:
+    return _rigid(system, name).motion_of(converged.state.u[system.part(name)])
 
 
 def _forces(system: System, k: int, converged: Converged, name: str) -> tuple[Array, Array]:
@@ -176,7 +179,7 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
     X, u, area, *_ = slave
     if link.rigid is not None:
         x, y, angle = _motion(system, link.rigid, converged)
-        centre = system.parts[system.part(link.rigid)].body.centre  # type: ignore[union-attr]
+        centre = _rigid(system, link.rigid).body.centre
         arm = X - np.reshape(centre, (2, 1))
         others.append(np.array([x - angle * arm[1], y + angle * arm[0]]))
     size = max(float(np.abs(each).max()) for each in (u, *others))
@@ -222,7 +225,7 @@ def _misfit_at_nodes(system: System, k: int, converged: Converged, size: float) 
         ways = np.array([[y, -x] if link.components == "normal" else [x, y]]) / np.hypot(x, y)
     if link.rigid is not None:
         across, up, angle = _motion(system, link.rigid, converged)
-        centre = system.parts[system.part(link.rigid)].body.centre  # type: ignore[union-attr]
+        centre = _rigid(system, link.rigid).body.centre
         arm = X - np.reshape(centre, (2, 1))
         u = u - np.array([across - angle * arm[1], up + angle * arm[0]])
     jump = (ways * u).sum(axis=1)

@@ -169,7 +169,10 @@ def _strength(system: System, loaded: Converged) -> dict[str, float]:
         pressure, tangential = contact_pressure(system, state, k)
         bound = system.bound(k, system.pairing(state, k), start, state.time).least(pressure)
         for number, _, _ in interface.sides:
-            law = system.parts[number].law(loaded.state.time)
+            part = system.parts[number]
+            if not isinstance(part, Discretisation):
+                continue
+            law = part.law(loaded.state.time)
             if law.elastic:
                 continue
             strength = float(law.shear_strength(loaded.responses[number].state).max())

@@ -175,8 +175,7 @@ def interface_of(
     sides = []
     for side in (contact.slave, contact.master):
         number, chain = names.index(side[0]), surfaces[side]
-        part = parts[number]
-        sides.append((number, part.surface(chain)))
+        sides.append((number, parts[number].surface(chain)))
     (slave, slave_surface), (master, master_surface) = sides
     both = (parts[slave], parts[master])
     check_overlap(both[0].body, both[1].body, (slave_surface, master_surface))
@@ -186,7 +185,7 @@ def interface_of(
     small = contact.sliding == "small" or (contact.sliding == "auto" and not curved)
     if small:
         reach = largest_overlap(both[0].body, both[1].body)
-    if small or not any(part.travels for part in both):
+    if small or not any(part.rigid.shape[1] or part.driven.fields.any() for part in both):
         at_rest = [np.zeros_like(chain.X) for _, chain in sides]
         reference = pair(slave_surface, at_rest[0], master_surface, at_rest[1], reach)
         if not reference.area.any():
@@ -196,7 +195,7 @@ def interface_of(
                 "normal of the slave meets the outside of the master. Check the boundaries and the "
                 "positions of the bodies",
             )  # fmt: skip
-    hot = [part.hot(chain) for part, (_, chain) in zip(both, sides, strict=True)]
+    hot = [_hot(part, chain) for part, (_, chain) in zip(both, sides, strict=True)]
     return Interface(
         declared=contact,
         slave=slave,
@@ -209,3 +208,11 @@ def interface_of(
         reach=reach,
         reference=reference if small else None,
     )
+
+
+def _hot(part: Part, surface: Surface) -> Softening | None:
+    """Return the softening at a surface's nodes; None if the yield stress is constant."""
+    if not isinstance(part, Discretisation):
+        return None
+    heat = Softening.of(part, part.X[:, surface.nodes])
+    return heat if heat and heat.strength.fields.any() else None

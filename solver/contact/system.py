@@ -173,7 +173,10 @@ class System:
         """
         at, found = self._least
         if at != time:  # several callers need it at the same time
-            each = [part.clamped(time) for part in self.parts]
+            each = [
+                whole.clamped(time) if isinstance(whole, Discretisation) else (0.0, 0.0)
+                for whole in self._chains.values()
+            ]
             force, energy = np.array([*each, self.links.clamped(self.parts, time)]).T
             found = LEAST * float(np.linalg.norm(force)), LEAST_ENERGY * float(energy.sum())
             self._least = time, found
@@ -205,7 +208,9 @@ class System:
     def during(self, start: State) -> System:
         """Return the system for an increment from ``start``; it locks motions of rigid bodies."""
         each = zip(self.parts, start.u, strict=True)
-        parts = tuple(part.during(start.time, u) for part, u in each)
+        parts = tuple(
+            part.during(start.time, u) if isinstance(part, RigidPart) else part for part, u in each
+        )
         unchanged = all(one is other for one, other in zip(parts, self.parts, strict=True))
         return self if unchanged else self.within(parts)
 
@@ -322,7 +327,7 @@ class System:
         """Return the accumulated plastic strain (n,) at the vertices of a slave."""
         interface = self.interfaces[pair]
         number, chain = interface.slave, self.chain(*interface.declared.slave)
-        if not self.parts[number].meshed:
+        if not isinstance(self.parts[number], Discretisation):
             return np.zeros(len(chain.vertices))
         if pair not in self._at_vertices:
             at = chain.nodes[chain.vertices]
@@ -389,7 +394,7 @@ class System:
         Stress and plastic strain are NaN in elements that are removed.
         """
         number = self.part(name)
-        if not self.parts[number].meshed:
+        if not isinstance(self.parts[number], Discretisation):
             whole = self.full(name)
             state = converged.state
             return whole.respond(self.displacement(name, state), whole.virgin(), state.time).law

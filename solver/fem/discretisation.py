@@ -26,7 +26,7 @@ from solver.fem.softening import Softening
 from solver.fem.surface import Surface, extract, gathered
 from solver.linear import solvers as linear
 from solver.linear.solvers import LinearSolver
-from solver.materials import Law, PlasticState, Response
+from solver.materials import Law, PlasticState
 from solver.mesh.elements import element_type
 from solver.model.body import Body
 from solver.typing import Array, Bools, Ints
@@ -123,11 +123,6 @@ class Discretisation(Nodes, Part):
             self._travelling = time, travelling_forces(self, self.body.travelling, time)
         return self._travelling[1]
 
-    @property
-    def travels(self) -> bool:
-        """Whether it may move as a whole: contact alone holds it, or a motion is prescribed."""
-        return super().travels or bool(self.driven.fields.any())
-
     def grows(self, before: float, after: float) -> bool:
         """Whether the external load grows from one time to another."""
         travelling = self.body.travelling
@@ -136,10 +131,6 @@ class Discretisation(Nodes, Part):
         return travelling.now(after)[0] > travelling.now(before)[0]
 
     # -- the law at all points ---------------------------------------------------------------
-
-    def virgin(self) -> PlasticState:
-        """Return the internal variables of the body before any load."""
-        return self.body.law.initial(self.weights.size, self.components)
 
     def strain(self, u: Array) -> Array:
         """Return Mandel strain (n_components, n_points) for displacements (n,)."""
@@ -153,11 +144,6 @@ class Discretisation(Nodes, Part):
         """Return whether elements at the points (n_points,) are removed; None if none ever are."""
         softening = self.softening
         return softening.gone(time) if softening and softening.removed.cases else None
-
-    def hot(self, surface: Surface) -> Softening | None:
-        """Return the softening at a surface's nodes; None if the yield stress is constant."""
-        heat = Softening.of(self, self.X[:, surface.nodes])
-        return heat if heat and heat.strength.fields.any() else None
 
     def eigenstrain(self, time: float) -> Array:
         """Return the eigenstrain (n_components, n_points, Mandel) of heat or initial stress."""
@@ -238,7 +224,6 @@ class Discretisation(Nodes, Part):
 
     def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,), without contact forces [N]."""
-        del u
         return self.external(time) - response.deformation.internal_force(response.law.stress)
 
     def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
@@ -254,18 +239,6 @@ class Discretisation(Nodes, Part):
             geometric = deformation.geometric(law.stress, slice(None))
             tangent += float(np.einsum("ei,eij,ej", each, geometric, each))
         return float(elastic[linear].sum() + tangent), float(elastic.sum())
-
-    def place(self, point: int) -> tuple[float, ...]:
-        """Return the position of a point [mm]."""
-        return tuple(self.positions[:, point].tolist())
-
-    def plastic_work(
-        self, before: PlasticState, response: Response, time: float
-    ) -> tuple[float, float]:
-        """Return the plastic work [N mm] and the least dissipation at a point [N mm/mm3]."""
-        flow = response.state.plastic_strain - before.plastic_strain
-        work = (response.stress * flow).sum(axis=0) @ self.weights.ravel()
-        return float(work), float(self.law(time).dissipation(before, response).min())
 
     # -- stiffness ---------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@ from scipy import sparse
 
 from solver.errors import ModelError
 from solver.fem.deformation import without_points
+from solver.fem.discretisation import Discretisation
 from solver.fem.nodes import Nodes
 from solver.fem.part import Part
 from solver.materials.state import Response
@@ -154,6 +155,6 @@ def _reference(part: Nodes, element: Ints, x: Array) -> Array:
 
 def elastic_energy(part: Part, u: Array, response: Response, time: float) -> float:
     """Return the elastic energy of a part [N mm], from stress or from its condensed stiffness."""
-    if part.meshed:
+    if isinstance(part, Discretisation):
         return float(part.law(time).energy_density(response.stress) @ part.volumes)
     return part.stiffness_along(u, without_points(part.n, response))[1] / 2

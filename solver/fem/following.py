@@ -5,9 +5,30 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from solver.fem.part import Part
+from solver.fem.part import Part, same_unknowns
+from solver.fem.rigid import RigidPart
+from solver.fem.wheel import Wheel
 from solver.linear import solvers as linear
-from solver.typing import Array
+from solver.typing import Array, Ints
+
+
+def passed_over(part: Part, before: Array, after: Array, way: float) -> float:
+    """Return the motion over the material of a part of a load that moves by ``way`` [mm].
+
+    ``before`` and ``after`` are the unknowns (n,) of the part; those of a rigid body do not shift.
+    """
+    if isinstance(part, Wheel):
+        return part.passed(before, after)
+    return 0.0 if isinstance(part, RigidPart) else way
+
+
+def _sources(part: Part, way: float) -> Ints:
+    """Return for each unknown (n,) the one at ``way`` [mm] behind it along x, or -1."""
+    if isinstance(part, Wheel):
+        return part.sources(way)
+    if isinstance(part, RigidPart):
+        return np.arange(part.n)
+    return same_unknowns(part.nodes, part.nodes - np.array([[way], [0.0]]))
 
 
 class Following:
@@ -26,7 +47,7 @@ class Following:
     """
 
     def __init__(self, part: Part, way: float) -> None:
-        self.source = part.sources(way)
+        self.source = _sources(part, way)
         free = np.zeros(part.n, dtype=bool)
         free[part.free] = True
         # held unknowns are not shifted: supports stay at rest, prescribed motions are known

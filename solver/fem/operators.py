@@ -206,5 +206,4 @@ class Fixed:
 
     def tangent(self, response: PartResponse, blend: float) -> Operator:
         """Return the elastic operator."""
-        del response, blend
         return self.elastic

@@ -11,14 +11,13 @@ from copy import copy
 import numpy as np
 from scipy import sparse
 
-from solver.fem.deformation import PartResponse, without_points
+from solver.fem.deformation import PartResponse
 from solver.fem.frame import MovingFrame, RigidMotion
 from solver.fem.loads import Superposed
 from solver.fem.operators import Fixed
 from solver.fem.part import Part
 from solver.fem.surface import Surface
 from solver.linear.solvers import Begun
-from solver.materials import PlasticState, Response
 from solver.mesh.rounding import ROUNDED
 from solver.model.rigid import Moved, Pushed, RigidBody
 from solver.typing import Array, Ints
@@ -32,12 +31,10 @@ class Unmoved:
 
     def begin(self, force: Array) -> Begun:
         """See `Operator`."""
-        del force
         return Begun(self._nothing, lambda change: self._nothing)
 
     def compliance(self, dofs: Ints, rows: Array) -> Array:
         """See `Operator`."""
-        del dofs
         return np.zeros((len(rows), len(rows)))
 
 
@@ -50,7 +47,6 @@ class RigidPart(Part):
     """
 
     body: RigidBody
-    meshed = False
 
     def __init__(self, body: RigidBody, axisymmetric: bool, reach: float = 0.0) -> None:
         self.body = body
@@ -79,7 +75,7 @@ class RigidPart(Part):
         self.rigid = np.eye(3)[:, self.free]
 
     def during(self, time: float, u: Array) -> RigidPart:
-        """See `Part.during`."""
+        """Return the part for an increment from a time and unknowns u, which may be locked."""
         each = self.body.every_load
         stays = np.array([isinstance(m, Pushed) and m.locked <= time for m in each])
         if not stays.any():
@@ -94,7 +90,6 @@ class RigidPart(Part):
 
     def chain(self, boundary: str, any_shape: bool = False) -> Surface:
         """Return a surface by its name."""
-        del any_shape
         curve = self.body.surfaces[boundary]
         count = np.asarray(curve.points).shape[1]
         step = 2 if curve.quadratic else 1
@@ -126,18 +121,12 @@ class RigidPart(Part):
 
     def pull_back(self, surface: Surface, u: Array, block: Array, gaps: int) -> tuple[Ints, Array]:
         """Return the three unknowns and derivative rows (n_rows, 3) on them."""
-        del gaps
         return np.arange(3), self.frame.rows(u, block, self.frame.passing(surface.X))
 
     def moved(self, u: Array, time: float) -> Array:
         """Return ``u`` with prescribed motions at their values at a time."""
         u = np.where(np.isnan(self._locked), u, self._locked)
         return np.where(self._held, self.driven.at(time), u)
-
-    @property
-    def travels(self) -> bool:
-        """Whether a motion is free or prescribed."""
-        return super().travels or bool(self.driven.fields.any())
 
     def turn(self, before: float, after: float) -> float:
         """Return the prescribed rotation between two times [rad]; 0 if rotation is free."""
@@ -149,35 +138,14 @@ class RigidPart(Part):
         """Return the unknowns (3,) before any load."""
         return self.moved(np.zeros(3), 0.0)
 
-    def passed(self, before: Array, after: Array, way: float) -> float:
-        """Return 0: prediction needs no shift for a rigid body."""
-        del before, after, way
-        return 0.0
-
-    def sources(self, way: float) -> Ints:
-        """Return the unknowns themselves."""
-        del way
-        return np.arange(3)
-
-    # -- it has no points, and no stiffness ------------------------------------------------------
+    # -- it has no stiffness --------------------------------------------------------------------
 
     def operators(self, surfaces: list[Surface], linear_solver: str) -> Fixed:
         """Return the operator of a part without elastic displacements."""
-        del surfaces, linear_solver
         return Fixed(Unmoved(3))
-
-    def virgin(self) -> PlasticState:
-        """Return the internal variables of no points."""
-        return self.body.law.initial(0, 4)
-
-    def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
-        """Return the response of no points."""
-        del u, time
-        return without_points(self.n, self.body.law.respond(np.zeros((4, 0)), state))
 
     def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return the external forces (3,) [N]."""
-        del u, response
         return self.external(time)
 
     def elastic_matrix(self) -> sparse.csr_array:
@@ -186,12 +154,4 @@ class RigidPart(Part):
 
     def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
         """Return zero: a rigid body stores no energy."""
-        del step, response
-        return 0.0, 0.0
-
-    def plastic_work(
-        self, before: PlasticState, response: Response, time: float
-    ) -> tuple[float, float]:
-        """Return zero."""
-        del before, response
         return 0.0, 0.0

@@ -14,7 +14,7 @@ from hashlib import sha256
 import numpy as np
 from scipy import sparse
 
-from solver.fem.deformation import PartResponse, without_points
+from solver.fem.deformation import PartResponse
 from solver.fem.discretisation import Discretisation, choose_pins
 from solver.fem.dofs import Dofs
 from solver.fem.loads import Superposed
@@ -22,7 +22,6 @@ from solver.fem.operators import Dense, Fixed
 from solver.fem.part import Part
 from solver.fem.surface import Surface
 from solver.linear.schur import Eliminated, SchurComplement
-from solver.materials import PlasticState, Response
 from solver.memory import remembered
 from solver.typing import Array, Ints
 
@@ -70,8 +69,6 @@ class Substructure(Part):
     of its unknowns, does not need it.
     """
 
-    meshed = False
-
     def __init__(self, whole: Discretisation, surfaces: list[Surface], linear_solver: str) -> None:
         self.whole = whole
         self.body = whole.body
@@ -81,7 +78,6 @@ class Substructure(Part):
         self.elastic = slice(len(kept))
         self.n = len(kept)
         self.nodes = whole.X[:, nodes]
-        self.driven = Superposed.of(self.n, ())
         self.rigid = whole.rigid[kept]
         self.free = np.flatnonzero(np.isin(kept, whole.free))
         self.active = choose_pins(self.rigid, self.free)
@@ -91,7 +87,7 @@ class Substructure(Part):
         return _condense(self.whole, self._kept, self._linear_solver)
 
     @cached_property
-    def loads(self) -> Superposed:  # type: ignore[override]  # a cached property can be written
+    def loads(self) -> Superposed:
         """Nodal forces of the body's loads, condensed to the kept nodes [N]."""
         return Superposed(self.whole.condensable.cases, self._condensed.forces)
 
@@ -100,29 +96,13 @@ class Substructure(Part):
         nodes = np.searchsorted(self._nodes, surface.nodes)
         return replace(surface, nodes=nodes)
 
-    def clamped(self, time: float) -> tuple[float, float]:
-        """See `Discretisation.clamped`."""
-        return self.whole.clamped(time)
-
     def operators(self, surfaces: list[Surface], linear_solver: str) -> Fixed:
         """Return the operator of an elastic part, which never changes."""
-        del surfaces, linear_solver
         S = self._condensed.stiffness[np.ix_(self.active, self.active)]
         return Fixed(Dense(S, self.active, self.n))
 
-    def virgin(self) -> PlasticState:
-        """Return the internal variables of zero points: the part cannot yield."""
-        return self.body.law.initial(0, self.whole.components)
-
-    def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
-        """Return the law's response for zero points."""
-        del u, time
-        none = np.zeros_like(state.plastic_strain)
-        return without_points(self.n, self.body.law.respond(none, state))
-
     def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,) [N]."""
-        del response
         force = self.external(time)
         force[self.elastic] -= self._condensed.stiffness @ u[self.elastic]
         return force
@@ -134,16 +114,8 @@ class Substructure(Part):
 
     def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
-        del response
         energy = float(step[self.elastic] @ self._condensed.stiffness @ step[self.elastic])
         return energy, energy
-
-    def plastic_work(
-        self, before: PlasticState, response: Response, time: float
-    ) -> tuple[float, float]:
-        """Return zero plastic work and zero least dissipation."""
-        del before, response
-        return 0.0, 0.0
 
     def on_whole(self, force: Array) -> Array:
         """Return the nodal forces (n,) of the whole body for those of this part [N]."""
@@ -152,7 +124,10 @@ class Substructure(Part):
         return whole
 
     def begin(self, force: Array) -> Eliminated:
-        """See `Part.begin`."""
+        """Return nodal forces of the whole body on the unknowns of this part.
+
+        ``finish`` returns the displacements of the whole body for those of this part.
+        """
         own, begun = np.zeros(self.n), self._condensed.begin(force)
         own[self.elastic] = begun.condensed
         return Eliminated(own, lambda u: begun.finish(u[self.elastic]))

@@ -113,9 +113,8 @@ class Wheel(Substructure):
         """Return the motion of the axle along x between two times [mm]."""
         return self.axle.position.at(after) - self.axle.position.at(before)
 
-    def passed(self, before: Array, after: Array, way: float) -> float:
+    def passed(self, before: Array, after: Array) -> float:
         """Return the motion of the contact along the rim [mm]: 0 if the wheel is locked."""
-        del way
         turn = self._hub + _TURN
         return float(before[turn] - after[turn])
 

@@ -161,7 +161,6 @@ class Windowed(Discretisation):
 
     def expand(self, u: Array, time: float) -> Array:
         """Return the whole body's displacements [mm]."""
-        del time
         change = self._outer.finish(u - self._begin[self.kept])
         return self._begin + change
 
@@ -177,7 +176,6 @@ class Windowed(Discretisation):
 
     def pull_back(self, surface: Surface, u: Array, block: Array, gaps: int) -> tuple[Ints, Array]:
         """See `Part.pull_back`; raises `Singular` if contact has left the region."""
-        del u, gaps
         at = self._number[surface.dofs]
         touches = (at >= 0) & self._touches[at]
         if block[:, ~touches].any():
@@ -188,12 +186,10 @@ class Windowed(Discretisation):
 
     def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
         """Return the response, from the internal variables that `at` has set."""
-        del state
         return super().respond(u, self._plastic, time)
 
     def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,), including the condensed rest [N]."""
-        del time
         inner = response.deformation.internal_force(response.law.stress)
         force = self._outer.condensed - inner
         force[self._edge] -= self._rest @ (u - self._begin[self.kept])[self._edge]
@@ -207,13 +203,8 @@ class Windowed(Discretisation):
         """Return the norm of the forces that load the whole body at a time [N]."""
         return self.whole.force_level(time)
 
-    def clamped(self, time: float) -> tuple[float, float]:
-        """See `Discretisation.clamped`."""
-        return self.whole.clamped(time)
-
     def moved(self, u: Array, time: float) -> Array:
         """Return the unknowns, whose prescribed motions have their values already."""
-        del time
         return u
 
     def rounding(self, u: Array) -> float:

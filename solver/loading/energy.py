@@ -16,8 +16,10 @@ import numpy as np
 
 from solver.contact.state import Converged, Energy
 from solver.contact.system import System
+from solver.fem.discretisation import Discretisation
 from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
+from solver.materials.state import PlasticState, Response
 
 
 def worked(system: System, before: Converged, now: Converged) -> Energy:
@@ -63,6 +65,8 @@ def _heat(parts: Sequence[Part], before: Converged, now: Converged) -> float:
     times = before.state.time, now.state.time
     work = 0.0
     for part, old, new in zip(parts, before.responses, now.responses, strict=True):
+        if not isinstance(part, Discretisation):
+            continue
         grown = part.eigenstrain(times[1]) - part.eigenstrain(times[0])
         if grown.any():
             work += float(((old.stress + new.stress) * grown).sum(axis=0) @ part.volumes) / 2
@@ -111,6 +115,17 @@ def _turned(system: System, before: Converged, now: Converged) -> float:
             ]
             work -= float(np.sum(forces, 0) @ moved - np.sum(resultants, 0) @ (u1 - u0)) / 2
     return work
+
+
+def plastic_work(
+    part: Part, before: PlasticState, response: Response, time: float
+) -> tuple[float, float]:
+    """Return plastic work [N mm] and least dissipation at a point [N mm/mm3] of an increment."""
+    if not isinstance(part, Discretisation):
+        return 0.0, 0.0
+    flow = response.state.plastic_strain - before.plastic_strain
+    work = (response.stress * flow).sum(axis=0) @ part.volumes
+    return float(work), float(part.law(time).dissipation(before, response).min())
 
 
 def _plastic_work(parts: Sequence[Part], before: Converged, now: Converged) -> float:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
 
 import numpy as np
 
 from solver.contact.candidates import Candidates
 from solver.contact.system import System
 from solver.fem.deformation import PartResponse
+from solver.fem.discretisation import Discretisation
 from solver.fem.part import Part
 from solver.loading.outcome import Mechanism
 from solver.loading.step import moving
-from solver.model.body import Body
 from solver.tensors import deviator
 from solver.typing import Array
 
@@ -64,24 +63,25 @@ def mechanism(
     candidates : contact, with the normal forces that bound friction
     level : force level [N]
     """
-    load, swelling, v, flow, most = 0.0, 0.0, [], [], []
+    load, swelling, v, flow = 0.0, 0.0, [], []
+    place: list[tuple[float, ...]] = []
     each = zip(system.parts, step, responses, residuals, candidates.pushes, strict=True)
     for part, u, response, residual, push in each:
-        strength = part.law(time).ultimate_shear_stress
-        flows = part.meshed and np.isfinite(strength)
+        law = part.law(time) if isinstance(part, Discretisation) else None
+        flows = law is not None and np.isfinite(law.ultimate_shear_stress)
         v.append(u if flows else moving(part, u))
         load += float((residual + push) @ v[-1])
         flow.append(0.0)
-        most.append(0)
+        place.append((np.nan, np.nan))
         if not flows:
             continue
-        body, surface = cast("Body", part.body), part.law(time).surface
-        strain = response.deformation.change(u)
-        if body.kinematics == "plane_stress":
+        assert isinstance(part, Discretisation) and law is not None
+        strain, surface = response.deformation.change(u), law.surface
+        if part.body.kinematics == "plane_stress":
             strain[2] = -strain[0] - strain[1]
-        tension = strength / surface.shear(1.0)
+        tension = law.ultimate_shear_stress / surface.shear(1.0)
         flow[-1] = float(tension * surface.power(strain) @ part.volumes)
-        most[-1] = int((strain**2).sum(axis=0).argmax())
+        place[-1] = tuple(part.positions[:, (strain**2).sum(axis=0).argmax()].tolist())
         swelling += float(tension * np.abs(strain[:3].sum(axis=0)) @ part.volumes)
         load += float((response.law.stress * deviator(strain)).sum(axis=0) @ part.volumes)
     rates = np.sum([candidates.of_part(k, u) for k, u in enumerate(v)], axis=0)
@@ -96,7 +96,7 @@ def mechanism(
     return Mechanism(
         ratio=load / (sum(flow) + friction + besides),
         body=system.parts[weakest].body.name,
-        place=system.parts[weakest].place(most[weakest]),
+        place=place[weakest],
     )
 
 

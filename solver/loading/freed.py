@@ -10,8 +10,10 @@ import numpy as np
 
 from solver.contact.system import System
 from solver.errors import ModelError
+from solver.fem.discretisation import Discretisation
 from solver.fem.dofs import vectors
 from solver.fem.part import Part
+from solver.fem.rigid import RigidPart
 from solver.fem.wheel import Wheel
 from solver.loading.program import Program
 from solver.loading.step import moving
@@ -40,7 +42,7 @@ def check_freed(system: System, program: Program) -> None:
             held = not target.apart and not all(pair.absent(target.time) for pair in pairs)
             if held or not part.force_level(target.time):
                 continue
-            own = part.during(before, part.start())
+            own = part.during(before, part.start()) if isinstance(part, RigidPart) else part
             pushed = moving(own, own.external(target.time))
             least = least or _LITTLE * max(part.force_level(time) for time in times)
             if np.linalg.norm(pushed) > least:
@@ -62,7 +64,7 @@ def _gone(pairs: list[ContactPair]) -> str:
 def _ways(part: Part, pushed: Array) -> str:
     """Return the directions in which a body would move, in words."""
     sizes = np.abs(pushed[-3:])  # motion of a rigid body or a hub
-    if part.meshed:
+    if isinstance(part, Discretisation):
         each = vectors(pushed, len(part.nodes))
         sizes = np.append(np.abs(each.mean(axis=1)), np.ptp(each, axis=1).max() / 2)
     ways = zip(("along x", "along y", "in rotation"), sizes, strict=True)

@@ -6,6 +6,7 @@ import numpy as np
 
 from solver.contact.state import Converged
 from solver.contact.system import System
+from solver.fem.discretisation import Discretisation
 
 _APART = 1e-4
 """Gap of a vertex without force over the edge length: the vertex is open above this ratio."""
@@ -25,8 +26,7 @@ def lost(system: System, before: Converged, now: Converged) -> float:
     worst = 0.0
     both = zip(system.parts, before.responses, now.start.plastic, strict=True)
     for part, response, plastic in both:
-        law = part.law(before.state.time)
-        if part.meshed and not law.elastic:
+        if isinstance(part, Discretisation) and not (law := part.law(before.state.time)).elastic:
             beyond = float(law.yield_value(response.stress, plastic).max(initial=0.0))
             worst = float(np.maximum(worst, beyond / law.yield_stress))
     for interface, contact in zip(system.interfaces, now.start.contacts, strict=True):

@@ -36,6 +36,7 @@ from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
 from solver.loading.acceleration import Series
 from solver.loading.control import Tolerances
+from solver.loading.energy import plastic_work
 from solver.loading.flow import is_singular, mechanism
 from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Mechanism, Yielded
@@ -416,7 +417,7 @@ class Increment:
         span = self.time - self.start.time
         contacts = candidates.kept(self.start.contacts, span, grows=not self.system.moves)
         spent = [
-            part.plastic_work(before, response.law, self.time)
+            plastic_work(part, before, response.law, self.time)
             for part, before, response in zip(
                 self.system.parts, self.start.plastic, responses, strict=True
             )

@@ -18,7 +18,8 @@ from solver.contact.problem import OPEN
 from solver.contact.state import ContactState, State
 from solver.contact.system import System
 from solver.fem.dofs import Dofs
-from solver.fem.following import Following
+from solver.fem.following import Following, passed_over
+from solver.fem.wheel import Wheel
 from solver.typing import Ints
 
 MEMORY = 8
@@ -53,7 +54,8 @@ class Predictor:
 
     def _way(self, before: float, after: float) -> float:
         """Return the motion of the wheels between two times [mm]; 0 if their motions differ."""
-        ways = {part.way(before, after) for part in self._system.parts if part.moves}
+        moving = (part for part in self._system.parts if part.moves)
+        ways = {p.way(before, after) if isinstance(p, Wheel) else 0.0 for p in moving}
         return ways.pop() if len(ways) == 1 else 0.0
 
     def _steps(self, before: State, now: State, way: float) -> list[int] | None:
@@ -62,7 +64,7 @@ class Predictor:
         for part, side, u0, u1 in zip(
             self._system.parts, self._sides, before.u, now.u, strict=True
         ):
-            passed = part.passed(u0, u1, way) / side
+            passed = passed_over(part, u0, u1, way) / side
             if abs(passed - round(passed)) > _OFF:
                 return None
             steps.append(round(passed))

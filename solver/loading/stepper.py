@@ -16,6 +16,7 @@ from solver.contact.state import ContactState, Converged, Energy, State, Timing
 from solver.contact.system import System
 from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.fem.fields import elastic_energy
+from solver.fem.rigid import RigidPart
 from solver.linear.threads import one_thread
 from solver.loading.control import Control
 from solver.loading.energy import worked
@@ -220,7 +221,8 @@ class Stepper:
         """
         before, expected = point.now, 0.0
         begin = before.state.time
-        turn = max((part.turn(begin, target) for part in self.system.parts), default=0.0)
+        rigid = (part for part in self.system.parts if isinstance(part, RigidPart))
+        turn = max((part.turn(begin, target) for part in rigid), default=0.0)
         step = (target - begin) / max(1, math.ceil(turn / _TURN - ROUNDING))
         if before.added:
             expected = before.added * (step / (begin - before.start.time)) ** 2

@@ -108,7 +108,6 @@ class BackStress(ABC):
 
         The stored work is 3/4 X:X / C; ``flow`` is the increment of plastic strain.
         """
-        del growth
         if not self.modulus:
             return np.zeros(old.shape[1])
         recalled = old + 2 / 3 * self.modulus * flow - new

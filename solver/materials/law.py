@@ -123,7 +123,6 @@ class Law(ABC):
 
     def at(self, points: Ints) -> Law:
         """Return the law of some points: the law itself if it is the same at all points."""
-        del points
         return self
 
     # -- strength ------------------------------------------------------------------------------

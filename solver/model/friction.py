@@ -152,7 +152,6 @@ class FrictionLaw(Checked, ABC):
 
     def check_bodies(self, *, elastic: bool) -> None:
         """Raise `ModelError` if the law does not suit the bodies; ``elastic``: both are elastic."""
-        del elastic
 
 
 FRICTION: Parts[FrictionLaw] = Parts("friction_law")

@@ -75,7 +75,6 @@ class Load:
 
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a value that is not allowed in a body of these kinematics."""
-        del kinematics
 
     def push(self, x: Array, along: Array) -> Array | None:
         """Return the forces (2, n) on pieces of its boundaries, per depth of the body [N/mm].
@@ -86,27 +85,22 @@ class Load:
         along : (2, n) vectors along the pieces, with the body on their left [mm]: outward normal
             times length is ``(along[1], -along[0])``
         """
-        del x, along
         return None
 
     def body_force(self, x: Array) -> Array | None:
         """Return the force per volume (2, n) at positions x [N/mm3]."""
-        del x
         return None
 
     def eigenstrain(self, x: Array) -> Array | None:
         """Return the eigenstrain xx, yy, zz, xy (4, n) at positions x: strain without stress."""
-        del x
         return None
 
     def initial_stress(self, x: Array) -> Array | None:
         """Return the stress present before loading, xx, yy, zz, xy (4, n), at positions x [MPa]."""
-        del x
         return None
 
     def softening(self, x: Array) -> tuple[Array, Array] | None:
         """Return the shares of Young's modulus and yield stress lost, (n,) each, at positions x."""
-        del x
         return None
 
     @property
@@ -262,7 +256,6 @@ class Displacement(BoundaryLoad):
 
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` if no component is given."""
-        del kinematics
         if not self.components:
             raise ModelError(f"displacement.{self.boundary}", None, "must give x, y or both [mm]")
 
@@ -320,7 +313,6 @@ class Removal(Load):
 
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for a load factor that is no share, or decreases."""
-        del kinematics
         if self.amplitude is None:
             raise ModelError("removal.amplitude", None, "must be given: solve takes loads back")
         share = np.asarray(self.amplitude.value)
@@ -388,7 +380,6 @@ class InitialStress(Load):
 
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for components beside a function of position, or an amplitude."""
-        del kinematics
         each = {name: getattr(self, name) for name in _TENSOR}
         if self.stress is not None and any(each.values()):
             allowed = "must be left out if stress, a function of position, is given"

@@ -157,7 +157,6 @@ class RigidBody:
 
     def facets(self, boundary: str, field: str = "boundary", outer: bool = False) -> Ints:
         """Return the number of a surface (1,)."""
-        del outer
         if boundary not in self.surfaces:
             known = ", ".join(self.surfaces) or "it has none"
             allowed = f"must name a surface of the rigid body: {known}"

@@ -12,6 +12,7 @@ from solver.contact.system import System
 from solver.fem.dofs import vectors
 from solver.fem.frame import RigidMotion
 from solver.fem.rigid import RigidPart
+from solver.fem.wheel import Wheel
 from solver.results.quantities import Quantity
 from solver.typing import Array
 
@@ -50,7 +51,7 @@ def observe(system: System, converged: Converged) -> Observed:
             motions[name] = part.motion_of(u)
             x, y, turning = forces
             reactions[name] = (float(x), float(y), float(turning) * part.frame.radius)
-        elif part.body.axle is None:  # type: ignore[union-attr]
+        elif not isinstance(part, Wheel):
             # from equilibrium: the supported nodes of a condensed body are eliminated
             whole = system.full(name)
             loads = vectors(whole.external(state.time), whole.dim).sum(axis=1)

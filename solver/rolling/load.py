@@ -117,7 +117,6 @@ class Given(PassingLoad):
 
     def on(self, u: Array, before: Any, start: Any = None) -> AppliedLoad:
         """See `PassingLoad`; it depends on nothing."""
-        del before, start
         factor = self.load.force
         return AppliedLoad(
             force=factor * self.force, u=u + factor * self.u, along=lambda change: change

@@ -31,7 +31,6 @@ _by_increments, _record = late("scenes.driver", "by_increments", "record")
 
 def _no_increments(parameters: Any) -> NoReturn:
     """Raise: neither model nor program of increments is known."""
-    del parameters
     raise NotImplementedError("this scene is computed by its own method alone, not by increments")
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from solver.audit import links
 from solver.audit.plain import PlainBody, load_factor
+from solver.fem.discretisation import Discretisation
 from solver.model.rigid import Moved, RigidBody
 from solver.results.body_fields import STORED
 from solver.results.named_places import NamedPlaces
@@ -124,7 +125,8 @@ class Rules:
         if self.track is not None:
             return of_pass(plain, self.track, self.passed, loaded=not released)
         number = self.system.part(body)
-        plastic = state.plastic[number] if self.system.parts[number].meshed else None
+        whole = isinstance(self.system.parts[number], Discretisation)
+        plastic = state.plastic[number] if whole else None
         return of_state(plain, self.system.displacement(body, state), plastic, state.time)
 
     def state(self, stage: str) -> Any:

@@ -236,7 +236,6 @@ class RollingWheel(PassingLoad):
         NoContact, NotConverged
             if no contact forces are found
         """
-        del before
         track = self.track
         surface, at = track.surface, track.at_surface
         shape = u[at]

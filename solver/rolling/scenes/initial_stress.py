@@ -45,7 +45,6 @@ class NoStress(SectionStress):
 
     def stress(self, points: Array, area: Array) -> Array:
         """Return zero."""
-        del area
         return np.zeros((6, points.shape[1]))
 
 
@@ -97,7 +96,6 @@ class OverHeight(SectionStress):
 
     def stress(self, points: Array, area: Array) -> Array:
         """Return the stress of the table."""
-        del area
         stress = np.zeros((6, points.shape[1]))
         stress[_XX] = np.interp(points[1], *self._points)
         return stress

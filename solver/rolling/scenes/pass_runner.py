@@ -61,7 +61,6 @@ class Passes(ABC):
 
     def decided(self, traces: Sequence[Any]) -> bool:
         """Return whether the passes so far are enough for all runs."""
-        del traces
         return False
 
 

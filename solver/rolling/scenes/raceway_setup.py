@@ -148,7 +148,6 @@ class RolledRaceway:
         LimitLoad
             if a prescribed shear is above the shear strength of the material
         """
-        del number
         if self._made is None or self._made[0] is not track:
             self._made = track, self._load(track)
         return self._made[1]
@@ -191,8 +190,6 @@ _PIXELS = 24
 
 def method(parameters: RacewayParameters) -> Method:
     """Return the method of the passes."""
-    del parameters
-
     return partial(by_passes, window=partial(RailPasses, RolledRaceway), reaches=REACHES)
 
 

@@ -51,8 +51,6 @@ _PIXEL = 0.5
 
 def method(parameters: WheelRailParameters) -> Method:
     """Return the method of the passes."""
-    del parameters
-
     return partial(by_passes, window=partial(RailPasses, RolledRail), reaches=REACHES)
 
 
