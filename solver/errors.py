@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class SolverError(Exception):
     """Base class of the errors that this package raises."""
 
 
-def plain(value: object) -> object:
+def plain(value: Any) -> object:
     """Return a value as messages show it: NumPy numbers become plain numbers."""
     is_number = hasattr(value, "dtype") and getattr(value, "ndim", 1) == 0
-    return value.item() if is_number else value  # type: ignore[attr-defined]
+    return value.item() if is_number else value
 
 
 class ModelError(SolverError, ValueError):

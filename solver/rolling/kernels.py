@@ -21,7 +21,9 @@ import numpy as np
 from numba import float32, float64, int64, njit, types
 
 from solver.materials.radial_return import SQRT23
+from solver.typing import Array, Ints
 
+_Each = tuple[int, ...]
 _PLANE = (0, 0, 0, 0)
 """One entry for each component in two dimensions."""
 _LINE, _TABLE = float64[::1], float64[:, ::1]
@@ -30,7 +32,9 @@ _EACH = tuple(types.UniTuple(int64, n) for n in (4, 6))
 
 
 @njit(cache=True, inline="always")
-def _trial(strain, plastic, accumulated, law, step, each):  # type: ignore[no-untyped-def]
+def _trial(
+    strain: Array, plastic: Array, accumulated: float, law: Array, step: Array, each: _Each
+) -> tuple[float, float]:
     """Return the norm of the trial stress, and by how much it is beyond the yield surface.
 
     `step` receives the trial stress.
@@ -48,7 +52,9 @@ def _trial(strain, plastic, accumulated, law, step, each):  # type: ignore[no-un
 
 
 @njit(cache=True, inline="always")
-def _return(strain, plastic, accumulated, law, step, each):  # type: ignore[no-untyped-def]
+def _return(
+    strain: Array, plastic: Array, accumulated: float, law: Array, step: Array, each: _Each
+) -> float:
     """Update `plastic` (n,) by an increment to `strain`; return the accumulated strain.
 
     `step` (n + 2,) receives the flow direction, the multiplier and the norm of the trial stress.
@@ -68,7 +74,9 @@ def _return(strain, plastic, accumulated, law, step, each):  # type: ignore[no-u
 
 
 @njit(cache=True, inline="always")
-def _return_along(strain, plastic, accumulated, law, step, each):  # type: ignore[no-untyped-def]
+def _return_along(
+    strain: Array, plastic: Array, accumulated: float, law: Array, step: Array, each: _Each
+) -> float:
     """Update the derivatives `plastic` (n,) and `accumulated` by the same increment."""
     n = len(each)
     gamma = step[n]
@@ -89,7 +97,9 @@ def _return_along(strain, plastic, accumulated, law, step, each):  # type: ignor
 
 
 @njit([(_ROWS, _TABLE, _LINE, _LINE, _STEPS, each) for each in _EACH], cache=True)
-def flow(strain, plastic, accumulated, law, steps, each):  # type: ignore[no-untyped-def]
+def flow(
+    strain: Array, plastic: Array, accumulated: Array, law: Array, steps: Array, each: _Each
+) -> tuple[Array, Array]:
     """Let material flow along rows.
 
     From one column to the next strain grows in equal increments. If the state at both ends is
@@ -133,7 +143,7 @@ def flow(strain, plastic, accumulated, law, steps, each):  # type: ignore[no-unt
 
 
 @njit([(_ROWS, _LINE, _STEPS, each) for each in _EACH], cache=True)
-def flow_along(strain, law, steps, each):  # type: ignore[no-untyped-def]
+def flow_along(strain: Array, law: Array, steps: Array, each: _Each) -> tuple[Array, Array]:
     """Return the changes of the results of `flow` for a change of strain.
 
     Parameters
@@ -169,7 +179,9 @@ def flow_along(strain, law, steps, each):  # type: ignore[no-untyped-def]
 
 
 @njit((_TABLE, _LINE, _LINE, float64), cache=True)
-def close(plastic, accumulated, law, bulk):  # type: ignore[no-untyped-def]
+def close(
+    plastic: Array, accumulated: Array, law: Array, bulk: float
+) -> tuple[Array, Array, Array, Array]:
     """Return the state of rows behind the load, where no stress acts on planes y = const.
 
     The strains along x and z return to zero. If the unloaded stress of a row is outside the yield
@@ -224,7 +236,9 @@ def close(plastic, accumulated, law, bulk):  # type: ignore[no-untyped-def]
 
 
 @njit((_TABLE, _LINE, _LINE, _TABLE, _ROWS), cache=True)
-def close_along(plastic, accumulated, law, steps, inverses):  # type: ignore[no-untyped-def]
+def close_along(
+    plastic: Array, accumulated: Array, law: Array, steps: Array, inverses: Array
+) -> Array:
     """Return the change of the plastic strain (n_rows, 4) of `close`.
 
     `plastic` (n_rows, 4) and `accumulated` (n_rows,) are the changes at the last column.
@@ -248,7 +262,7 @@ def close_along(plastic, accumulated, law, steps, inverses):  # type: ignore[no-
 @njit(
     (float64[:, :, :, :, ::1], int64[::1], float64[:, ::1], int64[::1], float64[:, ::1]), cache=True
 )
-def between(blocks, at, rows, by, columns):  # type: ignore[no-untyped-def]
+def between(blocks: Array, at: Ints, rows: Array, by: Ints, columns: Array) -> Array:
     """Return the effects of combinations of values on others; see `Influence.between`."""
     length, m = blocks.shape[:2]
     out = np.empty((len(at), len(by)))
@@ -270,7 +284,7 @@ def between(blocks, at, rows, by, columns):  # type: ignore[no-untyped-def]
     [float64[:, :, ::1](kind[:, :, ::1], float64[:, :, ::1]) for kind in (float32, float64)],
     cache=True,
 )
-def weighted(forces, columns):  # type: ignore[no-untyped-def]
+def weighted(forces: Array, columns: Array) -> Array:
     """Return sums (waves, k, n) of columns (waves, m, n), times forces (waves, k, m).
 
     Columns of nodes without force, most of them, are not read.
