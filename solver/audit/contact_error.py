@@ -46,7 +46,7 @@ def contact_error(system: System, converged: Converged) -> float:
         name, boundary = pair.slave if pair.slave[0] in system.names else pair.master
         if name not in recovered:
             points = ErrorPoints(system.full(name))
-            recovered[name] = points.at_nodes(system.response(name, converged).stress)
+            recovered[name] = points.at_nodes(system.state(name, converged).stress)
         if at_vertices.max() <= _ROUNDING * np.nan_to_num(np.abs(recovered[name])).max():
             continue
         chain = system.chain(name, boundary)

@@ -144,11 +144,12 @@ class _Deformed:
         self.name, state = plain.body.name, converged.state
         self.number, self.part = system.part(self.name), plain.part
         self.elasticity, self.stiffness = plain.body.law.elasticity, plain.body.law.stiffness(4)
-        meshed = isinstance(system.parts[self.number], Discretisation)
-        response = (
-            converged.responses[self.number] if meshed else system.response(self.name, converged)
-        )
-        self.stress, self.yielded = response.stress, response.state.accumulated > 0
+        if isinstance(system.parts[self.number], Discretisation):
+            self.stress, _, plastic, _ = converged.responses[self.number]
+        else:
+            found = system.state(self.name, converged)
+            self.stress, plastic = found.stress, found.plastic
+        self.yielded = plastic.accumulated > 0
         counts = plain.remaining(state.time) > GHOST
         for point in system.model.singular:
             counts &= ~point.reaches(plain.points)

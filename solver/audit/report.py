@@ -191,7 +191,7 @@ def _discretisation(
     names = [body.name for body in system.model.bodies]
     return {
         f"audit_error_{kind}": estimated_error(
-            ((system.full(name), system.response(name, converged).stress) for name in names),
+            ((system.full(name), system.state(name, converged).stress) for name in names),
             LEAST**2 * scale,
         )
         for kind, converged in zip(("loaded", "residual"), states, strict=True)

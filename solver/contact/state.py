@@ -108,6 +108,26 @@ class Energy:
     scale: float = 0.0
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyState:
+    """A whole body in a state, as results and audit see it.
+
+    Attributes
+    ----------
+    time : time of the state
+    u : (n,) displacements node by node, those of a wheel in its hub's frame [mm]
+    stress : (n_components, n_points) Mandel stress [MPa]
+    strain : (n_components, n_points) Mandel strain: elastic, plastic and thermal
+    plastic : internal variables at the points
+    """
+
+    time: float
+    u: Array
+    stress: Array
+    strain: Array
+    plastic: PlasticState
+
+
 def _none() -> Array:
     return np.zeros(1)
 

@@ -16,11 +16,10 @@ from solver.contact.geometry import Pairing
 from solver.contact.interface import Interface, interface_of, surfaces_of
 from solver.contact.links import Links, links_of, surfaces_of_links
 from solver.contact.slave import with_slaves
-from solver.contact.state import ContactState, Converged, State
+from solver.contact.state import BodyState, ContactState, Converged, State
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.fields import Sampler, recovery
-from solver.fem.frame import RigidMotion
 from solver.fem.operators import PartOperators
 from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
@@ -29,7 +28,6 @@ from solver.fem.surface import Surface
 from solver.fem.wheel import Wheel
 from solver.fem.window import Region, Windowed
 from solver.materials.law import Law
-from solver.materials.state import Response
 from solver.model.friction import BoundLines, ContactPlaces, lines_of
 from solver.model.link import Side
 from solver.model.model import Model
@@ -371,11 +369,6 @@ class System:
         self._paired.append((state, pair, found))
         return found
 
-    def axle(self, converged: Converged) -> RigidMotion | None:
-        """Return the motion of the first wheel; None without a wheel."""
-        both = zip(self.parts, converged.state.u, strict=True)
-        return next((part.motion_of(u) for part, u in both if isinstance(part, Wheel)), None)
-
     def sampler(self, name: str, X: Array) -> Sampler:
         """Return a sampler of nodal fields of a body at positions (2, n) [mm]."""
         return Sampler(self.full(name), X)
@@ -388,32 +381,22 @@ class System:
         """Return the positions of the integration points of a body (dim, n_points) [mm]."""
         return self.full(name).positions
 
-    def response(self, name: str, converged: Converged) -> Response:
-        """Return stress and internal variables at the points of a whole body.
-
-        Stress and plastic strain are NaN in elements that are removed.
-        """
-        number = self.part(name)
+    def state(self, name: str, converged: Converged) -> BodyState:
+        """Return the state of a whole body; its fields are NaN in elements that are removed."""
+        number, whole, time = self.part(name), self.full(name), converged.state.time
+        u, found = self.displacement(name, converged.state), converged.responses[number]
         if not isinstance(self.parts[number], Discretisation):
-            whole = self.full(name)
-            state = converged.state
-            return whole.respond(self.displacement(name, state), whole.virgin(), state.time).law
-        found, gone = converged.responses[number], self.full(name).gone(converged.state.time)
-        if gone is None or not gone.any():
-            return found
-        unknown = {
-            name: np.where(gone, np.nan, getattr(found.state, name))
-            for name in ("accumulated", "plastic_strain")
-        }
-        stress = np.where(gone, np.nan, found.stress)
-        return found._replace(stress=stress, state=replace(found.state, **unknown))
-
-    def strain(self, name: str, converged: Converged) -> Array:
-        """Return the strain (4, n_points, Mandel) of a whole body; NaN in removed elements."""
-        whole, time = self.full(name), converged.state.time
-        found = self.response(name, converged)
-        strain = whole.law(time).elastic_strain(found.stress) + found.state.plastic_strain
-        return strain + whole.eigenstrain(time)
+            found = whole.respond(u, whole.virgin(), time).law
+        stress, plastic, gone = found.stress, found.state, whole.gone(time)
+        if gone is not None and gone.any():
+            stress = np.where(gone, np.nan, stress)
+            plastic = replace(
+                plastic,
+                accumulated=np.where(gone, np.nan, plastic.accumulated),
+                plastic_strain=np.where(gone, np.nan, plastic.plastic_strain),
+            )
+        strain = whole.law(time).elastic_strain(stress) + plastic.plastic_strain
+        return BodyState(time, u, stress, strain + whole.eigenstrain(time), plastic)
 
     def initial(self) -> State:
         """Return the unloaded, undeformed state."""

@@ -47,14 +47,14 @@ PEAK_CONTACT_PRESSURE_S = declare(
 @output("contact", "s", "contact")
 def contact(run: FinishedRun) -> Values:
     """Return pressure, shear and gap along s, half-width, and peak pressure with its position."""
-    along = [run.tractions.along(c, run.view.s + centre) for c, centre in run.stages]
-    width, peak = run.tractions.extent(run.loaded)
+    along = [run.acting(c).along(run.view.s + centre) for c, centre in run.stages]
+    acting = run.acting(run.loaded)
     loaded = along[run.view.stages.index(run.view.loaded)][0]
     lines = (CONTACT_PRESSURE, CONTACT_SHEAR, CONTACT_GAP)
     return {
         **{line: np.stack([values[k] for values in along]) for k, line in enumerate(lines)},
-        CONTACT_HALF_WIDTH: width,
-        PEAK_CONTACT_PRESSURE: peak,
+        CONTACT_HALF_WIDTH: acting.half_width,
+        PEAK_CONTACT_PRESSURE: acting.peak,
         PEAK_CONTACT_PRESSURE_S: float(run.view.s[np.nan_to_num(loaded).argmax()]),
     }
 

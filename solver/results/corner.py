@@ -66,7 +66,7 @@ class Corner(Checked):
 
     def __call__(self, run: FinishedRun) -> Values:
         """Return the quantities of a run."""
-        points = run.tractions.points(run.loaded)
+        points = run.acting(run.loaded).points
         assert points is not None, "the model has a contact pair"
         r = 1 - points.s / self.half_width
         pressure = points.pressure / self.mean_pressure
@@ -88,7 +88,7 @@ class Corner(Checked):
 
     def warnings(self, run: FinishedRun) -> tuple[str, ...]:
         """Return a warning if the corner has lifted off."""
-        width, _ = run.tractions.extent(run.loaded)
+        width = run.acting(run.loaded).half_width
         if width >= self.half_width * (1 - 1e-9):
             return ()
         return (

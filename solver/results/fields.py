@@ -9,11 +9,9 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 from scipy.sparse import csr_array
 
-from solver.contact.state import State
+from solver.contact.state import BodyState, State
 from solver.fem.discretisation import Discretisation
 from solver.fem.fields import recovered_beside
-from solver.fem.frame import RigidMotion
-from solver.materials.state import Response
 from solver.results.body_fields import BodyValues
 from solver.results.view import Places
 from solver.tensors import not_below_zero, to_tensor, von_mises
@@ -28,8 +26,8 @@ class Solved(Protocol):
     """A converged state."""
 
     @property
-    def state(self) -> State:
-        """The unknowns."""
+    def state(self) -> State | BodyState:
+        """The unknowns, or the only body."""
 
 
 class Interpolation(Protocol):
@@ -69,17 +67,8 @@ class Bodies(Protocol):
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n_points) from values at points to those at nodes."""
 
-    def response(self, name: str, converged: Any) -> Response:
-        """Return stress and internal variables at the points of a body."""
-
-    def strain(self, name: str, converged: Any) -> Array:
-        """Return the strain (n_components, n_points, Mandel) at the points of a body."""
-
-    def displacement(self, name: str, state: State) -> Array:
-        """Return the displacements (n,) of a body [mm]."""
-
-    def axle(self, converged: Any) -> RigidMotion | None:
-        """Return the motion of the first wheel, or None without a wheel."""
+    def state(self, name: str, converged: Any) -> BodyState:
+        """Return the state of a body."""
 
 
 _POSITIVE = ("mises", "plastic_strain")
@@ -108,16 +97,16 @@ class SystemFields:
         return self._at_nodes.of(at, body, lambda: self._recovered(at, body))
 
     def _recovered(self, at: Solved, body: str) -> BodyValues:
-        response, nodes = self.system.response(body, at), self.system.full(body).X.shape[1]
-        moved = self.system.displacement(body, at.state).reshape(nodes, -1).T
-        mises = not_below_zero(self.recovered(body, von_mises(response.stress)))
+        found, nodes = self.system.state(body, at), self.system.full(body).X.shape[1]
+        moved = found.u.reshape(nodes, -1).T
+        mises = not_below_zero(self.recovered(body, von_mises(found.stress)))
         return BodyValues(
             displacement=np.where(np.isnan(mises), np.nan, moved),
-            stress=to_tensor(self.recovered(body, response.stress)),
+            stress=to_tensor(self.recovered(body, found.stress)),
             mises=mises,
-            plastic_strain=not_below_zero(self.recovered(body, response.state.accumulated)),
-            plastic_tensor=to_tensor(self.recovered(body, response.state.plastic_strain)),
-            strain=to_tensor(self.recovered(body, self.system.strain(body, at))),
+            plastic_strain=not_below_zero(self.recovered(body, found.plastic.accumulated)),
+            plastic_tensor=to_tensor(self.recovered(body, found.plastic.plastic_strain)),
+            strain=to_tensor(self.recovered(body, found.strain)),
         )
 
     def at_points(self, at: Solved, body: str) -> tuple[Array, Array, Array]:
@@ -127,8 +116,8 @@ class SystemFields:
         -------
         positions (n_axes, n) [mm], von Mises stress (n,) [MPa] and equivalent plastic strain (n,)
         """
-        found = self.system.response(body, at)
-        return self.system.positions(body), von_mises(found.stress), found.state.accumulated
+        found = self.system.state(body, at)
+        return self.system.positions(body), von_mises(found.stress), found.plastic.accumulated
 
     def at_places(self, places: Places, states: Sequence[Solved]) -> list[BodyValues]:
         """Return the fields at places of a body in each state; NaN outside the body."""
@@ -149,7 +138,7 @@ class Remembered(Generic[T]):
     """A cache of the values of the last states."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple[Any, ...], tuple[State, T]] = {}
+        self._known: dict[tuple[Any, ...], tuple[Any, T]] = {}
 
     def of(self, at: Solved, name: str, make: Callable[[], T]) -> T:
         """Return the value of this name in a state; ``make`` computes it if it is not cached."""

@@ -40,7 +40,7 @@ def extremes(run: FinishedRun) -> Values:
     """Return the largest plastic strain, the extreme residual stresses, and the plastic work."""
     system = run.system
     names = system.names
-    strains = {n: system.response(n, run.unloaded).state.accumulated for n in names}
+    strains = {n: system.state(n, run.unloaded).plastic.accumulated for n in names}
     largest = {name: float(np.nanmax(each)) for name, each in strains.items()}
     most = max(names, key=lambda name: largest[name])
     where = system.positions(most)[1, np.nanargmax(strains[most])]

@@ -88,7 +88,7 @@ class Indentation(Checked):
         body = run.system.full(name)
         nodes = body.boundary_nodes(run.view.surfaces[name])
         nodes = nodes[np.argsort(body.X[0, nodes])]
-        u = run.system.displacement(name, converged.state)[Dofs(nodes, 2).along(1)]
+        u = run.system.state(name, converged).u[Dofs(nodes, 2).along(1)]
         centre = self._approach(run.system, converged) if name == self.body else 0.0
         return np.asarray(np.interp(run.view.s, body.X[0, nodes], u) - centre)
 
@@ -102,7 +102,7 @@ class Indentation(Checked):
         X = system.full(self.body).X
         axis = np.flatnonzero(np.abs(X[0]) <= ROUNDED * self.radius)
         axis = axis[np.argsort(X[1, axis])]
-        moved = system.displacement(self.body, converged.state)[Dofs(axis, 2).along(1)]
+        moved = system.state(self.body, converged).u[Dofs(axis, 2).along(1)]
         y = X[1, axis]
         centre = self.radius if y.max() > 0 else -self.radius
         return float(-np.sign(centre) * np.interp(centre, y, moved))

@@ -38,7 +38,7 @@ class PressureError(Checked):
 
     def __call__(self, run: FinishedRun) -> Values:
         """Return the error of a run."""
-        points = run.tractions.points(run.loaded)
+        points = run.acting(run.loaded).points
         assert points is not None, "the model has a contact pair"
         x = points.s / self.half_width
         exact = 2 / (np.pi * np.sqrt(1 - np.minimum(x, _AWAY) ** 2))

@@ -9,11 +9,11 @@ from typing import Any
 from solver.audit.report import Audit
 from solver.loading.outcome import Outcome
 from solver.model.singular import SingularPoint
+from solver.results.acting import Acting
 from solver.results.fields import Bodies, Solved
 from solver.results.mesh_fields import MeshFields
 from solver.results.quantities import Quantity
 from solver.results.samples import Samples
-from solver.results.tractions import SurfaceTractions
 from solver.results.view import View
 
 
@@ -25,7 +25,7 @@ class FinishedRun:
     ----------
     parameters : the scene's parameters for this run
     samples : fields of its system at the positions of the scene's view
-    tractions : pressure and shear on its lower body
+    acting : (state) -> what acts on its lower body
     outcome : the result of its program
     check : function that returns the audit of a complete run
     doubts : warnings about parameters that look like mistakes, see `Model.doubts`
@@ -36,7 +36,7 @@ class FinishedRun:
 
     parameters: Any
     samples: Samples
-    tractions: SurfaceTractions
+    acting: Callable[[Any], Acting]
     outcome: Outcome
     check: Callable[[], Audit]
     doubts: tuple[str, ...] = ()
@@ -74,7 +74,7 @@ class FinishedRun:
         """The stored states, each with the position x of s = 0 [mm]."""
         states = [(name, self.outcome.points[name]) for name in self.view.stages]
         following = self.view.following
-        return [(c, self.tractions.centre(c) if name in following else 0.0) for name, c in states]
+        return [(c, self.acting(c).centre if name in following else 0.0) for name, c in states]
 
 
 Values = Mapping[Quantity, Any]

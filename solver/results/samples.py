@@ -66,7 +66,7 @@ class Samples:
     def flow(self, at: Solved) -> Array:
         """Return signed plastic strain (n_components, station, depth) in tensor components."""
         body = self.view.profile_body
-        points = self.system.response(body, at).state.plastic_strain
+        points = self.system.state(body, at).plastic.plastic_strain
         return to_tensor(self.along_depth(self.fields.recovered(body, points)))
 
     def surface_mises(self, at: Solved, centre: float) -> Array:

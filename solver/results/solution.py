@@ -129,7 +129,7 @@ class Solution:
         fields = (load.initial_stress(x) for load in loads)
         none = np.zeros((system.full(body).components, x.shape[1]))
         given = sum((each for each in fields if each is not None), none)
-        return x, given, to_tensor(system.response(body, rest).stress)
+        return x, given, to_tensor(system.state(body, rest).stress)
 
     def plastic_strain(self, body: str, stage: str = "unloaded") -> Array:
         """Return the recovered equivalent plastic strain at the nodes (n_nodes,)."""

@@ -20,12 +20,14 @@ STICK_FRACTION = declare(
 @output("stick", "contact")
 def stick(run: FinishedRun) -> Values:
     """Return the size of the stick zone: zero without friction, NaN without contact."""
-    points = run.tractions.points(run.loaded)
-    if points is None:
+    acting = run.acting(run.loaded)
+    if acting.points is None:
         return {STICK_HALF_WIDTH: np.nan, STICK_FRACTION: np.nan}
-    stuck = stick_half_width(points, symmetric=run.view.symmetric)
-    whole, _ = run.tractions.extent(run.loaded)
-    return {STICK_HALF_WIDTH: stuck, STICK_FRACTION: stuck / whole if whole else np.nan}
+    stuck = stick_half_width(acting.points, symmetric=run.view.symmetric)
+    return {
+        STICK_HALF_WIDTH: stuck,
+        STICK_FRACTION: stuck / whole if (whole := acting.half_width) else np.nan,
+    }
 
 
 def stick_half_width(points: ContactResult, *, symmetric: bool) -> float:

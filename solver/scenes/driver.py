@@ -17,6 +17,7 @@ from solver.loading.control import Control
 from solver.loading.outcome import Outcome
 from solver.loading.program import Program, walked
 from solver.loading.walker import Walker
+from solver.results.acting import acting_on
 from solver.results.at_all_nodes import mesh_fields
 from solver.results.cycles import decided
 from solver.results.outlines import outlines
@@ -25,7 +26,6 @@ from solver.results.record import Record, Status
 from solver.results.run import FinishedRun, Output, Values
 from solver.results.samples import Samples
 from solver.results.singular_points import singular_points
-from solver.results.tractions import tractions_of
 from solver.scenes.scene import Monitor, Scene
 
 
@@ -99,7 +99,7 @@ def by_increments(
     last = given[-1] if given is not None else largest
     system = System(scene.model(last))
     samples = Samples(system, scene.view(last))
-    tractions = tractions_of(system, symmetric=samples.view.symmetric, axis=samples.view.axis)
+    acting = acting_on(system, symmetric=samples.view.symmetric, axis=samples.view.axis)
     programs: Iterable[Program]
     if given is not None:
         runs, bound = given, None
@@ -132,7 +132,7 @@ def by_increments(
         yield FinishedRun(
             parameters=run,
             samples=samples,
-            tractions=tractions,
+            acting=acting,
             outcome=outcome,
             check=check,
             singular=system.model.singular,

@@ -148,7 +148,7 @@ def figures(run: FinishedRun) -> Values:
         at = int(np.argmin(np.abs(s - a * (1 - distance))))
         out[RESIDUAL_X[body]] = float(sigma[at])
     for body, quantity in MAX_PLASTIC_STRAIN.items():
-        strain = system.response(body, unloaded).state.accumulated
+        strain = system.state(body, unloaded).plastic.accumulated
         out[quantity] = float(strain.max())
     # the free side of the punch carries no sigma_x: what remains is error
     nodes = system.full("punch").boundary_nodes("right")
@@ -158,6 +158,6 @@ def figures(run: FinishedRun) -> Values:
     width = float(system.full("half_plane").X[0].max())
     line = np.linspace(0.0, width * (1 - 1e-9), 8000)
     cut = np.stack([line, np.full_like(line, -0.5 * a)])
-    stress = system.response("half_plane", unloaded).stress
+    stress = system.state("half_plane", unloaded).stress
     out[SELF_EQUILIBRIUM] = abs(cut_force(system.full("half_plane"), stress, cut))
     return out

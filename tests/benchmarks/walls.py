@@ -88,7 +88,7 @@ def _point(name: str, wall: Wall, case: Case, repeats: int) -> Point:
     mean = np.sqrt(hoop**2 @ body.volumes / body.volumes.sum())
     estimate = effectivity(
         body,
-        system.response("ring", run.result.unloaded).stress,
+        system.state("ring", run.result.unloaded).stress,
         lambda x: exact_stress(wall.exact, "unloaded", wall.poisson_ratio, x),
     )
     several = case.series == INCREMENTS

@@ -18,7 +18,6 @@ from solver.results.named_places import NamedPlaces
 from solver.results.record import Record
 from solver.results.requested import RequestedNumber
 from solver.results.run import FinishedRun
-from solver.results.tractions import PrescribedTractions
 from solver.results.view import View
 from solver.rolling.results.plane import TrackBody
 from solver.tensors import AXES, components
@@ -121,7 +120,7 @@ class Rules:
     def _fields(self, body: str, stage: str) -> Fields:
         state, plain, released = self.state(stage), self.plain(body), stage == self.view.unloaded
         if isinstance(plain, PlainSection):
-            return of_zone(plain, self.track, self.passed, state.u[0] if released else None)
+            return of_zone(plain, self.track, self.passed, state.u if released else None)
         if self.track is not None:
             return of_pass(plain, self.track, self.passed, loaded=not released)
         number = self.system.part(body)
@@ -294,8 +293,9 @@ class Rules:
         x, nowhere = self.axis("s") + self._centre(stage), np.full(len(self.axis("s")), np.nan)
         if isinstance(self.system, TrackBody):
             released = stage == self.view.unloaded
-            if isinstance(self.run.tractions, PrescribedTractions):
-                return of_pressure(self.run.tractions._travelling, float(released), x)
+            if self.run.parameters.load == "hertz":
+                acting: Any = self.run.acting
+                return of_pressure(*acting.args, float(released), x)
             if released:
                 return Acting(np.zeros_like(x), np.zeros_like(x), nowhere)
             return of_wheel(self.track, self.passed, x)

@@ -63,7 +63,7 @@ def sheared(steps: int, control: PathControl | None = None) -> Solution:
 
 def stress(found: Solution) -> np.ndarray:
     """Return the Mandel stress of the bar at its end."""
-    return found.system.response("bar", found.stages["on"]).stress
+    return found.system.state("bar", found.stages["on"]).stress
 
 
 def test_the_estimate_is_of_the_size_of_the_error_and_falls_with_the_increments():

@@ -116,7 +116,7 @@ def test_a_notched_bar_carries_the_stress_of_what_is_left():
     )
     found = solve(Model(bodies=(body,)))
     points = found.system.positions("bar")
-    stress = found.system.response("bar", found.loaded).stress[0]
+    stress = found.system.state("bar", found.loaded).stress[0]
     neck = (points[0] > 2.0) & (points[0] < 2.5)
     volumes = found.system.full("bar").volumes
     mean = (stress * volumes)[neck].sum() / volumes[neck].sum()

@@ -28,7 +28,7 @@ def walked(passes=(1,), **changed):
 
 
 def stress(system, outcome):
-    return system.response("half_space", outcome.points["unloaded"]).stress
+    return system.state("half_space", outcome.points["unloaded"]).stress
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def test_two_pads_on_one_plate_both_press_on_it(order):
     pairs = [ContactPair(slave=(p.name, "bottom"), master=("plate", "top")) for p in pads]
     solution = solve(Model(bodies=(*pads, plate), contacts=tuple(pairs[k] for k in order)))
     whole = solution.system.full("plate")
-    response = solution.system.response("plate", solution.loaded)
+    response = solution.system.state("plate", solution.loaded)
     nodes = whole.boundary_nodes("bottom")
     reaction = whole.undeformed.internal_force(response.stress)[2 * nodes + 1].sum()
     assert reaction == pytest.approx(1000.0, rel=1e-6)

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from solver.results.acting import Acting
 from solver.results.contact_result import ContactResult
 from solver.results.stick import STICK_FRACTION, STICK_HALF_WIDTH, stick, stick_half_width
-from solver.results.tractions import SurfaceTractions
 
 
 def points(x, closed, sticking):
@@ -47,6 +47,6 @@ def test_the_end_of_the_part_that_sticks(closed, sticking, half, whole):
 
 
 def test_without_contact_nothing_is_known() -> None:
-    run = SimpleNamespace(tractions=SurfaceTractions(), loaded=None)
+    run = SimpleNamespace(acting=lambda at: Acting(), loaded=None)
     found = stick(run)
     assert np.isnan([found[STICK_HALF_WIDTH], found[STICK_FRACTION]]).all()

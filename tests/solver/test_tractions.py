@@ -7,8 +7,8 @@ import pytest
 
 from solver import Body, Material, Model, System
 from solver.mesh import grid
+from solver.results.acting import acting_on
 from solver.results.contact_result import contact_patches
-from solver.results.tractions import SurfaceTractions, tractions_of
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 
@@ -20,14 +20,12 @@ def test_bodies_that_nothing_joins_have_no_contact_pressure_and_no_contact_width
         for name in ("one", "other")
     )
     system = System(Model(bodies=bodies))
-    tractions = tractions_of(system, symmetric=False)
-    assert type(tractions) is SurfaceTractions
-    state = system.initial()
-    for values in tractions.along(state, side):
+    acting = acting_on(system, symmetric=False)(system.initial())
+    for values in acting.along(side):
         assert values.shape == side.shape
         assert np.isnan(values).all()
-    assert np.isnan([*tractions.extent(state), tractions.force(state)]).all()
-    assert tractions.centre(state) == 0.0
+    assert np.isnan([acting.half_width, acting.peak, acting.force]).all()
+    assert acting.centre == 0.0
 
 
 S = np.arange(12.0)

@@ -136,7 +136,7 @@ def test_windows_change_the_result_by_less_than_the_tolerance(scene, run, monkey
     assert 5 < some == all_used
     assert sum(windowed.tally.iterations) < 1.2 * sum(whole.tally.iterations)
     body = system.names[-1]
-    stress = [system.response(body, o.points["unloaded"]).stress for o in (windowed, whole)]
+    stress = [system.state(body, o.points["unloaded"]).stress for o in (windowed, whole)]
     assert np.abs(stress[0] - stress[1]).max() < 1e-4
 
 
@@ -174,7 +174,7 @@ def test_whole_bodies_follow_failed_windows_in_the_shortest_increment(load_ratio
         for start, longest, half, shortest in halved:
             assert [(start, time) in whole for time in (longest, half, shortest)] == [0, 0, 1]
         body = system.names[-1]
-        stress = [system.response(body, o.points["unloaded"]).stress for o in (plain, found)]
+        stress = [system.state(body, o.points["unloaded"]).stress for o in (plain, found)]
         assert np.abs(stress[0] - stress[1]).max() < 10  # other increments
     else:
         assert isinstance(found.error, LimitLoad)

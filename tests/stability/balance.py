@@ -126,7 +126,7 @@ def _chain(system: System, side: tuple[str, str]) -> Array:
 def _left_over(system: System, name: str, converged: Converged) -> tuple[float, dict[str, float]]:
     """Return the force at free nodes, and by how much resultants at surfaces differ [N]."""
     part = system.full(name)
-    force = part.undeformed.internal_force(system.response(name, converged).stress)
+    force = part.undeformed.internal_force(system.state(name, converged).stress)
     force -= part.external(converged.state.time)
     rest = force.copy()
     rest[np.setdiff1d(np.arange(part.n), part.free)] = 0.0

@@ -151,7 +151,7 @@ def stress_miss(
     solution: Solution, body: str, expected: Array, stage: str = "loaded", scale: float = 0.0
 ) -> float:
     """Return how far stress is from a uniform one at any point, over its largest component."""
-    stress = solution.system.response(body, getattr(solution, stage)).stress
+    stress = solution.system.state(body, getattr(solution, stage)).stress
     size = scale or float(np.abs(expected).max())
     return float(np.abs(stress - expected[:, None]).max()) / size
 
@@ -164,7 +164,7 @@ def contact_force(solution: Solution, pair: int = 0, stage: str = "loaded") -> f
 def reaction(solution: Solution, body: str, boundary: str, stage: str = "loaded") -> float:
     """Return the upward force on a boundary that stress in the body balances [N]."""
     whole = solution.system.full(body)
-    response = solution.system.response(body, getattr(solution, stage))
+    response = solution.system.state(body, getattr(solution, stage))
     force = whole.undeformed.internal_force(response.stress)
     return float(force[2 * whole.boundary_nodes(boundary) + 1].sum())
 

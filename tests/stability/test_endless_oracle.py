@@ -31,12 +31,12 @@ def _points(which: str, **change: Callable[[np.ndarray], np.ndarray]) -> Callabl
     def tamper(passed: Passed) -> Passed:
         outcome = passed.run.outcome
         standing = outcome.points[which]
-        response, state = standing.response, standing.response.state
+        state, plastic = standing.state, standing.state.plastic
         if "stress" in change:
-            response = response._replace(stress=change["stress"](response.stress.copy()))
-        own = {n: f(getattr(state, n).copy()) for n, f in change.items() if n != "stress"}
-        response = response._replace(state=replace(state, **own))
-        points = dict(outcome.points) | {which: replace(standing, response=response)}
+            state = replace(state, stress=change["stress"](state.stress.copy()))
+        own = {n: f(getattr(plastic, n).copy()) for n, f in change.items() if n != "stress"}
+        state = replace(state, plastic=replace(plastic, **own))
+        points = dict(outcome.points) | {which: replace(standing, state=state)}
         run = replace(passed.run, outcome=replace(outcome, points=points))
         return replace(passed, run=run)
 

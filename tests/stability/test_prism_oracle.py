@@ -50,14 +50,13 @@ def _points(which: str, name: str, change: Callable[[Any], Any]) -> Callable[[Ro
     """Change stress, plastic_strain or accumulated of a state."""
 
     def tamper(rolled: Rolled) -> Rolled:
-        stage: Any = getattr(rolled.run, which)
-        response = stage.response
+        state: Any = getattr(rolled.run, which).state
         if name == "stress":
-            response = response._replace(stress=change(response.stress.copy()))
+            state = replace(state, stress=change(state.stress.copy()))
         else:
-            own = {name: change(getattr(response.state, name).copy())}
-            response = response._replace(state=replace(response.state, **own))
-        return _with(rolled, which, response=response)
+            own = {name: change(getattr(state.plastic, name).copy())}
+            state = replace(state, plastic=replace(state.plastic, **own))
+        return _with(rolled, which, state=state)
 
     return tamper
 

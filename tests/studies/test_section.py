@@ -14,6 +14,9 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.sparse import eye_array
 
 from solver import Material, ModelError
+from solver.contact.state import BodyState
+from solver.materials.state import PlasticState
+from solver.results.acting import Acting
 from solver.results.at_all_nodes import mesh_fields
 from solver.results.export import to_meshio
 from solver.results.extremes import residual_extremes
@@ -100,21 +103,15 @@ class Rail:
     def positions(self, name: str) -> np.ndarray:
         return self.X
 
-    def response(self, name: str, at: Any) -> Any:
+    def state(self, name: str, at: Any) -> BodyState:
         mandel = at.factor * to_mandel(self.stress)
-        strain = at.factor * 1e-3 * (3.0 + self.space[2])
-        return SimpleNamespace(
-            stress=mandel, state=SimpleNamespace(accumulated=strain, plastic_strain=mandel / 1e5)
+        return BodyState(
+            time=0.0,
+            u=displaced(self.space)[-len(self.X) :].T.ravel() * at.factor,
+            stress=mandel,
+            strain=2e-5 * to_mandel(at.factor * self.stress),
+            plastic=PlasticState(mandel / 1e5, at.factor * 1e-3 * (3.0 + self.space[2])),
         )
-
-    def strain(self, name: str, at: Any) -> np.ndarray:
-        return 2e-5 * to_mandel(at.factor * self.stress)
-
-    def displacement(self, name: str, state: Any) -> np.ndarray:
-        return displaced(self.space)[-len(self.X) :].T.ravel() * state.factor
-
-    def axle(self, at: Any) -> None:
-        return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,7 +164,7 @@ def finished(parameters: RailParameters) -> FinishedRun:
     return FinishedRun(
         parameters=parameters,
         samples=Samples(Rail(), VIEW),
-        tractions=SimpleNamespace(centre=lambda at: 0.0),
+        acting=lambda at: Acting(),
         outcome=SimpleNamespace(points=states, error=None, history=()),
         check=None,
     )

@@ -23,6 +23,7 @@ import solver.contact.system
 import solver.fem.discretisation
 import solver.fem.fields
 import solver.loading.walker
+import solver.results.acting
 import solver.results.contact_result
 import solver.results.extremes
 import solver.results.fields
@@ -32,7 +33,6 @@ import solver.results.places
 import solver.results.samples
 import solver.results.shakedown
 import solver.results.singularity
-import solver.results.tractions
 import solver.rolling.results.plane
 import solver.rolling.scenes.rolling_endless
 import solver.rolling.scenes.rolling_setup
@@ -49,11 +49,9 @@ from solver.results.requested import RequestedNumber
 from solver.results.run import FinishedRun
 from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
-from solver.results.tractions import PairTractions
 from solver.results.view import Axis, Places, View
 from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.track import Track
-from solver.rolling.results.plane import SteadyTractions
 from solver.scenes.scene import Scene
 from studies.scenes.description import Description
 from studies.scenes.scene import file_scene
@@ -384,18 +382,34 @@ def pressure_times(factor: float) -> Fault:
     return instead(solver.results.contact_result, "contact_pressure", make)
 
 
-def part_times(position: int, factor: float) -> Callable[[Any], Any]:
-    """Return what multiplies one of the values that a function returns."""
+def acting_otherwise(**changes: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return what makes other members of the `Acting` that a function returns."""
 
     def make(old: Any) -> Any:
         def other(*args: Any, **options: Any) -> Any:
-            found = list(old(*args, **options))
-            found[position] = factor * found[position]
-            return tuple(found)
+            found = old(*args, **options)
+            own = {name: change(getattr(found, name)) for name, change in changes.items()}
+            return replace(found, **own)
 
         return other
 
     return make
+
+
+def shear_turned(along: Any) -> Any:
+    def other(x: Any) -> Any:
+        pressure, shear, gap = along(x)
+        return pressure, -shear, gap
+
+    return other
+
+
+def gap_opened(along: Any) -> Any:
+    def other(x: Any) -> Any:
+        pressure, shear, gap = along(x)
+        return pressure, shear, gap + 1e-3
+
+    return other
 
 
 def later(old: Any) -> Any:
@@ -529,7 +543,9 @@ MUTATIONS: dict[str, Mutation] = {
         instead(solver.rolling.scenes.rolling_setup, "profiles", first_pass_last), STORED
     ),
     "shear of a wheel against its way": _passed(
-        instead(SteadyTractions, "along", part_times(1, -1.0)),
+        instead(
+            solver.rolling.scenes.rolling_endless, "of_wheel", acting_otherwise(along=shear_turned)
+        ),
         STORED,
         load="contact",
     ),
@@ -563,15 +579,20 @@ MUTATIONS: dict[str, Mutation] = {
     "pressure on half the circumference": _fitted(pressure_times(2.0), STORED),
     "pressure of a unit of thickness": _file(pressure_times(2.0), STORED),
     "shear on the other body": _fitted(
-        instead(PairTractions, "along", part_times(1, -1.0)), STORED
+        instead(solver.results.acting, "of_pair", acting_otherwise(along=shear_turned)), STORED
     ),
     "gap opened": _fitted(
-        instead(PairTractions, "along", lambda old: lambda *a: (*old(*a)[:2], old(*a)[2] + 1e-3)),
+        instead(solver.results.acting, "of_pair", acting_otherwise(along=gap_opened)), STORED
+    ),
+    "width for half-width": _pressed(
+        instead(
+            solver.results.acting, "of_pair", acting_otherwise(half_width=lambda half: 2.0 * half)
+        ),
         STORED,
     ),
-    "width for half-width": _pressed(instead(PairTractions, "extent", part_times(0, 2.0)), STORED),
     "peak pressure too high": _pressed(
-        instead(PairTractions, "extent", part_times(1, 1.01)), STORED
+        instead(solver.results.acting, "of_pair", acting_otherwise(peak=lambda peak: 1.01 * peak)),
+        STORED,
     ),
     "forces told an increment later": _file(
         instead(solver.results.increments, "_in_order", later), STORED

@@ -96,7 +96,7 @@ def disc(speed: float) -> Body:
 
 def error(solution: Solution, stage: str, exact: tuple[Array, Array], r: Array) -> float:
     """Return the largest error of radial and hoop stress, over the yield stress."""
-    stress = solution.system.response("disc", getattr(solution, stage)).stress
+    stress = solution.system.state("disc", getattr(solution, stage)).stress
     return float(np.abs(stress[[0, 2]] - np.stack(exact)).max() / YIELD)
 
 
@@ -127,7 +127,7 @@ def test_a_plane_disc_rotates_about_an_axis_across_its_plane() -> None:
         loads=(Centrifugal(density=DENSITY, speed=900.0, axis="z"),), condense=False,
     )  # fmt: skip
     solution = solve(Model(bodies=(ring,)), control=PathControl(load_step=1.0))
-    stress = solution.system.response("ring", solution.loaded).stress
+    stress = solution.system.state("ring", solution.loaded).stress
     r, *found = polar_stress(solution.system, "ring", stress)
     exact = RotatingDisc.elastic(r, DENSITY * 900.0**2)
     assert np.abs(np.array(found) - exact).max() < 5e-3 * exact[1].max()

@@ -7,8 +7,8 @@ import pytest
 
 from solver import Amplitude, Body, ContactPair, Displacement, Material, Model, Stage, solve
 from solver.mesh import graded, grid
+from solver.results.acting import of_pair
 from solver.results.stick import stick_half_width
-from solver.results.tractions import PairTractions
 from tests.reference.cattaneo import SlidingCylinders
 from tests.verification.bodies import NU, E, bent, cells
 from tests.verification.closed_forms import plane_strain_modulus
@@ -76,8 +76,8 @@ def test_the_push_leaves_the_pressure_of_hertz(solution, stage):
 
 @pytest.mark.parametrize("stage", [LITTLE, MUCH])
 def test_what_sticks_is_as_wide_as_by_cattaneo_and_mindlin(solution, stage):
-    tractions = PairTractions(solution.system, symmetric=False)
-    found = stick_half_width(tractions.points(solution.stages[stage]), symmetric=False)
+    acting = of_pair(solution.system, solution.stages[stage], symmetric=False)
+    found = stick_half_width(acting.points, symmetric=False)
     _, push = forces(solution, stage)
     assert found == pytest.approx(exact(solution, stage).stick_width(push), rel=0.02)
 

@@ -57,7 +57,7 @@ def test_uniform_pressure_passes_from_either_side(
     assert pressure == pytest.approx(np.full_like(pressure, P), rel=1e-10)
     assert not shear.any()
     for name in ("upper", "lower"):
-        stress = to_tensor(solution.system.response(name, solution.loaded).stress)
+        stress = to_tensor(solution.system.state(name, solution.loaded).stress)
         exact = np.array([0.0, -P, -NU * P, 0.0])[:, None]
         assert np.abs(stress - exact).max() < 1e-10 * P
 

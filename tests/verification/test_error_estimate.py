@@ -32,7 +32,7 @@ def of_wall(case, element, n, stage):
     strength = math.inf if stage == "elastic" else YIELD
     solution = press(kinematics, wall.pressure, nu, n, n, element, material=steel(strength, nu))
     state = solution.unloaded if stage == "unloaded" else solution.loaded
-    stress = solution.system.response("ring", state).stress
+    stress = solution.system.state("ring", state).stress
     body = solution.system.full("ring")
     return effectivity(body, stress, lambda x: exact_stress(wall, stage, nu, x))
 
@@ -86,7 +86,7 @@ def test_estimate_below_a_hertz_contact_is_the_true_error():
         xx, yy, xy = hertz_line.exact(size).stress(x[0], -x[1])
         return np.stack([xx, yy, NU * (xx + yy), SQRT2 * xy])
 
-    stress = solution.system.response("plane", solution.loaded).stress
+    stress = solution.system.state("plane", solution.loaded).stress
     assert LOW < effectivity(solution.system.full("plane"), stress, exact, within=2.0) < HIGH
 
 
@@ -99,8 +99,8 @@ def test_estimate_of_both_bodies_in_contact_is_the_true_error():
     bodies, true, energy = [], 0.0, 0.0
     for body in ("cylinder", "plane"):
         part, reference = coarse.system.full(body), fine.system.full(body)
-        stress = coarse.system.response(body, coarse.loaded).stress
-        nodal = recovery(reference) @ fine.system.response(body, fine.loaded).stress.T
+        stress = coarse.system.state(body, coarse.loaded).stress
+        nodal = recovery(reference) @ fine.system.state(body, fine.loaded).stress.T
         points = ErrorPoints(part)
         computed = points.computed(stress)
         exact = Sampler(reference, points.x.reshape(2, -1))(nodal.T).reshape(computed.shape)

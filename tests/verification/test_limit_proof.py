@@ -72,7 +72,7 @@ def test_a_bar_beside_an_elastic_one_has_no_limit_load(joined: str, steps: int) 
     found = solved(bars(ELASTIC, joined), steps)
     sign = -1 if joined == "pressed" else 1
     for name, exact in (("u", 120.0), ("l", (FORCE - 360.0) / 2)):
-        stress = found.system.response(name, found.stages["pulled"]).stress
+        stress = found.system.state(name, found.stages["pulled"]).stress
         assert np.abs(sign * stress[0] - exact).max() < 1e-3
         assert np.abs(stress[1:]).max() < 1e-3
 
@@ -96,5 +96,5 @@ def test_two_ideal_bars_have_one(joined: str) -> None:
 def test_little_stiffness_is_no_limit_load(material: Material) -> None:
     """However weak the second bar is, or little it hardens, it carries the rest."""
     found = solved(bars(material, "slave"), 2)
-    stress = found.system.response("l", found.stages["pulled"]).stress
+    stress = found.system.state("l", found.stages["pulled"]).stress
     assert np.abs(stress[0] - (FORCE - 360.0) / 2).max() < 0.1

@@ -45,7 +45,7 @@ YIELD, HEIGHT = 300.0, 10.0
 
 def points(solution: Solution, name: str, stage: str) -> tuple[Array, Array]:
     """Return positions (2, n) and Mandel stress (4, n) of the integration points."""
-    response = solution.system.response(name, solution.stages[stage])
+    response = solution.system.state(name, solution.stages[stage])
     return solution.system.positions(name), response.stress
 
 

@@ -52,7 +52,7 @@ def stress_error(solution, exact):
     """Largest deviation from a uniform stress (4,) in both bodies over the pressure."""
     return max(
         np.abs(
-            to_tensor(solution.system.response(name, solution.loaded).stress)
+            to_tensor(solution.system.state(name, solution.loaded).stress)
             - np.asarray(exact)[:, None]
         ).max()
         / P

@@ -40,7 +40,7 @@ def solved(parameters):
 def yielded(solution):
     """The largest plastic strain of each body."""
     return {
-        body: float(solution.system.response(body, solution.unloaded).state.accumulated.max())
+        body: float(solution.system.state(body, solution.unloaded).plastic.accumulated.max())
         for body in ("punch", "half_plane")
     }
 

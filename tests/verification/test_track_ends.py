@@ -52,7 +52,7 @@ def with_ends(length, depth):
     system = System(model(p))
     (outcome,) = Walker(system, ENOUGH).walk([p.schedule.program])
     assert outcome.error is None
-    stress = system.response("half_space", outcome.last).stress[0]
+    stress = system.state("half_space", outcome.last).stress[0]
     x, y = system.full("half_space").points.reshape(2, -1)
     middle = abs(x) < AVERAGED * length
     return np.array([stress[middle & (abs(y + row) < SAME)].mean() for row in depth])

@@ -47,7 +47,7 @@ def principal(solution: Any, name: str, stage: str) -> tuple[np.ndarray, np.ndar
     """Return radii (n,), and radial, hoop and axial stress (3, n), at the points."""
     system = solution.system
     converged = getattr(solution, stage)
-    return system.positions(name)[0], system.response(name, converged).stress[[0, 2, 1]]
+    return system.positions(name)[0], system.state(name, converged).stress[[0, 2, 1]]
 
 
 def test_a_steady_flow_of_heat_stresses_a_tube_as_the_closed_form() -> None:

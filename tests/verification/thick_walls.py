@@ -71,7 +71,7 @@ def misfit(
     solution: Solution, wall: ThickCylinder | ThickSphere, stage: str
 ) -> NDArray[np.float64]:
     """Return the errors of radial and hoop stress (2, n_points) / yield stress at a stage."""
-    stress = solution.system.response("ring", getattr(solution, stage)).stress
+    stress = solution.system.state("ring", getattr(solution, stage)).stress
     r, radial, hoop = polar_stress(solution.system, "ring", stress)
     return (np.stack([radial, hoop]) - np.stack(_STAGES[stage](wall, r))) / wall.yield_stress
 

@@ -8,10 +8,11 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array, hstack
 from scipy.spatial import cKDTree
 
+from solver.contact.state import BodyState
 from solver.fem.fields import Sampler, recovery
 from solver.fem.frame import RigidMotion
+from solver.results.acting import Acting
 from solver.results.contact_result import contact_patches
-from solver.results.tractions import SurfaceTractions
 from solver.rolling.passing import Pass
 from solver.rolling.plane.fields import TrackFields, of_layers, under_load
 from solver.rolling.plane.layers import Layers
@@ -73,23 +74,16 @@ class TrackBody(SteadyBody):
         points = self.part.points.reshape(2, -1)
         return np.concatenate([points, points[:, self._first] * [[1.0], [0.0]]], axis=1)
 
-    def axle(self, converged: PassStage) -> RigidMotion | None:
-        """Return the displacement of the axle, which stays at x = 0, or None without a wheel."""
-        touching = converged.touching
-        return None if touching is None else RigidMotion(x=0.0, y=touching.height, rotation=0.0)
-
     def under_load(self, found: Pass[Layers]) -> PassStage:
         """Return the state under the load of a pass."""
         touching = found.loading if isinstance(found.loading, RollingContact) else None
-        return self._stage(LOADED, under_load(self.track, found), touching)
+        return PassStage(self._state(LOADED, under_load(self.track, found)), touching)
 
     def left_by(self, found: Pass[Layers]) -> PassStage:
         """Return the state after a pass."""
-        return self._stage(RELEASED, of_layers(self.track, found.law, found.after), None)
+        return PassStage(self._state(RELEASED, of_layers(self.track, found.law, found.after)))
 
-    def _stage(
-        self, time: float, fields: TrackFields, touching: RollingContact | None
-    ) -> PassStage:
+    def _state(self, time: float, fields: TrackFields) -> BodyState:
         u, strain, inside, (above, at_surface) = fields
         strain = np.concatenate([strain, above], axis=1)
         plastic = inside.unpacked(np.concatenate([inside.packed, at_surface.packed], axis=1))
@@ -101,47 +95,30 @@ class TrackBody(SteadyBody):
             u = (u.reshape(-1, 2)[nodes] * [-1.0, 1.0]).ravel()
             stress = stress[:, points] * _MIRRORED
             plastic = plastic.at(points).mirrored
-        return PassStage.of(time, u, stress, plastic, touching)
+        return self.state_of(time, u, stress, plastic)
 
 
-class SteadyTractions(SurfaceTractions):
-    """Pressure and shear of a wheel.
+def of_wheel(way: int, at: PassStage) -> Acting:
+    """Return pressure and shear of a wheel; ``way`` is 1 if it moves along +x, -1 if back."""
+    touching: RollingContact | None = at.touching
+    if touching is None:
+        return Acting(along=lambda x: (np.zeros_like(x), np.zeros_like(x), np.full_like(x, np.nan)))
+    s, order = way * touching.x, np.argsort(way * touching.x)
 
-    Parameters
-    ----------
-    way : 1 if the wheel moves along +x, -1 if it moves back
-    """
-
-    def __init__(self, way: int) -> None:
-        self._way = way
-
-    def along(self, converged: PassStage, x: Array) -> tuple[Array, Array, Array]:
-        """See `SurfaceTractions`."""
-        touching = converged.touching
-        if touching is None:
-            return np.zeros_like(x), np.zeros_like(x), np.full_like(x, np.nan)
-        at = self._way * touching.x
-        order = np.argsort(at)
-
+    def along(x: Array) -> tuple[Array, Array, Array]:
         def sampled(values: Array, beyond: float) -> Array:
-            return np.asarray(np.interp(x, at[order], values[order], left=beyond, right=beyond))
+            return np.asarray(np.interp(x, s[order], values[order], left=beyond, right=beyond))
 
-        return (
-            sampled(touching.pressure, 0.0),
-            sampled(-self._way * touching.shear, 0.0),
-            sampled(touching.gap, np.nan),
-        )
+        shear = sampled(-way * touching.shear, 0.0)
+        return sampled(touching.pressure, 0.0), shear, sampled(touching.gap, np.nan)
 
-    def extent(self, converged: PassStage) -> tuple[float, float]:
-        """See `SurfaceTractions`."""
-        touching = converged.touching
-        assert touching is not None
-        order = np.argsort(touching.x)
-        closed = touching.normal[order] > 0
-        patches = contact_patches(touching.x[order], touching.gap[order], closed)
-        return (patches[-1][1] - patches[0][0]) / 2, float(touching.pressure.max())
-
-    def force(self, converged: PassStage) -> float:
-        """See `SurfaceTractions`."""
-        assert converged.touching is not None
-        return -self._way * float(converged.touching.tangential.sum())
+    rising = np.argsort(touching.x)
+    closed = touching.normal[rising] > 0
+    patches = contact_patches(touching.x[rising], touching.gap[rising], closed)
+    return Acting(
+        along=along,
+        half_width=(patches[-1][1] - patches[0][0]) / 2,
+        peak=float(touching.pressure.max()),
+        force=-way * float(touching.tangential.sum()),
+        axle=RigidMotion(x=0.0, y=touching.height, rotation=0.0),
+    )

@@ -14,15 +14,17 @@ import numpy as np
 from scipy.sparse import csr_array
 from skfem import CellBasis
 
+from solver.contact.state import BodyState
 from solver.fem.fields import Sampler, recovery
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
 from solver.memory import kept
 from solver.model.body import Body
+from solver.results.acting import Acting
 from solver.results.mesh_fields import MeshFields, counterclockwise
-from solver.results.tractions import SurfaceTractions
 from solver.rolling.passing import Pass
 from solver.rolling.rail.flow import PrismState
+from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.section import Section
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.results.stage import LOADED, RELEASED, PassStage, SteadyBody
@@ -83,13 +85,6 @@ class PrismBody(SteadyBody):
         """Return positions (3, n) of the points [mm]."""
         return np.asarray(self.part.points)
 
-    def strain(self, name: str, converged: PassStage) -> Array:
-        """Return the strain (6, n, Mandel) at the points, without that of an initial stress."""
-        return super().strain(name, converged) - self.track.initial_strain.T
-
-    def axle(self, converged: PassStage) -> None:
-        """Return None: the wheel has no mesh."""
-
     def under_load(self, found: Pass[PrismState]) -> PassStage:
         """Return the state under the load of a pass; NaN outside the zone."""
         track, before, middle = self.track, found.before, self.track.before
@@ -101,20 +96,20 @@ class PrismBody(SteadyBody):
         u[track.modes.unknowns] += track.left_by(before.plastic_strain)[track.modes.unknowns]
         whole = np.full((track.section.weights.size, 6), np.nan)
         whole[track.modes.points] = strain
-        stage = self._stage(LOADED, u, whole, inside)
+        state = self._state(LOADED, u, whole, inside)
         elastic = before.strain[:, None] + found.strain - found.plastic_strain
         stress = np.einsum("ab,pcb->apc", self._law.stiffness(6), elastic)
         lowest = to_tensor(stress.reshape(6, -1)).min(axis=1)
-        return replace(stage, touching=applied.contact, lowest=lowest)
+        return PassStage(state, applied.contact, lowest)
 
     def left_by(self, found: Pass[PrismState]) -> PassStage:
         """Return the state after a pass, in the whole section."""
         track, after = self.track, found.after
         u = track.left_by(after.plastic_strain)
         strain = track.initial_strain + track.straight.strain(u)
-        return self._stage(RELEASED, u, strain, after.state)
+        return PassStage(self._state(RELEASED, u, strain, after.state))
 
-    def _stage(self, time: float, u: Array, strain: Array, inside: PlasticState) -> PassStage:
+    def _state(self, time: float, u: Array, strain: Array, inside: PlasticState) -> BodyState:
         """Return a state with these displacements, strains and, in the zone, internal variables."""
         n, points = len(strain), self.track.modes.points
         whole = self._law.initial(n, 6)
@@ -122,7 +117,8 @@ class PrismBody(SteadyBody):
         packed[..., points] = inside.packed
         plastic = whole.unpacked(packed)
         stress = self._law.stiffness(6) @ (strain.T - plastic.plastic_strain)
-        return PassStage.of(time, u, stress, plastic)
+        found = self.state_of(time, u, stress, plastic)
+        return replace(found, strain=found.strain - self.track.initial_strain.T)
 
 
 @kept
@@ -138,18 +134,14 @@ def in_space(plane: Array) -> Array:
     return np.stack([np.zeros_like(z), y, z])
 
 
-class PatchTractions(SurfaceTractions):
-    """Resultants of a contact in a patch: it has no pressure along a line."""
-
-    def extent(self, converged: PassStage) -> tuple[float, float]:
-        """See `SurfaceTractions`: half the width across the track."""
-        contact = converged.touching
-        z = contact.grid.z[(contact.status != 0).any(axis=0)]
-        return float(np.ptp(z)) / 2, float(contact.pressure.max())
-
-    def force(self, converged: PassStage) -> float:
-        """See `SurfaceTractions`."""
-        return float(converged.touching.force[0])
+def of_patch(at: PassStage) -> Acting:
+    """Return half the width across the track, peak and force of a patch; none along a line."""
+    contact: PatchContact | None = at.touching
+    if contact is None:
+        return Acting()
+    z = contact.grid.z[(contact.status != 0).any(axis=0)]
+    peak = float(contact.pressure.max())
+    return Acting(half_width=float(np.ptp(z)) / 2, peak=peak, force=float(contact.force[0]))
 
 
 _CORNERS = 4

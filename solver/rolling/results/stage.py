@@ -6,10 +6,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from solver.contact.state import State
-from solver.materials.state import PlasticState, Response
+from solver.contact.state import BodyState
+from solver.materials.state import PlasticState
 from solver.rolling.passing import Pass
 from solver.typing import Array
 
@@ -19,30 +17,18 @@ LOADED, RELEASED = 0.0, 1.0
 
 @dataclass(frozen=True, slots=True)
 class PassStage:
-    """A state of the body.
+    """A state under the load of a pass or after it.
 
     Attributes
     ----------
-    state : displacements and internal variables; its time is `LOADED` or `RELEASED`
-    response : stress and internal variables at the points
+    state : the body; its time is `LOADED` or `RELEASED`
     touching : the contact in the frame of the load, or None
     lowest : (n_components,) smallest stress components around the load, None if not known [MPa]
     """
 
-    state: State
-    response: Response
+    state: BodyState
     touching: Any = None
     lowest: Array | None = None
-
-    @classmethod
-    def of(
-        cls, time: float, u: Array, stress: Array, plastic: PlasticState, touching: Any = None,
-        lowest: Array | None = None,
-    ) -> PassStage:  # fmt: skip
-        """Return a state with displacements (n,), stress and internal variables at points."""
-        n = len(stress)
-        response = Response(stress, np.zeros((n, n, 0)), plastic, np.zeros(0, dtype=bool))
-        return cls(State(time, (u,), (plastic,), ()), response, touching, lowest)
 
 
 class SteadyBody(ABC):
@@ -70,15 +56,11 @@ class SteadyBody(ABC):
         """Return the body."""
         return self.part
 
-    def response(self, name: str, converged: PassStage) -> Response:
-        """Return stress and internal variables at the points."""
-        return converged.response
+    def state(self, name: str, converged: PassStage) -> BodyState:
+        """Return the state of the body."""
+        return converged.state
 
-    def strain(self, name: str, converged: PassStage) -> Array:
-        """Return the strain (n_components, n, Mandel) at the points."""
-        found = converged.response
-        return self.part.body.law.elastic_strain(found.stress) + found.state.plastic_strain
-
-    def displacement(self, name: str, state: State) -> Array:
-        """Return the displacements (n,) [mm]."""
-        return state.u[0]
+    def state_of(self, time: float, u: Array, stress: Array, plastic: PlasticState) -> BodyState:
+        """Return a state with displacements (n,), stress and internal variables at points."""
+        strain = self.part.body.law.elastic_strain(stress) + plastic.plastic_strain
+        return BodyState(time, u, stress, strain, plastic)

@@ -15,10 +15,10 @@ from solver.errors import ModelError, NotConverged, WindowTooSmall
 from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
 from solver.materials.law import Law
+from solver.results.acting import Acting
 from solver.results.mesh_fields import MeshFields
 from solver.results.run import FinishedRun
 from solver.results.samples import Samples
-from solver.results.tractions import SurfaceTractions
 from solver.results.view import View
 from solver.rolling.passing import Pass, SolveBudget
 from solver.rolling.results.stage import SteadyBody
@@ -48,8 +48,8 @@ class Passes(ABC):
         """Yield the passes in their order; ``budget`` counts the solves of each."""
 
     @abstractmethod
-    def shown(self, number: int) -> tuple[Samples, SurfaceTractions]:
-        """Return the fields of a `SteadyBody`, pressure and shear in a pass, counted from 0."""
+    def shown(self, number: int) -> tuple[Samples, Callable[[Any], Acting]]:
+        """Return the fields of a `SteadyBody`, and what acts on it, in a pass counted from 0."""
 
     @abstractmethod
     def trace(self, found: Pass[Any]) -> Any:
@@ -154,7 +154,7 @@ class _Path:
         """Return a run with the results of the last pass found."""
         passes, found, previous = self._passes, self._found, self._previous
         number = max(len(self._steps) - 1, 0)
-        (samples, tractions), points, beside = passes.shown(number), {}, None
+        (samples, acting), points, beside = passes.shown(number), {}, None
         view, body = samples.view, cast("SteadyBody", samples.system)
         if found is not None and self.error is None:
             loaded, left = body.under_load(found), body.left_by(found)
@@ -170,7 +170,7 @@ class _Path:
         return FinishedRun(
             parameters=run,
             samples=samples,
-            tractions=tractions,
+            acting=acting,
             outcome=Outcome(
                 tally=Tally(iterations=tuple(self._steps), seconds=seconds, plastic_work=np.nan),
                 last=points.get(view.unloaded),

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from solver.contact.state import Converged
+from solver.contact.system import System
+from solver.results.acting import axle_of
 from solver.results.cycles import (
     SHAKEDOWN_STATE,
     STEADY_NET_INCREMENT,
     STEADY_PLASTIC_INCREMENT,
 )
-from solver.results.fields import Bodies, Solved
 from solver.results.maps import PROFILE_PLASTIC_STRAIN, RESIDUAL_PROFILE
 from solver.results.quantities import declare
 from solver.results.run import Values
@@ -108,19 +109,19 @@ class Trace(PassTrace):
             samples.profile("plastic_strain", left),
             samples.flow(left).swapaxes(0, 1),
             samples.profile("displacement", left)[0, :, 0],
-            _creepage(samples.system, points["mid_track"], points["loaded"]),
+            _creepage(samples, points["mid_track"], points["loaded"]),
             float(left.responses[-1].state.accumulated.max()),
         )
 
 
-def _creepage(bodies: Bodies, first: Solved, last: Solved) -> float:
+def _creepage(samples: Samples, first: Converged, last: Converged) -> float:
     """Return the creepage of the wheel between two states, NaN without a wheel."""
-    before, now = bodies.axle(first), bodies.axle(last)
-    if before is None or now is None:
+    assert isinstance(samples.system, System)
+    begun, ended = axle_of(samples.system, first), axle_of(samples.system, last)
+    if begun is None or ended is None:
         return np.nan
-    axle = bodies.full("wheel").body.axle
-    assert axle is not None
-    return 1 + axle.radius * (now.rotation - before.rotation) / (now.x - before.x)
+    (wheel, before), (_, now) = begun, ended
+    return 1 + wheel.axle.radius * (now.rotation - before.rotation) / (now.x - before.x)
 
 
 def passes(traces: Sequence[PassTrace], cycle: int) -> Values:

@@ -12,8 +12,8 @@ import numpy as np
 from solver.audit.report import Audit
 from solver.linear.threads import one_thread
 from solver.memory import kept
+from solver.results.acting import Acting
 from solver.results.samples import Samples
-from solver.results.tractions import SurfaceTractions
 from solver.results.view import View
 from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.audit.rail import audit_prism
@@ -21,7 +21,7 @@ from solver.rolling.passing import Pass, SolveBudget
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.patch_contact import AppliedPatch, PatchContact, PatchLoad
 from solver.rolling.rail.track import PrismTrack
-from solver.rolling.results.rail import PatchTractions, PrismBody, zone_fields
+from solver.rolling.results.rail import PrismBody, of_patch, zone_fields
 from solver.rolling.scenes.pass_runner import Passes
 from solver.rolling.scenes.passes import PassTrace
 from solver.rolling.search import search
@@ -108,9 +108,9 @@ class RailPasses(Passes):
             before, last = found.after, load
             yield found
 
-    def shown(self, number: int) -> tuple[Samples, SurfaceTractions]:
+    def shown(self, number: int) -> tuple[Samples, Callable[[Any], Acting]]:
         """See `Passes`."""
-        return self._samples, PatchTractions()
+        return self._samples, of_patch
 
     def trace(self, found: Pass[PrismState]) -> RailTrace:
         """See `Passes`."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,10 +20,10 @@ from solver.memory import kept
 from solver.model.amplitude import Amplitude
 from solver.model.friction import effective_friction
 from solver.model.motion import Axle
+from solver.results.acting import Acting, of_pressure
 from solver.results.run import FinishedRun
 from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
-from solver.results.tractions import PrescribedTractions, SurfaceTractions
 from solver.results.view import View
 from solver.rolling.audit.plane import audit_pass
 from solver.rolling.load import FULL_SLIP, PassingLoad, RollingLoad
@@ -31,7 +32,7 @@ from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.track import Track, standing_pressure, track_of
 from solver.rolling.plane.wheel import Rim, RollingContact, RollingWheel
-from solver.rolling.results.plane import SteadyTractions, TrackBody
+from solver.rolling.results.plane import TrackBody, of_wheel
 from solver.rolling.scenes.pass_runner import Passes, by_passes
 from solver.rolling.scenes.passes import Trace, shakedown_of
 from solver.rolling.scenes.rolling_model import wheel_body
@@ -212,14 +213,14 @@ class TrackPasses(Passes):
         """See `Passes`."""
         return steady_passes(self.parameters, self._reach, budget=budget)
 
-    def shown(self, number: int) -> tuple[Samples, SurfaceTractions]:
+    def shown(self, number: int) -> tuple[Samples, Callable[[Any], Acting]]:
         """See `Passes`."""
         p, way = self.parameters.of_pass(number), self._ways[number]
         if p.load == "contact":
-            return self._by_way[way], SteadyTractions(way)
+            return self._by_way[way], partial(of_wheel, way)
         shear = way * p.friction * p.traction
         pressure = standing_pressure(p.half_width, p.peak_pressure, shear)
-        return self._by_way[way], PrescribedTractions(pressure)
+        return self._by_way[way], partial(of_pressure, pressure)
 
     def trace(self, found: Pass[Layers]) -> Trace:
         """Return the trace of a pass, from the state that it leaves."""

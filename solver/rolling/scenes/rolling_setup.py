@@ -156,8 +156,9 @@ def profile_figures(run: FinishedRun) -> Values:
 
 def wheel(run: FinishedRun) -> Values:
     """Return the longitudinal force at mid-track, and height and rotation of a wheel."""
-    out: dict[Quantity, float] = {LONGITUDINAL_FORCE: run.tractions.force(run.loaded)}
-    if (hub := run.system.axle(run.loaded)) is not None:
+    acting = run.acting(run.loaded)
+    out: dict[Quantity, float] = {LONGITUDINAL_FORCE: acting.force}
+    if (hub := acting.axle) is not None:
         out |= {AXLE_HEIGHT: hub.y, AXLE_ROTATION: hub.rotation}
     return out
 
@@ -165,10 +166,9 @@ def wheel(run: FinishedRun) -> Values:
 def surface(run: FinishedRun) -> Values:
     """Return residual stress at and near the surface at mid-track, without extrapolation."""
     found = FreeSurface.of(run.system.full("half_space"), "top")
-    response = run.system.response("half_space", run.unloaded)
-    u = run.system.displacement("half_space", run.unloaded.state)
-    free = found.at(0.0, found.stress(u, response.state.plastic_strain))
-    row = found.at(0.0, found.first_row(response.stress))
+    left = run.system.state("half_space", run.unloaded)
+    free = found.at(0.0, found.stress(left.u, left.plastic.plastic_strain))
+    row = found.at(0.0, found.first_row(left.stress))
     return {
         **{FIRST_ROW[axis]: float(value) for axis, value in zip("xz", row, strict=True)},
         FIRST_ROW_DEPTH: float(found.at(0.0, found.depth)),

@@ -110,7 +110,7 @@ def judge_pulled(pulled: Pulled) -> dict[str, Figure]:
     wanted = bar.strains()
     largest = max(np.abs(wanted))
     for load, strain, converged in zip(bar.loads, wanted, pulled.states, strict=True):
-        stress = system.response("bar", converged).stress
+        stress = system.state("bar", converged).stress
         off = np.abs(stress - np.array([load, 0.0, 0.0, 0.0])[:, None]).max()
         stressed = max(stressed, float(off) / YIELD)
         u = system.displacement("bar", converged.state)[2 * nodes]

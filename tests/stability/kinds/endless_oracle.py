@@ -102,8 +102,8 @@ def never_yields(parameters: RollingParameters) -> bool:
 def _left(passed: Passed) -> dict[str, float]:
     """Return how far the state after the passes is from one of free layers."""
     p, run = passed.parameters, passed.run
-    response = run.unloaded.response
-    stress, ep = response.stress / p.yield_stress, response.state.plastic_strain
+    left = run.unloaded.state
+    stress, ep = left.stress / p.yield_stress, left.plastic.plastic_strain
     nu, E = p.poisson_ratio, p.youngs_modulus / p.yield_stress
     wanted = np.zeros_like(stress)
     wanted[0] = -E / (1 - nu**2) * (ep[0] + nu * ep[2])
@@ -141,7 +141,7 @@ def _law(passed: Passed, own: RollingParameters) -> dict[str, float]:
     inside = (x < AHEAD * a) & (x > -BEHIND * a) & (y > -DEEP * a)
     found = {}
     for name, state in (("yield loaded", run.loaded), ("yield left", run.unloaded)):
-        stress, plastic = state.response.stress, state.response.state
+        stress, plastic = state.state.stress, state.state.plastic
         ep, total = plastic.plastic_strain, plastic.accumulated
         relative = stress - 2 / 3 * linear.kinematic_modulus * ep
         relative[:3] -= relative[:3].mean(axis=0)
@@ -167,7 +167,7 @@ def _balance(passed: Passed, own: RollingParameters) -> dict[str, float]:
     """Return how far the stress under load is from what presses on the surface."""
     run = passed.run
     part = run.system.full("half_space")
-    stress = run.loaded.response.stress[:, : part.weights.size]
+    stress = run.loaded.state.stress[:, : part.weights.size]
     left = part.undeformed.internal_force(stress).reshape(-1, 2)
     held = np.ones(part.n, dtype=bool)
     held[part.free] = False

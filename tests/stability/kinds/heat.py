@@ -107,7 +107,7 @@ def judge(bar: Bar, solution: Solution) -> dict[str, Figure]:
     """Return the figures: stress at every point, at the end of every stage."""
     figures = {}
     for k, sigma in enumerate(bar.stresses()):
-        stress = solution.system.response("bar", solution.stages[str(k)]).stress
+        stress = solution.system.state("bar", solution.stages[str(k)]).stress
         off = np.abs(stress - np.array([sigma, 0.0, 0.0, 0.0])[:, None]).max()
         # without hardening the flow may gather anywhere: balance alone limits the difference
         figures[f"stress {k}"] = Figure(float(off) / YIELD, 1e-5)

@@ -70,7 +70,7 @@ def judge(name: str, load: float, solution: Solution) -> dict[str, Figure]:
         for key in found[0]:
             before = figures.get(key, Figure(0.0, 1e-7)).value
             figures[key] = Figure(max([before, *(f[key] for f in found)]), 1e-7)
-        stress = solution.system.response(body.name, solution.loaded).stress
+        stress = solution.system.state(body.name, solution.loaded).stress
         volume = part.weights.sum()
         # mean stress of a body is the virtual work of its loads on an affine motion
         along = 1 if name == "blocks" else 0

@@ -208,7 +208,7 @@ def _left(rolled: Rolled) -> dict[str, float]:
     p, run = rolled.parameters, rolled.run
     part = run.system.full(run.view.profile_body)
     stage: Any = run.unloaded
-    stress, ep = stage.response.stress, stage.response.state.plastic_strain
+    stress, ep = stage.state.stress, stage.state.plastic.plastic_strain
     w = part.weights.ravel()
     _, y, z = part.points
     E, nu = p.youngs_modulus, p.poisson_ratio
@@ -265,7 +265,7 @@ def _work(rolled: Rolled, stress: Array, w: Array) -> float:
     by_z = np.array([stress[up[a]] @ w / root[up[a]] for a in range(3)])
     if not isinstance(p, WheelRailParameters):
         return float(np.abs(by_y).max())
-    u = run.unloaded.state.u[0].reshape(-1, 3)[foot]
+    u = run.unloaded.state.u.reshape(-1, 3)[foot]
     order = np.argsort(z)
     u, y, z = u[order], y[order], z[order]
     length = np.hypot(np.diff(z[::2]), np.diff(y[::2]))
@@ -290,10 +290,10 @@ def _law(rolled: Rolled) -> dict[str, float]:
         ("yield left", run.unloaded),
     )
     for name, stage in stages:
-        response = stage.response
-        zone = np.isfinite(response.stress).all(axis=0)
-        stress, ep = response.stress[:, zone], response.state.plastic_strain[:, zone]
-        total = response.state.accumulated[zone]
+        state = stage.state
+        zone = np.isfinite(state.stress).all(axis=0)
+        stress, ep = state.stress[:, zone], state.plastic.plastic_strain[:, zone]
+        total = state.plastic.accumulated[zone]
         beyond = float(beyond_yield(p, stress, ep, total).max()) / p.yield_stress
         found[name] = max(0.0, beyond)
         largest = max(float(np.abs(ep).max()), 1e-300)

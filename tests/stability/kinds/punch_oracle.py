@@ -87,7 +87,7 @@ def _length(system: System, body: str, axis: int) -> float:
 def _work(system: System, body: str, converged: Converged, axis: str) -> float:
     """Return the virtual work of the affine stretch along an axis, over the body's length [N]."""
     part = system.full(body)
-    stress = system.response(body, converged).stress
+    stress = system.state(body, converged).stress
     along = stress[1] if axis == "y" else stress[0]
     if axis == "x" and part.body.kinematics == "axisymmetric":
         along = along + stress[2]
@@ -131,9 +131,9 @@ def _hats(parameters: PunchParameters, system: System, converged: Converged) -> 
 
 def law(system: System, body: str, converged: Converged) -> dict[str, float]:
     """Return how far stress and strain at the points of a body are from its law."""
-    part, response = system.full(body), system.response(body, converged)
-    material, stress = part.body.material, response.stress
-    plastic, accumulated = response.state.plastic_strain, response.state.accumulated
+    part, state = system.full(body), system.state(body, converged)
+    material, stress = part.body.material, state.stress
+    plastic, accumulated = state.plastic.plastic_strain, state.plastic.accumulated
     E, nu = material.elasticity.youngs_modulus, material.elasticity.poisson_ratio
     strain = part.strain(system.displacement(body, converged.state))
     elastic = (1 + nu) / E * stress

@@ -137,9 +137,7 @@ def judge(pressed: Pressed, found: tuple[Solution, Solution | None]) -> dict[str
     if pressed.kind == "plate":
         whole = pushed.system.full("block")
         nodes = whole.boundary_nodes("top")
-        force = whole.undeformed.internal_force(
-            pushed.system.response("block", pushed.loaded).stress
-        )
+        force = whole.undeformed.internal_force(pushed.system.state("block", pushed.loaded).stress)
         at = -float(force[2 * nodes + 1] @ (whole.X[0, nodes] - a / 2)) / push
         figures["moment"] = Figure(abs(at - pressed.off * a) / a, 1e-5)
         figures["turning"] = Figure(abs(moment + push * pressed.off * a) / (push * a), 1e-6)

@@ -192,7 +192,7 @@ def _wheel(rolled: Rolled) -> dict[str, Figure]:
     system = rolled.system
     track = system.full("half_space")
     nodes = track.boundary_nodes("top")
-    left = track.undeformed.internal_force(system.response("half_space", loaded).stress)
+    left = track.undeformed.internal_force(system.state("half_space", loaded).stress)
     force = left.reshape(-1, 2)[nodes].T
     u = system.displacement("half_space", loaded.state).reshape(-1, 2)[nodes].T
     hub = np.array([0.0, p.radius]) + loaded.state.u[0][-3:-1]
@@ -213,7 +213,7 @@ def _laws(rolled: Rolled) -> dict[str, Figure]:
     surface, p = system.interfaces[0].slave_surface, rolled.parameters
     touching = np.abs(surface.X[0, surface.vertices])[N > 0]
     laws = [law(system, "half_space", c) for c in (loaded, unloaded)]
-    first, last = (system.response("half_space", c).state.accumulated for c in (loaded, unloaded))
+    first, last = (system.state("half_space", c).plastic.accumulated for c in (loaded, unloaded))
     largest = max(float(last.max()), 1e-12)
     return {
         **{k: Figure(max(found[k] for found in laws), 1e-7) for k in laws[0]},

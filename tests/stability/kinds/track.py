@@ -91,7 +91,7 @@ def judge(stepped: Stepped) -> dict[str, Figure]:
     pressed, free = _forces(stepped, loaded)
     at_rest, residual = _forces(stepped, left)
     laws = [law(run.system, "half_space", c) for c in (loaded, left)]
-    totals = [run.system.response("half_space", c).state.accumulated for c in (loaded, left)]
+    totals = [run.system.state("half_space", c).plastic.accumulated for c in (loaded, left)]
     yielded = float(totals[1].max())
     return {
         "audit": Figure(0.0, 0.0),
@@ -108,7 +108,7 @@ def judge(stepped: Stepped) -> dict[str, Figure]:
 def _forces(stepped: Stepped, converged: Converged) -> tuple[np.ndarray, float]:
     """Return the force (2,) that stress leaves at the surface, and the largest below it [N]."""
     part = stepped.run.system.full("half_space")
-    stress = stepped.run.system.response("half_space", converged).stress
+    stress = stepped.run.system.state("half_space", converged).stress
     force = part.undeformed.internal_force(stress).reshape(-1, 2)
     x, y = part.X
     edge = 1e-9 * float(np.ptp(x))

@@ -74,8 +74,8 @@ def compare(
         for body in BODIES:
             u = solution.displacement(body, stage) / length
             moved = max(moved, _apart(u, wanted.displacement(body, stage), wanted, body))
-            points = solution.system.response(body, here).stress / stress
-            same = wanted.system.response(body, there).stress
+            points = solution.system.state(body, here).stress / stress
+            same = wanted.system.state(body, there).stress
             strained = max(strained, float(np.abs(points - same).max()) / 300.0)
         figures[f"displacement {stage}"] = Figure(moved, limit)
         figures[f"stress {stage}"] = Figure(strained, limit)
