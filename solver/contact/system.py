@@ -20,7 +20,7 @@ from solver.contact.state import BodyState, ContactState, Converged, State
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.fields import Sampler, recovery
-from solver.fem.operators import PartOperators
+from solver.fem.operators import Operators
 from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
 from solver.fem.substructure import Substructure
@@ -107,7 +107,7 @@ class System:
         )
         self.links: Links = links_of(model, self.parts, self.all_names, linked)
 
-        self._windows: dict[int, tuple[bytes, Windowed, PartOperators]] = {}
+        self._windows: dict[int, tuple[bytes, Windowed, Operators]] = {}
         self._least: tuple[float, tuple[float, float]] = (np.nan, (0.0, 0.0))
         self._at_vertices: dict[int, csr_array] = {}
         self._expanded: deque[tuple[Array, float, Array]] = deque(maxlen=_EXPANDED)
@@ -181,7 +181,7 @@ class System:
         return found
 
     @cached_property
-    def operators(self) -> tuple[PartOperators, ...]:
+    def operators(self) -> tuple[Operators, ...]:
         """The inverses of the stiffness of each part."""
         return tuple(
             part.operators(chains, self._linear_solver)

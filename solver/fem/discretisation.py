@@ -20,7 +20,7 @@ from solver.fem.loads import (
     travelling_forces,
 )
 from solver.fem.nodes import Nodes
-from solver.fem.operators import Operators
+from solver.fem.operators import Assembled
 from solver.fem.part import Part
 from solver.fem.softening import Softening
 from solver.fem.surface import Surface, extract, gathered
@@ -105,10 +105,10 @@ class Discretisation(Nodes, Part):
         """Return the surface of a named boundary: one open chain, unless any shape is allowed."""
         return gathered(self, boundary) if any_shape else extract(self, boundary)
 
-    def operators(self, surfaces: list[Surface], linear_solver: str) -> Operators:
+    def operators(self, surfaces: list[Surface], linear_solver: str) -> Assembled:
         """Return the inverse stiffnesses of this part, for its contact surfaces."""
         contact = [surface.dofs for surface in surfaces]
-        return Operators(self, np.concatenate([np.zeros(0, int), *contact]), linear_solver)
+        return Assembled(self, np.concatenate([np.zeros(0, int), *contact]), linear_solver)
 
     @property
     def volumes(self) -> Array:

@@ -100,19 +100,25 @@ class Factored:
         return self._analysed.solver.compliance(block)
 
 
-class PartOperators(Protocol):
-    """The operators of a part."""
+class Operators:
+    """The operators of a part whose stiffness never changes."""
 
-    @property
+    def __init__(self, elastic: Operator | None) -> None:
+        self._elastic = elastic
+
+    @cached_property
     def elastic(self) -> Operator:
         """The operator of the elastic stiffness."""
+        assert self._elastic is not None
+        return self._elastic
 
     def tangent(self, response: PartResponse, blend: float) -> Operator:
         """Return the operator of ``(1 - blend) tangent + blend elastic stiffness``."""
+        return self.elastic
 
 
-class Operators:
-    """The operators of one part; the elastic one is factorised once and kept.
+class Assembled(Operators):
+    """The operators of a meshed part; the elastic one is factorised once and kept.
 
     Parameters
     ----------
@@ -121,22 +127,17 @@ class Operators:
     """
 
     def __init__(
-        self,
-        part: Stiff,
-        contact: Ints,
-        linear_solver: str,
-        elastic: Operator | None = None,
+        self, part: Stiff, contact: Ints, linear_solver: str, elastic: Operator | None = None
     ) -> None:
-        self._part = part
-        self._contact = contact
-        self._name = linear_solver
-        if elastic is not None:
-            self.elastic = elastic
+        super().__init__(elastic)
+        self._part, self._contact, self._name = part, contact, linear_solver
 
     @cached_property
     def elastic(self) -> Operator:
-        """The elastic operator."""
-        return Factored(Analysed(self._part, self._contact, self._name), self._part.elastic_data)
+        """The operator of the elastic stiffness."""
+        return self._elastic or Factored(
+            Analysed(self._part, self._contact, self._name), self._part.elastic_data
+        )
 
     @cached_property
     def _analysed(self) -> Analysed:
@@ -196,14 +197,3 @@ class Restricted:
     def compliance(self, dofs: Ints, rows: Array) -> Array:
         """See `Operator`."""
         return self._whole.compliance(self._kept[dofs], rows)
-
-
-class Fixed:
-    """The operators of a part whose stiffness never changes."""
-
-    def __init__(self, operator: Operator) -> None:
-        self.elastic = operator
-
-    def tangent(self, response: PartResponse, blend: float) -> Operator:
-        """Return the elastic operator."""
-        return self.elastic

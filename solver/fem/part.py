@@ -12,7 +12,7 @@ from scipy import sparse
 from solver.fem.deformation import PartResponse, without_points
 from solver.fem.dofs import Dofs, vectors
 from solver.fem.loads import Superposed
-from solver.fem.operators import PartOperators
+from solver.fem.operators import Dense, Operators
 from solver.fem.surface import Surface
 from solver.materials.state import PlasticState
 from solver.model.body import Body
@@ -54,25 +54,9 @@ class Part(ABC):
     rigid: Array
     moves: bool = False
 
-    # -- each kind of part has its own ---------------------------------------------------------
-
-    @abstractmethod
-    def operators(self, surfaces: list[Surface], linear_solver: str) -> PartOperators:
-        """Return the inverse stiffnesses of this part, for its contact surfaces."""
-
-    @abstractmethod
-    def residual(self, time: float, u: Array, response: PartResponse) -> Array:
-        """Return external minus internal forces (n,), without contact forces [N]."""
-
     @abstractmethod
     def elastic_matrix(self) -> sparse.csr_array:
         """Return the elastic stiffness on all unknowns (n, n), supports not applied."""
-
-    @abstractmethod
-    def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
-        """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
-
-    # -- without points and loads --------------------------------------------------------------
 
     @cached_property
     def loads(self) -> Superposed:
@@ -92,6 +76,20 @@ class Part(ABC):
         """Return stress, tangent and new internal variables at all points."""
         none = np.zeros_like(state.plastic_strain)
         return without_points(self.n, self.body.law.respond(none, state))
+
+    def operators(self, surfaces: list[Surface], linear_solver: str) -> Operators:
+        """Return the inverse stiffnesses of this part, for its contact surfaces."""
+        stiffness = self.elastic_matrix()[self.active][:, self.active].toarray()
+        return Operators(Dense(stiffness, self.active, self.n))
+
+    def residual(self, time: float, u: Array, response: PartResponse) -> Array:
+        """Return external minus internal forces (n,), without contact forces [N]."""
+        return self.external(time) - self.elastic_matrix() @ u
+
+    def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
+        """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
+        energy = float(step @ (self.elastic_matrix() @ step))
+        return energy, energy
 
     def surface(self, surface: Surface) -> Surface:
         """Return a surface of the whole body in this part's numbering."""

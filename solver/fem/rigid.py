@@ -11,31 +11,13 @@ from copy import copy
 import numpy as np
 from scipy import sparse
 
-from solver.fem.deformation import PartResponse
 from solver.fem.frame import MovingFrame, RigidMotion
 from solver.fem.loads import Superposed
-from solver.fem.operators import Fixed
 from solver.fem.part import Part
 from solver.fem.surface import Surface
-from solver.linear.solvers import Begun
 from solver.mesh.rounding import ROUNDED
 from solver.model.rigid import Moved, Pushed, RigidBody
 from solver.typing import Array, Ints
-
-
-class Unmoved:
-    """The operator of a part without elastic displacements."""
-
-    def __init__(self, n: int) -> None:
-        self._nothing = np.zeros(n)
-
-    def begin(self, force: Array) -> Begun:
-        """See `Operator`."""
-        return Begun(self._nothing, lambda change: self._nothing)
-
-    def compliance(self, dofs: Ints, rows: Array) -> Array:
-        """See `Operator`."""
-        return np.zeros((len(rows), len(rows)))
 
 
 class RigidPart(Part):
@@ -138,20 +120,6 @@ class RigidPart(Part):
         """Return the unknowns (3,) before any load."""
         return self.moved(np.zeros(3), 0.0)
 
-    # -- it has no stiffness --------------------------------------------------------------------
-
-    def operators(self, surfaces: list[Surface], linear_solver: str) -> Fixed:
-        """Return the operator of a part without elastic displacements."""
-        return Fixed(Unmoved(3))
-
-    def residual(self, time: float, u: Array, response: PartResponse) -> Array:
-        """Return the external forces (3,) [N]."""
-        return self.external(time)
-
     def elastic_matrix(self) -> sparse.csr_array:
         """Return the stiffness (3, 3), which is zero."""
         return sparse.csr_array((3, 3))
-
-    def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
-        """Return zero: a rigid body stores no energy."""
-        return 0.0, 0.0

@@ -18,7 +18,6 @@ from solver.fem.deformation import PartResponse
 from solver.fem.discretisation import Discretisation, choose_pins
 from solver.fem.dofs import Dofs
 from solver.fem.loads import Superposed
-from solver.fem.operators import Dense, Fixed
 from solver.fem.part import Part
 from solver.fem.surface import Surface
 from solver.linear.schur import Eliminated, SchurComplement
@@ -95,11 +94,6 @@ class Substructure(Part):
         """Return a surface of the whole body in this part's numbering."""
         nodes = np.searchsorted(self._nodes, surface.nodes)
         return replace(surface, nodes=nodes)
-
-    def operators(self, surfaces: list[Surface], linear_solver: str) -> Fixed:
-        """Return the operator of an elastic part, which never changes."""
-        S = self._condensed.stiffness[np.ix_(self.active, self.active)]
-        return Fixed(Dense(S, self.active, self.n))
 
     def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,) [N]."""

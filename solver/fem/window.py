@@ -23,7 +23,7 @@ from solver.fem.deformation import PartResponse
 from solver.fem.discretisation import Discretisation, choose_pins
 from solver.fem.dofs import Dofs, vectors
 from solver.fem.loads import Superposed
-from solver.fem.operators import Operator, Operators, Restricted
+from solver.fem.operators import Assembled, Operator, Restricted
 from solver.fem.softening import Softening
 from solver.fem.surface import Surface
 from solver.linear.schur import Eliminated, SchurComplement
@@ -164,10 +164,10 @@ class Windowed(Discretisation):
         change = self._outer.finish(u - self._begin[self.kept])
         return self._begin + change
 
-    def inverses(self, elastic: Operator, linear_solver: str) -> Operators:
+    def inverses(self, elastic: Operator, linear_solver: str) -> Assembled:
         """Return its inverse stiffnesses, given the elastic operator of the whole body."""
         restricted = Restricted(elastic, self.kept, self.whole.n)
-        return Operators(self, np.flatnonzero(self._touches), linear_solver, restricted)
+        return Assembled(self, np.flatnonzero(self._touches), linear_solver, restricted)
 
     def motion(self, surface: Surface, u: Array) -> Array:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
