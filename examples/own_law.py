@@ -55,7 +55,7 @@ class Saturating(Law):
         G, C = self.elasticity.shear_modulus, self.stiffness(len(strain))
         trial = C @ (strain - state.plastic_strain)
         yielding = self.yield_value(trial, state) > 0
-        q, N = self.surface.equivalent(trial), self.flow_direction(trial, state)
+        q, N = self.surface.equivalent(trial), self.surface.normal(trial)
 
         dp = np.zeros_like(q)
         for _ in range(50):

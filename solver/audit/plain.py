@@ -303,5 +303,6 @@ class PlainBody:
 
     def elastic_energy(self, stress: Array, time: float) -> float:
         """Return the energy of a Mandel stress (4, n_points) at a time [N mm]."""
-        density = self.law(time).energy_density(stress)
+        law = self.law(time)
+        density = law.elasticity.energy_density(stress) / law.stiff
         return float((density * self.volume.ravel()).sum())

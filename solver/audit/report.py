@@ -175,7 +175,7 @@ def _strength(system: System, loaded: Converged) -> dict[str, float]:
             law = part.law(loaded.state.time)
             if law.elastic:
                 continue
-            strength = float(law.shear_strength(loaded.responses[number].state).max())
+            strength = float(law.surface.shear(law.strength(loaded.responses[number].state)).max())
             shear = max(shear, float(np.abs(tangential).max()) / strength)
             friction = max(friction, float(bound.max()) / strength)
     return {"audit_surface_shear": shear, "audit_friction_over_strength": friction}

@@ -395,7 +395,8 @@ class System:
                 accumulated=np.where(gone, np.nan, plastic.accumulated),
                 plastic_strain=np.where(gone, np.nan, plastic.plastic_strain),
             )
-        strain = whole.law(time).elastic_strain(stress) + plastic.plastic_strain
+        law = whole.law(time)
+        strain = law.elasticity.strain(stress) / law.stiff + plastic.plastic_strain
         return BodyState(time, u, stress, strain + whole.eigenstrain(time), plastic)
 
     def initial(self) -> State:

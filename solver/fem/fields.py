@@ -156,5 +156,6 @@ def _reference(part: Nodes, element: Ints, x: Array) -> Array:
 def elastic_energy(part: Part, u: Array, response: Response, time: float) -> float:
     """Return the elastic energy of a part [N mm], from stress or from its condensed stiffness."""
     if isinstance(part, Discretisation):
-        return float(part.law(time).energy_density(response.stress) @ part.volumes)
+        law = part.law(time)
+        return float(law.elasticity.energy_density(response.stress) / law.stiff @ part.volumes)
     return part.stiffness_along(u, without_points(part.n, response))[1] / 2

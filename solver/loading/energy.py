@@ -70,10 +70,10 @@ def _heat(parts: Sequence[Part], before: Converged, now: Converged) -> float:
         grown = part.eigenstrain(times[1]) - part.eigenstrain(times[0])
         if grown.any():
             work += float(((old.stress + new.stress) * grown).sum(axis=0) @ part.volumes) / 2
-        laws = [part.law(time) for time in times]
-        if laws[0] is not laws[1]:
+        old_law, law = (part.law(time) for time in times)
+        if old_law is not law:
             both, *each = (
-                laws[1].energy_density(stress) - laws[0].energy_density(stress)
+                (found := law.elasticity.energy_density(stress)) / law.stiff - found / old_law.stiff
                 for stress in (old.stress + new.stress, old.stress, new.stress)
             )
             work += float((both - each[0] - each[1]) @ part.volumes) / 2

@@ -73,7 +73,8 @@ def _carried(part: Discretisation, now: Converged, number: int, error: Array) ->
     """
     response = now.responses[number]
     points = np.flatnonzero(response.yielding)
-    strain = part.law(now.state.time).at(points).elastic_strain(error[:, points])
+    law = part.law(now.state.time).at(points)
+    strain = law.elasticity.strain(error[:, points]) / law.stiff
     carried = error.copy()
     carried[:, points] = np.einsum("ijp,jp->ip", response.tangent[:, :, points], strain)
     return carried

@@ -209,17 +209,6 @@ class TrescaMaterial(ElasticPlastic):
         """Tresca's hexagonal prism."""
         return Tresca()
 
-    @property
-    def has_corners(self) -> bool:
-        """True: the surface has edges."""
-        return True
-
-    def flow_rule_error(
-        self, stress: Array, flow: Array, growth: Array, after: PlasticState
-    ) -> Array:
-        """Return the error (n_points,) of a flow; at an edge it may lie between two normals."""
-        return self.surface.flow_rule_error(stress, flow, growth, 2 * self.elasticity.shear_modulus)
-
 
 @dataclass(frozen=True, kw_only=True)
 class SmoothMaterial(ElasticPlastic):

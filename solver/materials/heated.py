@@ -61,34 +61,10 @@ class Heated(Wrapped):
         """Return the stress of the tension curve (n_points,) [MPa]."""
         return self.strong * self.law.strength(state.stretched(self._stretch))
 
-    def shear_strength(self, state: PlasticState) -> Array:
-        """Return the stress of the curve in shear (n_points,) [MPa]."""
-        return self.strong * self.law.shear_strength(state.stretched(self._stretch))
-
     def yield_value(self, stress: Array, state: PlasticState) -> Array:
         """Return the yield function (n_points,) [MPa]."""
         own = self.law.yield_value(stress / self.strong, state.stretched(self._stretch))
         return self.strong * own
-
-    def flow_direction(self, stress: Array, state: PlasticState) -> Array:
-        """Return the flow direction (n_components, n_points), Mandel."""
-        return self.law.flow_direction(stress / self.strong, state.stretched(self._stretch))
-
-    def flow_rule_error(
-        self, stress: Array, flow: Array, growth: Array, after: PlasticState
-    ) -> Array:
-        """Return the error (n_points,) of a plastic flow by this law."""
-        k = self._stretch
-        own = stress / self.strong, flow * k, growth * k, after.stretched(k)
-        return self.law.flow_rule_error(*own) / k
-
-    def elastic_strain(self, stress: Array) -> Array:
-        """Return the elastic strain (n_components, n_points) of Mandel stress."""
-        return self.law.elastic_strain(stress) / self.stiff
-
-    def energy_density(self, stress: Array) -> Array:
-        """Return the elastic energy (n_points,) of Mandel stress [N mm/mm3]."""
-        return self.law.energy_density(stress) / self.stiff
 
     def dissipation(self, before: PlasticState, response: Response) -> Array:
         """Return the work (n_points,) that an increment turns into heat [N mm/mm3]."""

@@ -10,7 +10,7 @@ associated flow on a von Mises surface and isotropic hardening that saturates. O
 
 - `back_stress` and `strength` for kinematic hardening
 - `hardens` if stress grows without bound, `ultimate_shear_stress` if there is no hardening
-- `surface` for another yield condition, `flow_rule_error` and `has_corners` if it has edges
+- `surface` for another yield condition
 - `symmetric` if the tangent is not symmetric
 - `linear_hardening` if the closed forms of linear hardening may replace `respond`
 
@@ -113,13 +113,10 @@ class Law(ABC):
         """Return the elastic stiffness (n_components, n_components) on Mandel strain [MPa]."""
         return self.elasticity.stiffness(n_components)
 
-    def elastic_strain(self, stress: Array) -> Array:
-        """Return the elastic Mandel strain (n_components, n_points) of a stress, all components."""
-        return self.elasticity.strain(stress)
-
-    def energy_density(self, stress: Array) -> Array:
-        """Return the elastic energy (n_points,) of Mandel stress [N mm/mm3]."""
-        return self.elasticity.energy_density(stress)
+    @attribute
+    def stiff(self) -> float | Array:
+        """Young's modulus at the points over that of `elasticity`."""
+        return 1.0
 
     def at(self, points: Ints) -> Law:
         """Return the law of some points: the law itself if it is the same at all points."""
@@ -153,15 +150,6 @@ class Law(ABC):
         return False
 
     @attribute
-    def has_corners(self) -> bool:
-        """Whether stress may stay at a corner or on an edge of the yield surface.
-
-        The tangent is small or zero there, though the body may carry more load: increments then
-        blend it with elastic stiffness.
-        """
-        return False
-
-    @attribute
     def ultimate_shear_stress(self) -> float:
         """Upper bound of the shear stress at any plastic strain [MPa]; inf if none is known."""
         return math.inf
@@ -170,23 +158,12 @@ class Law(ABC):
         """Return the stress (n_points,) of the tension curve at this plastic strain [MPa]."""
         return self.flow_stress(state)
 
-    def shear_strength(self, state: PlasticState) -> Array:
-        """Return the stress (n_points,) of the curve in pure shear at this plastic strain [MPa]."""
-        return self.surface.shear(self.strength(state))
-
     # -- conditions ----------------------------------------------------------------------------
 
     def yield_value(self, stress: Array, state: PlasticState) -> Array:
         """Return the yield function (n_points,) [MPa]: negative inside the yield surface."""
         relative = stress - self.back_stress(state)
         return self.surface.equivalent(relative) - self.flow_stress(state)
-
-    def flow_direction(self, stress: Array, state: PlasticState) -> Array:
-        """Return the flow direction (n_components, n_points), Mandel.
-
-        It is the increment of plastic strain per unit of the plastic multiplier.
-        """
-        return self.surface.normal(stress - self.back_stress(state))
 
     def dissipation(self, before: PlasticState, response: Response) -> Array:
         """Return the work (n_points,) that an increment turns into heat [N mm/mm3]."""
@@ -222,21 +199,7 @@ class Law(ABC):
         worst = np.maximum(worst, np.where(dp > 0, np.abs(beyond), np.maximum(beyond, 0.0)))
         flow = after.plastic_strain - before.plastic_strain
         turned = _ROUNDING * 2 * G * np.abs(strain).max(axis=0) / self.flow_stress(after)
-        aside = np.maximum(self.flow_rule_error(stress, flow, dp, after) - dp * turned, 0.0)
+        relative = stress - self.back_stress(after)
+        aside = self.surface.flow_rule_error(relative, flow, dp, 2 * G)
+        aside = np.maximum(aside - dp * turned, 0.0)
         return np.asarray(np.maximum(worst, 2 * G * np.maximum(aside, -dp)))
-
-    def flow_rule_error(
-        self, stress: Array, flow: Array, growth: Array, after: PlasticState
-    ) -> Array:
-        """Return the error (n_points,) of a plastic flow by this law, a strain.
-
-        Override it for a yield surface with edges, where more than one direction is permitted.
-
-        Parameters
-        ----------
-        stress : (n_components, n_points) Mandel stress at the end of an increment [MPa]
-        flow : (n_components, n_points) increment of plastic strain, Mandel
-        growth : (n_points,) plastic multiplier
-        after : internal variables at the end
-        """
-        return np.asarray(np.abs(flow - growth * self.flow_direction(stress, after)).max(axis=0))

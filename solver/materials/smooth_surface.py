@@ -8,7 +8,7 @@ sixth defines it: the equivalent stress of a unit deviator as a function of its 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -18,7 +18,7 @@ from solver.errors import ModelError
 from solver.materials.curves import Curve
 from solver.materials.principal_return import Returned, grown
 from solver.materials.scalar import falling_root
-from solver.materials.yield_surface import Tension
+from solver.materials.yield_surface import Tension, YieldSurface
 from solver.tensors import dyad, principal
 from solver.typing import Array
 
@@ -88,7 +88,7 @@ def _stresses(angle: Any) -> Any:
     return np.stack([s3 + second + first, s3 + second, s3])
 
 
-class SmoothSurface(ABC):
+class SmoothSurface(YieldSurface):
     """A smooth convex yield surface; subclasses are frozen dataclasses of their parameters."""
 
     __slots__ = ()

@@ -23,7 +23,7 @@ class PlasticState:
     TENSORS : names of the internal variables that are Mandel tensors
     plastic_strain : (n_components, n_points) Mandel
     accumulated : (n_points,) sum of the plastic multipliers: plastic strain grows by the
-        multiplier times `Law.flow_direction`. With von Mises it is the equivalent plastic
+        multiplier times `YieldSurface.normal`. With von Mises it is the equivalent plastic
         strain, the sum of sqrt(2/3) |d plastic_strain|
     """
 

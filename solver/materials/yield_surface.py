@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -20,27 +21,54 @@ _EDGES = np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0]])
 """Flow on the second face at the edges s2 = s3 and s1 = s2; `_FACE` is that on face s1 - s3."""
 
 
-class YieldSurface(Protocol):
-    """The shape of a yield surface centred at zero; its size comes from the law."""
+class YieldSurface(ABC):
+    """The shape of a yield surface centred at zero; its size comes from the law.
 
+    Attributes
+    ----------
+    has_corners : whether stress may stay at a corner or on an edge. The tangent is small or zero
+        there, though the body may carry more load: increments then blend it with elastic stiffness
+    """
+
+    __slots__ = ()
+    has_corners: ClassVar[bool] = False
+
+    @abstractmethod
     def shear(self, tension: Tension) -> Tension:
         """Return the pure shear stress that is equivalent to a tensile stress [MPa]."""
 
+    @abstractmethod
     def equivalent(self, stress: Array) -> Array:
         """Return the equivalent tensile stress (n_points,) of a stress [MPa]."""
 
+    @abstractmethod
     def normal(self, stress: Array) -> Array:
         """Return the derivative (n_components, n_points) of `equivalent` by Mandel stress."""
 
+    @abstractmethod
     def power(self, strain: Array) -> Array:
         """Return the largest work (n_points,) of a stress inside on the deviator of Mandel strain.
 
         The surface has the tensile stress 1.
         """
 
+    def flow_rule_error(self, stress: Array, flow: Array, growth: Array, unit: float) -> Array:
+        """Return the deviation (n_points,) of a flow from the associated flow rule, a strain.
+
+        Override it for a surface with edges, where more than one direction is permitted.
+
+        Parameters
+        ----------
+        stress : (n_components, n_points) Mandel stress relative to the back stress [MPa]
+        flow : (n_components, n_points) increment of plastic strain, Mandel
+        growth : (n_points,) plastic multiplier
+        unit : difference of stress that counts as much as a strain of 1 [MPa]
+        """
+        return np.asarray(np.abs(flow - growth * self.normal(stress)).max(axis=0))
+
 
 @dataclass(frozen=True, slots=True)
-class VonMises:
+class VonMises(YieldSurface):
     """The von Mises surface: yield depends only on the size of the deviator."""
 
     def shear(self, tension: Tension) -> Tension:
@@ -62,13 +90,14 @@ class VonMises:
 
 
 @dataclass(frozen=True, slots=True)
-class Tresca:
+class Tresca(YieldSurface):
     """The Tresca surface: yield depends only on the largest shear stress.
 
     In principal stresses it is a hexagonal prism. On its edges, where two principal stresses are
     equal, any flow between the normals of the two faces is associated.
     """
 
+    has_corners: ClassVar[bool] = True
     over_mises: ClassVar[float] = 2 / math.sqrt(3)
 
     def shear(self, tension: Tension) -> Tension:
@@ -123,13 +152,7 @@ class Tresca:
             face[:, at], growth[at], derivative[:, :, at] = edge
         return Returned(face, growth, derivative)
 
-    def flow_rule_error(
-        self,
-        stress: Array,
-        flow: Array,
-        growth: Array,
-        unit: float,
-    ) -> Array:
+    def flow_rule_error(self, stress: Array, flow: Array, growth: Array, unit: float) -> Array:
         """Return the deviation (n_points,) of a flow from the associated flow rule, a strain.
 
         For associated flow:
@@ -139,13 +162,6 @@ class Tresca:
         - its volume is zero, and its largest absolute principal value is the multiplier
         - its middle principal value is zero, except on the edge that it points to
         - stress does the work of the flow stress on it
-
-        Parameters
-        ----------
-        stress : (n_components, n_points) Mandel stress relative to the back stress [MPa]
-        flow : (n_components, n_points) increment of plastic strain, Mandel
-        growth : (n_points,) multiplier
-        unit : difference of stress that counts as much as a strain of 1 [MPa]
         """
         values, directions = principal(stress)
         high, middle, low = principal(flow)[0]

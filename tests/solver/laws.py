@@ -119,7 +119,7 @@ class StoredCentre(Law):
         C = self.stiffness(len(strain))
         trial = C @ (strain - state.plastic_strain)
         f = self.yield_value(trial, state)
-        N = self.flow_direction(trial, state)
+        N = self.surface.normal(trial - state.centre)
         dp = np.maximum(f, 0.0) / (3 * G + Hk)
         flow = dp * N
         after = replace(

@@ -156,7 +156,7 @@ def test_tension_follows_the_strength_up_to_the_limit(name: str) -> None:
     assert stress[0] - stress[1] == pytest.approx(law.strength(state)[0], rel=1e-3)
     far = replace(state, accumulated=np.array([10.0]))
     bound = law.ultimate_shear_stress
-    assert law.shear_strength(far)[0] == pytest.approx(bound, rel=1e-3)
+    assert law.surface.shear(law.strength(far))[0] == pytest.approx(bound, rel=1e-3)
     assert not (law.hardens or law.symmetric)
 
 

@@ -147,5 +147,5 @@ def test_no_tangent_in_a_corner_of_the_yield_surface_is_no_limit_load() -> None:
     parameters = scene.parameters(**own, yield_condition="tresca")
     (record,) = scene.path(parameters, [0.6], lambda fraction: None)
     assert record.status is Status.OK, record.message
-    assert PlaneStress(parameters.material()).has_corners
-    assert not PlaneStress(PunchParameters().material()).has_corners
+    assert PlaneStress(parameters.material()).surface.has_corners
+    assert not PlaneStress(PunchParameters().material()).surface.has_corners

@@ -165,7 +165,7 @@ def test_an_accident_below_the_limit_load_is_none(share, monkeypatch):
 
     monkeypatch.setattr(Increment, "_iterate", broken)
     for law in (tresca(), steel(YIELD, 0.45)):
-        pressure = LIMITS["plane_strain"] * (1.0 if law.has_corners else 2 / np.sqrt(3))
+        pressure = LIMITS["plane_strain"] * (1.0 if law.surface.has_corners else 2 / np.sqrt(3))
         with pytest.raises(NotConverged) as outcome:
             pressed(law, "plane_strain", pressure)
         assert not isinstance(outcome.value, LimitLoad)

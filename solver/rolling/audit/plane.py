@@ -104,7 +104,7 @@ def _of_contact(material: Law, found: Pass[Layers]) -> dict[str, float]:
     touching = found.loading
     if not isinstance(touching, RollingContact):
         return {}
-    strength = float(material.shear_strength(found.after.state).max())
+    strength = float(material.surface.shear(material.strength(found.after.state)).max())
     return {
         "audit_tension": largest(-touching.normal),
         "audit_friction_excess": largest(

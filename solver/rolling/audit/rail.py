@@ -60,7 +60,7 @@ def audit_prism(
     surface = plain.surface(waves, traction) + before.displacement
     patch = AuditedPatch(
         law, loading.load, loading.contact, plain.width, surface,
-        strength=float(law.shear_strength(after.state).max()),
+        strength=float(law.surface.shear(law.strength(after.state)).max()),
     )  # fmt: skip
     # behind of all passes, not of this one: what each leaves over must not add up
     left_strain, left_surface = plain.constant(stiff * after.plastic_strain)

@@ -62,5 +62,5 @@ class SteadyBody(ABC):
 
     def state_of(self, time: float, u: Array, stress: Array, plastic: PlasticState) -> BodyState:
         """Return a state with displacements (n,), stress and internal variables at points."""
-        strain = self.part.body.law.elastic_strain(stress) + plastic.plastic_strain
+        strain = self.part.body.law.elasticity.strain(stress) + plastic.plastic_strain
         return BodyState(time, u, stress, strain, plastic)

@@ -51,7 +51,7 @@ class Bar:
     @property
     def has_corners(self) -> bool:
         """Whether the stress of the bar lies on an edge: softness then proves no limit."""
-        return self.law.has_corners
+        return self.law.surface.has_corners
 
     def solve(self) -> Solution:
         """Pull the bar and let it go."""
