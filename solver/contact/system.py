@@ -20,7 +20,7 @@ from solver.contact.state import BodyState, ContactState, Converged, State
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.fields import Sampler, recovery
-from solver.fem.operators import Operators
+from solver.fem.operators import Operators, operators_of
 from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
 from solver.fem.substructure import Substructure
@@ -184,7 +184,7 @@ class System:
     def operators(self) -> tuple[Operators, ...]:
         """The inverses of the stiffness of each part."""
         return tuple(
-            part.operators(chains, self._linear_solver)
+            operators_of(part, chains, self._linear_solver)
             for part, chains in zip(self.parts, self.surfaces, strict=True)
         )
 

@@ -20,7 +20,6 @@ from solver.fem.loads import (
     travelling_forces,
 )
 from solver.fem.nodes import Nodes
-from solver.fem.operators import Assembled
 from solver.fem.part import Part
 from solver.fem.softening import Softening
 from solver.fem.surface import Surface, extract, gathered
@@ -104,11 +103,6 @@ class Discretisation(Nodes, Part):
     def chain(self, boundary: str, any_shape: bool = False) -> Surface:
         """Return the surface of a named boundary: one open chain, unless any shape is allowed."""
         return gathered(self, boundary) if any_shape else extract(self, boundary)
-
-    def operators(self, surfaces: list[Surface], linear_solver: str) -> Assembled:
-        """Return the inverse stiffnesses of this part, for its contact surfaces."""
-        contact = [surface.dofs for surface in surfaces]
-        return Assembled(self, np.concatenate([np.zeros(0, int), *contact]), linear_solver)
 
     @property
     def volumes(self) -> Array:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
 
 from solver.fem.deformation import PartResponse
+from solver.fem.discretisation import Discretisation
+from solver.fem.part import Part
+from solver.fem.surface import Surface
 from solver.linear import solvers as linear
 from solver.linear.solvers import Begun
 from solver.typing import Array, Ints
@@ -28,27 +31,6 @@ class Operator(Protocol):
         """Return ``rows K^-1 rows'`` for rows (m, len(dofs)) on unknowns of contact surfaces."""
 
 
-class Stiff(Protocol):
-    """A part whose stiffness is assembled.
-
-    The unknowns ``active`` of all ``n`` are solved for; ``pattern`` is the upper triangle on them.
-    """
-
-    n: int
-    active: Ints
-
-    @property
-    def pattern(self) -> sparse.csr_array:
-        """Upper triangle of the stiffness on the active unknowns, values not set."""
-
-    @property
-    def elastic_data(self) -> Array:
-        """Values of the elastic stiffness on ``pattern``."""
-
-    def tangent_data(self, response: PartResponse) -> Array:
-        """Return the values of the tangent on ``pattern``."""
-
-
 class Analysed:
     """The analysed stiffness pattern of a part, with its unknowns on contact surfaces.
 
@@ -60,7 +42,7 @@ class Analysed:
     solver : linear solver of the active unknowns
     """
 
-    def __init__(self, part: Stiff, contact: Ints, name: str) -> None:
+    def __init__(self, part: Discretisation, contact: Ints, name: str) -> None:
         self.part = part
         kept = np.isin(part.active, contact)
         self.contact = part.active[kept]
@@ -127,7 +109,11 @@ class Assembled(Operators):
     """
 
     def __init__(
-        self, part: Stiff, contact: Ints, linear_solver: str, elastic: Operator | None = None
+        self,
+        part: Discretisation,
+        contact: Ints,
+        linear_solver: str,
+        elastic: Operator | None = None,
     ) -> None:
         super().__init__(elastic)
         self._part, self._contact, self._name = part, contact, linear_solver
@@ -197,3 +183,12 @@ class Restricted:
     def compliance(self, dofs: Ints, rows: Array) -> Array:
         """See `Operator`."""
         return self._whole.compliance(self._kept[dofs], rows)
+
+
+def operators_of(part: Part, surfaces: Sequence[Surface], linear_solver: str) -> Operators:
+    """Return the inverse stiffnesses of a part, for its contact surfaces."""
+    if isinstance(part, Discretisation):
+        contact = [surface.dofs for surface in surfaces]
+        return Assembled(part, np.concatenate([np.zeros(0, int), *contact]), linear_solver)
+    stiffness = part.elastic_matrix()[part.active][:, part.active].toarray()
+    return Operators(Dense(stiffness, part.active, part.n))

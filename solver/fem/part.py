@@ -12,7 +12,6 @@ from scipy import sparse
 from solver.fem.deformation import PartResponse, without_points
 from solver.fem.dofs import Dofs, vectors
 from solver.fem.loads import Superposed
-from solver.fem.operators import Dense, Operators
 from solver.fem.surface import Surface
 from solver.materials.state import PlasticState
 from solver.model.body import Body
@@ -76,11 +75,6 @@ class Part(ABC):
         """Return stress, tangent and new internal variables at all points."""
         none = np.zeros_like(state.plastic_strain)
         return without_points(self.n, self.body.law.respond(none, state))
-
-    def operators(self, surfaces: list[Surface], linear_solver: str) -> Operators:
-        """Return the inverse stiffnesses of this part, for its contact surfaces."""
-        stiffness = self.elastic_matrix()[self.active][:, self.active].toarray()
-        return Operators(Dense(stiffness, self.active, self.n))
 
     def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,), without contact forces [N]."""

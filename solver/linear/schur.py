@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy import sparse
@@ -38,22 +37,6 @@ class Eliminated:
     finish: Callable[[Array], Array]
 
 
-class _Method(Protocol):
-    """Elimination of the first k unknowns of a matrix (k + b, k + b)."""
-
-    def eliminate(self, data: Array) -> Array:
-        """Return the Schur complement (b, b) of the matrix with these values.
-
-        Only its upper triangle is defined.
-        """
-
-    def forward(self, right: Array) -> Array:
-        """Return a right-hand side (k + b, ...) after the elimination."""
-
-    def backward(self, half: Array, kept: Array) -> Array:
-        """Return the solution (k + b, ...) after `forward`, given the last unknowns (b, ...)."""
-
-
 class _ByColumns:
     """Elimination by one solve for each of the last unknowns, with any linear solver.
 
@@ -69,7 +52,10 @@ class _ByColumns:
         self._solver = linear.analyse(inner, linear_solver) if size else None
 
     def eliminate(self, data: Array) -> Array:
-        """See `_Method`."""
+        """Return the Schur complement (b, b) of the matrix with these values.
+
+        Only its upper triangle is defined.
+        """
         size = self._size
         self._upper.data = data
         self._couple = sparse.csr_array(self._upper[:size, size:])
@@ -83,12 +69,12 @@ class _ByColumns:
         return schur
 
     def forward(self, right: Array) -> Array:
-        """See `_Method`."""
+        """Return a right-hand side (k + b, ...) after the elimination."""
         inner = self._solved(right[: self._size])
         return np.concatenate([inner, right[self._size :] - self._couple.T @ inner])
 
     def backward(self, half: Array, kept: Array) -> Array:
-        """See `_Method`."""
+        """Return the solution (k + b, ...) after `forward`, given the last unknowns (b, ...)."""
         return np.concatenate([half[: self._size] - self._solved(self._couple @ kept), kept])
 
     def _solved(self, right: Array) -> Array:
@@ -109,7 +95,7 @@ class Elimination:
         self._upper, self._size = upper.copy(), size
         ends = upper.shape[0]
         self._diagonal = upper.indptr[size:-1]  # the first entries of the last rows
-        self._method: _Method
+        self._method: Pardiso | _ByColumns
         if linear.chosen(linear_solver) == "pardiso" and 0 < size < ends:
             self._method = Pardiso(upper, np.arange(size, ends))
         else:

@@ -8,9 +8,10 @@ variable ``RESIDUA_LINEAR_SOLVER`` (``pardiso`` or ``superlu``) overrides this c
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,22 +29,6 @@ class Singular(ArithmeticError):
     """The matrix cannot be factorised."""
 
 
-class LinearSolver(Protocol):
-    """An analysed pattern; after `factorise`, a factor."""
-
-    def factorise(self, data: Array) -> None:
-        """Factorise the upper triangle with these values; raise `Singular` if that fails."""
-
-    def solve(self, b: Array) -> Array:
-        """Return the solution for ``b`` (n,) or (n, k)."""
-
-    def begin(self, b: Array) -> Begun:
-        """Return the solution for ``b`` (n,) on the kept unknowns, to be finished later."""
-
-    def compliance(self, rows: Array) -> Array:
-        """Return ``rows A^-1 rows'`` (k, k) for ``rows`` (k, m) on the m kept unknowns."""
-
-
 @dataclass(frozen=True, slots=True)
 class Begun:
     """A solution whose right-hand side may still change on the kept unknowns.
@@ -58,12 +43,49 @@ class Begun:
     finish: Callable[[Array], Array]
 
 
-class SuperLU:
+class LinearSolver(ABC):
+    """An analysed pattern; after `factorise`, a factor."""
+
+    def __init__(self, upper: sparse.csr_array, kept: Ints) -> None:
+        self._upper, self._kept = upper, kept
+
+    @abstractmethod
+    def factorise(self, data: Array) -> None:
+        """Factorise the upper triangle with these values; raise `Singular` if that fails."""
+
+    @abstractmethod
+    def solve(self, b: Array) -> Array:
+        """Return the solution for ``b`` (n,) or (n, k)."""
+
+    def begin(self, b: Array) -> Begun:
+        """Return the solution for ``b`` (n,) on the kept unknowns, to be finished later.
+
+        It needs a second solve if the right-hand side changes.
+        """
+        first = self.solve(b)
+
+        def finish(change: Array) -> Array:
+            if not change.any():
+                return first
+            changed = b.copy()
+            changed[self._kept] += change
+            return self.solve(changed)
+
+        return Begun(first[self._kept], finish)
+
+    def compliance(self, rows: Array) -> Array:
+        """Return ``rows A^-1 rows'`` (k, k) for ``rows`` (k, m) on the m kept unknowns."""
+        columns = np.zeros((self._upper.shape[0], len(rows)))
+        columns[self._kept] = rows.T
+        W = rows @ self.solve(columns)[self._kept]
+        return 0.5 * (W + W.T)
+
+
+class SuperLU(LinearSolver):
     """SuperLU, which comes with SciPy."""
 
     def __init__(self, upper: sparse.csr_array, kept: Ints) -> None:
-        self._upper = upper.copy()
-        self._kept = kept
+        super().__init__(upper.copy(), kept)
 
     def __sizeof__(self) -> int:
         """Return the bytes including the factor, which is not on Python's heap."""
@@ -88,26 +110,12 @@ class SuperLU:
         """See `LinearSolver`."""
         return np.asarray(self._factor.solve(np.ascontiguousarray(b)))
 
-    def begin(self, b: Array) -> Begun:
-        """See `LinearSolver`."""
-        return _twice(self, b, self._kept)
 
-    def compliance(self, rows: Array) -> Array:
-        """See `LinearSolver`."""
-        return _compliance(self, rows, self._upper.shape[0], self._kept)
-
-
-class PardisoSolver:
+class PardisoSolver(LinearSolver):
     """MKL PARDISO: Cholesky, or LDL' if a pivot is not positive."""
 
-    def __init__(
-        self,
-        upper: sparse.csr_array,
-        kept: Ints,
-        ordering: int,
-    ) -> None:
-        self._upper = upper
-        self._kept = kept
+    def __init__(self, upper: sparse.csr_array, kept: Ints, ordering: int) -> None:
+        super().__init__(upper, kept)
         self._definite = pardiso.Pardiso(upper, kept, ordering=ordering)
         self._indefinite: pardiso.Pardiso | None = None
         self._current = self._definite
@@ -137,7 +145,7 @@ class PardisoSolver:
     def begin(self, b: Array) -> Begun:
         """See `LinearSolver`."""
         if self._current is not self._definite or not len(self._kept):
-            return _twice(self, b, self._kept)
+            return super().begin(b)
         half = self._definite.forward(b)
         right = half[self._kept]
 
@@ -150,42 +158,32 @@ class PardisoSolver:
         """See `LinearSolver`."""
         if self._current is self._definite:
             return self._definite.compliance(rows)
-        return _compliance(self, rows, self._upper.shape[0], self._kept)
+        return super().compliance(rows)
 
 
-class Factors(Protocol):
+class _SuperLUFactors:
     """The factors of several positive definite matrices of one pattern."""
+
+    def __init__(self, upper: sparse.csr_array, count: int) -> None:
+        self._each = [SuperLU(upper, np.zeros(0, dtype=np.int64)) for _ in range(count)]
 
     def factorise(self, data: Array, which: int) -> None:
         """Factorise the upper triangle with these values, as matrix number ``which``.
 
         Raises `Singular` if that fails.
         """
+        self._each[which].factorise(data)
 
     def solve(self, b: NDArray[Any], which: int) -> NDArray[Any]:
         """Return the solution for ``b`` (n,) or (n, k) with the matrix number ``which``.
 
         It has the precision of ``b``, single or double.
         """
-
-
-class _SuperLUFactors:
-    """See `Factors`."""
-
-    def __init__(self, upper: sparse.csr_array, count: int) -> None:
-        self._each = [SuperLU(upper, np.zeros(0, dtype=np.int64)) for _ in range(count)]
-
-    def factorise(self, data: Array, which: int) -> None:
-        """See `Factors`."""
-        self._each[which].factorise(data)
-
-    def solve(self, b: NDArray[Any], which: int) -> NDArray[Any]:
-        """See `Factors`."""
         return self._each[which].solve(b.astype(float)).astype(b.dtype)
 
 
 class _PardisoFactors:
-    """See `Factors`: one analysis per precision, ordered by minimum degree.
+    """The same by PARDISO: one analysis per precision, ordered by minimum degree.
 
     A matrix that is not positive definite in single precision has factors only in double.
     """
@@ -198,7 +196,7 @@ class _PardisoFactors:
         self._in_single = np.zeros(count, dtype=bool)
 
     def factorise(self, data: Array, which: int) -> None:
-        """See `Factors`."""
+        """See `_SuperLUFactors`."""
         try:
             self._double.factorise(data, which)
         except pardiso.PardisoError as failure:
@@ -210,32 +208,13 @@ class _PardisoFactors:
             self._in_single[which] = False
 
     def solve(self, b: NDArray[Any], which: int) -> NDArray[Any]:
-        """See `Factors`."""
+        """See `_SuperLUFactors`."""
         if b.dtype == np.float32 and self._in_single[which]:
             return self._single.solve(b, which)
         return self._double.solve(b, which).astype(b.dtype, copy=False)
 
 
-def _twice(solver: LinearSolver, b: Array, kept: Ints) -> Begun:
-    """Return a solution that needs a second solve if the right-hand side changes."""
-    first = solver.solve(b)
-
-    def finish(change: Array) -> Array:
-        if not change.any():
-            return first
-        changed = b.copy()
-        changed[kept] += change
-        return solver.solve(changed)
-
-    return Begun(first[kept], finish)
-
-
-def _compliance(solver: LinearSolver, rows: Array, n: int, kept: Ints) -> Array:
-    """Return ``rows A^-1 rows'`` by one solve per row."""
-    columns = np.zeros((n, len(rows)))
-    columns[kept] = rows.T
-    W = rows @ solver.solve(columns)[kept]
-    return 0.5 * (W + W.T)
+Factors = _SuperLUFactors | _PardisoFactors
 
 
 def chosen(name: str = "auto") -> str:
@@ -291,5 +270,6 @@ def analyse_several(upper: sparse.csr_array, count: int, name: str = "auto") -> 
     ------
     ModelError : the solver named is unknown or not installed
     """
-    of = _PardisoFactors if chosen(name) == "pardiso" else _SuperLUFactors
-    return of(upper, count)
+    if chosen(name) == "pardiso":
+        return _PardisoFactors(upper, count)
+    return _SuperLUFactors(upper, count)

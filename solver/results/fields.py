@@ -11,11 +11,11 @@ from scipy.sparse import csr_array
 
 from solver.contact.state import BodyState, State
 from solver.fem.discretisation import Discretisation
-from solver.fem.fields import recovered_beside
+from solver.fem.fields import Sampler, recovered_beside
 from solver.results.body_fields import BodyValues
 from solver.results.view import Places
 from solver.tensors import not_below_zero, to_tensor, von_mises
-from solver.typing import Array, Bools
+from solver.typing import Array
 
 _MOST = 8
 """Number of values in a `Remembered` cache."""
@@ -28,20 +28,6 @@ class Solved(Protocol):
     @property
     def state(self) -> State | BodyState:
         """The unknowns, or the only body."""
-
-
-class Interpolation(Protocol):
-    """Interpolates nodal fields of a body at n positions, such as a `Sampler`.
-
-    Attributes
-    ----------
-    inside : (n,) whether a position is in the body
-    """
-
-    inside: Bools
-
-    def __call__(self, nodal: Array) -> Array:
-        """Return values (..., n) of nodal fields (..., n_nodes); NaN outside the body."""
 
 
 class Bodies(Protocol):
@@ -61,7 +47,7 @@ class Bodies(Protocol):
     def positions(self, name: str) -> Array:
         """Return the positions (n_axes, n_points) of the points of a body [mm]."""
 
-    def sampler(self, name: str, X: Array) -> Interpolation:
+    def sampler(self, name: str, X: Array) -> Sampler:
         """Return the interpolation of nodal fields of a body at positions (n_axes, n) [mm]."""
 
     def recovery(self, name: str) -> csr_array:
@@ -128,7 +114,7 @@ class SystemFields:
         ]
 
 
-def interpolated(sampler: Interpolation, values: BodyValues, name: str) -> Array:
+def interpolated(sampler: Sampler, values: BodyValues, name: str) -> Array:
     """Return a field (..., n) interpolated between nodes; non-negative fields stay so."""
     found = sampler(getattr(values, name))
     return not_below_zero(found) if name in _POSITIVE else found

@@ -41,7 +41,7 @@ class _Left(NamedTuple):
 
 
 class SteppedSweep:
-    """Sweep of a material with any law along rows; see `solver.rolling.flow.Sweep`."""
+    """Sweep of a material with any law along rows; see `CompiledSweep`."""
 
     def __init__(self, law: Law, strain: Array, start: PlasticState, parts: int) -> None:
         self._law, self._start = law, start
@@ -138,7 +138,7 @@ class SteppedSweep:
 
 
 class SteppedFlow(SteppedSweep):
-    """Flow of a material with any law along rows; see `solver.rolling.flow.Flow`."""
+    """Flow of a material with any law along rows; see `CompiledFlow`."""
 
     def __init__(self, law: Law, strain: Array, start: PlasticState, parts: int) -> None:
         super().__init__(law, strain, start, parts)

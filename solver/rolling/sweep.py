@@ -19,7 +19,15 @@ flow, flow_along, close, close_along = late(
 
 
 class CompiledSweep:
-    """Sweep of a material with linear hardening along rows; see `solver.rolling.flow.Sweep`."""
+    """The internal variables of a material with linear hardening that flows along rows.
+
+    Strains have n components, 4 or 6.
+
+    Attributes
+    ----------
+    states : internal variables (..., n_rows, n_columns) at the columns
+    ago : internal variables at the beginning of the last increment before each column
+    """
 
     def __init__(
         self, elasticity: Elasticity, rule: LinearHardening, strain: Array, start: PlasticState,
@@ -53,7 +61,10 @@ class CompiledSweep:
         )
 
     def changes(self, added: Array) -> Array:
-        """Return the changes of plastic strain for a change of the strains."""
+        """Return the changes of plastic strain (n_rows, n_columns, n).
+
+        ``added`` is the change of strain (n_rows, n_columns, n) at the columns.
+        """
         return self._changes(added)[0]
 
     def _changes(self, added: Array) -> tuple[Array, Array]:
@@ -61,7 +72,10 @@ class CompiledSweep:
 
 
 class CompiledFlow(CompiledSweep):
-    """Flow of a material with linear hardening along rows; see `solver.rolling.flow.Flow`."""
+    """A sweep in two dimensions, and the residual state of the half-plane that follows it.
+
+    ``after`` are the internal variables (..., n_rows) behind the load.
+    """
 
     def __init__(
         self, elasticity: Elasticity, rule: LinearHardening, strain: Array, start: PlasticState,
@@ -77,7 +91,7 @@ class CompiledFlow(CompiledSweep):
         self.after = PlasticState(left.T, gathered)
 
     def along(self, added: Array) -> tuple[Array, Array]:
-        """Return the changes of plastic strain for a change of the strains."""
+        """Return the changes of plastic strain (n_rows, n_columns, 4), and behind (n_rows, 4)."""
         plastic, total = self._changes(added)
         ends = np.ascontiguousarray(plastic[:, -1]), total[:, -1].copy()
         return plastic, close_along(*ends, self._law, *self._closing)

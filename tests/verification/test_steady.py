@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from solver import LimitLoad, Material, ModelError, NotConverged
+from solver.fem.operators import operators_of
 from solver.materials import PlasticState
 from solver.results.sliding_limits import melan_limit
 from solver.rolling.plane.fields import under_load
@@ -92,7 +93,7 @@ def test_a_steady_pass_is_a_fixed_point_of_one_increment(hardening, shear):
     forces = load.force
     rows, part = place.rows, place.part
     before = one.before.plastic_strain
-    whole = part.operators([place.surface], "auto").elastic
+    whole = operators_of(part, [place.surface], "auto").elastic
     state = under_load(place, one).plastic
     stands_for = part.undeformed.internal_force(material.stiffness(4) @ state.plastic_strain)
     u = whole.begin(forces + stands_for).finish(np.zeros_like(forces))

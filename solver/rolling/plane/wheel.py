@@ -29,6 +29,7 @@ from solver.contact.problem import OPEN, ContactProblem, ContactSolution
 from solver.errors import NoContact, NotConverged, WindowTooSmall
 from solver.fem.discretisation import Discretisation
 from solver.fem.frame import turning
+from solver.fem.operators import operators_of
 from solver.fem.surface import Surface, extract
 from solver.fem.wheel import Wheel
 from solver.model.body import Body
@@ -79,7 +80,7 @@ class Rim:
     def compliance(self) -> Array:
         """Displacements of the rim for forces on it (n, n), over its unknowns [mm/N]."""
         dofs = self.surface.dofs
-        return self.wheel.operators([], "auto").elastic.compliance(dofs, np.eye(len(dofs)))
+        return operators_of(self.wheel, [], "auto").elastic.compliance(dofs, np.eye(len(dofs)))
 
 
 def flowed(surface: Surface, way: int) -> Array:
