@@ -13,6 +13,9 @@ from solver.materials.state import PlasticState
 from solver.rolling.flow import Sweep
 from solver.typing import Array
 
+LOADED, RELEASED = 0.0, 1.0
+"""Times of the states under the load and after it."""
+
 
 @dataclass(frozen=True, slots=True)
 class LeftState(ABC):

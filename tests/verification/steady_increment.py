@@ -129,7 +129,8 @@ class SteadyIncrement:
         counts from here, for all vertices, as the steady pass takes it.
         """
         found, rows = self.found, self.track.rows
-        plastic = under_load(self.track, found).plastic
+        whole = np.arange(self.track.part.weights.size)
+        plastic = under_load(self.track, found).plastic.at(whole)
         packed = plastic.packed
         packed[:, rows.points] = np.concatenate(
             [found.before.state.packed[..., None], found.states.packed[..., :-1]], axis=2

@@ -1,78 +1,55 @@
-"""Displacement, strain and internal variables of a whole half-plane, during a pass and after it."""
+"""The state of a whole half-plane, during a pass and after it."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from solver.contact.state import BodyState
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
+from solver.rolling.body import LOADED, RELEASED
 from solver.rolling.passing import Pass
 from solver.rolling.plane.layers import Layers
-from solver.rolling.plane.rows import FlowRows
 from solver.rolling.plane.track import Track
 from solver.tensors import SQRT2
-from solver.typing import Array, Ints
+from solver.typing import Array
 
 
-class TrackFields(NamedTuple):
-    """Displacements (n,) [mm], strain (4, n_points) Mandel, and internal variables.
+def of_layers(track: Track, law: Law, layers: Layers) -> BodyState:
+    """Return the state of a half-plane that is a function of depth alone.
 
-    ``surface`` has strain and internal variables at the surface, above `FlowRows.highest`.
+    Its points are followed by the places at the surface above `FlowRows.highest`.
     """
-
-    u: Array
-    strain: Array
-    plastic: PlasticState
-    surface: tuple[Array, PlasticState]
-
-
-def of_layers(track: Track, law: Law, layers: Layers) -> TrackFields:
-    """Return the fields of a half-plane whose state is a function of depth alone."""
     rows, n = track.rows, track.part.weights.size
-
-    def at(every: Ints, size: int, layers: Layers) -> tuple[Array, PlasticState]:
-        strain, virgin = np.zeros((4, size)), law.initial(size, 4)
-        strain[:, every] = layers.strain(track.elasticity).T[:, :, None]
-        packed = virgin.packed
-        packed[:, every] = layers.state.packed[:, :, None]
-        return strain, virgin.unpacked(packed)
-
-    above = at(rows.above, len(rows.highest), layers.top)
-    return TrackFields(_sunk(track, layers), *at(rows.every, n, layers), above)
+    virgin = law.initial(n + len(rows.highest), 4)
+    strain, packed = np.zeros_like(virgin.plastic_strain), virgin.packed
+    for every, own in ((rows.every, layers), (n + rows.above, layers.top)):
+        strain[:, every] = own.strain(track.elasticity).T[:, :, None]
+        packed[:, every] = own.state.packed[:, :, None]
+    return _state(track, RELEASED, _sunk(track, layers), strain, virgin.unpacked(packed))
 
 
-def under_load(track: Track, found: Pass[Layers]) -> TrackFields:
-    """Return the fields under the load of a pass, which moves along +x."""
+def under_load(track: Track, found: Pass[Layers]) -> BodyState:
+    """Return the state under the load of a pass, which moves along +x; for points `of_layers`."""
     rows, before, after = track.rows, of_layers(track, found.law, found.before), found.after
-    grown = after.plastic_strain - found.before.plastic_strain
+    n, columns, grown = track.part.weights.size, rows.shape[1], after.plastic_strain
+    grown = grown - found.before.plastic_strain
     u = track.operator.expand(found.loading.u, rows.force_behind(grown))
-    added = track.part.strain(u)
+    added, strain, packed = track.part.strain(u), before.strain.copy(), before.plastic.packed
+    strain[:, :n] += added
     uppermost = np.moveaxis(added[:, rows.every[: 2 * rows.uppermost]], 0, 2)
-    strain, above = before.surface
-    strain[:, rows.above] += np.moveaxis(rows.onto_surface(uppermost), 2, 0)
-    return TrackFields(
-        before.u + u,
-        before.strain + added,
-        _passed(rows, rows.every, before.plastic, found.states, after),
-        (strain, _passed(rows, rows.above, above, found.surface, after.top)),
-    )
+    strain[:, n + rows.above] += np.moveaxis(rows.onto_surface(uppermost), 2, 0)
+    # before the window as before the pass, in the window as it flows, behind it as after the pass
+    each = (rows.every, found.states, after), (n + rows.above, found.surface, after.top)
+    for every, flow, own in each:
+        packed[:, every[:, :columns]] = flow.packed
+        packed[:, every[:, columns + rows.ahead.shape[1] :]] = own.state.packed[:, :, None]
+    return _state(track, LOADED, before.u + u, strain, before.plastic.unpacked(packed))
 
 
-def _passed(
-    rows: FlowRows,
-    every: Ints,
-    before: PlasticState,
-    flow: PlasticState,
-    after: Layers,
-) -> PlasticState:
-    """Return internal variables of all points: before, in and behind the window."""
-    n = rows.shape[1]
-    packed = before.packed
-    packed[:, every[:, :n]] = flow.packed
-    packed[:, every[:, n + rows.ahead.shape[1] :]] = after.state.packed[:, :, None]
-    return before.unpacked(packed)
+def _state(track: Track, time: float, u: Array, strain: Array, plastic: PlasticState) -> BodyState:
+    stress = track.part.body.law.stiffness(4) @ (strain - plastic.plastic_strain)
+    return BodyState(time, u, stress, strain, plastic)
 
 
 def _sunk(track: Track, layers: Layers) -> Array:

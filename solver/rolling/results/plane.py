@@ -14,11 +14,11 @@ from solver.fem.frame import RigidMotion
 from solver.results.acting import Acting
 from solver.results.contact_result import contact_patches
 from solver.rolling.passing import Pass
-from solver.rolling.plane.fields import TrackFields, of_layers, under_load
+from solver.rolling.plane.fields import of_layers, under_load
 from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.track import Track
 from solver.rolling.plane.wheel import RollingContact
-from solver.rolling.results.stage import LOADED, RELEASED, PassStage, SteadyBody
+from solver.rolling.results.stage import PassStage, SteadyBody
 from solver.typing import Array, Ints
 
 _LEVEL = 1e-6
@@ -77,17 +77,15 @@ class TrackBody(SteadyBody):
     def under_load(self, found: Pass[Layers]) -> PassStage:
         """Return the state under the load of a pass."""
         touching = found.loading if isinstance(found.loading, RollingContact) else None
-        return PassStage(self._state(LOADED, under_load(self.track, found)), touching)
+        return PassStage(self._seen(under_load(self.track, found)), touching)
 
     def left_by(self, found: Pass[Layers]) -> PassStage:
         """Return the state after a pass."""
-        return PassStage(self._state(RELEASED, of_layers(self.track, found.law, found.after)))
+        return PassStage(self._seen(of_layers(self.track, found.law, found.after)))
 
-    def _state(self, time: float, fields: TrackFields) -> BodyState:
-        u, strain, inside, (above, at_surface) = fields
-        strain = np.concatenate([strain, above], axis=1)
-        plastic = inside.unpacked(np.concatenate([inside.packed, at_surface.packed], axis=1))
-        stress = self.track.part.body.law.stiffness(4) @ (strain - plastic.plastic_strain)
+    def _seen(self, state: BodyState) -> BodyState:
+        """Return a state of the track in the fixed frame."""
+        u, stress, plastic = state.u, state.stress, state.plastic
         if self.way == -1:
             points, nodes = self.track.mirror
             uppermost = np.searchsorted(self.track.rows.highest, points[self._first])
@@ -95,7 +93,7 @@ class TrackBody(SteadyBody):
             u = (u.reshape(-1, 2)[nodes] * [-1.0, 1.0]).ravel()
             stress = stress[:, points] * _MIRRORED
             plastic = plastic.at(points).mirrored
-        return self.state_of(time, u, stress, plastic)
+        return self.state_of(state.time, u, stress, plastic)
 
 
 def of_wheel(way: int, at: PassStage) -> Acting:

@@ -22,12 +22,13 @@ from solver.memory import kept
 from solver.model.body import Body
 from solver.results.acting import Acting
 from solver.results.mesh_fields import MeshFields, counterclockwise
+from solver.rolling.body import LOADED, RELEASED
 from solver.rolling.passing import Pass
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.section import Section
 from solver.rolling.rail.track import PrismTrack
-from solver.rolling.results.stage import LOADED, RELEASED, PassStage, SteadyBody
+from solver.rolling.results.stage import PassStage, SteadyBody
 from solver.tensors import not_below_zero, to_tensor, von_mises
 from solver.typing import Array, Ints
 

@@ -11,9 +11,6 @@ from solver.materials.state import PlasticState
 from solver.rolling.passing import Pass
 from solver.typing import Array
 
-LOADED, RELEASED = 0.0, 1.0
-"""Times of the states under the load and after it."""
-
 
 @dataclass(frozen=True, slots=True)
 class PassStage:
