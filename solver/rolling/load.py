@@ -9,6 +9,9 @@ from typing import Any, Self
 
 import numpy as np
 
+from solver.errors import Spins
+from solver.kinds import Checked
+from solver.parameters import Positive
 from solver.typing import Array
 
 FULL_SLIP = 1.0
@@ -16,7 +19,7 @@ FULL_SLIP = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RollingLoad:
+class RollingLoad(Checked):
     """What a wheel carries, and how it moves; a moment or force that is None is not prescribed.
 
     Attributes
@@ -25,9 +28,14 @@ class RollingLoad:
     drive : moment on the axle over radius, positive when braking [N]; None if ``creepage`` is given
     lateral_force : force on the body along z [N]; None if ``lateral_creepage`` is given
     creepage, lateral_creepage, spin : prescribed motion, see the wheel [1, 1, 1/mm]
+
+    Raises
+    ------
+    ModelError
+        if a number is not finite, or the force is not positive
     """
 
-    force: float
+    force: Positive
     drive: float | None = None
     lateral_force: float | None = None
     creepage: float = 0.0
@@ -52,6 +60,12 @@ class RollingLoad:
         return replace(
             self, drive=None, creepage=self.creepage + FULL_SLIP * float(np.sign(self.drive))
         )
+
+
+def spinning(carried: float) -> Spins:
+    """Return the error for a moment of which full slip carries only a share."""
+    much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"
+    return Spins(much, carried, 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

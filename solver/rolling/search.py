@@ -23,7 +23,7 @@ from solver.errors import LimitLoad, NoContact, NotConverged, Spins, TooLong, Wi
 from solver.materials.law import Law
 from solver.materials.material import Material
 from solver.rolling.body import PassedBody, S
-from solver.rolling.load import AppliedLoad, PassingLoad, RollingLoad
+from solver.rolling.load import AppliedLoad, PassingLoad, RollingLoad, spinning
 from solver.rolling.passing import TOLERANCE, Pass, SolveBudget, passing
 from solver.typing import Array
 
@@ -167,8 +167,7 @@ def _check_spinning(exactly: Callable[[RollingLoad], Pass[Any]], load: RollingLo
         return
     carried = most.loading.moment / load.drive
     if carried < 1.0:
-        much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"
-        raise Spins(much, carried, 1.0)
+        raise spinning(carried)
 
 
 def _tried(solve: Callable[..., Pass[S]], *given: Any) -> Pass[S] | NotConverged:

@@ -9,6 +9,7 @@ import pytest
 
 from solver import ModelError
 from solver.results.record import Status
+from solver.rolling.load import RollingLoad
 from solver.rolling.plane.lines import recorded_step
 from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.rolling.scenes.rolling_setup import view
@@ -87,3 +88,12 @@ def test_friction_may_be_above_one_but_not_without_bound() -> None:
     assert rough.scalars["longitudinal_force"] != 0.0
     with pytest.raises(ModelError, match=r"friction = 11\.0: must be at least 0 and at most 10"):
         RollingParameters(friction=11.0)
+
+
+@pytest.mark.parametrize(
+    "given", [{"force": -1.0}, {"force": 1.0, "drive": np.nan}, {"force": 1.0, "spin": np.inf}]
+)
+def test_a_load_that_no_wheel_can_have_is_refused(given: dict[str, float]) -> None:
+    *_, name = given
+    with pytest.raises(ModelError, match=f"{name} .* must be "):
+        RollingLoad(**given)

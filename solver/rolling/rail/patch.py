@@ -28,7 +28,7 @@ import numpy as np
 from solver.errors import ModelError, NoContact, Spins, WindowTooSmall
 from solver.linear.threads import one_thread
 from solver.model.friction import BoundLines, FrictionLaw, pressure_lines
-from solver.rolling.load import FULL_SLIP
+from solver.rolling.load import FULL_SLIP, spinning
 from solver.rolling.rail.friction_cone import (
     NORMAL,
     OPEN,
@@ -325,8 +325,7 @@ class RollingPatch(PatchLoad):
             much = f"with all of its contact slipping the lateral force is {lateral:.0f} N"
             much += f", not {told}: give one that a wheel at this position can have"
             raise Spins(f"the wheel slides off: {much}", carried, 1.0)
-        much = f"the wheel spins: all of its contact slips at {carried:.2%} of the moment"
-        raise Spins(much, carried, 1.0)
+        raise spinning(carried)
 
 
 def _check_rim(status: Ints) -> None:
