@@ -13,8 +13,7 @@ import numpy as np
 
 from solver.contact.geometry import Pairing
 from solver.contact.links import Links
-from solver.contact.problem import OPEN
-from solver.contact.rows import ContactRows, OnParts, joined
+from solver.contact.problem import OPEN, ContactRows, OnParts, joined
 from solver.contact.state import ContactState, State
 from solver.contact.system import System
 from solver.fem.operators import Operator

@@ -17,8 +17,7 @@ from scipy import linalg
 from solver.contact.complementarity import solve_contact
 from solver.contact.geometry import pair
 from solver.contact.overlap import largest_overlap
-from solver.contact.problem import ContactProblem, ContactSolution
-from solver.contact.rows import ContactRows, OnParts, joined
+from solver.contact.problem import ContactProblem, ContactRows, ContactSolution, OnParts, joined
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.dofs import Dofs

@@ -28,7 +28,7 @@ def strain_operator(
     values : (n_nodes, n_elements, n_points) shape functions
     gradients : (dim, n_nodes, n_elements, n_points) their global derivatives [1/mm]
     radius : (n_elements, n_points) first coordinate of the points [mm]
-    kinematics : see `solver.model.kinematics`; not read in three dimensions
+    kinematics : see `solver.model.loads.Kinematics`; not read in three dimensions
 
     Returns
     -------

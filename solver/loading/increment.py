@@ -38,7 +38,6 @@ from solver.loading.acceleration import Series
 from solver.loading.control import Tolerances
 from solver.loading.energy import plastic_work
 from solver.loading.flow import is_singular, mechanism
-from solver.loading.line_search import search
 from solver.loading.outcome import IncrementFailed, Mechanism, Yielded
 from solver.loading.slide import Slide, slide
 from solver.loading.step import (
@@ -48,6 +47,7 @@ from solver.loading.step import (
     on_parts,
     out_of_balance,
     rounding,
+    search,
     unheld,
 )
 from solver.loading.timing import timing

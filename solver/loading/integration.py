@@ -1,6 +1,6 @@
-"""Error of stress in an increment: backward Euler gives plastic flow one direction.
+"""Errors of an increment: of its stress, and of the state in which it begins.
 
-The strain of the increment is applied again in `_PARTS` equal parts along the same straight path,
+Backward Euler gives plastic flow one direction. The strain of the increment is applied again in `_PARTS` equal parts along the same straight path,
 in which the direction of flow changes. Their error is smaller by this number, so the difference
 between the two stresses estimates the error. It is of second order in the length of an increment;
 the sum over a path is of first order.
@@ -84,3 +84,32 @@ def _mean(part: Discretisation, error: Array, flows: Bools) -> float:
     """Return the root mean square of an error over the flowing volume, over the yield stress."""
     square = 1.5 * (error**2).sum(axis=0) @ part.volumes / part.volumes[flows].sum()
     return float(np.sqrt(square)) / part.body.law.yield_stress
+
+
+_APART = 1e-4
+"""Gap of a vertex without force over the edge length: the vertex is open above this ratio."""
+
+
+def lost(system: System, before: Converged, now: Converged) -> float:
+    """Return the difference between the beginning of ``now`` and the end of ``before``.
+
+    It is the larger of
+
+    - the yield value, over the yield stress, of the stress at the end of ``before`` with the
+      internal variables at the beginning of ``now``: positive if plastic strain, hardening or back
+      stress was lost
+    - the gap, over the mean edge length, of an open vertex that is marked as touching, if above
+      `_APART`
+    """
+    worst = 0.0
+    both = zip(system.parts, before.responses, now.start.plastic, strict=True)
+    for part, response, plastic in both:
+        if isinstance(part, Discretisation) and not (law := part.law(before.state.time)).elastic:
+            beyond = float(law.yield_value(response.stress, plastic).max(initial=0.0))
+            worst = float(np.maximum(worst, beyond / law.yield_stress))
+    for interface, contact in zip(system.interfaces, now.start.contacts, strict=True):
+        kept = contact.touching & (contact.normal <= 0) & np.isfinite(contact.gap)
+        if contact.normal.any() and kept.any():
+            apart = float(contact.gap[kept].max() / interface.slave_surface.lengths.mean())
+            worst = max(worst, apart) if apart > _APART else worst
+    return worst

@@ -20,9 +20,8 @@ from solver.fem.rigid import RigidPart
 from solver.linear.threads import one_thread
 from solver.loading.control import Control
 from solver.loading.energy import worked
-from solver.loading.history import lost
 from solver.loading.increment import Increment
-from solver.loading.integration import integrated
+from solver.loading.integration import integrated, lost
 from solver.loading.narrowing import FailedInWindows, narrowed
 from solver.loading.outcome import IncrementFailed, Mechanism, PathEnded, Point, Tally, Yielded
 from solver.loading.prediction import MEMORY, Predictor

@@ -17,8 +17,7 @@ from solver.mesh.check import check_mesh
 from solver.mesh.elements import element_type
 from solver.mesh.rounding import with_zeros
 from solver.model.amplitude import Amplitude
-from solver.model.kinematics import Kinematics
-from solver.model.loads import Displacement, Load, Pressure
+from solver.model.loads import Displacement, Kinematics, Load, Pressure
 from solver.model.motion import Axle, TravellingPressure
 from solver.parameters import Thickness
 from solver.tensors import AXES

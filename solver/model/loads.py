@@ -23,7 +23,6 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.kinds import check
 from solver.model.amplitude import Amplitude
-from solver.model.kinematics import Kinematics
 from solver.parameters import Coordinate
 from solver.parts import Parts
 from solver.typing import Array
@@ -36,6 +35,10 @@ PerKelvin = Annotated[float, Unit("1/K")]
 
 _ALWAYS = Amplitude.constant(1.0)
 _VECTOR, _TENSOR = ("x", "y"), ("xx", "yy", "zz", "xy")
+
+
+Kinematics = Literal["plane_strain", "plane_stress", "axisymmetric"]
+"""Assumption on the third direction of a two-dimensional body."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -31,14 +31,13 @@ from solver.model.model import Model
 from solver.model.rigid import RigidBody
 from solver.parameters import Positive
 from solver.results import saved
-from solver.results.at_all_nodes import mesh_fields
 from solver.results.body_fields import BodyValues
 from solver.results.contact_result import ContactResult, contact_result
 from solver.results.cycles import decided, shakedown_of
 from solver.results.export import write_vtu
 from solver.results.fields import SystemFields
 from solver.results.history import Observed, observe
-from solver.results.mesh_fields import MeshFields
+from solver.results.mesh_fields import MeshFields, mesh_fields
 from solver.results.shakedown import Shakedown
 from solver.results.view import Places
 from solver.tensors import to_tensor

@@ -18,14 +18,13 @@ from solver.loading.outcome import Outcome
 from solver.loading.program import Program, walked
 from solver.loading.walker import Walker
 from solver.results.acting import acting_on
-from solver.results.at_all_nodes import mesh_fields
 from solver.results.cycles import decided
-from solver.results.outlines import outlines
+from solver.results.mesh_fields import mesh_fields
+from solver.results.outlines import outlines, singular_points
 from solver.results.quantities import Quantity
 from solver.results.record import Record, Status
 from solver.results.run import FinishedRun, Output, Values
 from solver.results.samples import Samples
-from solver.results.singular_points import singular_points
 from solver.scenes.scene import Monitor, Scene
 
 

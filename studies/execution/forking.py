@@ -29,7 +29,7 @@ NEEDED = (
     "distributed.nanny",
     "netCDF4",
     "h5py",
-    "solver.contact.lemke",
+    "solver.contact.given_bound",
     "solver.linear.pardiso",
     "solver.results.solution",
     "solver.scenes.punch_setup",

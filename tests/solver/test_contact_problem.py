@@ -9,8 +9,7 @@ import pytest
 
 from solver.contact import complementarity
 from solver.contact.complementarity import solve_contact
-from solver.contact.given_bound import given_bound
-from solver.contact.lemke import lemke
+from solver.contact.given_bound import given_bound, lemke
 from solver.contact.links import solve_linked
 from solver.contact.problem import BACKWARD, FORWARD, OPEN, STICK, ContactProblem
 from solver.model.friction import BoundLines

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from solver.contact.system import System
-from solver.fem.following import Following
 from solver.loading.control import Control
-from solver.loading.prediction import Predictor
+from solver.loading.prediction import Following, Predictor
 from solver.loading.walker import Walker
 from solver.rolling.scenes.rolling import ROLLING
 from solver.rolling.scenes.rolling_parameters import RollingParameters

@@ -17,11 +17,11 @@ from solver import Material, ModelError
 from solver.contact.state import BodyState
 from solver.materials.state import PlasticState
 from solver.results.acting import Acting
-from solver.results.at_all_nodes import mesh_fields
 from solver.results.export import to_meshio
 from solver.results.extremes import residual_extremes
 from solver.results.fields import SystemFields
 from solver.results.maps import isochromatics, maps, profiles, surfaces
+from solver.results.mesh_fields import mesh_fields
 from solver.results.named_places import NamedPlaces, at_named_places
 from solver.results.record import Status
 from solver.results.requested import RequestedNumber
