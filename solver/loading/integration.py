@@ -1,9 +1,9 @@
 """Errors of an increment: of its stress, and of the state in which it begins.
 
-Backward Euler gives plastic flow one direction. The strain of the increment is applied again in `_PARTS` equal parts along the same straight path,
-in which the direction of flow changes. Their error is smaller by this number, so the difference
-between the two stresses estimates the error. It is of second order in the length of an increment;
-the sum over a path is of first order.
+Backward Euler gives plastic flow one direction. The strain of the increment is applied again in
+`_PARTS` equal parts along the same straight path, in which the direction of flow changes. Their
+error is smaller by this number, so the difference between the two stresses estimates the error. It
+is of second order in the length of an increment; the sum over a path is of first order.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The sharp corner at the end of a contact: the power of its singularity."""
+"""The sharp corner at the end of a contact: power of the singularity, and error of pressure."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import MISSING, dataclass
 import numpy as np
 
 from solver.kinds import Checked
-from solver.parameters import Length, Stress, described
+from solver.parameters import Friction, Length, Stress, described
 from solver.results.contact_result import ContactResult
 from solver.results.outputs import output
+from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values
 from solver.results.singularity import (
     APPARENT_POWER,
@@ -105,3 +106,41 @@ def _first_term_leads(points: ContactResult, r: np.ndarray, low: float) -> bool:
     """Whether shear at the start of the fit exceeds half that of the first term of a notch."""
     near = int(np.argmin(np.abs(r - low)))
     return bool(points.shear[near] > _NOTCH_SHEAR / 2 * points.pressure[near])
+
+
+PRESSURE_ERROR = declare(
+    "pressure_error",
+    "relative error of contact pressure without friction against the closed form, in the mean "
+    "square over nine tenths of the contact",
+)
+_AWAY = 0.9
+"""End of the range of the error, in half-widths; the pressure is infinite at 1."""
+
+
+@output("pressure_error", "contact")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureError(Checked):
+    """The error against p(x) / p0 = 2 / (pi sqrt(1 - (x/a)^2)), with p0 the mean pressure.
+
+    It is NaN with friction: there is no closed form.
+
+    References
+    ----------
+    K.L. Johnson, Contact Mechanics (1985), section 2.8.
+    """
+
+    half_width: Length = described(MISSING, "half-width a of the punch")
+    mean_pressure: Stress = described(MISSING, "mean pressure p0 under the punch")
+    friction: Friction = described(0.0, "Coulomb friction coefficient")
+
+    def __call__(self, run: FinishedRun) -> Values:
+        """Return the error of a run."""
+        points = run.acting(run.loaded).points
+        assert points is not None, "the model has a contact pair"
+        x = points.s / self.half_width
+        exact = 2 / (np.pi * np.sqrt(1 - np.minimum(x, _AWAY) ** 2))
+        miss = points.pressure / self.mean_pressure - exact
+        at = x <= _AWAY
+        square = [np.trapezoid(each[at] ** 2, x[at]) for each in (miss, exact)]
+        error = float(np.sqrt(square[0] / square[1]))
+        return {PRESSURE_ERROR: np.nan if self.friction else error}

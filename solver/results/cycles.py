@@ -47,12 +47,18 @@ def over_cycles(cycles: Sequence[Cycle], laws: Sequence[Law]) -> Values:
     """Return the variables over cycles, and the shakedown state; empty without cycles."""
     if not cycles:
         return {}
-    found = shakedown_of(cycles, laws)
     return {
         CYCLE: np.arange(1, len(cycles) + 1),
         CYCLE_PLASTIC_INCREMENT: np.array([c.accumulated.max(initial=0.0) for c in cycles]),
         CYCLE_NET_INCREMENT: np.array([c.net.max(initial=0.0) for c in cycles]),
         CYCLE_DISSIPATION: np.array([c.dissipated for c in cycles]),
+        **shakedown(shakedown_of(cycles, laws)),
+    }
+
+
+def shakedown(found: Shakedown) -> Values:
+    """Return the variables of a shakedown state."""
+    return {
         SHAKEDOWN_STATE: found.state,
         STEADY_PLASTIC_INCREMENT: found.accumulated,
         STEADY_NET_INCREMENT: found.net,

@@ -40,7 +40,6 @@ MODULES = tuple(
     f"solver.results.{module}"
     for module in (
         "contact", "corner", "extremes", "figures", "increments", "indentation", "maps", "places",
-        "pressure_error", "stick",
     )
 )  # fmt: skip
 """Modules that define outputs of scene files, or quantities of these."""

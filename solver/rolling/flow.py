@@ -40,13 +40,9 @@ def sweep_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Sweep:
     start : internal variables (..., n_rows) before the pass
     parts : number of equal increments of strain from one column to the next
     """
-    if law.linear_hardening:
-        return CompiledSweep(law.elasticity, law.linear_hardening, strain, start, parts)
-    return SteppedSweep(law, strain, start, parts)
+    return (CompiledSweep if law.linear_hardening else SteppedSweep)(law, strain, start, parts)
 
 
 def flow_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Flow:
     """Return the sweep and the residual state behind it; for arguments see `sweep_of`, n is 4."""
-    if law.linear_hardening:
-        return CompiledFlow(law.elasticity, law.linear_hardening, strain, start, parts)
-    return SteppedFlow(law, strain, start, parts)
+    return (CompiledFlow if law.linear_hardening else SteppedFlow)(law, strain, start, parts)

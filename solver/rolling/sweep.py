@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from solver.late import late
-from solver.materials.elasticity import Elasticity
-from solver.materials.radial_return import SQRT23, LinearHardening
+from solver.materials.law import Law
+from solver.materials.radial_return import SQRT23
 from solver.materials.state import PlasticState
 from solver.typing import Array
 
@@ -29,11 +29,9 @@ class CompiledSweep:
     ago : internal variables at the beginning of the last increment before each column
     """
 
-    def __init__(
-        self, elasticity: Elasticity, rule: LinearHardening, strain: Array, start: PlasticState,
-        parts: int,
-    ) -> None:  # fmt: skip
-        double_shear = 2 * elasticity.shear_modulus
+    def __init__(self, law: Law, strain: Array, start: PlasticState, parts: int) -> None:
+        rule, double_shear = law.linear_hardening, 2 * law.elasticity.shear_modulus
+        assert rule is not None
         self._law = np.array(
             [
                 double_shear,
@@ -77,16 +75,13 @@ class CompiledFlow(CompiledSweep):
     ``after`` are the internal variables (..., n_rows) behind the load.
     """
 
-    def __init__(
-        self, elasticity: Elasticity, rule: LinearHardening, strain: Array, start: PlasticState,
-        parts: int,
-    ) -> None:  # fmt: skip
-        super().__init__(elasticity, rule, strain, start, parts)
+    def __init__(self, law: Law, strain: Array, start: PlasticState, parts: int) -> None:
+        super().__init__(law, strain, start, parts)
         left, gathered, *self._closing = close(
             np.ascontiguousarray(self.states.plastic_strain[..., -1].T),
             self.states.accumulated[:, -1].copy(),
             self._law,
-            elasticity.bulk_modulus,
+            law.elasticity.bulk_modulus,
         )
         self.after = PlasticState(left.T, gathered)
 

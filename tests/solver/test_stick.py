@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from solver.results.acting import Acting
+from solver.results.contact import STICK_FRACTION, STICK_HALF_WIDTH, stick, stick_half_width
 from solver.results.contact_result import ContactResult
-from solver.results.stick import STICK_FRACTION, STICK_HALF_WIDTH, stick, stick_half_width
 
 
 def points(x, closed, sticking):

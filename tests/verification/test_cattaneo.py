@@ -8,7 +8,7 @@ import pytest
 from solver import Amplitude, Body, ContactPair, Displacement, Material, Model, Stage, solve
 from solver.mesh import graded, grid
 from solver.results.acting import of_pair
-from solver.results.stick import stick_half_width
+from solver.results.contact import stick_half_width
 from tests.reference.cattaneo import SlidingCylinders
 from tests.verification.bodies import NU, E, bent, cells
 from tests.verification.closed_forms import plane_strain_modulus

@@ -107,8 +107,7 @@ def test_rows_stepped_by_the_law_flow_as_the_compiled_ones(hardening, parts):
     before = passes(law, [1])[0].after
     at_rest = before.strain(ELASTIC)[:, None]
     strain = np.concatenate([at_rest, at_rest + added], axis=1)
-    rule = law.linear_hardening
-    compiled = CompiledFlow(law.elasticity, rule, strain, before.state, parts)
+    compiled = CompiledFlow(law, strain, before.state, parts)
     stepped = SteppedFlow(law, strain, before.state, parts)
     assert (compiled.states.accumulated[:, -1] > before.accumulated).any()
     for name in ("states", "ago", "after"):

@@ -11,11 +11,6 @@ import numpy as np
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.results.acting import axle_of
-from solver.results.cycles import (
-    SHAKEDOWN_STATE,
-    STEADY_NET_INCREMENT,
-    STEADY_PLASTIC_INCREMENT,
-)
 from solver.results.maps import PROFILE_PLASTIC_STRAIN, RESIDUAL_PROFILE
 from solver.results.quantities import declare
 from solver.results.run import Values
@@ -172,15 +167,6 @@ def shakedown_of(parameters: Any, traces: Sequence[PassTrace], cycle: int | None
     if cycle is None and found.state is not ShakedownState.ELASTIC:
         return Shakedown(ShakedownState.UNDECIDED, np.nan, np.nan)
     return found
-
-
-def shakedown(found: Shakedown) -> Values:
-    """Return the variables of a shakedown state."""
-    return {
-        SHAKEDOWN_STATE: found.state,
-        STEADY_PLASTIC_INCREMENT: found.accumulated,
-        STEADY_NET_INCREMENT: found.net,
-    }
 
 
 def mean_added(traces: Sequence[PassTrace], most: int) -> tuple[float, float]:

@@ -11,10 +11,11 @@ import scipy
 
 from solver.materials.law import Law
 from solver.model.friction import PatchStatus
+from solver.results.cycles import shakedown
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values
 from solver.rolling.rail.section import Section
-from solver.rolling.scenes.passes import mean_added, passes, shakedown, shakedown_of
+from solver.rolling.scenes.passes import mean_added, passes, shakedown_of
 from solver.rolling.scenes.rolling_setup import CREEPAGE, LONGITUDINAL_FORCE
 from solver.scenes.sketch import Sketch
 from solver.typing import Array

@@ -11,6 +11,7 @@ import numpy as np
 from solver.loading.program import Program
 from solver.loading.refinement import StepRefinement
 from solver.mesh.lines import cells
+from solver.results.cycles import shakedown
 from solver.results.quantities import Quantity, declare
 from solver.results.record import Status
 from solver.results.run import FinishedRun, Values
@@ -18,7 +19,7 @@ from solver.results.shakedown import Shakedown, ShakedownState
 from solver.results.view import View
 from solver.rolling.plane.lines import recorded_step
 from solver.rolling.results.free_surface import FreeSurface
-from solver.rolling.scenes.passes import Trace, passes, profiles, shakedown, shakedown_of
+from solver.rolling.scenes.passes import Trace, passes, profiles, shakedown_of
 from solver.rolling.scenes.rolling_endless import by_steady_passes
 from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.scenes.driver import by_increments
