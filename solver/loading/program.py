@@ -10,10 +10,12 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise, takewhile
+from typing import Any
 
 from solver.errors import ModelError
 from solver.kinds import check
 from solver.parameters import AtLeastOne, NotNegative
+from solver.typing import Array
 
 ROUNDING = 1e-9
 """Relative difference of two times: times that differ by less are equal."""
@@ -244,3 +246,24 @@ def load_and_release(load: float, step: float, unload_steps: int) -> Program:
     loaded = Stage(name="loaded", target=load, step=step)
     unloaded = Stage(name="unloaded", target=0.0, steps=unload_steps, apart=True)
     return Program(laps=(Lap((loaded, unloaded)),), retraces=True)
+
+
+HALVINGS = 6
+"""Most halvings of the increments by `StepRefinement`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepRefinement:
+    """Increments are halved while this changes the result of the first lap.
+
+    Backward Euler in the plastic strain is of first order in the increment, so the change by the
+    last halving estimates the remaining error.
+
+    Attributes
+    ----------
+    measure : (trace of a lap) -> numbers that must converge
+    tolerance : largest change accepted
+    """
+
+    measure: Callable[[Any], Array]
+    tolerance: float

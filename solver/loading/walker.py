@@ -22,8 +22,7 @@ from solver.loading.control import Control
 from solver.loading.cycle import Cycle
 from solver.loading.freed import check_freed
 from solver.loading.outcome import Outcome, PathEnded, Point, Settled, Tally
-from solver.loading.program import Program, Target, shared
-from solver.loading.refinement import HALVINGS, StepRefinement
+from solver.loading.program import HALVINGS, Program, StepRefinement, Target, shared
 from solver.loading.stepper import Report, Stepper, Watch, turned
 
 Points = Mapping[str, Converged]

@@ -8,8 +8,7 @@ from typing import Any, NoReturn
 
 from solver.late import late
 from solver.loading.control import INCREMENT_ERROR
-from solver.loading.program import Program
-from solver.loading.refinement import StepRefinement
+from solver.loading.program import Program, StepRefinement
 from solver.results.quantities import QUANTITIES, Quantity
 from solver.results.record import Record, Status
 from solver.results.view import View

@@ -27,8 +27,7 @@ from solver.audit.report import audit
 from solver.fem.fields import Sampler
 from solver.linear import pardiso as mkl
 from solver.loading.increment import Increment
-from solver.loading.program import Lap, shared
-from solver.loading.refinement import StepRefinement
+from solver.loading.program import Lap, StepRefinement, shared
 from solver.materials import TrescaMaterial
 from solver.mesh import grid
 from solver.model.amplitude import Amplitude

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 
-from solver.loading.refinement import HALVINGS
+from solver.loading.program import HALVINGS
 from solver.rolling.plane.lines import half_space_nodes, rim_elements, track_lines, wheel_nodes
 from solver.rolling.scenes.rolling_model import track_grid
 from solver.rolling.scenes.rolling_parameters import RollingParameters

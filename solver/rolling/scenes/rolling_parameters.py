@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.loading.refinement import HALVINGS
+from solver.loading.program import HALVINGS
 from solver.parameters import Accuracy, Other, by_accuracy, described
 from solver.rolling.plane.lines import MOST_COLUMNS, window_elements
 from solver.rolling.scenes.schedule import Schedule

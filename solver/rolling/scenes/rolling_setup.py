@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.loading.program import Program
-from solver.loading.refinement import StepRefinement
+from solver.loading.program import Program, StepRefinement
 from solver.mesh.lines import cells
 from solver.results.cycles import shakedown
 from solver.results.quantities import Quantity, declare
