@@ -64,8 +64,7 @@ def of_pair(system: System, at: Converged, *, symmetric: bool, axis: Axis = ALON
 
     def along(x: Array) -> tuple[Array, Array, Array]:
         def sampled(values: Array, beyond: Array) -> Array:
-            left, right = beyond
-            return np.asarray(np.interp(x, found.s, values, left=left, right=right))
+            return np.asarray(np.interp(x, found.s, values, *beyond))
 
         return sampled(found.pressure, free), sampled(found.shear, free), sampled(gap, nowhere)
 
@@ -107,8 +106,8 @@ def acting_on(system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> Calla
     """Return the function from states to what acts between the bodies of a system, or on one."""
     if system.interfaces:
         known: Remembered[Acting] = Remembered()
-        make = partial(of_pair, system, symmetric=symmetric, axis=axis)
-        return lambda at: known.of(at, "", lambda: make(at))
+        pair = partial(of_pair, system, symmetric=symmetric, axis=axis)
+        return lambda at: known.of(at, "", partial(pair, at))
     for body in system.model.bodies:
         if body.travelling is not None:
             return partial(of_pressure, body.travelling)
