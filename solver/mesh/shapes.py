@@ -285,13 +285,9 @@ def ball(
     across = lines if above else -lines[::-1]
     few((len(along) - 1) * (len(across) - 1))
     bent = mapped(grid(along, across), lambda X: _onto_disc(X, radius))
-    return renamed(bent, ball_sides(above=above)).translated(at)
-
-
-def ball_sides(*, above: bool) -> dict[str, str]:
-    """Return the boundaries of a ball: name -> side of the grid that is mapped onto it."""
     surface, cap = ("bottom", "top") if above else ("top", "bottom")
-    return {"surface": surface, "cap": cap, "left": "left", "right": "right"}
+    sides = {"surface": surface, "cap": cap, "left": "left", "right": "right"}
+    return renamed(bent, sides).translated(at)
 
 
 def ball_lines(radius: float, fine: float, size: float, growth: float) -> Array:

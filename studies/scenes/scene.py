@@ -20,8 +20,8 @@ from solver.results.named_places import NamedPlaces, at_named_places
 from solver.results.outputs import outputs
 from solver.results.record import Status
 from solver.results.run import FinishedRun, Output, Values
-from solver.scenes.effort import Effort
 from solver.scenes.material_parameters import ContactParameters
+from solver.scenes.scene import Effort
 from studies.errors import SceneError, StudyError
 from studies.scenes import tables
 from studies.scenes.building import Builder, friction_of, law_of, program_of
@@ -273,7 +273,7 @@ def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
             if not mistakes:
                 mistakes = [
                     *_wrong_laws(description, found),
-                    *too_large(description, found),
+                    *too_large(found),
                     *too_long(description, found),
                 ]
         except SceneError as error:

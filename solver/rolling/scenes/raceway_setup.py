@@ -33,8 +33,7 @@ from solver.rolling.scenes.rail_outputs import sketched
 from solver.rolling.scenes.rail_passes import REACHES, RailPasses
 from solver.rolling.scenes.rail_window import PrismGeometry, split_rows, whole
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
-from solver.scenes.effort import Effort
-from solver.scenes.scene import Method
+from solver.scenes.scene import Effort, Method
 from solver.scenes.sketch import Sketch
 
 _BLOCK = 32.0

@@ -14,7 +14,7 @@ from solver.materials.law import Law
 from solver.rolling.rail.section import Section
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.rail_parameters import PrismParameters
-from solver.scenes.effort import Effort
+from solver.scenes.scene import Effort
 from solver.tensors import SQRT2
 
 _FIRST, _FACTOR = 0.5, 2.2e-5

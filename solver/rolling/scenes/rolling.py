@@ -20,12 +20,10 @@ from solver.late import late
 from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.scenes.scene import Scene
 
-_method, _program, _refinement, _warnings, _advice = late(
-    "rolling.scenes.rolling_setup", "method", "program", "refinement", "warnings", "advice"
+_method, _program, _view, _refinement, _warnings, _advice = late(
+    "rolling.scenes.rolling_setup", "method", "program", "view", "refinement", "warnings", "advice"
 )
-_model, _sketch = late("rolling.scenes.rolling_model", "model", "sketch")
-(_view,) = late("rolling.scenes.rolling_setup", "view")
-(_effort,) = late("rolling.scenes.rolling_effort", "effort")
+_model, _sketch, _effort = late("rolling.scenes.rolling_model", "model", "sketch", "effort")
 (_trace,) = late("rolling.scenes.passes", "Trace.of")
 
 ROLLING = Scene(

@@ -19,8 +19,7 @@ from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
 from solver.rolling.scenes.wheel_rail_contact import expected_contact, wheel_of
 from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_track import RolledRail, geometry, meshed
-from solver.scenes.effort import Effort
-from solver.scenes.scene import Method
+from solver.scenes.scene import Effort, Method
 from solver.scenes.sketch import Sketch
 from solver.typing import Array
 
