@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from solver.materials import TrescaMaterial
-from solver.rolling.flow import sweep_of
-from solver.rolling.stepped import SteppedSweep
+from solver.rolling.flow import SteppedSweep, sweep_of
 from solver.rolling.sweep import CompiledSweep
 from solver.tensors import SQRT2
 from tests.solver.laws import CURVES, HARDENING, STEEL, chaboche, smooth, steel

@@ -14,10 +14,9 @@ import pytest
 from solver import LimitLoad, Material, ModelError, NotConverged
 from solver.materials import PlasticState
 from solver.results.sliding_limits import melan_limit
-from solver.rolling.plane.fields import under_load
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.rows import RowFlow
-from solver.rolling.plane.track import Track, track_of
+from solver.rolling.plane.track import Track, track_of, under_load
 
 YIELD = 502.0
 K = YIELD / sqrt(3)

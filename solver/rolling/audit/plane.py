@@ -10,9 +10,8 @@ from solver.audit.theory import Neglected, equivalent, largest_strain
 from solver.materials.law import Law
 from solver.rolling.audit.flow import INFLOW, STEADINESS, AuditedFlow, difference, judged, largest
 from solver.rolling.passing import Pass
-from solver.rolling.plane.fields import of_layers, under_load
 from solver.rolling.plane.layers import Layers
-from solver.rolling.plane.track import Track
+from solver.rolling.plane.track import Track, of_layers, under_load
 from solver.rolling.plane.wheel import RollingContact
 
 _LIMITS = {"audit_inflow": INFLOW, "audit_steadiness": STEADINESS}

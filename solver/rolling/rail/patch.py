@@ -35,10 +35,10 @@ from solver.rolling.rail.friction_cone import (
     TANGENTS,
     ConeProblem,
     ConeSolution,
+    Influence,
     solve_cone,
 )
 from solver.rolling.rail.half_space import half_space
-from solver.rolling.rail.influence import Influence
 from solver.rolling.rail.patch_contact import PatchContact, PatchLoad
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.rolling.rail.profiled_wheel import ProfiledWheel

@@ -13,9 +13,8 @@ from solver.fem.frame import RigidMotion
 from solver.results.contact_result import contact_patches
 from solver.results.tractions import SurfaceTractions
 from solver.rolling.passing import Pass
-from solver.rolling.plane.fields import TrackFields, of_layers, under_load
 from solver.rolling.plane.layers import Layers
-from solver.rolling.plane.track import Track
+from solver.rolling.plane.track import Track, TrackFields, of_layers, under_load
 from solver.rolling.plane.wheel import RollingContact
 from solver.rolling.results.stage import LOADED, RELEASED, PassStage, SteadyBody
 from solver.typing import Array, Ints
