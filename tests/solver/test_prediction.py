@@ -10,8 +10,7 @@ from solver.fem.following import Following
 from solver.loading.control import Control
 from solver.loading.prediction import Predictor
 from solver.loading.walker import Walker
-from solver.rolling.scenes.rolling import ROLLING
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import ROLLING, RollingParameters
 
 pytestmark = pytest.mark.solves
 

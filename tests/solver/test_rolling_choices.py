@@ -10,7 +10,7 @@ import pytest
 from solver import ModelError
 from solver.results.record import Status
 from solver.rolling.plane.lines import recorded_step
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_setup import view
 from solver.shipped import SCENES
 

@@ -34,8 +34,8 @@ from solver.rolling.flow import SteppedFlow
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.rows import RowFlow
 from solver.rolling.plane.track import Track, track_of, under_load
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import load_on, track_for
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.rolling.sweep import CompiledFlow
 from solver.shipped import SCENES
 from tests.solver.yield_surfaces import Hosford
@@ -324,7 +324,7 @@ def test_the_audit_finds_what_is_wrong_with_internal_variables(broken, figure):
 
 OWN = """
 from solver.shipped import SCENES
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 
 p = RollingParameters(
     element_size=4.0, growth=1.5, load="hertz", passes=2, hardening="threshold", threshold=30.0,

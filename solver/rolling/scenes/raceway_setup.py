@@ -28,7 +28,7 @@ from solver.rolling.rail.profiles.zone import Zone, raceway_mesh
 from solver.rolling.rail.section import Section
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.pass_runner import by_passes
-from solver.rolling.scenes.raceway_parameters import BESIDE, RacewayParameters
+from solver.rolling.scenes.raceway import BESIDE, RacewayParameters
 from solver.rolling.scenes.rail_outputs import sketched
 from solver.rolling.scenes.rail_passes import REACHES, RailPasses
 from solver.rolling.scenes.rail_window import PrismGeometry, split_rows, whole

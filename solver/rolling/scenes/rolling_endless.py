@@ -34,8 +34,8 @@ from solver.rolling.plane.wheel import Rim, RollingContact, RollingWheel
 from solver.rolling.results.plane import SteadyTractions, TrackBody
 from solver.rolling.scenes.pass_runner import Passes, by_passes
 from solver.rolling.scenes.passes import Trace, shakedown_of
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_model import wheel_body
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.rolling.search import search
 from solver.scenes.driver import by_increments
 from solver.scenes.scene import Monitor, Scene

@@ -17,7 +17,7 @@ from solver.model.model import Model
 from solver.model.motion import Axle, TravellingPressure
 from solver.rolling.plane.lines import half_space_nodes, rim_elements, track_lines, wheel_nodes
 from solver.rolling.plane.track import CONTACT, half_space_body, standing_pressure
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.scenes.scene import Effort
 from solver.scenes.sketch import Sketch
 from solver.typing import Array

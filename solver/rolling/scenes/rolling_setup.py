@@ -19,8 +19,8 @@ from solver.results.view import View
 from solver.rolling.plane.lines import recorded_step
 from solver.rolling.results.free_surface import FreeSurface
 from solver.rolling.scenes.passes import Trace, passes, profiles, shakedown, shakedown_of
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import by_steady_passes
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.scenes.driver import by_increments
 from solver.scenes.scene import Method
 from solver.typing import Array

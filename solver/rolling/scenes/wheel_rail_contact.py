@@ -22,7 +22,7 @@ from solver.rolling.rail.profiles.wheel_profile import (
     measured,
     s1002,
 )
-from solver.rolling.scenes.wheel_rail_parameters import Points, WheelRailParameters
+from solver.rolling.scenes.wheel_rail import Points, WheelRailParameters
 from solver.typing import Ints
 
 _PRESSED = 0.5

@@ -16,8 +16,8 @@ from solver.rolling.scenes.pass_runner import by_passes
 from solver.rolling.scenes.rail_outputs import cycles, sketched
 from solver.rolling.scenes.rail_passes import REACHES, RailPasses
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
+from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact, wheel_of
-from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_track import RolledRail, geometry, meshed
 from solver.scenes.scene import Effort, Method
 from solver.scenes.sketch import Sketch

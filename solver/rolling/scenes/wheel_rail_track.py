@@ -21,6 +21,7 @@ from solver.rolling.rail.straight import SettledStress, StraightPrism, check_ela
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.initial_stress import NoStress, SectionStress
 from solver.rolling.scenes.rail_window import PrismGeometry, split_rows, whole
+from solver.rolling.scenes.wheel_rail import Points, WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import (
     canted,
     expected_contact,
@@ -29,7 +30,6 @@ from solver.rolling.scenes.wheel_rail_contact import (
     wheel_of,
     wheel_profile,
 )
-from solver.rolling.scenes.wheel_rail_parameters import Points, WheelRailParameters
 from solver.tensors import to_mandel
 from solver.typing import Array
 
