@@ -1,7 +1,9 @@
-"""Sweeps of a material along rows of points: compiled where the law allows it.
+"""Sweeps of a material along rows of points: by compiled loops where the law allows it.
 
-For any other law all rows flow together, column by column. Every increment calls `Law.respond`. The
-only assumption on the law is a convex yield surface: a row that is inside at both ends of a
+The loops (`solver.rolling.kernels`) are the radial return of linear hardening from point to point.
+
+With any other law all rows flow together, column by column. Every increment calls `Law.respond`.
+The only assumption on the law is a convex yield surface: a row that is inside at both ends of a
 straight strain path is inside all along it, and needs no increments.
 
 The derivative is propagated from column to column too. Within a column it is that of one increment,
@@ -18,10 +20,82 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from solver.errors import NotConverged
+from solver.late import late
+from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
+from solver.materials.radial_return import SQRT23, LinearHardening
 from solver.materials.state import PlasticState
-from solver.rolling.sweep import CompiledFlow, CompiledSweep
 from solver.typing import Array, Ints
+
+flow, flow_along, close, close_along = late(
+    "rolling.kernels", "flow", "flow_along", "close", "close_along"
+)
+
+
+class CompiledSweep:
+    """Sweep of a material with linear hardening along rows; see `Sweep`."""
+
+    def __init__(
+        self, elasticity: Elasticity, rule: LinearHardening, strain: Array, start: PlasticState,
+        parts: int,
+    ) -> None:  # fmt: skip
+        double_shear = 2 * elasticity.shear_modulus
+        self._law = np.array(
+            [
+                double_shear,
+                double_shear + rule.prager_modulus,
+                rule.isotropic_modulus,
+                double_shear + 2 / 3 * rule.modulus,
+                rule.yield_stress,
+            ]
+        )
+        self._each = (0,) * strain.shape[2]
+        plastic = np.ascontiguousarray(start.plastic_strain.T)
+        before = plastic, np.ascontiguousarray(start.accumulated)
+        # numpy asks for zeros, and gets memory that costs nothing where nothing is written
+        self._path = np.zeros((strain.shape[0], strain.shape[1] - 1, parts, strain.shape[2] + 2))
+        plastic, total = flow(strain, *before, self._law, self._path, self._each)
+        self.states = PlasticState(np.moveaxis(plastic, 2, 0), total)
+
+    @property
+    def ago(self) -> PlasticState:
+        """Internal variables at the beginning of the last increment before each column."""
+        last, n = self._path[:, :, -1], len(self._each)
+        flowed = np.moveaxis(last[..., n, None] * last[..., :n], 2, 0)
+        return PlasticState(
+            self.states.plastic_strain - flowed, self.states.accumulated - SQRT23 * last[..., n]
+        )
+
+    def changes(self, added: Array) -> Array:
+        """Return the changes of plastic strain for a change of the strains."""
+        return self._changes(added)[0]
+
+    def _changes(self, added: Array) -> tuple[Array, Array]:
+        return flow_along(added, self._law, self._path, self._each)
+
+
+class CompiledFlow(CompiledSweep):
+    """Flow of a material with linear hardening along rows; see `Flow`."""
+
+    def __init__(
+        self, elasticity: Elasticity, rule: LinearHardening, strain: Array, start: PlasticState,
+        parts: int,
+    ) -> None:  # fmt: skip
+        super().__init__(elasticity, rule, strain, start, parts)
+        left, gathered, *self._closing = close(
+            np.ascontiguousarray(self.states.plastic_strain[..., -1].T),
+            self.states.accumulated[:, -1].copy(),
+            self._law,
+            elasticity.bulk_modulus,
+        )
+        self.after = PlasticState(left.T, gathered)
+
+    def along(self, added: Array) -> tuple[Array, Array]:
+        """Return the changes of plastic strain for a change of the strains."""
+        plastic, total = self._changes(added)
+        ends = np.ascontiguousarray(plastic[:, -1]), total[:, -1].copy()
+        return plastic, close_along(*ends, self._law, *self._closing)
+
 
 _STEP = 1e-6
 """Ratio of the difference step to the largest value of a variable, or to the yield strain."""

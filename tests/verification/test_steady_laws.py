@@ -30,13 +30,12 @@ from solver.materials import (
 )
 from solver.rolling import flow
 from solver.rolling.audit.plane import audit_pass
-from solver.rolling.flow import SteppedFlow
+from solver.rolling.flow import CompiledFlow, SteppedFlow
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.rows import RowFlow
 from solver.rolling.plane.track import Track, track_of, under_load
 from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import load_on, track_for
-from solver.rolling.sweep import CompiledFlow
 from solver.shipped import SCENES
 from tests.solver.yield_surfaces import Hosford
 from tests.verification.steady_increment import SteadyIncrement
