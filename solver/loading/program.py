@@ -12,8 +12,7 @@ from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise, takewhile
 
 from solver.errors import ModelError
-from solver.kinds import check
-from solver.parameters import AtLeastOne, NotNegative
+from solver.parameters import AtLeastOne, NotNegative, check
 
 ROUNDING = 1e-9
 """Relative difference of two times: times that differ by less are equal."""

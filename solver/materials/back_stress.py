@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.kinds import Checked
 from solver.materials.law import attribute
-from solver.parameters import NotNegative
+from solver.parameters import Checked, NotNegative
 from solver.typing import Array
 
 _STEP = 1e-5

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from solver.errors import ModelError
-from solver.kinds import Checked
 from solver.materials.elastic_plastic import SmoothMaterial, TrescaMaterial
 from solver.materials.elasticity import Elasticity
 from solver.materials.hardening_rules import GrowingRule, HardeningRule
 from solver.materials.law import Law
 from solver.materials.smooth_surface import SmoothSurface
+from solver.parameters import Checked
 from solver.parts import Parts
 
 

@@ -17,10 +17,9 @@ from annotated_types import Interval, Unit
 from skfem import Mesh
 
 from solver.errors import ModelError
-from solver.kinds import Checked, require
 from solver.mesh.grids import grid, joined, mapped, merged, renamed
 from solver.mesh.lines import continued, refined
-from solver.parameters import Coordinate, Length
+from solver.parameters import Checked, Coordinate, Length, require
 from solver.typing import Array
 
 Pair = tuple[Coordinate, Coordinate]

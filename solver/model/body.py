@@ -11,7 +11,6 @@ import numpy as np
 from skfem import Mesh
 
 from solver.errors import ModelError
-from solver.kinds import check
 from solver.materials import Law, PlaneStress
 from solver.mesh.check import check_mesh
 from solver.mesh.elements import element_type
@@ -20,7 +19,7 @@ from solver.model.amplitude import Amplitude
 from solver.model.kinematics import Kinematics
 from solver.model.loads import Displacement, Load, Pressure
 from solver.model.motion import Axle, TravellingPressure
-from solver.parameters import Thickness
+from solver.parameters import Thickness, check
 from solver.tensors import AXES
 
 Held = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]

@@ -6,8 +6,7 @@ from dataclasses import MISSING, dataclass
 
 import numpy as np
 
-from solver.kinds import Checked
-from solver.parameters import Length, Stress, described
+from solver.parameters import Checked, Length, Stress, described
 from solver.results.contact_result import ContactResult
 from solver.results.outputs import output
 from solver.results.run import FinishedRun, Values

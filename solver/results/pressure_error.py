@@ -9,8 +9,7 @@ from dataclasses import MISSING, dataclass
 
 import numpy as np
 
-from solver.kinds import Checked
-from solver.parameters import Friction, Length, Stress, described
+from solver.parameters import Checked, Friction, Length, Stress, described
 from solver.results.outputs import output
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values

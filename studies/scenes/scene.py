@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.kinds import check
 from solver.loading.program import Program, walked
-from solver.parameters import Accuracy, by_accuracy, described
+from solver.parameters import Accuracy, by_accuracy, check, described
 from solver.results.cycles import LEAST, over_cycles
 from solver.results.figures import cost
 from solver.results.named_places import NamedPlaces, at_named_places

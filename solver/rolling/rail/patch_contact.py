@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.errors import WindowTooSmall
-from solver.kinds import check
-from solver.parameters import Length
+from solver.parameters import Length, check
 from solver.rolling.load import AppliedLoad, PassingLoad
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.friction_cone import NORMAL, OPEN, SLIP, TANGENTS

@@ -11,9 +11,8 @@ from scipy import sparse
 
 from solver.errors import ModelError
 from solver.fem.surface import extract
-from solver.kinds import check
 from solver.mesh.edges import shape_derivatives, shape_functions
-from solver.parameters import Length
+from solver.parameters import Length, check
 from solver.rolling.rail.section import Section
 from solver.typing import Array
 

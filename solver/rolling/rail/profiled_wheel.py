@@ -16,9 +16,8 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.kinds import check
 from solver.materials import Elasticity
-from solver.parameters import Infinite, Length
+from solver.parameters import Infinite, Length, check
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.typing import Array
 

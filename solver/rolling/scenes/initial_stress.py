@@ -10,8 +10,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.kinds import Checked, check
-from solver.parameters import Pairs, described
+from solver.parameters import Checked, Pairs, check, described
 from solver.parts import Parts
 from solver.typing import Array
 

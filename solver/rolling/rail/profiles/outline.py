@@ -159,17 +159,12 @@ class Outline:
         return float(self._moments()[0])
 
     @property
-    def centroid(self) -> Array:
-        """Centroid (2,) [mm]."""
-        return self._moments()[1]
-
-    @property
     def second_moments(self) -> Array:
         """Second moments of area about the centroid (2, 2): integrals of products [mm4]."""
-        return self._moments()[2]
+        return self._moments()[1]
 
-    def _moments(self) -> tuple[float, Array, Array]:
-        """Return area, centroid and second moments, by Green's theorem.
+    def _moments(self) -> tuple[float, Array]:
+        """Return area and second moments about the centroid, by Green's theorem.
 
         The integral of a homogeneous function of degree d over the area is 1 / (d + 2) of its
         integral times the distance of the tangent from the origin over the curve.
@@ -183,7 +178,7 @@ class Outline:
         area = dA.sum() / 2
         centroid = X @ dA / 3 / area
         second = (X * dA) @ X.T / 4 - area * np.outer(centroid, centroid)
-        return area, centroid, second
+        return area, second
 
     # -- motions -------------------------------------------------------------------------------
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.files import read_file
-from solver.kinds import require
-from solver.parameters import Pairs
+from solver.parameters import Pairs, require
 from solver.typing import Array
 
 _FEWEST = 4

@@ -22,8 +22,6 @@ Pair = tuple[float, float]
 
 _HEIGHT, _FOOT, _HEAD, _WEB, _TOE = 172.0, 150.0, 72.0, 16.5, 11.5
 """Height; widths of foot, head and web; thickness of the foot at its ends [mm]."""
-_GAUGE = 14.3
-"""Depth below the top at which the head has its width and its straight sides begin [mm]."""
 _UPPER, _LOWER = 51.0, 31.5
 """Fishing surfaces, extended to the axis: depth below the top, height above the base [mm]."""
 _FISHING, _SIDE, _TAPER = 1 / 2.75, 1 / 20, 1 / 14

@@ -15,9 +15,8 @@ import numpy as np
 from skfem import MeshQuad2
 
 from solver.errors import ModelError
-from solver.kinds import check
 from solver.mesh.lines import graded
-from solver.parameters import Coordinate, Length
+from solver.parameters import Coordinate, Length, check
 from solver.rolling.rail.profiles.patches import (
     even,
     halved,
