@@ -28,7 +28,7 @@ class Curve(Protocol):
 
     @property
     def limit(self) -> float:
-        """Size that it tends to [MPa]; inf if it grows without bound."""
+        """Limit of the size at large plastic strain [MPa]; inf if it grows without bound."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

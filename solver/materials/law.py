@@ -1,4 +1,4 @@
-"""The contract of a material law: what bodies, contact and audit use of it.
+"""The contract of a material law: all that bodies, contact and audit use.
 
 A law gives stress, tangent and new internal variables for a strain (`Law.respond`). It never
 changes the state it is given; the new state replaces it only when the increment has converged.
@@ -87,7 +87,7 @@ class Law(ABC):
 
     @attribute
     def linear_hardening(self) -> LinearHardening | None:
-        """Its hardening, if it is von Mises' law with linear hardening; None otherwise.
+        """Linear hardening, if the law is von Mises' with linear hardening; None otherwise.
 
         Its responses then have closed forms, and its flow along rows is compiled.
         """
@@ -140,7 +140,7 @@ class Law(ABC):
 
     @attribute
     def elastic(self) -> bool:
-        """Whether it can never yield."""
+        """Whether the material never yields."""
         return math.isinf(self.yield_stress)
 
     @attribute

@@ -16,7 +16,8 @@ _ZZ = 2
 _ROUNDING = float(np.finfo(float).eps)
 """Ratio of stress zz to the magnitude of its terms; up to it stress zz is rounding."""
 _SMALL = 1e-9
-"""The same for laws that iterate and are less exact; used when further steps do not improve."""
+"""The same ratio for laws that iterate and are less exact: it counts if further steps do not reduce
+stress zz."""
 _MAX_ITERATIONS = 100
 
 

@@ -66,7 +66,7 @@ class SmoothCondition(SmoothSurface, YieldCondition):
 @YIELD_CONDITIONS.word("mises")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MisesCondition(YieldCondition):
-    """Yield by the size of the deviator; it can be combined with every hardening rule."""
+    """Yield by the size of the deviator, with any hardening rule."""
 
     rules: ClassVar[type[Any]] = HardeningRule
 
