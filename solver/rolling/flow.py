@@ -98,14 +98,14 @@ class CompiledFlow(CompiledSweep):
 
 
 _STEP = 1e-6
-"""Ratio of the difference step to the largest value of a variable, or to the yield strain."""
+"""Step of differences over the largest value of a variable, or over the yield strain."""
 _AT_REST, _ALMOST = 1e-11, 1e-8
-"""Ratio of the stress on planes y = const to the yield stress that counts as zero: as desired, and
-as accepted if rounding in a law prevents more."""
+"""Stress on planes y = const, over the yield stress, that counts as zero: the target, and the value
+accepted if rounding in a law prevents more."""
 _CLOSING = 60
 """Largest number of steps of Newton's method for the state behind the load."""
 _FREE = np.array([1, 3])
-"""Components yy and xy, whose strain follows from stress at rest."""
+"""Components yy and xy, whose strains follow from the condition that their stresses vanish."""
 
 
 class _Left(NamedTuple):
@@ -288,16 +288,16 @@ def _solved(matrices: Array, right: Array) -> Array:
 
 
 INFLOW = 0.1
-"""Largest ratio of the plastic strain added in the first column of the window to that of the pass.
-Points that an earlier pass left at yield flow as soon as the load approaches, however large the
-window is; a ratio of 5 % changes stress by 1 % of the yield stress."""
+"""Largest plastic strain added in the first column of the window, over that of the pass. Points
+that an earlier pass left at yield flow as soon as the load approaches, however large the window is;
+a ratio of 5 % changes stress by 1 % of the yield stress."""
 LEAST = 0.05
-"""Ratio of the plastic strain of a pass to the yield strain; below it `INFLOW` refers to this
-level. The deepest row may have `INFLOW` times this level."""
+"""Least plastic strain of a pass, over the yield strain, to which `INFLOW` refers. The deepest row
+may add `INFLOW` times this level."""
 PARTS = 16
 """Number of increments between two points of a row, for every law: the error is of first order in
-their length. Under a braked wheel at draft accuracy residual stress is wrong by 2 MPa in 500, and
-by 8 to 9 MPa with four."""
+their length. Under a braked wheel at draft accuracy the error of residual stress is 2 MPa in 500;
+with four increments it is 8 to 9 MPa."""
 
 
 class Sweep(Protocol):
@@ -337,7 +337,7 @@ class Flow(Sweep, Protocol):
 
 
 def allowed_inflow(law: Law, most_added: float) -> float:
-    """Return the plastic strain that points at the edge of a window may add; see `INFLOW`."""
+    """Return the largest plastic strain added at the edge of a window; see `INFLOW`."""
     return INFLOW * max(LEAST * law.yield_stress / law.elasticity.youngs_modulus, most_added)
 
 

@@ -31,11 +31,11 @@ from solver.rolling.rail.track import PrismTrack
 from solver.typing import Array, Ints
 
 _FORCE = 1e-6
-"""Largest tension and friction excess, over the force."""
+"""Limit of tension and of friction excess, over the force."""
 
 
 class AuditedPatch:
-    """Tractions on the surface of a prism, and the load that they come from.
+    """Tractions on the surface of a prism, and the load that causes them.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class AuditedPatch:
         self._closed = self._normal > PRESSED * self.force
 
     def missing(self) -> float:
-        """Return the largest difference of a resultant from what is prescribed, over the force."""
+        """Return the largest difference of a resultant from the prescribed one, over the force."""
         load, contact = self._load, self._contact
         given: list[float] = []
         if isinstance(load, EllipticPatch):
@@ -119,7 +119,7 @@ class AuditedPatch:
 
     @property
     def limits(self) -> dict[str, float]:
-        """Limits of those figures that depend on the contact."""
+        """Limits of the figures that depend on the contact."""
         return {
             "audit_overlap": OVERLAP[0] * self.approach,
             "audit_closed_gap": GAP * self.approach,
@@ -166,7 +166,7 @@ class AuditedPatch:
         return np.asarray(effects)
 
     def _wrong_slip(self, bound: Array) -> float:
-        """Return the friction work missing because of wrong slip, over the friction work.
+        """Return the friction work that is missing because of wrong slip, over the friction work.
 
         Slip is wrong if the shear is below its bound, or does not oppose it.
         """
@@ -189,9 +189,10 @@ class AuditedPatch:
 
 
 _LENGTH = 0.01
-"""Largest stress of the last level of the far field, over the yield stress."""
+"""Limit of the stress of the last level of the far field, over the yield stress."""
 _ROWS = 16
-"""Number of rows of points along which the law is repeated: those that yield most, and others."""
+"""Number of rows of points along which the law is evaluated again: the rows that yield most, and
+others."""
 _LIMITS = {"audit_inflow": INFLOW, "audit_steadiness": STEADINESS, "audit_length": _LENGTH}
 
 
@@ -208,7 +209,7 @@ def audit_prism(
     ----------
     law : the declared law of the prism
     previous : the pass before it, None for the first one
-    plain : second evaluation of the track, to be shared by passes over it
+    plain : second evaluation of the track, which passes over it share
 
     Returns
     -------
@@ -273,7 +274,7 @@ def audit_prism(
 
 
 def _rows(found: Pass[PrismState]) -> Ints:
-    """Return the rows along which the law is repeated: half yield most, half lie anywhere."""
+    """Return the rows to evaluate again: half of them yield most, half lie anywhere."""
     added = (found.accumulated - found.before.accumulated[:, None]).max(axis=1)
     count = min(_ROWS, len(added)) // 2
     anywhere = np.linspace(0, len(added) - 1, count).astype(np.int64)
@@ -289,7 +290,7 @@ def _left_before(track: PrismTrack, plain: PlainPrism, before: PrismState) -> Ar
 
 
 def _beyond_outside(law: Law, elastic: Array) -> float:
-    """Return the stress beyond yield where no point may flow, outside the zone [MPa].
+    """Return the stress beyond yield outside the zone, where no point may flow [MPa].
 
     Parameters
     ----------
@@ -302,7 +303,7 @@ def _beyond_outside(law: Law, elastic: Array) -> float:
 def _released(law: Law, found: Pass[PrismState]) -> float:
     """Return the difference of the state behind from that of the law [MPa].
 
-    It follows from the last station, on the way to the strain without load.
+    The law is evaluated from the last station, on the way to the strain without load.
     """
     before, after, parts = found.before, found.after, found.parts
     start = (before.strain + found.strain[:, -1]).T
