@@ -24,7 +24,7 @@ class Other:
 
 
 Needs = Mapping[str, tuple[Any, ...] | Other]
-"""Other parameters with values; a parameter needs that one of them has one of these values."""
+"""Other parameters, each with values: one of them must have one of its values."""
 
 
 def described(default: Any, description: str, *, needs: Needs | None = None) -> Any:

@@ -129,7 +129,7 @@ SELF_EQUILIBRIUM = declare(
     "ratio of the residual normal force on a plane cut to yield stress times area",
 )
 _INSIDE = {"half_plane": NEAREST, "punch": 0.028}
-"""Ratio of the distance from the corner at which the publication has residual stress to a."""
+"""Distance from the corner at which residual stress is published, over a."""
 
 
 def figures(run: FinishedRun) -> Values:

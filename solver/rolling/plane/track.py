@@ -30,10 +30,10 @@ from solver.tensors import SQRT2
 from solver.typing import Array, Ints
 
 CONTACT = 2.0
-"""Ratio of half the length of the surface that may come into contact to the half-width."""
+"""Half the length of the surface that may come into contact, over the half-width."""
 _BLOCKS = 8
-"""Number of parts in which the compliance of the surface is solved for: all displacements at once
-would take as much memory as all else of a track."""
+"""Number of parts in which the compliance of the surface is computed: all displacements at once
+would take as much memory as the rest of a track."""
 
 
 class Track:

@@ -81,15 +81,15 @@ NORMAL, TANGENTS = 1, (0, 2)
 """Places of the normal and of the tangents among local axes (x, normal, tangent across)."""
 
 _TOLERANCE = 1e-9
-"""Largest error of a condition over the largest pressure, for shear times the steepest slope of the
-friction bound."""
+"""Tolerance: largest error of a condition over the largest pressure; for shear, over that times the
+steepest slope of the friction bound."""
 _STEPS = 60
 _SHORTEST = 1 / 256
-"""Smallest share of a Newton step in the line search. Where all points slip, a creepage that is
-found by its moment may overshoot a hundredfold."""
+"""Smallest share of a Newton step in the line search. Where all points slip, a creepage that
+follows from a given moment may overshoot a hundredfold."""
 _LOST = 1e6
-"""Ratio of the largest |q - d w| to the first resultant on one point, a pressure that no contact
-reaches; above it motions grow without bound."""
+"""Motions grow without bound if |q - d w| exceeds this multiple of the pressure of the whole load
+on one point."""
 _LOOSE = "the contact forces are not determined: nothing holds the wheel"
 
 
@@ -105,8 +105,8 @@ class ConeProblem:
     offset : (n, m, 3) effects without tractions and motions [mm]
     lines : (n_lines, 1) lines of the largest shear over pressure
     motions : (k, n, m, 3) effects of the rigid motions
-    weights : (k, n, m, 3) sums of values that are given, such as areas [mm2]
-    resultants : (k,) what they are [N]; the first is the load
+    weights : (k, n, m, 3) weights of sums that are prescribed, such as areas [mm2]
+    resultants : (k,) prescribed values of the sums [N]; the first is the load
     """
 
     influence: Influence
@@ -177,7 +177,7 @@ def solve_cone(problem: ConeProblem, values: Array, rigid: Array) -> ConeSolutio
 
 
 class _Iterate:
-    """Values and rigid motions, and by how much they miss the conditions."""
+    """Values and rigid motions, and their errors in the conditions."""
 
     def __init__(self, problem: ConeProblem, values: Array, rigid: Array) -> None:
         self.problem, self.values, self.rigid = problem, values, rigid

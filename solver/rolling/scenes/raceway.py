@@ -31,14 +31,14 @@ ELEMENTS: Mapping[str, int] = {"draft": 4, "standard": 6, "fine": 10}
 one. The largest shear under a circle, which decides shakedown without friction, is 3 % too small
 with 4 of them, 0.3 % with 6."""
 BESIDE = 1.5
-"""Half the width of the zone that may yield, along the surface, over b."""
+"""Half the width along the surface of the zone that may yield, over b."""
 _STEEPEST = math.radians(60.0)
 """Largest slope of ball, roller and groove in the zone [rad]."""
 MOST_LONG = 25.0
-"""Largest ratio of the semi-axes; a longer contact is a line."""
+"""Largest ratio of the semi-axes: a longer contact is nearly a line."""
 _LONGEST = 0.2
-"""Largest ratio of the semi-axis along the raceway to the relative radius: the ball or roller must
-be above all stations at which it may touch."""
+"""Largest semi-axis along the raceway, over the relative radius: the ball or roller must be above
+all stations at which it may touch."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,7 +114,7 @@ class RacewayParameters(PrismParameters):
     def _check_ellipse(self) -> None:
         """Raise `ModelError` if the elastic Hertz contact is too long or too wide.
 
-        The bound that it names is one that is taken.
+        The bound in the message is itself an allowed value.
         """
         ellipse = self.ellipse
         if ellipse.ratio > MOST_LONG:
@@ -139,9 +139,10 @@ class RacewayParameters(PrismParameters):
             )  # fmt: skip
 
     def _bound(self, wide: bool) -> tuple[str, float, bool]:
-        """Return a parameter, its value at the largest ratio, and whether it is the least one.
+        """Return a parameter, its value at the largest ratio, and whether this is a lower bound.
 
-        It is the groove or its conformity, where they can give this ratio; otherwise the crown.
+        The parameter is the groove or its conformity, where these can give the ratio; otherwise the
+        crown.
         """
         relative = self.rolling * radii_of(MOST_LONG) ** (1 if wide else -1)
         by_conformity = self.groove_radius == "conformity"
@@ -198,7 +199,7 @@ class RacewayParameters(PrismParameters):
 
     @property
     def size(self) -> tuple[float, float]:
-        """Semi-axes to which mesh and results are made, rounded so that runs share them [mm]."""
+        """Semi-axes for mesh and places of results, rounded so that runs share meshes [mm]."""
         return float(f"{self.ellipse.a:.3g}"), float(f"{self.ellipse.b:.3g}")
 
     @property
@@ -217,7 +218,7 @@ class RacewayParameters(PrismParameters):
 
 
 def _rounded(limit: float, lowest: float = 0.0, *, up: bool = False) -> float:
-    """Return a limit with five digits of what it is above the lowest value, rounded up or down."""
+    """Return a limit whose excess over the lowest value is rounded up or down to five digits."""
     above = max(limit - lowest, 1e-9 * limit)
     digit = 10.0 ** (math.floor(math.log10(above)) - 4)
     return digit * (math.ceil if up else math.floor)(limit / digit)

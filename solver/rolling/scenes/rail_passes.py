@@ -31,18 +31,18 @@ from solver.typing import Array
 REACHES = (1.0, 1.4, 2.0)
 """Ratios of the size of zone and window to the usual size, tried in turn."""
 _SETTLED = 1
-"""Number of Newton steps of a pass, up to which the next one is taken to be nearly the same."""
+"""Largest number of Newton steps of a pass after which the next pass begins with its strain."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RailTrace(PassTrace):
-    """What a pass over a prism leaves; ``lowest`` (6,) is the smallest residual stress [MPa]."""
+    """The state after a pass over a prism; ``lowest`` (6,) is the least residual stress [MPa]."""
 
     lowest: Array
 
 
 class RolledPrism(Protocol):
-    """What a scene says of its prism.
+    """The prism of a scene, and its loads.
 
     Attributes
     ----------
@@ -87,9 +87,9 @@ class RailPasses(Passes):
     def found(self, budget: SolveBudget) -> Iterator[Pass[PrismState]]:
         """See `Passes`.
 
-        A pass begins with the elastic solution of its load on the strain that is left. Only where
-        pass after pass is nearly the same it begins with the strain of the last one: of passes that
-        still yield, that is farther away, and of another load it leads nowhere.
+        A pass begins with the elastic solution of its load on the residual strain. If the passes
+        are nearly the same, it begins with the strain of the last pass; while passes still yield,
+        that guess is worse, and after another load it does not converge.
         """
         track, law = self._track, self.law
         before = track.virgin(law)

@@ -16,7 +16,7 @@ from solver.rolling.scenes.wheel_parameters import WheelParameters
 from solver.scenes.scene import Scene
 
 ROUGH = {"friction": Other(0.0), "cohesion": Other(0.0), "friction_law": Other("coulomb")}
-"""What a creepage needs to have an effect."""
+"""Parameters of which a creepage needs one to have an effect."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +38,7 @@ class PrismParameters(WheelParameters):
 
     @property
     def contact_modulus(self) -> float:
-        """E* of wheel and prism [MPa]."""
+        """E* of the contact of wheel and prism [MPa]."""
         return 1 / sum(
             1 / each.plane_strain_modulus for each in (self.elasticity, self.wheel_elasticity)
         )
@@ -72,7 +72,7 @@ def rail_scene(
     Parameters
     ----------
     geometry : (parameters) -> what the set-up depends on
-    outputs : those beside maps, profiles, extremes, the contact patch and the section
+    outputs : further ones, after maps, profiles, extremes, the contact patch and the section
     advice : what to do if a pass does not converge
     """
     method, view, sketch, effort = late(

@@ -44,12 +44,12 @@ _GROWTH: Mapping[Accuracy, float] = {"draft": 1.15, "standard": 1.15, "fine": 1.
 _LARGEST = 100.0
 """Largest element side [mm]."""
 _MARGIN = 2.5
-"""Smallest ratio of the fine length beyond the end of the track to the Hertz half-width."""
+"""Least length with small elements beyond the end of the track, over the Hertz half-width."""
 _SPREAD = 0.65
-"""Ratio of the length that a sinking wheel touches beyond the end of the track to the Hertz
-half-width times the load ratio."""
+"""Length beyond the end of the track that a sinking wheel touches, over the Hertz half-width times
+the load ratio."""
 _LONGEST_REACH = 0.8
-"""Largest ratio of `RollingParameters.reach` to half the circumference of the wheel."""
+"""Largest `RollingParameters.reach`, over half the circumference of the wheel."""
 _MOST_INCREMENTS = 100_000
 _OF_A_PASS = ("load_ratio", "friction", "traction", "control", "given_creepage", "heading")
 """Parameters that may differ from pass to pass."""
@@ -198,7 +198,7 @@ class RollingParameters(WheelParameters):
             raise ModelError(
                 *(("track", self.track) if room > 0 else ("load_ratio", self.load_ratio)),
                 f"the rim of a wheel of radius {self.radius:g} has room for a track of at most "
-                f"{math.floor(max(room, 0.0))} mm beside half-widths of {self.half_width:.4g} mm",
+                f"{math.floor(max(room, 0.0))} mm with half-widths of {self.half_width:.4g} mm",
             )  # fmt: skip
 
     def usual(self) -> Mapping[str, float]:

@@ -1,10 +1,9 @@
 """Passes with different loads: a sequence, or random traffic about the parameters of a run.
 
-Those of random traffic scatter as a normal distribution that is cut off at three standard
-deviations. Dynamic wheel loads are distributed so: J. Eisenmann, Germans gain a better
-understanding of track structure, Railway Gazette International 128 (1972) 305-308. Their standard
-deviation is 0.1 (track in very good condition) to 0.3 (poor condition) of the load, more above
-60 km/h.
+In random traffic the loads have a normal distribution that is cut off at three standard deviations,
+as dynamic wheel loads have: J. Eisenmann, Germans gain a better understanding of track structure,
+Railway Gazette International 128 (1972) 305-308. Their standard deviation is 0.1 (track in very
+good condition) to 0.3 (poor condition) of the load, more above 60 km/h.
 """
 
 from __future__ import annotations
@@ -79,7 +78,7 @@ class Scattered(Protocol):
 def deviations(seed: int, passes: int, count: int) -> Array:
     """Return deviations (passes, count) from the mean, in standard deviations.
 
-    Those of a pass do not depend on how many passes follow.
+    The deviations of a pass do not depend on the number of later passes.
     """
     normal = NormalDist()
     least, most = normal.cdf(-CUT), normal.cdf(CUT)
@@ -88,7 +87,7 @@ def deviations(seed: int, passes: int, count: int) -> Array:
 
 
 def check_spreads(parameters: Scattered, spreads: Sequence[str]) -> None:
-    """Raise `ModelError` for a spread that takes a parameter beyond its limits.
+    """Raise `ModelError` for a spread that moves a parameter beyond its limits.
 
     Parameters
     ----------

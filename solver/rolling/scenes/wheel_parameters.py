@@ -75,7 +75,7 @@ class WheelParameters(ContactParameters):
 
 
 def check_given_shear(parameters: Any) -> None:
-    """Raise `ModelError` for a friction law that a prescribed shear, in proportion, has not."""
+    """Raise `ModelError` for friction that does not give shear in proportion to pressure."""
     for name, usual in (("friction_law", "coulomb"), ("shear_limit", 0), ("cohesion", 0)):
         if (value := getattr(parameters, name)) != usual:
             raise ModelError(name, value, f"must be {usual}: load = hertz prescribes the shear")

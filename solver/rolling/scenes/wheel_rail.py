@@ -31,8 +31,8 @@ from solver.rolling.scenes.sequence import CUT, block_of, check_spreads, deviati
 ELEMENT_SIZE: Mapping[str, float] = {"draft": 2.0, "standard": 1.0, "fine": 0.5}
 """Side of the elements under the contact, across and in depth [mm]."""
 _HEAD, _WIDEST, _LOWEST, _HIGHEST = 28.0, 38.0, -30.0, 5.0
-"""Where the ends of a running surface given by points may be, on either side of the axis of the
-rail; heights between which it lies [mm]."""
+"""Least and largest distance from the axis of the rail of the ends of a running surface given by
+points; lowest and highest position of the surface [mm]."""
 _CLOSEST = 1.0
 """Least distance of stations along the rail [mm]."""
 Points = tuple[tuple[float, float], ...]
@@ -46,10 +46,10 @@ _OF_A_PASS = (
 _OF_A_PLACE = (
     "lateral_position", "yaw", "wheel_profile", "wheel_slope", "crown_radius", "wheel_radius",
 )  # fmt: skip
-"""Those that decide where the wheel touches, for one load."""
+"""Parameters of a pass that decide where the wheel touches, for one load."""
 _SPREADS = ("load_spread", "lateral_spread", "traction_spread")
 _POSITIONS = 13
-"""Number of lateral positions that stand for those of random traffic, half a standard deviation
+"""Number of lateral positions that represent those of random traffic, half a standard deviation
 apart."""
 
 (_checked,) = late("rolling.rail.profiles.meshed_rail", "checked")
@@ -77,8 +77,8 @@ class WheelRailParameters(PrismParameters):
     )
     spin: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1/mm")] = described(
         0.0,
-        "rotation of the wheel about the downward vertical over its velocity, beside the spin that "
-        "the slope of the contact makes",
+        "rotation of the wheel about the downward vertical over its velocity, in addition to the "
+        "spin by the slope of the contact",
         needs=ROUGH,
     )
     lateral_position: Annotated[float, Interval(ge=-30.0, le=30.0), Unit("mm")] = described(
@@ -178,7 +178,7 @@ class WheelRailParameters(PrismParameters):
 
     @property
     def stressed_by(self) -> str:
-        """The parameter that a stress before the first pass is blamed on."""
+        """The parameter that errors of the stress before the first pass name."""
         own = next(iter(declared(INITIAL_STRESS[self.initial_stress])), "initial_stress")
         return "temperature_change" if self.initial_stress == "none" else own
 
@@ -255,7 +255,7 @@ class WheelRailParameters(PrismParameters):
 
     @property
     def outermost(self) -> list[WheelRailParameters]:
-        """Passes whose contacts hold those of all passes: the heaviest at each place."""
+        """Passes whose contacts cover those of all passes: the heaviest at each place."""
         heaviest: dict[tuple[Any, ...], WheelRailParameters] = {}
         for own in sorted(self.block, key=lambda own: own.load):
             heaviest[tuple(getattr(own, name) for name in _OF_A_PLACE)] = own

@@ -95,7 +95,7 @@ def traffic(run: FinishedRun) -> Values:
 
 
 def wheel(run: FinishedRun) -> Values:
-    """Return the wheel of the last pass: its profile as it touches the rail, height, and slip.
+    """Return the wheel of the last pass: its profile at first touch, its height, and its slip.
 
     The height is that of the axle over the one at which the undeformed bodies touch; the moment is
     that about the vertical through the running circle.

@@ -16,11 +16,12 @@ Pair = tuple[float, float]
 
 
 _POINTS = 16
-"""Gauss points of each piece in integrals; exact to rounding for arcs up to a half circle."""
+"""Number of Gauss points of a piece in integrals: exact to rounding for arcs up to a half
+circle."""
 _SAMPLES = 2001
-"""Points among which the highest one is looked for."""
+"""Number of samples in the search for the highest point."""
 _SHORT = 1e-9
-"""Ratio of a piece to the whole; shorter ones are left out."""
+"""Length of a piece over the whole length below which it is left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +134,7 @@ class Outline:
         return np.arctan2(chords[1], chords[0]) - self.bends * self.lengths / 2
 
     def _found(self, s: Array) -> tuple[Ints, Array]:
-        """Return the pieces at lengths ``s``, and the lengths from their beginnings."""
+        """Return the pieces at lengths ``s``, and the lengths from the beginnings of the pieces."""
         starts = np.cumsum([0.0, *self.lengths[:-1]])
         s = np.asarray(s, dtype=float) % self.length
         piece = np.searchsorted(starts, s, side="right") - 1

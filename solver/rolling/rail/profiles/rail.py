@@ -47,7 +47,7 @@ _PLACES = {
 
 
 class Rail(ABC):
-    """What a wheel needs of a rail."""
+    """The rail as a wheel sees it."""
 
     __slots__ = ()
 
@@ -195,7 +195,8 @@ def rail_60e1() -> RailSection:
 def _crown() -> tuple[tuple[float, ...], float]:
     """Return the turns of the arcs of the crown, and the half width of the sides at its top.
 
-    The last arc ends at z = 0, so that half the head is as wide as the tangent there is long.
+    The last arc ends at z = 0, so that half the width of the head is the length of the tangent
+    there.
     """
     side, (_, middle, last) = math.atan(_SIDE), _CROWN
     first = math.asin(_NARROW / 2 / last)
