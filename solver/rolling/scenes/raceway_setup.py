@@ -31,7 +31,7 @@ from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.pass_runner import by_passes
 from solver.rolling.scenes.raceway import BESIDE, RacewayParameters
 from solver.rolling.scenes.rail_outputs import sketched
-from solver.rolling.scenes.rail_passes import REACHES, RailPasses
+from solver.rolling.scenes.rail_passes import REACHES, RailPasses, RolledPrism
 from solver.rolling.scenes.rail_window import PrismGeometry, split_rows, whole
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
 from solver.scenes.scene import Effort, Method
@@ -130,32 +130,16 @@ def track_of(own: RacewayGeometry) -> PrismTrack:
     return own.track(section_of(own), _LEVELS)
 
 
-class RolledRaceway:
-    """A ball or roller on a raceway, as `solver.rolling.scenes.rail_passes.RolledPrism`."""
-
-    def __init__(self, parameters: RacewayParameters) -> None:
-        self.parameters = parameters
-        self._made: tuple[PrismTrack, PatchLoad] | None = None
+class RolledRaceway(RolledPrism):
+    """A ball or roller on a raceway."""
 
     def track(self, reach: float) -> PrismTrack:
         """See `RolledPrism`."""
         return track_of(geometry(self.parameters, reach))
 
-    def load(self, track: PrismTrack, number: int) -> PatchLoad:
-        """See `RolledPrism`; all passes have the same load.
-
-        Raises
-        ------
-        LimitLoad
-            if a prescribed shear is above the shear strength of the material
-        """
-        del number
-        if self._made is None or self._made[0] is not track:
-            self._made = track, self._load(track)
-        return self._made[1]
-
-    def _load(self, track: PrismTrack) -> PatchLoad:
-        p, ellipse = self.parameters, self.parameters.ellipse
+    def made(self, track: PrismTrack, own: RacewayParameters, last: Any) -> PatchLoad:
+        """See `RolledPrism`; a prescribed shear may be above the shear strength."""
+        p, ellipse = own, own.ellipse
         if p.load == "hertz":
             shear = p.traction * p.friction
             limit = too_much_shear(p.material(), abs(shear) * ellipse.peak_pressure)

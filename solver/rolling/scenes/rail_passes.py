@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +42,7 @@ class RailTrace(PassTrace):
     lowest: Array
 
 
-class RolledPrism(Protocol):
+class RolledPrism(ABC):
     """The prism of a scene, and its loads.
 
     Attributes
@@ -49,19 +50,31 @@ class RolledPrism(Protocol):
     parameters : parameters of the scene
     """
 
-    parameters: Any
+    def __init__(self, parameters: Any) -> None:
+        self.parameters, self._passes = parameters, parameters.each_pass()
+        self._made: tuple[PrismTrack, Any, PatchLoad] | None = None
 
+    @abstractmethod
     def track(self, reach: float) -> PrismTrack:
         """Return the prism; ``reach`` is the ratio of zone and window to their usual size.
 
         Raises `ModelError` if the section has no room for them.
         """
 
-    def load(self, track: PrismTrack, number: int) -> PatchLoad:
-        """Return the load of a pass over the prism, counted from 0.
+    @abstractmethod
+    def made(self, track: PrismTrack, own: Any, last: Any) -> PatchLoad:
+        """Return the load of a pass with these parameters; ``last`` is one on this prism, or None.
 
-        It is the same object as in the pass before if the load is the same.
+        Raises `LimitLoad` if no prism of the material can carry it.
         """
+
+    def load(self, track: PrismTrack, number: int) -> PatchLoad:
+        """Return the load of a pass, counted from 0: the same object as before if it is equal."""
+        own, known = self._passes[number], self._made
+        if known is None or known[:2] != (track, own):
+            last = known[2] if known is not None and known[0] is track else None
+            known = self._made = track, own, self.made(track, own, last)
+        return known[2]
 
 
 class RailPasses(Passes):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from annotated_types import Interval, Unit
 
@@ -35,6 +35,10 @@ class PrismParameters(WheelParameters):
         "velocity of the axle along z over that along x, as by skew; the yaw of a wheel adds to it",
         needs=ROUGH,
     )
+
+    def each_pass(self) -> Sequence[Self]:
+        """Return the parameters of each pass; those of equal passes are one object."""
+        return [self] * self.passes
 
     @property
     def contact_modulus(self) -> float:

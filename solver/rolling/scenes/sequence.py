@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from statistics import NormalDist
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -68,13 +68,6 @@ CUT = 3.0
 """Largest deviation from the mean, in standard deviations."""
 
 
-class Scattered(Protocol):
-    """Parameters of passes that scatter."""
-
-    def deviating(self, deviation: Sequence[float]) -> object:
-        """Return the parameters of a pass; deviations are in standard deviations."""
-
-
 def deviations(seed: int, passes: int, count: int) -> Array:
     """Return deviations (passes, count) from the mean, in standard deviations.
 
@@ -86,12 +79,12 @@ def deviations(seed: int, passes: int, count: int) -> Array:
     return np.array([normal.inv_cdf(each) for each in share.ravel()]).reshape(share.shape)
 
 
-def check_spreads(parameters: Scattered, spreads: Sequence[str]) -> None:
+def check_spreads(parameters: Any, spreads: Sequence[str]) -> None:
     """Raise `ModelError` for a spread that moves a parameter beyond its limits.
 
     Parameters
     ----------
-    spreads : names of the standard deviations, in the order of `Scattered.deviating`
+    spreads : names of the standard deviations, in the order of ``parameters.deviating``
     """
     for number, name in enumerate(spreads):
         for way in (-CUT, CUT):

@@ -12,7 +12,6 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.memory import kept
-from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.profiles.meshed_rail import MeshedRail, ZonedMesh
 from solver.rolling.rail.profiles.points import SectionMesh
 from solver.rolling.rail.profiles.zone import Zone, rail_mesh
@@ -258,36 +257,6 @@ def stressed_track(own: RailGeometry, rail: SectionStress, thermal_strain: float
     """Return the rail with its stress before the first pass."""
     track, initial = track_of(own), settled_in(own, rail, thermal_strain)
     return track if initial is None else track.stressed(initial)
-
-
-class RolledRail:
-    """A wheel on a rail, as `solver.rolling.scenes.rail_passes.RolledPrism`."""
-
-    def __init__(self, parameters: WheelRailParameters) -> None:
-        self.parameters = parameters
-        self._passes = parameters.each_pass()
-        self._made: tuple[PrismTrack, WheelRailParameters, RollingPatch] | None = None
-
-    def track(self, reach: float) -> PrismTrack:
-        """See `RolledPrism`."""
-        p, own = self.parameters, geometry(self.parameters, reach)
-        meshed(p, own)
-        return stressed_track(own, p.rail_stress, p.thermal_strain)
-
-    def load(self, track: PrismTrack, number: int) -> RollingPatch:
-        """See `RolledPrism`; wheels of other passes share the influences of tractions."""
-        p, last = self._passes[number], self._made
-        if last is not None and last[:2] == (track, p):
-            return last[2]
-        wheel, rolls = wheel_of(p), p.under(p.load)
-        if last is not None and last[0] is track:
-            made = last[2].changed(wheel=wheel, load=rolls, **p.rubbing)
-        else:
-            made = RollingPatch(
-                grid=track.grid, compliance=track.compliance, wheel=wheel, load=rolls, **p.rubbing
-            )
-        self._made = track, p, made
-        return made
 
 
 def settled(section: Section, of: SectionStress, thermal_strain: float) -> SettledStress | None:
