@@ -32,8 +32,8 @@ R = TypeVar("R")
 SETTING, USUAL = "RESIDUA_KEPT_MEMORY", "300MB"
 """Environment variable with the most memory of kept values, such as ``"2GB"``, and its default."""
 _SHARE = 16
-"""Limited address space of a process over the memory of kept values, at least. Of 1 GiB, libraries
-use 640 MB, and a Gaussian process of 1000 runs 270 MB while it is made."""
+"""Least ratio of the address space of a limited process to the memory of kept values. Of 1 GiB,
+libraries use 640 MB, and a Gaussian process of 1000 runs uses 270 MB while it is made."""
 _SIZE = re.compile(r"(\d+(?:\.\d+)?) ?([kMGT]?)(i?)B")
 _GROWN, _FREE = 32_000_000, 128_000_000
 """Growth of a process, without kept values, that starts a garbage collection, and free memory that

@@ -33,10 +33,6 @@ def components(count: int) -> tuple[str, ...]:
     return _COMPONENTS[:count]
 
 
-COMPONENTS = components(4)
-"""Names of the components in two dimensions."""
-
-
 def to_tensor(mandel: Array) -> Array:
     """Return tensor components ``(n_components, ...)`` from Mandel components of that shape."""
     tensor = np.array(mandel, dtype=float)

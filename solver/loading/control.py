@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from solver.kinds import Checked
 from solver.loading.program import Program, load_and_release
-from solver.parameters import AtLeastOne, Infinite, Positive
+from solver.parameters import AtLeastOne, Checked, Infinite, Positive
 
 INCREMENT_ERROR = 0.006
 """Error of stress by the length of an increment, over the yield stress, at most: the errors of all

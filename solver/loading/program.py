@@ -13,8 +13,7 @@ from itertools import groupby, pairwise, takewhile
 from typing import Any
 
 from solver.errors import ModelError
-from solver.kinds import check
-from solver.parameters import AtLeastOne, NotNegative
+from solver.parameters import AtLeastOne, NotNegative, check
 from solver.typing import Array
 
 ROUNDING = 1e-9

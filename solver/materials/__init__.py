@@ -5,8 +5,8 @@ curve and back stresses decide how it responds. Its forms declare the parts: `Ch
 such as `Voce` or `Table`, and `BackStress`es, such as `ArmstrongFrederick`; `Material` linear
 hardening by numbers; `TrescaMaterial` and `SmoothMaterial` another yield surface. In `Layered`,
 layers yield one after the other. `PlaneStress` turns any law into one for plane stress; `Heated`
-lowers the stiffness and strength of any law. Both inherit from `wrapped.Wrapped`, which takes all
-other members from the wrapped law.
+lowers the stiffness and strength of any law. Both inherit from `law.Wrapped`, which takes all other
+members from the wrapped law.
 """
 
 from solver.materials.back_stress import ArmstrongFrederick, BackStress

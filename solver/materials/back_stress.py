@@ -12,15 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.kinds import Checked
 from solver.materials.law import attribute
-from solver.parameters import NotNegative
+from solver.parameters import Checked, NotNegative
 from solver.typing import Array
 
 _STEP = 1e-5
-"""Step of the central differences, relative; their error is its square. |normal| is 1.2."""
+"""Relative step of the central differences, whose error is of the order of its square; |normal| is
+1.2."""
 _STRAIN = 1e-4
-"""Plastic strain added to dp in the scale of the step: not less than the strain at first yield."""
+"""Plastic strain added to dp where the step is taken relative to dp: about the strain at first
+yield."""
 
 
 class BackStress(ABC):
@@ -38,7 +39,7 @@ class BackStress(ABC):
 
     @attribute
     def limit(self) -> float:
-        """Stress that it tends to in tension [MPa]; inf if it grows without bound."""
+        """Limit of the back stress in tension [MPa]; inf if it grows without bound."""
         raise NotImplementedError(f"{type(self).__name__} must give its limit")
 
     @attribute

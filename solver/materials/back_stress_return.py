@@ -20,10 +20,11 @@ from solver.typing import Array, Ints
 _ROUNDING = 8 * float(np.finfo(float).eps)
 """Ratio of residual to trial stress; up to it the residual is rounding."""
 _SMALL = 1e-10
-"""Ratio up to which a point counts as solved when further steps do not lessen the residual."""
+"""Ratio of residual to trial stress up to which a point counts as solved if further steps do not
+reduce the residual."""
 _MAX_ITERATIONS = 100
 _BLOCK = 300
-"""Points that are solved together: their arrays stay in the cache of the processor."""
+"""Number of points solved together, so that their arrays stay in the cache of the processor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +170,7 @@ def general_return(
 
     1. unknowns: relative stress xi and growth dp; N = 3/2 xi / q, with q its von Mises stress
     2. ``xi - s + 2 G dp N + sum of X(dp, N) = 0`` and ``q - R(p + dp) = 0``
-    3. Newton's method from the flow without hardening; a step that does not lessen the residual, or
+    3. Newton's method from the flow without hardening; a step that does not reduce the residual, or
        makes dp negative, is halved
     4. the tangent follows from the derivative of xi and dp by s, from the same equations
 

@@ -10,8 +10,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.kinds import Checked
-from solver.parameters import Infinite, Modulus, NotNegative
+from solver.parameters import Checked, Infinite, Modulus, NotNegative
 from solver.typing import Array
 
 Saturation = Annotated[float, Interval(ge=0.0, le=1e7), Unit("MPa")]
@@ -29,7 +28,7 @@ class Curve(Protocol):
 
     @property
     def limit(self) -> float:
-        """Size that it tends to [MPa]; inf if it grows without bound."""
+        """Limit of the size at large plastic strain [MPa]; inf if it grows without bound."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

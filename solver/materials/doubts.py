@@ -13,7 +13,8 @@ it."""
 _METALS = (1e4, 1e6)
 """Range of Young's modulus of metals and ceramics, with a margin [MPa]."""
 _UNITS = (("GPa", 1e3, 1.0), ("kPa", 1.0, 1e-3), ("Pa", 1.0, 1e-6))
-"""A wrong unit, and the factors to MPa of Young's modulus and of the yield stress, if in it."""
+"""Wrong unit, and the factors to MPa of Young's modulus and of the yield stress if only that one is
+given in it."""
 
 
 def doubts(laws: Mapping[str, Law]) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """The law of parts: elasticity, yield surface, hardening curve and back stresses.
 
-`ElasticPlastic` is the law; its subclasses only declare its parts. What the parts are decides how
-it responds: in closed form if hardening is linear on a von Mises surface, by one scalar equation or
+`ElasticPlastic` is the law; its subclasses only declare its parts. The parts decide how it
+responds: in closed form if hardening is linear on a von Mises surface, by one scalar equation or
 Newton's method with other curves and back stresses, and in principal stresses on other surfaces.
 """
 
@@ -47,12 +47,12 @@ class ElasticPlastic(Law):
 
     @attribute
     def back_stresses(self) -> tuple[BackStress, ...]:
-        """Rules of the parts of its centre; only a von Mises surface moves."""
+        """Rules of the back stresses, whose sum is the centre; only a von Mises surface moves."""
         return ()
 
     @cached_property
     def linear_hardening(self) -> LinearHardening | None:
-        """Its hardening, if the surface is von Mises' and grows and moves linearly."""
+        """The hardening, if it is linear and the surface is von Mises'; None otherwise."""
         curve, moduli, own = self.curve, 0.0, type(self)
         # a subclass may change what it inherits
         if not (
@@ -88,7 +88,7 @@ class ElasticPlastic(Law):
 
     @property
     def ultimate_shear_stress(self) -> float:
-        """Shear stress that curve and back stresses together tend to [MPa]."""
+        """Limit of the shear stress that curve and back stresses carry together [MPa]."""
         return self.surface.shear(self._limit)
 
     @property
@@ -178,7 +178,7 @@ class Chaboche(ElasticPlastic):
     ----------
     elasticity : Hooke's law
     curve : size of the yield surface over the accumulated plastic strain
-    back_stresses : rules of the parts of its centre
+    back_stresses : rules of the back stresses, whose sum is the centre of the yield surface
 
     References
     ----------

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.kinds import Checked
-from solver.parameters import Infinite, Modulus, Poisson
+from solver.parameters import Checked, Infinite, Modulus, Poisson
 from solver.tensors import identity
 from solver.typing import Array
 

@@ -12,14 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.errors import ModelError
-from solver.kinds import Checked
 from solver.materials.back_stress import ArmstrongFrederick, BackStress
 from solver.materials.curves import Curve, Rate, Saturation, Table, Voce
 from solver.materials.elastic_plastic import Chaboche
 from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
 from solver.materials.layered import Layered
-from solver.parameters import Fraction, HardeningRatio, Pairs, described
+from solver.parameters import Checked, Fraction, HardeningRatio, Pairs, described
 from solver.parts import Parts
 from solver.typing import Array
 

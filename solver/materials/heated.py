@@ -14,9 +14,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from solver.materials.law import Law
+from solver.materials.law import Law, Wrapped
 from solver.materials.state import PlasticState, Response
-from solver.materials.wrapped import Wrapped
 from solver.typing import Array, Ints
 
 

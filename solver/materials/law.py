@@ -1,4 +1,4 @@
-"""The contract of a material law: what bodies, contact and audit use of it.
+"""The contract of a material law: all that bodies, contact and audit use.
 
 A law gives stress, tangent and new internal variables for a strain (`Law.respond`). It never
 changes the state it is given; the new state replaces it only when the increment has converged.
@@ -87,7 +87,7 @@ class Law(ABC):
 
     @attribute
     def linear_hardening(self) -> LinearHardening | None:
-        """Its hardening, if it is von Mises' law with linear hardening; None otherwise.
+        """Linear hardening, if the law is von Mises' with linear hardening; None otherwise.
 
         Its responses then have closed forms, and its flow along rows is compiled.
         """
@@ -136,7 +136,7 @@ class Law(ABC):
 
     @attribute
     def elastic(self) -> bool:
-        """Whether it can never yield."""
+        """Whether the material never yields."""
         return math.isinf(self.yield_stress)
 
     @attribute
@@ -203,3 +203,40 @@ class Law(ABC):
         aside = self.surface.flow_rule_error(relative, flow, dp, 2 * G)
         aside = np.maximum(aside - dp * turned, 0.0)
         return np.asarray(np.maximum(worst, 2 * G * np.maximum(aside, -dp)))
+
+
+class Wrapped(Law):
+    """A law that takes from the wrapped law all members that a subclass does not define.
+
+    A subclass defines at least `respond`.
+    """
+
+    __slots__ = ()
+
+    law: Law
+
+    def flow_stress(self, state: PlasticState) -> Array:
+        """Return the flow stress (n_points,) of the wrapped law [MPa]."""
+        return self.law.flow_stress(state)
+
+    @property
+    def linear_hardening(self) -> LinearHardening | None:
+        """None: the response of the law inside is not that of this law."""
+        return None
+
+
+def _forwarded(name: str, member: object) -> Any:
+    if isinstance(member, attribute):
+        return property(lambda self: getattr(self.law, name), doc=member.__doc__)
+
+    def call(self: Wrapped, *args: Any, **options: Any) -> Any:
+        method: Callable[..., Any] = getattr(self.law, name)
+        return method(*args, **options)
+
+    call.__name__, call.__doc__ = name, member.__doc__
+    return call
+
+
+for _name, _member in vars(Law).items():
+    if not _name.startswith("_") and _name not in {*vars(Wrapped), "respond"}:
+        setattr(Wrapped, _name, _forwarded(_name, _member))

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from solver.kinds import Checked
 from solver.materials.back_stress import ArmstrongFrederick
 from solver.materials.curves import Voce
 from solver.materials.elastic_plastic import ElasticPlastic
 from solver.materials.elasticity import Elasticity
-from solver.parameters import Fraction, HardeningRatio, Infinite, Modulus, Poisson
+from solver.parameters import Checked, Fraction, HardeningRatio, Infinite, Modulus, Poisson
 
 Hardening = Literal["none", "isotropic", "kinematic", "mixed"]
 
@@ -62,16 +61,6 @@ class Material(Checked, ElasticPlastic):
         """Prager's back stress, if the yield surface moves."""
         modulus = self.kinematic_modulus
         return (ArmstrongFrederick(modulus),) if modulus else ()
-
-    @property
-    def shear_modulus(self) -> float:
-        """G [MPa]."""
-        return self.elasticity.shear_modulus
-
-    @property
-    def bulk_modulus(self) -> float:
-        """K [MPa]."""
-        return self.elasticity.bulk_modulus
 
     @property
     def plastic_modulus(self) -> float:

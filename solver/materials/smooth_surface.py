@@ -1,4 +1,4 @@
-"""Smooth user-defined yield surfaces: a function of principal stresses, and all that follows.
+"""Smooth user-defined yield surfaces, each given by one function of the principal stresses.
 
 The yield surface of an isotropic material that does not depend on mean stress is a cylinder along
 the hydrostatic axis. Its section is symmetric about the axes of the principal stresses, so that one
@@ -30,9 +30,10 @@ _IMAGINARY = 1e-30
 _STEP = 3e-6
 """Step of the central difference of the exact slopes: rounding and truncation are 1e-10."""
 _NOISE = 10.0
-"""Rounding of a slope, in units of the rounding of one operation."""
+"""Rounding error of a slope over that of one operation."""
 _STATIONARY = 1e4
-"""Tolerance of the angle of `power`, in units of rounding: power is stationary in this angle."""
+"""Tolerance of the angle in `power` over rounding; a loose one suffices, since power is stationary
+in this angle."""
 _FLAT = 1e-12
 """Curvature assigned to a flat face."""
 
@@ -242,11 +243,11 @@ class SmoothSurface(YieldSurface):
             below, above = self.at(angle - step), self.at(angle + step)
             steep = np.abs(slope) + np.abs(bend) + f
             conditions = {
-                "the stress itself in tension": (pull - 1.0, 1e-9),
-                "so many times as large as stress": (larger / size - 8.0, 1e-6),
-                "the same at any mean stress": (moved / size - 1.0, 1e-9),
+                "equal to the stress in tension": (pull - 1.0, 1e-9),
+                "proportional to the stress": (larger / size - 8.0, 1e-6),
+                "independent of the mean stress": (moved / size - 1.0, 1e-9),
                 "without a corner where two stresses are the same": (slope[[0, -1]], 1e-6),
-                "the same in its profile": (f / size - 1.0, 1e-9),
+                "equal to that of its profile": (f / size - 1.0, 1e-9),
                 "computed with complex numbers, without abs": (
                     ((above.size - below.size) / (2 * step) - slope) / steep, 1e-4),
                 "convex": (np.minimum(f + bend, 0.0) / steep, 1e-6),

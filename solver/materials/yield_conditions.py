@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from solver.errors import ModelError
-from solver.kinds import Checked
 from solver.materials.elastic_plastic import SmoothMaterial, TrescaMaterial
 from solver.materials.elasticity import Elasticity
 from solver.materials.hardening_rules import GrowingRule, HardeningRule
 from solver.materials.law import Law
 from solver.materials.smooth_surface import SmoothSurface
+from solver.parameters import Checked
 from solver.parts import Parts
 
 
@@ -66,7 +66,7 @@ class SmoothCondition(SmoothSurface, YieldCondition):
 @YIELD_CONDITIONS.word("mises")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MisesCondition(YieldCondition):
-    """Yield by the size of the deviator; it can be combined with every hardening rule."""
+    """Yield by the size of the deviator, with any hardening rule."""
 
     rules: ClassVar[type[Any]] = HardeningRule
 

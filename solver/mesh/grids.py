@@ -5,14 +5,16 @@ A body takes any scikit-fem mesh with named boundaries, also one of `studies.sce
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Sized
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 from skfem import Mesh, MeshQuad, MeshQuad2, MeshTri
 
 from solver.errors import ModelError
+from solver.mesh.elements import element_type
 from solver.mesh.rounding import ROUNDED, in_box
 from solver.typing import Array, Ints
 
@@ -36,6 +38,30 @@ def grid(x: Array, y: Array, cells: str = "quad") -> Mesh:
             name: lambda m, axis=axis, value=value: np.abs(m[axis] - value) < tolerance
             for name, (axis, value) in sides.items()
         }
+    )
+
+
+class GridSize(NamedTuple):
+    """Numbers of elements and nodes of a grid, and of nodes on one line along x and along y."""
+
+    elements: int
+    nodes: int
+    along: int
+    up: int
+
+
+def grid_size(x: Sized, y: Sized, element: str) -> GridSize:
+    """Return the size of `grid` for these lines, without making it."""
+    kind, columns, rows = element_type(element), len(x) - 1, len(y) - 1
+    at_corner, on_edge = kind.element.nodal_dofs, kind.element.facet_dofs
+    rectangles, parts = columns * rows, 1 + (kind.cells == "tri")  # a diagonal cuts a rectangle
+    edges = columns * (rows + 1) + rows * (columns + 1) + (parts - 1) * rectangles
+    inside = kind.element.interior_dofs * parts * rectangles
+    return GridSize(
+        elements=parts * rectangles,
+        nodes=at_corner * (columns + 1) * (rows + 1) + on_edge * edges + inside,
+        along=at_corner * (columns + 1) + on_edge * columns,
+        up=at_corner * (rows + 1) + on_edge * rows,
     )
 
 

@@ -17,10 +17,9 @@ from annotated_types import Interval, Unit
 from skfem import Mesh
 
 from solver.errors import ModelError
-from solver.kinds import Checked, require
 from solver.mesh.grids import grid, joined, mapped, merged, renamed
 from solver.mesh.lines import continued, refined
-from solver.parameters import Coordinate, Length
+from solver.parameters import Checked, Coordinate, Length, require
 from solver.typing import Array
 
 Pair = tuple[Coordinate, Coordinate]
@@ -285,13 +284,9 @@ def ball(
     across = lines if above else -lines[::-1]
     few((len(along) - 1) * (len(across) - 1))
     bent = mapped(grid(along, across), lambda X: _onto_disc(X, radius))
-    return renamed(bent, ball_sides(above=above)).translated(at)
-
-
-def ball_sides(*, above: bool) -> dict[str, str]:
-    """Return the boundaries of a ball: name -> side of the grid that is mapped onto it."""
     surface, cap = ("bottom", "top") if above else ("top", "bottom")
-    return {"surface": surface, "cap": cap, "left": "left", "right": "right"}
+    sides = {"surface": surface, "cap": cap, "left": "left", "right": "right"}
+    return renamed(bent, sides).translated(at)
 
 
 def ball_lines(radius: float, fine: float, size: float, growth: float) -> Array:

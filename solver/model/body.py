@@ -11,7 +11,6 @@ import numpy as np
 from skfem import Mesh
 
 from solver.errors import ModelError
-from solver.kinds import check
 from solver.materials import Law, PlaneStress
 from solver.mesh.check import check_mesh
 from solver.mesh.elements import element_type
@@ -19,7 +18,7 @@ from solver.mesh.rounding import with_zeros
 from solver.model.amplitude import Amplitude
 from solver.model.loads import Displacement, Kinematics, Load, Pressure
 from solver.model.motion import Axle, TravellingPressure
-from solver.parameters import Thickness
+from solver.parameters import Thickness, check
 from solver.tensors import AXES
 
 Held = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]

@@ -8,10 +8,9 @@ from typing import Literal
 import numpy as np
 
 from solver.errors import ModelError
-from solver.kinds import check
 from solver.model.amplitude import Amplitude
 from solver.model.friction import FrictionLaw, law_of
-from solver.parameters import Coordinate, Friction
+from solver.parameters import Coordinate, Friction, check
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

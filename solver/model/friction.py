@@ -18,8 +18,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.kinds import Checked
-from solver.parameters import Friction, Other, described
+from solver.parameters import Checked, Friction, Other, described
 from solver.parts import Parts
 from solver.typing import Array, Bools, Ints
 

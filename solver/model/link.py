@@ -9,8 +9,7 @@ from typing import Annotated, Literal
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.kinds import check
-from solver.parameters import Infinite
+from solver.parameters import Infinite, check
 
 Components = Literal["x", "y", "xy", "normal", "tangential"]
 Springs = Annotated[float, Interval(gt=0.0), Unit("N/mm3")]

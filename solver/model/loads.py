@@ -21,9 +21,8 @@ import scipy
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.kinds import check
 from solver.model.amplitude import Amplitude
-from solver.parameters import Coordinate
+from solver.parameters import Coordinate, check
 from solver.parts import Parts
 from solver.typing import Array
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.errors import ModelError
-from solver.kinds import check
 from solver.materials.doubts import doubts
 from solver.model.body import Body
 from solver.model.contact_pair import ContactPair
 from solver.model.link import Link
 from solver.model.rigid import Pushed, RigidBody
 from solver.model.singular import SingularPoint
+from solver.parameters import check
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.errors import ModelError
-from solver.kinds import check
 from solver.materials import Elasticity, Law, PlasticState, Response
 from solver.model.loads import Load
-from solver.parameters import Coordinate, Infinite, Thickness
+from solver.parameters import Coordinate, Infinite, Thickness, check
 from solver.typing import Array, Ints
 
 _TURN = 0.1

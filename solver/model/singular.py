@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.kinds import Checked
-from solver.parameters import Coordinate, Length
+from solver.parameters import Checked, Coordinate, Length
 from solver.typing import Array, Bools
 
 

@@ -6,8 +6,7 @@ from dataclasses import MISSING, dataclass
 
 import numpy as np
 
-from solver.kinds import Checked
-from solver.parameters import Friction, Length, Stress, described
+from solver.parameters import Checked, Friction, Length, Stress, described
 from solver.results.contact_result import ContactResult
 from solver.results.outputs import output
 from solver.results.quantities import declare

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from solver.fem.dofs import Dofs, vectors
-from solver.kinds import Checked
 from solver.mesh.rounding import ROUNDED
-from solver.parameters import Length, described
+from solver.parameters import Checked, Length, described
 from solver.results.contact_result import contact_patches
 from solver.results.fields import Bodies, Solved
 from solver.results.outputs import output

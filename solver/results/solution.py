@@ -19,7 +19,6 @@ from solver.contact.system import System
 from solver.errors import ModelError
 from solver.fem.dofs import vectors
 from solver.fem.frame import RigidMotion
-from solver.kinds import require
 from solver.loading.control import Control, PathControl
 from solver.loading.cycle import Cycle
 from solver.loading.outcome import Tally
@@ -29,7 +28,7 @@ from solver.loading.walker import Walker
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.model.rigid import RigidBody
-from solver.parameters import Positive
+from solver.parameters import Positive, require
 from solver.results import saved
 from solver.results.body_fields import BodyValues
 from solver.results.contact_result import ContactResult, contact_result

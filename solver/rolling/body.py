@@ -1,4 +1,4 @@
-"""What a steady pass asks of the body that a load passes over."""
+"""The body that a load passes over, as a steady pass uses it."""
 
 from __future__ import annotations
 
@@ -53,7 +53,8 @@ class FlowPast(ABC, Generic[S]):
     Attributes
     ----------
     states : internal variables (..., n_rows, n_columns)
-    force : what balances the plastic strain that the pass adds, as the body solves for it
+    force : force or eigenstress equivalent to the plastic strain that the pass adds, as the body
+        takes it
     """
 
     force: Array
@@ -79,7 +80,7 @@ class FlowPast(ABC, Generic[S]):
 
     @property
     def beyond(self) -> str:
-        """Where the window is too small, as points yield at its edge; empty if nowhere."""
+        """Side where the window is too small, since points yield there; else empty."""
         return ""
 
     @abstractmethod
@@ -92,7 +93,7 @@ class FlowPast(ABC, Generic[S]):
 
 
 class PassedBody(Protocol[S]):
-    """An elastic body with rows of points around a load; each kind has its own kind of field u."""
+    """An elastic body with rows of points around a load; each kind of body has its own field u."""
 
     @property
     def weights(self) -> Array:
@@ -104,7 +105,7 @@ class PassedBody(Protocol[S]):
 
     @property
     def rough(self) -> Self:
-        """The same body with fewer digits, for Newton's equation, which is solved to one."""
+        """The same body in lower precision, for Newton's equation, which is solved to one digit."""
 
     def solve(self, force: Array) -> Any:
         """Return the field of a ``force`` of `FlowPast`, without the load."""

@@ -1,4 +1,4 @@
-"""What passes over a body along +x: its force and motion, and how it acts on the body."""
+"""The load that passes over a body along +x: its force and motion, and how it acts on the body."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from solver.errors import Spins
-from solver.kinds import Checked
-from solver.parameters import Positive
+from solver.parameters import Checked, Positive
 from solver.typing import Array
 
 FULL_SLIP = 1.0
@@ -20,7 +19,7 @@ FULL_SLIP = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RollingLoad(Checked):
-    """What a wheel carries, and how it moves; a moment or force that is None is not prescribed.
+    """Force and motion of a wheel; a moment or force that is None is not prescribed.
 
     Attributes
     ----------
@@ -87,13 +86,13 @@ class AppliedLoad:
 
     @property
     def start(self) -> Self:
-        """What the contact of another pass begins with."""
+        """The first guess for the contact of another pass."""
         return self
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PassingLoad(ABC):
-    """What passes over a body; never changed, only replaced.
+    """A load that passes over a body; never changed, only replaced.
 
     Attributes
     ----------
@@ -104,7 +103,7 @@ class PassingLoad(ABC):
 
     @abstractmethod
     def on(self, u: Any, before: Any, start: Any = None) -> AppliedLoad:
-        """Return how it acts.
+        """Return how the load acts.
 
         Parameters
         ----------
@@ -122,7 +121,7 @@ class PassingLoad(ABC):
 class Given(PassingLoad):
     """Constant nodal forces (n,) [N], and the displacements (m,) that they cause [mm].
 
-    Both are those of a ``load`` of 1, which is their factor.
+    They are given for a ``load`` of 1, which multiplies them.
     """
 
     force: Array

@@ -32,28 +32,31 @@ from solver.rolling.load import AppliedLoad, PassingLoad
 from solver.typing import Array
 
 TOLERANCE = 1e-4
-"""Largest deviatoric strain of the residual, times 2 G / yield stress, of a converged pass."""
+"""Tolerance of a pass: largest deviatoric strain of the residual times 2 G, over the yield
+stress."""
 
 _FORCING = 0.1
 """Relative residual to which GMRES solves Newton's equation."""
 _KRYLOV, _MOST_KRYLOV = 60, 240
-"""Largest number of GMRES iterations for a step of Newton's method: at first, and if too few."""
+"""Largest number of GMRES iterations for a Newton step: at first, and after some were too few."""
 _STALLED = 0.98
-"""Ratio of a residual to the one before; above it a step that GMRES did not solve has stalled."""
+"""A Newton step that GMRES did not solve has stalled if the residual falls to more than this
+share."""
 _FAR_FROM = 0.01
-"""Ratio of the residual to the first one; above it a pass is far from convergence."""
+"""A pass is far from convergence while its residual is above this share of the first one."""
 _STEPS = 60
 _SHORTEST = 1 / 32
 """Smallest share of a Newton step in the line search."""
 _AWAY = 3.0
-"""Largest growth of the residual that a whole step may cause."""
+"""Largest ratio of the residual after a whole step to that before."""
 _FLOWS, _RUNS = 0.1, 1.0
-"""A stalled solve counts as a limit load above the first plastic strain, any solve above the
-second. A material that hardens has no limit load: Newton's method has then diverged."""
+"""Plastic strains above which a stalled solve, or any solve, counts as a limit load. A material
+that hardens has no limit load: Newton's method has then diverged."""
 _SOLVES = 10_000
-"""Largest number of solves with the stiffness until a pass is found; one pass takes 50 to 2100."""
+"""Largest number of solves with the stiffness for one pass; a pass takes 50 to 2100."""
 _PATIENCE, _PROGRESS = 14, 0.7
-"""Over this number of steps the residual must drop to this ratio, or the pass is given up."""
+"""Number of steps, and the share of the residual to which it must fall in them; otherwise the
+search for the pass ends."""
 
 
 class SolveBudget:
@@ -151,7 +154,7 @@ def passing(
     load : load that passes along +x
     before : state by depth before the pass
     guess : strains (n_rows, n_columns, n_components) to start from, for instance of a similar pass
-    start : what the first contact begins with, for instance that of the pass before
+    start : first guess for the contact, for instance that of the pass before
     parts : number of increments between two points of a row, `PARTS` if None
     tolerance : largest deviatoric strain of the residual, times 2 G / yield stress
     budget : counts the solves, those of earlier attempts included
@@ -263,7 +266,7 @@ class _At(Generic[S]):
 
 
 def searched(at: Callable[[float], Sized], size: float, shortest: float = _SHORTEST) -> Sized:
-    """Return the iterate after a step, or after a share of it if only that lowers the residual.
+    """Return the iterate after a Newton step, or after the share that lowers the residual.
 
     The residual has kinks where points begin to yield, open, close or slip. Shares are halved until
     one lowers the residual, and on as long as the next one lowers it further: a share that barely

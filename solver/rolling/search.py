@@ -28,15 +28,16 @@ from solver.rolling.passing import TOLERANCE, Pass, SolveBudget, passing
 from solver.typing import Array
 
 _HARDEST, _SOFTEST = 0.024, 1e-4
-"""First and last hardening ratio, slope of the uniaxial curve over Young's modulus."""
+"""Hardening ratios, slope of the uniaxial curve over Young's modulus: the first and the last
+one."""
 _STIFFEST = 0.3
-"""Largest first hardening ratio, tried if no pass is found with `_HARDEST`, and only for a material
+"""Largest hardening ratio to begin with if no pass is found with `_HARDEST`, only for a material
 that hardens. Without hardening such a load is above the limit, or too close to it."""
 _SHARE, _SLOWEST = 1 / 3, 0.8
-"""Ratio of one hardening ratio to the previous one: at first, and at most after failures."""
+"""Ratio of a hardening ratio to the previous one: the first, and the largest after failures."""
 _LARGE = 0.3
-"""Plastic strain added in a pass; above it the load counts as the limit load of a material without
-hardening. It grows as elements become smaller."""
+"""Plastic strain added in a pass above which the load counts as the limit load of a material
+without hardening. It grows as elements become smaller."""
 _LIGHTER, _HEAVIER = (0.8, 0.9, 0.95), (1.1, 1.06, 1.03)
 """Factors of the load in the passes that lead to it."""
 _PARTS, _TOLERANCE = 8, 2e-3
@@ -62,8 +63,8 @@ def search(
 
     Parameters
     ----------
-    wider : whether an easier pass that needs a larger window, or too many solves, is an error of
-        its own; if not, the error is that of the pass itself
+    wider : whether to raise the error of an easier pass that needs a larger window, or too many
+        solves; otherwise the error is that of the pass itself
 
     Raises
     ------
@@ -171,7 +172,7 @@ def _check_spinning(exactly: Callable[[RollingLoad], Pass[Any]], load: RollingLo
 
 
 def _tried(solve: Callable[..., Pass[S]], *given: Any) -> Pass[S] | NotConverged:
-    """Return a pass, or the reason why it was not found; raise what no easier pass can mend."""
+    """Return a pass, or its error; raise an error that no easier pass can mend."""
     try:
         return solve(*given)
     except (WindowTooSmall, TooLong, Spins):

@@ -7,7 +7,6 @@ the functions that compute it as text: they are imported when they are called.
 
 from __future__ import annotations
 
-from solver.scenes.effort import Effort
-from solver.scenes.scene import Monitor, Scene
+from solver.scenes.scene import Effort, Monitor, Scene
 
 __all__ = ["Effort", "Monitor", "Scene"]

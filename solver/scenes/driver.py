@@ -90,7 +90,7 @@ def _merged(run: FinishedRun, outputs: Sequence[Output]) -> Values:
 def by_increments(
     scene: Scene, runs: Iterable[Any], monitor: Monitor, largest: Any = None
 ) -> Iterator[FinishedRun]:
-    """Solve the programs of runs that differ in the branch parameter; yield each when finished.
+    """Solve the programs of runs that differ in the branch parameter; yield each run when finished.
 
     With `largest`, a bound on the runs, the next run is asked for when the one before is finished.
     """

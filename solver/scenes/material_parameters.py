@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from solver.errors import ModelError
-from solver.kinds import check
 from solver.materials.elasticity import Elasticity
 from solver.materials.hardening_rules import HARDENING
 from solver.materials.law import Law
@@ -15,7 +14,7 @@ from solver.materials.material import Material
 from solver.materials.yield_conditions import YIELD_CONDITIONS
 from solver.model.contact_pair import ContactPair
 from solver.model.friction import FRICTION, FrictionLaw
-from solver.parameters import Accuracy, Poisson, Stress, described
+from solver.parameters import Accuracy, Poisson, Stress, check, described
 from solver.parts import Parts
 
 

@@ -38,12 +38,12 @@ _USUAL: Mapping[Accuracy, Mapping[str, float]] = {
 }
 """Parameters of each accuracy; docs/accuracy.md has their errors."""
 _LARGEST, _PUNCH_LARGEST = 0.08, 0.25
-"""Ratios of the largest element side to a: along the contact, and along the height of the punch."""
+"""Largest element sides along the contact, and along the height of the punch, over a."""
 _MOST_ELEMENTS = 60_000
 NEAREST = 0.005
-"""Ratio of the distance from the corner of the first published number to a."""
+"""Distance from the corner of the first published number, over a."""
 _DIAGONAL = 1.5
-"""Ratio of the diagonal of an element at the corner to its side, sqrt(2) rounded up."""
+"""Diagonal of an element at the corner over its side: sqrt(2), rounded up."""
 
 
 class Lines(NamedTuple):

@@ -11,16 +11,15 @@ import numpy as np
 from solver.audit.cut import cut_force
 from solver.loading.program import Program, load_and_release, walked
 from solver.mesh.elements import element_type
-from solver.mesh.grids import grid
+from solver.mesh.grids import grid, grid_size
 from solver.mesh.lines import cells
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.results.quantities import Quantity, declare
 from solver.results.run import FinishedRun, Values
 from solver.results.view import View
-from solver.scenes.effort import Effort
-from solver.scenes.grid_size import GridSize, grid_size
 from solver.scenes.punch import NEAREST, PunchParameters
+from solver.scenes.scene import Effort
 from solver.typing import Array
 
 
@@ -60,16 +59,11 @@ def program(parameters: PunchParameters) -> Program:
     return replace(pressed, place="load_ratio {:.6g}".format)
 
 
-def grid_sizes(parameters: PunchParameters) -> tuple[GridSize, GridSize]:
-    """Return the sizes of the grids of punch and half-plane."""
-    under, beyond, up, down = (len(each) - 1 for each in parameters.lines)
-    element = parameters.element
-    return grid_size(under, up, element), grid_size(under + beyond, down, element)
-
-
 def effort(parameters: PunchParameters, load_ratios: Sequence[float]) -> Effort:
     """Return the work of loading to each load ratio in turn and of releasing from each."""
-    punch, plane = grid_sizes(parameters)
+    under, beyond, up, down = parameters.lines
+    punch = grid_size(under, up, parameters.element)
+    plane = grid_size([*under, *beyond[1:]], down, parameters.element)
     # an elastic punch is reduced to its contact surface; x is held on the line of symmetry
     own = 2 * punch.along - 1 if parameters.elastic_punch else 2 * punch.nodes - punch.up
     increments = _increments(tuple(load_ratios), parameters.load_step, parameters.unload_steps)
@@ -135,7 +129,7 @@ SELF_EQUILIBRIUM = declare(
     "ratio of the residual normal force on a plane cut to yield stress times area",
 )
 _INSIDE = {"half_plane": NEAREST, "punch": 0.028}
-"""Ratio of the distance from the corner at which the publication has residual stress to a."""
+"""Distance from the corner at which residual stress is published, over a."""
 
 
 def figures(run: FinishedRun) -> Values:

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from skfem.assembly import Dofs
 
 from solver.errors import ModelError
-from solver.scenes.effort import Effort
+from solver.mesh.elements import element_type
+from solver.mesh.shapes import few
+from solver.scenes.scene import Effort
 from studies.errors import StudyError
 from studies.scenes import tables
-from studies.scenes.body_size import BodySize, is_grid, size_of_grid, size_of_mesh
-from studies.scenes.building import friction_of, increments_of, load_of, mesh_of_body
+from studies.scenes.building import (
+    default_element,
+    friction_of,
+    increments_of,
+    load_of,
+    mesh_of_body,
+)
+from studies.scenes.shape_tables import GridTable, RoundTable, lines_of
 
 if TYPE_CHECKING:
+    from skfem import Mesh
+
     from studies.scenes.description import Description
 
 _MOST_INCREMENTS = 200_000
@@ -54,20 +65,21 @@ def effort_of(
         held += [(b, axis) for each in loads for b in each.boundaries for axis in each.components]
         for axis in (0, 1):
             fixed = size.on(boundary for boundary, along in held if along == axis)
-            unknowns += size.nodes if condensed is None else size.count(condensed)
-            unknowns -= size.count(fixed if condensed is None else fixed & condensed)
+            kept = range(size.nodes) if condensed is None else condensed
+            unknowns += len(kept) - len(fixed.intersection(kept))
     total = sum(increments)
     return Effort(elements=elements, unknowns=unknowns, increments=total, most_increments=total)
 
 
-def too_large(description: Description, scene: tables.SceneFile) -> Iterator[StudyError]:
-    """Yield mistakes in shapes that are grids: those that make no mesh, or a too large one."""
+def too_large(scene: tables.SceneFile) -> Iterator[StudyError]:
+    """Yield mistakes in shapes that are grids: those without lines, or with too many."""
     for name, body in scene.bodies.items():
-        if is_grid(body):
+        if isinstance(body.shape, GridTable | RoundTable):
             try:
-                _size_of(description, name, body)
-            except StudyError as error:
-                yield error
+                lines_of(body.shape)
+            except ModelError as error:
+                field = f"bodies.{name}.shape.{error.field}"
+                yield StudyError(field, error.value, error.allowed)
 
 
 def too_long(description: Description, scene: tables.SceneFile) -> Iterator[StudyError]:
@@ -106,27 +118,57 @@ def _free_motions(scene: tables.SceneFile) -> int:
     return sum(motion.pushed is not None for motion in motions)
 
 
-_SIZES: WeakKeyDictionary[Description, dict[str, BodySize]] = WeakKeyDictionary()
-"""Sizes of the bodies of each description in use, by the JSON of their tables."""
+class _BodySize(NamedTuple):
+    """Numbers of elements and nodes of a body, and the numbers of the nodes of each boundary."""
+
+    elements: int
+    nodes: int
+    boundaries: Mapping[str, frozenset[int]]
+
+    def on(self, boundaries: Iterable[str]) -> frozenset[int]:
+        """Return the nodes of boundaries; unknown ones have none."""
+        each = (self.boundaries.get(name, frozenset()) for name in boundaries)
+        return frozenset().union(*each)
+
+
+def _size_of_mesh(mesh: Mesh, element: str | None) -> _BodySize:
+    """Return the size of a mesh with an element; None is the default element of a body."""
+    nodes = Dofs(mesh, element_type(element or default_element(mesh)).element)
+    boundaries = {
+        name: frozenset(nodes.get_facet_dofs(np.asarray(facets)).flatten().tolist())
+        for name, facets in (mesh.boundaries or {}).items()
+    }
+    return _BodySize(mesh.nelements, int(nodes.N), boundaries)
+
+
+_SIZES: WeakKeyDictionary[Description, dict[str, _BodySize]] = WeakKeyDictionary()
+"""Sizes of the bodies of each description in use, by the JSON of what decides them."""
 _MOST = 256
 """Largest number of sizes that are kept for a description."""
 
 
-def _size_of(description: Description, name: str, body: tables.BodyTable) -> BodySize:
-    """Return the size of a body."""
-    known = _SIZES.setdefault(description, {})
-    key = body.model_dump_json(exclude={"supports", "material"})
-    if key not in known:
-        try:
-            known[key] = (
-                size_of_grid(body)
-                if is_grid(body)
-                else size_of_mesh(mesh_of_body(body, description.meshes), body.element)
-            )
-        except ModelError as error:
-            beside = body.shape is None or error.field.startswith(("boundaries.", "cuts."))
-            where = f"bodies.{name}" if beside else f"bodies.{name}.shape"
-            raise StudyError(f"{where}.{error.field}", error.value, error.allowed) from None
-        while len(known) > _MOST:
-            del known[next(iter(known))]
+def _size_of(description: Description, name: str, body: tables.BodyTable) -> _BodySize:
+    """Return the size of a body; its mesh is made for it, within the limit of shapes.
+
+    All grids of as many lines, without cuts and boxes, have the size of one of them.
+    """
+    known, leave = _SIZES.setdefault(description, {}), {"supports", "material"}
+    boxed = body.cuts or any(each.x or each.y for each in body.boundaries.values())
+    try:
+        lines = ""
+        if isinstance(body.shape, GridTable | RoundTable) and not boxed:
+            lines = f"{body.shape.kind} {[len(each) for each in lines_of(body.shape)]}"
+            leave = {*leave, "shape", "move", "regions"}
+        key = lines + body.model_dump_json(exclude=leave)
+        if key not in known:
+            mesh = mesh_of_body(body, description.meshes)
+            if body.shape is not None:
+                few(mesh.nelements)
+            known[key] = _size_of_mesh(mesh, body.element)
+    except ModelError as error:
+        beside = body.shape is None or error.field.startswith(("boundaries.", "cuts."))
+        where = f"bodies.{name}" if beside else f"bodies.{name}.shape"
+        raise StudyError(f"{where}.{error.field}", error.value, error.allowed) from None
+    while len(known) > _MOST:
+        del known[next(iter(known))]
     return known[key]

@@ -11,17 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.kinds import check
 from solver.loading.program import Program, walked
-from solver.parameters import Accuracy, by_accuracy, described
+from solver.parameters import Accuracy, by_accuracy, check, described
 from solver.results.cycles import LEAST, over_cycles
 from solver.results.figures import cost
 from solver.results.named_places import NamedPlaces, at_named_places
 from solver.results.outputs import outputs
 from solver.results.record import Status
 from solver.results.run import FinishedRun, Output, Values
-from solver.scenes.effort import Effort
 from solver.scenes.material_parameters import ContactParameters
+from solver.scenes.scene import Effort
 from studies.errors import SceneError, StudyError
 from studies.scenes import tables
 from studies.scenes.building import Builder, friction_of, law_of, program_of
@@ -273,7 +272,7 @@ def _parameters(description: Description, scene: tables.SceneFile) -> type[Any]:
             if not mistakes:
                 mistakes = [
                     *_wrong_laws(description, found),
-                    *too_large(description, found),
+                    *too_large(found),
                     *too_long(description, found),
                 ]
         except SceneError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -19,7 +19,6 @@ from solver.mesh.shapes import (
     Radius,
     ball,
     ball_lines,
-    ball_sides,
     disc,
     few,
     fillet,
@@ -200,9 +199,7 @@ def mesh_of(shape: Any, cells: str) -> Mesh:
         naming the entry of the shape that is wrong
     """
     if isinstance(shape, GridTable):
-        lines = lines_of(shape)
-        few((len(lines.x) - 1) * (len(lines.y) - 1))
-        return grid(lines.x, lines.y, cells)
+        return grid(*lines_of(shape), cells)
     given = {name: getattr(shape, name) for name in type(shape).model_fields if name != "kind"}
     if near := given.get("near"):
         given["near"] = [Near(**each.model_dump()) for each in near]
@@ -213,28 +210,18 @@ def mesh_of(shape: Any, cells: str) -> Mesh:
     return _MESHED[shape.kind](**given)
 
 
-class GridLines(NamedTuple):
-    """Lines (n,) of a grid before it is bent [mm].
-
-    ``names`` are the boundaries of the mesh: name -> side of the grid.
-    """
-
-    x: Array
-    y: Array
-    names: Mapping[str, str]
-
-
-def lines_of(shape: Any) -> GridLines:
-    """Return the lines of a shape that is one grid, bent or not: `GridTable` or `RoundTable`."""
+def lines_of(shape: GridTable | RoundTable) -> tuple[Array, Array]:
+    """Return the lines of the grid of a shape before it is bent, or raise `ModelError` [mm]."""
     if isinstance(shape, RoundTable):
-        across = ball_lines(shape.radius, shape.fine, shape.size, shape.growth)
-        along = across if shape.symmetric else np.concatenate([-across[:0:-1], across])
-        return GridLines(along, across, ball_sides(above=True))
-    x, y = (
-        _graded(name, marks, [mark.at for mark in marks], shape.growth)
-        for name, marks in (("x", shape.x), ("y", shape.y))
-    )
-    return GridLines(x, y, {name: name for name in ("left", "right", "bottom", "top")})
+        y = ball_lines(shape.radius, shape.fine, shape.size, shape.growth)
+        x = y if shape.symmetric else np.concatenate([-y[:0:-1], y])
+    else:
+        x, y = (
+            _graded(name, marks, [mark.at for mark in marks], shape.growth)
+            for name, marks in (("x", shape.x), ("y", shape.y))
+        )
+    few((len(x) - 1) * (len(y) - 1))
+    return x, y
 
 
 def _graded(field: str, marks: Sequence[_MarkTable], at: Sequence[float], growth: float) -> Array:

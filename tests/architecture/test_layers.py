@@ -15,7 +15,7 @@ from tests.architecture.sources import ROOT, modules
 LAYERS = {
     # from the ground up; a module may import from its own layer and from those before it
     "solver": (
-        "version", "late", "typing", "errors", "files", "parameters", "kinds", "parts", "memory",
+        "version", "late", "typing", "errors", "files", "parameters", "parts", "memory",
         "tensors", "linear", "mesh", "materials", "model", "fem", "contact", "loading",
         "results.quantities", "audit", "results", "scenes", "rolling", "shipped",
     ),

@@ -14,8 +14,8 @@ import pytest
 
 from solver import Body, Material, Model, solve
 from solver.mesh import grid
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import steady_passes
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 from tests.architecture.sources import PROJECT, ROOT, tracked
 from tests.marks import EXPENSIVE, FOLDERS, HERE, of_folder
 

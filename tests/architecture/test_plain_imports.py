@@ -15,7 +15,7 @@ import pytest
 from solver.late import Late
 from solver.results.outputs import MODULES
 from solver.results.quantities import DECLARING
-from solver.rolling.scenes.wheel_rail_parameters import _checked
+from solver.rolling.scenes.wheel_rail import _checked
 from solver.shipped import SCENES
 from tests.architecture.sources import ROOT, importing, modules
 

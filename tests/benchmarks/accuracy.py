@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from solver import Record
 from solver.memory import release
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.scenes.punch import PunchParameters
 from studies.scenes.registry import scene_named
 from tests.benchmarks.measure import Point, timed

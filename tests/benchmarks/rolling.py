@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from solver import SCENES, Record
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 from tests.benchmarks.measure import Point, timed
 from tests.benchmarks.steady import LOADS, graded_by, loads
 

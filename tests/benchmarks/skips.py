@@ -17,8 +17,8 @@ from solver import SCENES, Body, ContactPair, Material, Model, PathControl, solv
 from solver.contact import candidates
 from solver.memory import release
 from solver.mesh import grid
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import steady_passes
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.scenes.punch import PunchParameters
 from solver.scenes.punch_setup import model
 from tests.benchmarks.measure import timed

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from solver.rolling.plane.track import Track
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import steady_passes, track_for
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 from tests.benchmarks.measure import Point, timed
 
 BASE = RollingParameters()

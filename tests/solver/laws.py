@@ -24,7 +24,7 @@ from solver.materials import (
     TrescaMaterial,
     Voce,
 )
-from solver.materials.wrapped import Wrapped
+from solver.materials.law import Wrapped
 from tests.solver.back_stress_rules import BurletCailletaud, OhnoWang
 from tests.solver.yield_surfaces import Hosford, Odd, Quick
 

@@ -36,8 +36,8 @@ from solver.rolling.load import RollingLoad
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.track import track_of
 from solver.rolling.plane.wheel import RollingWheel
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import rim_of
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 WEAK = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)

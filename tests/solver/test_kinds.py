@@ -26,11 +26,10 @@ from solver import (
     solve,
 )
 from solver.contact.system import System
-from solver.kinds import require
 from solver.loading.outcome import Tally
 from solver.mesh import grid
 from solver.model.friction import ContactPlaces, FrictionLaw, Value
-from solver.parameters import Length
+from solver.parameters import Length, require
 from solver.scenes.punch import PunchParameters
 
 

@@ -12,9 +12,8 @@ from solver import ModelError, Status, System
 from solver.contact.complementarity import solve_contact
 from solver.contact.problem import OPEN, ContactProblem
 from solver.model.friction import LEAST_FRICTION
-from solver.rolling.scenes.rolling import ROLLING
+from solver.rolling.scenes.rolling import ROLLING, RollingParameters
 from solver.rolling.scenes.rolling_model import model
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 from tests.records import kept
 from tests.solver.test_contact_problem import instance
 

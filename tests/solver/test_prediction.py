@@ -9,8 +9,7 @@ from solver.contact.system import System
 from solver.loading.control import Control
 from solver.loading.prediction import Following, Predictor
 from solver.loading.walker import Walker
-from solver.rolling.scenes.rolling import ROLLING
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import ROLLING, RollingParameters
 
 pytestmark = pytest.mark.solves
 

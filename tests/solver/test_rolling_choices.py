@@ -11,7 +11,7 @@ from solver import ModelError
 from solver.results.record import Status
 from solver.rolling.load import RollingLoad
 from solver.rolling.plane.lines import recorded_step
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_setup import view
 from solver.shipped import SCENES
 

@@ -25,9 +25,8 @@ from solver.contact.problem import STICK
 from solver.fem.discretisation import Discretisation
 from solver.mesh import grid, mapped
 from solver.model.friction import Coulomb
-from solver.rolling.scenes.rolling import ROLLING
+from solver.rolling.scenes.rolling import ROLLING, RollingParameters
 from solver.rolling.scenes.rolling_model import model as rolling_model
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.scenes.punch import PunchParameters
 from solver.scenes.punch_setup import model as punch_model
 

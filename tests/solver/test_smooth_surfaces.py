@@ -207,16 +207,16 @@ def _mises(s: Any) -> Any:
 @pytest.mark.parametrize(
     ("of", "words"),
     [
-        (lambda s: 2 * _mises(s), "the stress itself in tension"),
-        (lambda s: _mises(s) ** 2, "so many times as large as stress"),
-        (lambda s: _mises(s) + 0.1 * s.sum(axis=0) - 0.1 * (s[0] - s[2]), "at any mean stress"),
+        (lambda s: 2 * _mises(s), "equal to the stress in tension"),
+        (lambda s: _mises(s) ** 2, "proportional to the stress"),
+        (lambda s: _mises(s) + 0.1 * s.sum(axis=0) - 0.1 * (s[0] - s[2]), "of the mean stress"),
         (lambda s: s[0] - s[2], "without a corner"),
         (
             lambda s: Hosford(8.0).tension(np.abs(s - s.mean(axis=0)) * [[1], [-1], [-1]]),
             "with complex numbers, without abs",
         ),
         (lambda s: Odd(0.2).tension(s), "convex"),
-        (lambda s: np.nan * _mises(s), "the stress itself in tension"),
+        (lambda s: np.nan * _mises(s), "equal to the stress in tension"),
     ],
 )
 def test_what_is_no_smooth_yield_surface_is_refused(of, words):

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from solver.materials import TrescaMaterial
-from solver.rolling.flow import sweep_of
-from solver.rolling.stepped import SteppedSweep
-from solver.rolling.sweep import CompiledSweep
+from solver.rolling.flow import CompiledSweep, SteppedSweep, sweep_of
 from solver.tensors import SQRT2
 from tests.solver.laws import CURVES, HARDENING, STEEL, chaboche, smooth, steel
 from tests.solver.yield_surfaces import Hosford

@@ -16,8 +16,7 @@ from solver.loading.control import Control
 from solver.loading.increment import Increment
 from solver.loading.outcome import IncrementFailed
 from solver.loading.walker import Walker
-from solver.rolling.scenes.rolling import ROLLING
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import ROLLING, RollingParameters
 from solver.scenes.punch import PUNCH, PunchParameters
 
 PRESSED = PunchParameters(accuracy="draft", friction=0.3, load_ratio=0.6)

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from solver.materials import Elasticity, Heated, Law, Material, PlaneStress, TrescaMaterial, Voce
-from solver.materials.law import attribute
-from solver.materials.wrapped import Wrapped
+from solver.materials.law import Wrapped, attribute
 
 MEMBERS = {name: member for name, member in vars(Law).items() if not name.startswith("_")}
 OWN = {"respond", "linear_hardening"}

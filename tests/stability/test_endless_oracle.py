@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from solver import Status
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 from tests.stability.kinds import bearing, endless
 from tests.stability.kinds.endless_oracle import LIMITS, Passed, judge, never_yields
 

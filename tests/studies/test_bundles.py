@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from solver.errors import ModelError
+from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import _contact_of
-from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
 from solver.shipped import SCENES
 from studies import Limits, Store, Study, run_study
 from studies.definition.cases import LoadingPath

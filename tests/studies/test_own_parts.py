@@ -146,7 +146,7 @@ SURFACE = """
 from solver import SCENES, ModelError
 from solver.parameters import unmet
 from solver.scenes.punch import PunchParameters
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 from studies import Study
 
 print(type(PunchParameters(yield_condition="hosford").material()).__name__)

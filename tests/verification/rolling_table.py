@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from solver import SCENES
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 from tests.records import kept
 
 TABLE = Path(__file__).parents[2] / "data" / "studies" / "rolling-table.toml"

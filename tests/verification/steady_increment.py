@@ -23,12 +23,11 @@ from solver.model.amplitude import Amplitude
 from solver.model.contact_pair import ContactPair
 from solver.model.motion import Axle
 from solver.rolling.passing import passing
-from solver.rolling.plane.fields import under_load
-from solver.rolling.plane.track import Track
+from solver.rolling.plane.track import Track, under_load
 from solver.rolling.plane.wheel import flowed
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import load_on, rim_of
 from solver.rolling.scenes.rolling_model import wheel_body
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from solver.rolling.rail.profiles.zone import Zone, rail_mesh
 from solver.rolling.rail.section import Section
 from solver.rolling.rail.straight import StraightPrism, straight_motions
 from solver.rolling.scenes.initial_stress import NoStress, OverHeight, RollerStraightened
-from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_track import settled
 from tests.verification.prism_blocks import PERFECT, RE, block, ellipse, residual, stressed
 from tests.verification.stepped_prism import SteppedPrism

@@ -19,7 +19,7 @@ from solver.rolling.load import RollingLoad
 from solver.rolling.passing import Pass, passing
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.initial_stress import OverHeight
-from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from tests.solver.yield_surfaces import Hosford
 from tests.verification.prism_blocks import AHEAD, PERFECT, RE, A, block, residual, stressed
 from tests.verification.stepped_prism import SteppedEllipse, SteppedPrism

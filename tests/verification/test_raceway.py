@@ -18,7 +18,7 @@ from solver.rolling.load import RollingLoad
 from solver.rolling.passing import passing
 from solver.rolling.rail.patch_contact import EllipticPatch
 from solver.rolling.scenes.hertz_ellipse import HertzEllipse
-from solver.rolling.scenes.raceway_parameters import MOST_LONG, RacewayParameters
+from solver.rolling.scenes.raceway import MOST_LONG, RacewayParameters
 from solver.rolling.scenes.raceway_setup import RolledRaceway, geometry, track_of
 from solver.shipped import SCENES
 from tests.records import kept

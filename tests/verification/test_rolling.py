@@ -15,7 +15,7 @@ from solver.loading import walker
 from solver.loading.outcome import PathEnded
 from solver.loading.stepper import Stepper
 from solver.rolling.scenes import rolling_model
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 from tests.records import kept
 
 COARSE = {"element_size": 2.0, "advance_step": 2.0, "track": 20.0}

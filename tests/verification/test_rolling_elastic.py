@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from solver import SCENES, Status
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 from tests.verification.closed_forms import HertzLine, carter_creepage
 
 YIELD, MODULUS, PEAK = 1e6, 2e5, 1360.0

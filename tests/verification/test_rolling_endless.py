@@ -16,8 +16,8 @@ from solver.rolling.audit.plane import audit_pass
 from solver.rolling.passing import SolveBudget
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.scenes import pass_runner, rolling_endless
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import load_on, track_for
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 from tests.records import kept
 
 COARSE = {"element_size": 3.0, "growth": 1.3}

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from solver import SCENES, Status
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 
 
 @cache

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 from tests.verification.rolling_table import CASES, YIELD, after, mid_track, strain, stress
 
 # -- free rolling --------------------------------------------------------------------------------

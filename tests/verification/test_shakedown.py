@@ -21,7 +21,7 @@ from solver.results.sliding_limits import (
     melan_limit,
     sliding_contact,
 )
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 from tests.records import kept
 
 YIELD_STRAIN = 502.0 / 2e5

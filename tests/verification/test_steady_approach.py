@@ -17,8 +17,8 @@ from solver.rolling.plane.lines import wheel_nodes
 from solver.rolling.plane.rolling import Expected
 from solver.rolling.plane.track import track_of
 from solver.rolling.results.plane import TrackBody
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import load_on, track_for
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.rolling.search import _HARDEST, _LIGHTER, _SOFTEST, _approached, _fading, search
 
 

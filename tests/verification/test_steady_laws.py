@@ -30,14 +30,12 @@ from solver.materials import (
 )
 from solver.rolling import flow
 from solver.rolling.audit.plane import audit_pass
-from solver.rolling.plane.fields import under_load
+from solver.rolling.flow import CompiledFlow, SteppedFlow
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.rows import RowFlow
-from solver.rolling.plane.track import Track, track_of
+from solver.rolling.plane.track import Track, track_of, under_load
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import load_on, track_for
-from solver.rolling.scenes.rolling_parameters import RollingParameters
-from solver.rolling.stepped import SteppedFlow
-from solver.rolling.sweep import CompiledFlow
 from solver.shipped import SCENES
 from tests.solver.yield_surfaces import Hosford
 from tests.verification.steady_increment import SteadyIncrement
@@ -325,7 +323,7 @@ def test_the_audit_finds_what_is_wrong_with_internal_variables(broken, figure):
 
 OWN = """
 from solver.shipped import SCENES
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 
 p = RollingParameters(
     element_size=4.0, growth=1.5, load="hertz", passes=2, hardening="threshold", threshold=30.0,

@@ -21,8 +21,8 @@ from solver.rolling.load import RollingLoad
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.track import track_of
 from solver.rolling.plane.wheel import RollingWheel
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import rim_of
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 from tests.verification.closed_forms import carter_creepage
 
 A, YIELD, FRICTION = 8.0, 502.0, 0.3

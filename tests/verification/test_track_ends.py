@@ -16,9 +16,9 @@ from solver import System, Walker
 from solver.loading.control import Control, Tolerances
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.track import Track
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import load_on
 from solver.rolling.scenes.rolling_model import model
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 
 SIDE = 4.0
 FREE = {

@@ -12,9 +12,10 @@ from solver import ModelError, Record
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
 from solver.rolling.scenes.sequence import CUT, deviations
+from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact
-from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.rolling.scenes.wheel_rail_track import RolledRail, geometry
+from solver.rolling.scenes.wheel_rail_setup import RolledRail
+from solver.rolling.scenes.wheel_rail_track import geometry
 from solver.shipped import SCENES
 from tests.records import kept
 

@@ -16,9 +16,10 @@ from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
 from solver.rolling.rail.track import PrismField
 from solver.rolling.scenes.initial_stress import RollerStraightened
+from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact
-from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.rolling.scenes.wheel_rail_track import RolledRail, geometry, section_of, track_of
+from solver.rolling.scenes.wheel_rail_setup import RolledRail
+from solver.rolling.scenes.wheel_rail_track import geometry, section_of, track_of
 from solver.shipped import SCENES
 from tests.records import kept
 from tests.verification.hertz_ellipse import HertzEllipse

@@ -13,8 +13,8 @@ from solver.errors import NoContact, NotConverged, WindowTooSmall
 from solver.results.record import Status
 from solver.rolling import search
 from solver.rolling.scenes import rail_passes as prism_passes
+from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
-from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_track import geometry
 from solver.shipped import SCENES
 

@@ -10,7 +10,7 @@ import pytest
 
 from solver import ModelError, Record
 from solver.results.record import Status
-from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.shipped import SCENES
 from tests.records import kept
 

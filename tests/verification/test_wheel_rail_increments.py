@@ -18,8 +18,9 @@ from solver.rolling.passing import Pass, passing
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.rail_passes import contact_of
-from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.rolling.scenes.wheel_rail_track import RolledRail, geometry, track_of
+from solver.rolling.scenes.wheel_rail import WheelRailParameters
+from solver.rolling.scenes.wheel_rail_setup import RolledRail
+from solver.rolling.scenes.wheel_rail_track import geometry, track_of
 from tests.verification.stepped_patch import SteppedPatch
 from tests.verification.stepped_prism import SteppedIncrement, SteppedPrism
 

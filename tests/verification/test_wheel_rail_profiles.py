@@ -12,7 +12,7 @@ from solver import ModelError, Record
 from solver.results.record import Status
 from solver.rolling.rail.profiles.rail import rail_60e1
 from solver.rolling.rail.profiles.wheel_profile import s1002
-from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_track import geometry
 from solver.shipped import SCENES
 

@@ -20,19 +20,19 @@ Rows = Ints | slice
 
 
 INFLOW = 0.1
-"""Limit of the ratio of the plastic strain added in the first column to that of the pass. Points
-that an earlier pass left at yield flow as soon as the load approaches, in a window of any size; 5 %
-change stress by 1 % of the yield stress."""
+"""Limit of the plastic strain added in the first column, over that of the pass. Points that an
+earlier pass left at yield flow as soon as the load approaches, in a window of any size; 5 % change
+stress by 1 % of the yield stress."""
 _LEAST = 0.05
-"""Least plastic strain of a pass, in yield strains, to which added strain refers: a pass that adds
-less hardly yields, and the limit is then 1/200 of the yield strain."""
+"""Least plastic strain of a pass, over the yield strain, to which `INFLOW` refers: a pass that adds
+less hardly yields, and 1/200 of the yield strain may then be added."""
 STEADINESS = 1e-4
-"""Limit of the stress that the difference of two strains makes, over the yield stress: far below
-the error of any mesh, and far above rounding."""
+"""Limit of the difference of two strains, as stress over the yield stress: far below the error of
+any mesh, and far above rounding."""
 
 
 class AuditedFlow:
-    """The flow of material through the window: for each column, the last increment before it.
+    """The flow of material through the window, by the last increment before each column.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class AuditedFlow:
         return float(self._material.dissipation(self._before, response).min())
 
     def large_strain(self, body: str, volume: Array) -> Neglected:
-        """Return what small-strain theory leaves out of the stress of a body in the window.
+        """Return the stress that small-strain theory neglects in a body, in the window.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class AuditedFlow:
         return of_material(body, elasticity, self._stress, self._strain, volume.ravel())
 
     def strained(self) -> Array:
-        """Return the largest equivalent plastic strain of each row (n_rows,), in and behind it."""
+        """Return the largest equivalent plastic strain (n_rows,), in the window and behind."""
         within, behind = (
             equivalent(state) for state in (self._found.states, self._found.after.state)
         )
@@ -124,7 +124,7 @@ def judged(
     limits: Mapping[str, float],
     neglected: Sequence[Neglected],
 ) -> Audit:
-    """Return the audit of a pass by its figures, their limits, and what the theory neglects."""
+    """Return the audit of a pass from its figures, their limits, and what the theory neglects."""
     figures = {**figures, "audit_large_strain": max(each.share for each in neglected)}
     own = {name: at for name, at in limits.items() if name in figures}
     return Audit(

@@ -3,8 +3,8 @@
 Amplitudes are complex, those of a real Fourier transform over the stations downstream, so that a
 derivative along x is a factor i k. The operators of `solver.rolling.rail` are not used: strain
 comes from the gradients of the elements, springs and the means under the hats from their edges. Its
-factors only give the displacements that are checked, and what lies beyond the length is that of its
-far field. What lies outside the zone is solved anew, with the whole section, for a few waves.
+factors only give the displacements that are checked, and its far field gives the field beyond the
+length. Outside the zone the whole section is solved again, for a few waves.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from solver.tensors import SQRT2
 from solver.typing import Array, Complexes, Ints
 
 _SAMPLED = (0, 1, 5)
-"""Waves of which the whole section is solved: the mean along x, where springs and supports carry
-most, the longest wave, and one about as long as the contact."""
+"""Numbers of the waves for which the whole section is solved: the mean along x, for which springs
+and supports carry most, the longest wave, and one about as long as the contact."""
 _EDGE_POINTS = 4
 _LEFT_OUT = 0.01
-"""Share of the stress at the rim of the zone, of all waves together, that waves may have which are
-left out outside it. A rail's stress there then errs by 0.3 % of the largest; all waves take six
-times as long."""
+"""Share of the stress at the rim of the zone that may come from waves which are neglected outside
+it. The stress of a rail there then has an error of 0.3 % of the largest; all waves take six times
+as long."""
 
 
 class Waves(NamedTuple):
-    """What eigenstress and tractions make in a prism that repeats itself.
+    """The fields of eigenstress and tractions in a prism that repeats itself.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class PlainPrism:
 
     @cached_property
     def _gradients(self) -> tuple[Array, Array]:
-        """Strain (n_elements, 4, 6, 24) across x, and what is multiplied by i k."""
+        """Operators (n_elements, 4, 6, 24) of strain across x, and of strain times i k."""
         values = self.track.section.plane.basis.basis
         N = np.stack([np.broadcast_to(np.asarray(b[0]), self.area.shape) for b in values], axis=-1)
         along_z, along_y = (
@@ -144,7 +144,7 @@ class PlainPrism:
 
     @cached_property
     def _whole(self) -> dict[int, tuple[sparse.csr_array, LinearSolver]]:
-        """For each sampled wave the stiffness, and the factors of its real form on free unknowns.
+        """Stiffness of each sampled wave, and the factors of its real form on free unknowns.
 
         With displacements along x divided by i the stiffness is real.
         """
@@ -170,7 +170,7 @@ class PlainPrism:
     def waves(self, eigenstress: Array, traction: Array) -> Waves:
         """Return the waves of eigenstress (n_points, window, 6) and tractions (n, m, 3) [MPa].
 
-        In the zone displacements are those of the factors of the track, for forces found here.
+        In the zone displacements come from the factors of the track, for the forces computed here.
         """
         modes = self.track.modes
         pushed = self._force(np.fft.rfft(self._everywhere(eigenstress), axis=1))
@@ -191,7 +191,7 @@ class PlainPrism:
         return Waves(u, pulled, pushed, self._strain(u))
 
     def _everywhere(self, eigenstress: Array) -> Array:
-        """Return the eigenstress at all stations: it fades behind the window to where L ends."""
+        """Return the eigenstress at all stations; behind the window it fades to zero."""
         left = self.track.modes.stations - eigenstress.shape[1]
         t = np.arange(1, left + 1) / (left + 1)
         fading = (1 - t) ** 3 * (1 + 3 * t + 6 * t**2)
@@ -209,7 +209,7 @@ class PlainPrism:
         return np.asarray(flat.reshape(-1, 6, u.shape[1]).swapaxes(1, 2))
 
     def strain(self, found: Waves) -> Array:
-        """Return the strain (n_points, window, 6) of waves and of what lies beyond L."""
+        """Return the strain (n_points, window, 6) of the waves and of the far field."""
         stations = self.track.modes.stations
         own = np.fft.irfft(found.strain, stations, axis=1)[:, : len(self.track.modes.x)]
         far = self.track.far
@@ -218,8 +218,8 @@ class PlainPrism:
     def beside(self, found: Waves) -> Array:
         """Return the strain (n, 6) at the load, at all points of the section outside the zone.
 
-        It is that of the pass, without what is constant along x. Waves of which little reaches the
-        rim of the zone are left out.
+        It is the strain of the pass, without that which is constant along x. Waves that are weak at
+        the rim of the zone are neglected.
         """
         track, C = self.track, self.track.elasticity.stiffness(6)
         modes, stations = track.modes, track.modes.stations
@@ -254,7 +254,7 @@ class PlainPrism:
     def _around(
         self,
     ) -> tuple[sparse.csr_array, sparse.csr_array, Ints, Stiffness, LinearSolver]:
-        """Operators of elements outside the zone; unknowns there, their stiffness, and a solver."""
+        """Operators outside the zone, the unknowns there, their stiffness, and a solver."""
         still, waving = (self._rows(each, self._outside) for each in self._gradients)
         rest = np.setdiff1d(self.track.section.free, self.track.modes.unknowns)
         stiffness = self.track.section.stiffness(rest)
@@ -269,7 +269,8 @@ class PlainPrism:
     def unbalanced(self, found: Waves) -> float:
         """Return the norm of the nodal forces out of balance [N].
 
-        At nodes that only elements of the zone share in every wave, at all nodes in sampled waves.
+        In every wave it counts nodes that only elements of the zone share, in sampled waves all
+        nodes.
         """
         C = self.track.elasticity.stiffness(6)
         lacking = found.pulled + found.pushed - self._force(found.strain @ C)
@@ -313,10 +314,10 @@ class PlainPrism:
         return (self._throughout @ u).reshape(-1, 6), self._mean(u)
 
     def initial_stress(self, given: Array, held: Array) -> Array:
-        """Return the stress (n, 6) of the whole section when given stresses come to equilibrium.
+        """Return the stress (n, 6) of the section once given stresses are in equilibrium.
 
-        See `solver.rolling.rail.straight.StraightPrism.settled`: what of ``given`` lengthens, bends
-        and turns the prism is gone.
+        See `solver.rolling.rail.straight.StraightPrism.settled`: the part of ``given`` that would
+        lengthen, bend and turn the prism vanishes.
         """
         still, C = self._throughout, self.track.elasticity.stiffness(6)
         area = self.area.reshape(-1, 1)
@@ -389,7 +390,7 @@ class PlainPrism:
         return forces
 
     def surface(self, found: Waves, traction: Array) -> Array:
-        """Return the displacement (n, m, 3) of the grid, with what lies beyond L [mm]."""
+        """Return the displacement (n, m, 3) of the grid, with that of the far field [mm]."""
         waves = self._mean(found.u.reshape(self._n, -1))
         moved = np.fft.irfft(waves, self.track.modes.stations, axis=2)[..., self.track.near]
         moved = np.moveaxis(moved, 2, 0)

@@ -10,9 +10,8 @@ from solver.audit.theory import Neglected, equivalent, largest_strain
 from solver.materials.law import Law
 from solver.rolling.audit.flow import INFLOW, STEADINESS, AuditedFlow, difference, judged, largest
 from solver.rolling.passing import Pass
-from solver.rolling.plane.fields import of_layers, under_load
 from solver.rolling.plane.layers import Layers
-from solver.rolling.plane.track import Track
+from solver.rolling.plane.track import Track, of_layers, under_load
 from solver.rolling.plane.wheel import RollingContact
 
 _LIMITS = {"audit_inflow": INFLOW, "audit_steadiness": STEADINESS}
@@ -62,7 +61,7 @@ def audit_pass(
 
 
 def _neglected(track: Track, found: Pass[Layers], flow: AuditedFlow) -> tuple[Neglected, Neglected]:
-    """Return what small-strain theory leaves out of strain and stress, in the window and behind."""
+    """Return the strain and stress that small-strain theory neglects, in the window and behind."""
     depth, surface = found.after.whole.depth, (found.surface, found.after.top.state)
     top, name = max(float(equivalent(state).max()) for state in surface), track.part.body.name
     places = np.stack([np.zeros_like(depth), -depth])
@@ -73,7 +72,8 @@ def _neglected(track: Track, found: Pass[Layers], flow: AuditedFlow) -> tuple[Ne
 def _released(track: Track, material: Law, found: Pass[Layers]) -> float:
     """Return the difference of the state behind the load from that of the law [MPa].
 
-    It is one increment from the last column; planes y = const must be free of stress.
+    The state behind follows in one increment from the last column; planes y = const must be free of
+    stress.
     """
     states = found.states.packed
     last = found.before.state.unpacked(states[..., -1])
@@ -85,7 +85,7 @@ def _released(track: Track, material: Law, found: Pass[Layers]) -> float:
 def _lost(material: Law, found: Pass[Layers], previous: Pass[Layers] | None, way: int) -> float:
     """Return the difference between the state before the pass and that behind the last one.
 
-    It is the largest difference of internal variables, as stress over the yield stress. In the
+    The largest difference of internal variables counts, as stress over the yield stress. In the
     opposite direction shear has the opposite sign.
     """
     before = found.before.whole.state

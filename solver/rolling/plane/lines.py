@@ -10,15 +10,16 @@ from solver.mesh.lines import continued, graded
 from solver.typing import Array
 
 _AHEAD, _BEHIND, _DEEP = 3.0, 5.0, 4.0
-"""Extent of the window ahead of, behind and below the load, over the half-width. Only 3 half-widths
-behind a load with shear cause an error of 5 MPa in 500 near the surface, because points at yield
-still flow there. Elements that grow behind the load cause 30 MPa: points flow too much."""
+"""Extent of the window ahead of, behind and below the load, over the half-width. With only 3
+half-widths behind a load with shear, stress near the surface has an error of 5 MPa in 500, because
+points at yield still flow there. With elements that grow behind the load the error is 30 MPa:
+points flow too much."""
 _FAR = 1600.0
-"""Distance of the sides and the bottom, over the half-width. Half of it changes stress by 1 MPa in
-500."""
+"""Distance of the sides and the bottom from the load, over the half-width. Half of this distance
+changes stress by 1 MPa in 500."""
 _FAR_GROWTH = 2.0
-"""Ratio of neighbouring element sides outside the window. It changes stress by 0.1 MPa in 500 and
-takes a sixth of the time of a fine mesh."""
+"""Ratio of neighbouring element sides outside the window. It changes stress by 0.1 MPa in 500
+against a fine mesh, in a sixth of the time."""
 MOST_COLUMNS = 3000
 """Largest number of elements along the window."""
 
@@ -56,10 +57,10 @@ def window_depth(a: float, reach: float = 1.0) -> float:
 
 
 _DEEP = 4.0
-"""Ratio of the depth in which element sides grow by ``growth`` to the Hertz half-width; below it
-they grow faster."""
+"""Depth over the Hertz half-width in which element sides grow by ``growth``; below it they grow
+faster."""
 _RECORDED = 30
-"""Smallest number of positions of results in a Hertz half-width."""
+"""Least number of positions of results per Hertz half-width."""
 _ROUNDING = 1e-12
 _HUB = 0.3
 """Ratio of the radius of the rigid hub to that of the wheel."""
@@ -104,6 +105,7 @@ def wheel_nodes(R: float, reach: float, h: float) -> tuple[Array, Array]:
 def rim_elements(reach: float, h: float) -> int:
     """Return the number of elements of side ``h`` along the part of the rim that may touch.
 
-    Rounding of ``reach / h`` adds no element: a steady pass needs equal sides on rim and track.
+    Rounding of ``reach / h`` must not add an element: a steady pass needs equal sides on rim and
+    track.
     """
     return 2 * math.ceil(reach / h * (1 - _ROUNDING))

@@ -19,12 +19,12 @@ from solver.typing import Array
 
 EXACT_AFTER = 4
 REPEATED = 1e-5
-"""Tolerance after `EXACT_AFTER` passes: small errors of many passes add up."""
+"""Tolerance of passes after the first `EXACT_AFTER`, since small errors of many passes add up."""
 
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """The strain that the next pass is expected to add, extrapolated from the last passes.
+    """Prediction of the strain that the next pass adds, extrapolated from the last passes.
 
     ``strain`` is that of the last pass, ``change`` its change from the pass before (None after one
     pass), and ``kept`` the ratio of that change to the change before.
@@ -36,11 +36,11 @@ class Expected:
 
     @property
     def next(self) -> Array:
-        """The strain that the next pass is expected to add."""
+        """The predicted strain of the next pass."""
         return self.strain if self.change is None else self.strain + self.kept * self.change
 
     def after(self, strain: Array) -> Expected:
-        """Return the expectation after a pass that added this strain."""
+        """Return the prediction after a pass that added this strain."""
         change = strain - self.strain
         if self.change is None:
             return Expected(strain, change)

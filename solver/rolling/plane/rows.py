@@ -73,7 +73,7 @@ class CondensedTrack:
 
 
 _LEVEL = 1e-6
-"""Ratio of a difference of depth to the depth of the rows; up to it points lie on one row."""
+"""Points are on one row if their depths differ by less than this share of the window's depth."""
 
 
 class FlowRows:
@@ -266,7 +266,7 @@ class RowFlow(FlowPast[Layers]):
 
     @property
     def beyond(self) -> str:
-        """Where the window is too small, because points yield at its edge; empty if nowhere.
+        """Side where the window is too small, because points yield there; else empty.
 
         Points that an earlier pass left on the yield surface may flow a little there.
         """

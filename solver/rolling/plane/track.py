@@ -1,4 +1,4 @@
-"""The half-plane over which a steady load passes: meshed and factorised once for many passes."""
+"""The half-plane over which a steady load passes, factorised once for many passes; its fields."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 from scipy.spatial import cKDTree
 
+from solver.contact.state import BodyState
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.loads import travelling_forces
@@ -15,22 +16,26 @@ from solver.fem.surface import Surface, extract
 from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
 from solver.materials.material import Material
+from solver.materials.state import PlasticState
 from solver.memory import kept
 from solver.mesh.grids import grid, within
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.motion import TravellingPressure
+from solver.rolling.body import LOADED, RELEASED
 from solver.rolling.load import Given
+from solver.rolling.passing import Pass
 from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.lines import MOST_COLUMNS, track_lines, window_depth, window_elements
 from solver.rolling.plane.rows import CondensedTrack, FlowRows, RowFlow
+from solver.tensors import SQRT2
 from solver.typing import Array, Ints
 
 CONTACT = 2.0
-"""Ratio of half the length of the surface that may come into contact to the half-width."""
+"""Half the length of the surface that may come into contact, over the half-width."""
 _BLOCKS = 8
-"""Number of parts in which the compliance of the surface is solved for: all displacements at once
-would take as much memory as all else of a track."""
+"""Number of parts in which the compliance of the surface is computed: all displacements at once
+would take as much memory as the rest of a track."""
 
 
 class Track:
@@ -215,3 +220,51 @@ def track_of(
 ) -> Track:
     """Return the track with these dimensions, made once in a process: see `Track`."""
     return Track(half_width, element_size, growth, elasticity, reach=reach)
+
+
+def of_layers(track: Track, law: Law, layers: Layers) -> BodyState:
+    """Return the state of a half-plane that is a function of depth alone.
+
+    Its points are followed by the places at the surface above `FlowRows.highest`.
+    """
+    rows, n = track.rows, track.part.weights.size
+    virgin = law.initial(n + len(rows.highest), 4)
+    strain, packed = np.zeros_like(virgin.plastic_strain), virgin.packed
+    for every, own in ((rows.every, layers), (n + rows.above, layers.top)):
+        strain[:, every] = own.strain(track.elasticity).T[:, :, None]
+        packed[:, every] = own.state.packed[:, :, None]
+    return _state(track, RELEASED, _sunk(track, layers), strain, virgin.unpacked(packed))
+
+
+def under_load(track: Track, found: Pass[Layers]) -> BodyState:
+    """Return the state under the load of a pass, which moves along +x; for points `of_layers`."""
+    rows, before, after = track.rows, of_layers(track, found.law, found.before), found.after
+    n, columns, grown = track.part.weights.size, rows.shape[1], after.plastic_strain
+    grown = grown - found.before.plastic_strain
+    u = track.operator.expand(found.loading.u, rows.force_behind(grown))
+    added, strain, packed = track.part.strain(u), before.strain.copy(), before.plastic.packed
+    strain[:, :n] += added
+    uppermost = np.moveaxis(added[:, rows.every[: 2 * rows.uppermost]], 0, 2)
+    strain[:, n + rows.above] += np.moveaxis(rows.onto_surface(uppermost), 2, 0)
+    # before the window as before the pass, in the window as it flows, behind it as after the pass
+    each = (rows.every, found.states, after), (n + rows.above, found.surface, after.top)
+    for every, flow, own in each:
+        packed[:, every[:, :columns]] = flow.packed
+        packed[:, every[:, columns + rows.ahead.shape[1] :]] = own.state.packed[:, :, None]
+    return _state(track, LOADED, before.u + u, strain, before.plastic.unpacked(packed))
+
+
+def _state(track: Track, time: float, u: Array, strain: Array, plastic: PlasticState) -> BodyState:
+    stress = track.part.body.law.stiffness(4) @ (strain - plastic.plastic_strain)
+    return BodyState(time, u, stress, strain, plastic)
+
+
+def _sunk(track: Track, layers: Layers) -> Array:
+    """Return the nodal displacements (n,) of a layered state, relative to depth [mm]."""
+    strain = layers.strain(track.elasticity)
+    edges = np.append(0.0, np.cumsum(layers.thickness))
+    u = np.zeros_like(track.part.X)
+    for axis, rate in enumerate((SQRT2 * strain[:, 3], strain[:, 1])):
+        below = np.append(0.0, np.cumsum((rate * layers.thickness)[::-1]))[::-1]
+        u[axis] = np.interp(-track.part.X[1], edges, below)
+    return np.asarray(u.T.ravel())

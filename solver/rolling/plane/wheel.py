@@ -99,7 +99,7 @@ def flowed(surface: Surface, way: int) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Linearisation:
-    """An approximate contact, about which the next contact problem is linearised.
+    """An approximate contact, at which the next contact problem is linearised.
 
     ``on_track`` and ``on_wheel`` are nodal forces on the surfaces, ``tilt`` is the vertical
     component of the tangential forces on the wheel.
@@ -127,7 +127,7 @@ class RollingContact(AppliedLoad):
     bound : (n,) friction bound of the tangential forces [N]
     creepage : 1 + R d(rotation) / d(advance)
     height : displacement of the axle along y [mm]
-    near : (shape of the surface without the wheel) -> what the next contact begins with
+    near : (shape of the surface without the wheel) -> first guess for the next contact
     """
 
     x: Array
@@ -162,12 +162,12 @@ class RollingContact(AppliedLoad):
 
 _ROUNDS = 40
 _NEAR = 0.01
-"""Ratio of the expected change of a contact force to the load; up to it the expected contact is the
-initial guess."""
+"""Largest predicted change of a contact force, over the load, with which the predicted contact is
+the first guess."""
 _COVERED = 0.999
-"""Share of a vertex's hat that must face the rim; below it the vertex is no contact point."""
+"""A vertex is a contact point if at least this share of its hat faces the rim."""
 _SETTLED = 1e-7
-"""Ratio of the change of contact forces to the load; below it the contact geometry converged."""
+"""Change of contact forces, over the load, below which the contact geometry has converged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +230,7 @@ class RollingWheel(PassingLoad):
         return self.load.drive if self.friction.rough else None
 
     def on(self, u: Array, before: Layers, start: RollingContact | None = None) -> RollingContact:
-        """See `PassingLoad`; the track is as wide as before, and its surface as straight.
+        """See `PassingLoad`; ``before`` has no effect: it leaves the surface straight.
 
         Raises
         ------

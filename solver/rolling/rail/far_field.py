@@ -1,4 +1,4 @@
-"""What a load on an endless prism makes beyond the same load repeated every length L.
+"""The far field: what an endless prism under a load adds to one that is loaded every length L.
 
 The field of a load is an integral over wavenumbers k, that of the repeated load a trapezoidal sum
 with step 2 pi / L. They differ by loads at the distances +-L, +-2 L, ...; from there only the
@@ -6,13 +6,13 @@ resultants count, and only small k, since these fields are smooth. So the result
 x over a width of L / 8, are solved on the length 8 L by a few waves, and the solution on L, every
 eighth of these waves, is subtracted. Then 64 L less 8 L with the width L, and so on.
 
-The spread has the transform ``exp(-t) (1 + t + t^2 / 2)``, t = (k width)^2 / 2: what is missing is
-of the sixth order in k.
+The spread has the transform ``exp(-t) (1 + t + t^2 / 2)``, t = (k width)^2 / 2: its error is of the
+sixth order in k.
 
-A prism *clamped* at both ends of a span has more: forces and moments on its section beyond the
-ends, with which the section does not move at the ends, in the mean. Within the span the field of an
-end is that of loads beyond it: both are made of the waves that fade away from the end. Bending in
-both planes, torsion, shear and foundation are those of the section, not of a theory of beams.
+In a prism *clamped* at both ends of a span, forces and moments act on the section beyond the ends,
+so that in the mean the section does not move at the ends. Within the span the field of an end is
+that of loads beyond it: both are made of the waves that fade away from the end. Bending in both
+planes, torsion, shear and foundation are those of the section, not of a theory of beams.
 """
 
 from __future__ import annotations
@@ -31,17 +31,18 @@ from solver.rolling.rail.section import I_AXIS, I_COMPONENTS, Carried, Section
 from solver.typing import Array, Bools
 
 _FIRST = 24
-"""Number of wavenumbers with which it begins."""
+"""Number of wavenumbers at which the section is solved first."""
 _WIDE = 3.0
-"""Product of wavenumber and size of the section, above which answers change with the wavenumber,
-not with its logarithm."""
+"""Product of wavenumber and size of the section above which answers vary with the wavenumber, below
+with its logarithm."""
 _MISSED = 1e-5
-"""Largest residual over the largest force of a load. Strain of the far field of a rail then errs by
-2e-5; with the first wavenumbers the residual is a tenth of this, and strain errs by 1e-6."""
+"""Tolerance: largest residual over the largest force of a load. The strain of the far field of a
+rail then has an error of 2e-5. With the first wavenumbers the residual is a tenth of this, and the
+error is 1e-6."""
 _ROUNDED = 1e-14
-"""Residual over the product of stiffness and displacement that rounding may make."""
+"""Residual by rounding, over the product of stiffness and displacement."""
 _SAME = 1e-12
-"""Singular value, of 1 for the largest, below which a direction is none of its own."""
+"""Singular value, over the largest, below which a direction depends on the others."""
 
 
 class SampledAnswers(NamedTuple):
@@ -60,11 +61,11 @@ class SampledAnswers(NamedTuple):
 def sampled_answers(section: Section, forces: Array, wavenumbers: Array) -> SampledAnswers:
     """Return the answers of a section to forces (section.n, q) at wavenumbers (waves,) [N/mm].
 
-    With the displacements V at a few wavenumbers, split into those along x and those across, the
-    answer at any other one is sought among their sums V y, by ``V' K_k V y = V' f``. Its error
-    falls exponentially with their number, since K_k is a polynomial of k. Split answers hold those
-    at -k too. What the equations are missed by halfway between two wavenumbers decides whether this
-    one is added.
+    Let V be the displacements at a few wavenumbers, split into those along x and those across. The
+    answer at any other wavenumber is approximated by V y, with ``V' K_k V y = V' f``. The error
+    falls exponentially with their number, since K_k is a polynomial of k. Split answers include
+    those at -k. A wavenumber halfway between two others is added if the residual there is too
+    large.
 
     A.K. Noor, J.M. Peters, AIAA Journal 18 (1980) 455-462 (reduced basis technique).
     """
@@ -103,7 +104,7 @@ def sampled_answers(section: Section, forces: Array, wavenumbers: Array) -> Samp
 
 
 def _spread(k: Array, size: float) -> list[int]:
-    """Return the numbers of the wavenumbers (waves,), not negative, with which it begins."""
+    """Return the numbers of the first wavenumbers, of all (waves,), which are not negative."""
     bend = _WIDE / size
     at = np.sin(np.pi / 2 * np.linspace(0.0, 1.0, _FIRST)) ** 2  # closer at the ends
     wanted = bend * np.expm1(np.log1p(k.max() / bend) * at)
@@ -132,21 +133,21 @@ def _split(answers: Array, along: Bools) -> Array:
 _RATIO = 8
 """Ratio of the lengths of two levels, and of a length to the width of the spread load on it."""
 _CUT = 6.0
-"""Product of k and width beyond which waves are left out: the transform is below 3e-6 there."""
+"""Product of k and width above which waves are neglected: the transform is below 3e-6 there."""
 _LOOSE = 1e-9
-"""Singular value of the motions of the surface rows, of 1 at the farthest node; below it the rows
-do not carry a resultant."""
+"""The surface rows cannot carry a resultant if the smallest singular value of their motions, of 1
+at the farthest node, is below this."""
 _ALONG = np.array([True, False, False, False, True, True])
 """Whether motions of a section, as `Section.mean_motions`, are along x; resultants are the first
 four of them."""
 _ROOM = 1.5
-"""Least ratio of the length of the first level with loads beyond the ends to the span."""
+"""Least length of the first level with loads beyond the ends, over the span."""
 _BEYOND = 4.0
-"""Distance of these loads from the ends over the width over which they are spread."""
+"""Distance of these loads from the ends, over the width of their spread."""
 
 
 class FarField:
-    """What an endless or clamped prism adds to one loaded every L, for loads near one station.
+    """The far field of an endless or clamped prism, for loads near one station.
 
     Resultants (4,) are the forces along x, y and z [N] and the moment about x, at the middle of the
     nodes of the section [N mm].
@@ -264,7 +265,7 @@ def _combined(directions: Array, sums: Array, carrying: Bools) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _SectionLoad:
-    """Unit loads (q,) at one place, and what they make.
+    """Unit loads (q,) at one place, and their fields.
 
     ``made`` (r, waves, q) shares of directions of the section in the answers, ``k`` (waves,) and
     ``share`` (waves,) of the waves, ``along`` (q,) whether a load carries i.
@@ -319,7 +320,7 @@ def _clamped(
 
 
 def _level_of(length: float, levels: int, span: float) -> tuple[int, float]:
-    """Return the first level that is long against a span, and how far beyond its ends loads are."""
+    """Return the first level longer than a span, and the distance of loads beyond its ends."""
     if not span > 0:
         raise ModelError("span", span, "must be positive [mm]")
     for level in range(1, levels + 1):
@@ -331,7 +332,7 @@ def _level_of(length: float, levels: int, span: float) -> tuple[int, float]:
 
 
 def _shares(length: float, levels: int, first: int | None = None) -> dict[int, float]:
-    """Return the shares of waves in what all levels add, by their numbers on the longest length.
+    """Return the shares of waves in the sum of all levels, by their numbers on the longest length.
 
     They are what the levels add to the load repeated every ``length``. With ``first`` they are all
     that a single load makes far from it, by the levels from that one on.

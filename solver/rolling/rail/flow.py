@@ -96,7 +96,7 @@ class PrismFlow(_Swept):
 
     @property
     def beyond(self) -> str:
-        """Where the window is too small, because points yield at its edge; empty if nowhere."""
+        """Side where the window is too small, because points yield there; else empty."""
         added, most = self.added, allowed_inflow(self._law, self.most_added)
         if added[:, 0].max() > most:
             return "ahead"
@@ -107,8 +107,8 @@ class PrismFlow(_Swept):
 
         At the last station the load still acts a little. On the way to no load and no change along
         x points may yield once more, which is a pass of one column through the section alone. The
-        strain there is that of all plastic strain, not of what this pass adds: what is left over
-        of each release would add up from pass to pass.
+        strain there is that of all plastic strain, not of the strain that this pass adds: the
+        residual of each release would add up from pass to pass.
         """
         body = _Release(self._modes, self._virgin())
         end = self._last(self._begin.displacement)

@@ -24,11 +24,56 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.errors import NoContact
+from solver.late import late
 from solver.linear.dense import RefinedLU
 from solver.model.friction import BoundLines, PatchStatus
 from solver.rolling.passing import searched
-from solver.rolling.rail.influence import Influence
-from solver.typing import Array
+from solver.typing import Array, Ints
+
+(between,) = late("rolling.kernels", "between")
+
+
+class Influence:
+    """A linear map from values (n, m, 3) at stations and vertices to others of this shape.
+
+    Parameters
+    ----------
+    kernel : (2n, m, 3, m, 3), entry ``[d, i, a, j, b]`` is the effect on value a at vertex i, d
+        stations downstream of value b at vertex j; negative d are at the end, as in an FFT
+    """
+
+    def __init__(self, kernel: Array) -> None:
+        length, m = kernel.shape[:2]
+        self.shape = (length // 2, m, 3)
+        self._spectrum = np.fft.rfft(kernel.reshape(length, 3 * m, 3 * m), axis=0)
+        self._blocks = np.ascontiguousarray(kernel.transpose(0, 1, 3, 2, 4))
+
+    def of(self, values: Array) -> Array:
+        """Return the effects (n, m, 3) of values (n, m, 3)."""
+        return self.everywhere(values)[: self.shape[0]]
+
+    def everywhere(self, values: Array) -> Array:
+        """Return the effects (2n, m, 3); those at stations before the first are at the end."""
+        n, m, _ = self.shape
+        modes = np.fft.rfft(values.reshape(n, 3 * m, 1), 2 * n, axis=0)
+        return np.fft.irfft(self._spectrum @ modes, 2 * n, axis=0).reshape(2 * n, m, 3)
+
+    def own(self) -> Array:
+        """Return the effects (m, 3, 3) of the values at a point on that point itself."""
+        vertices = np.arange(self.shape[1])
+        return self._blocks[0, vertices, vertices]
+
+    def between(self, at: Ints, rows: Array, by: Ints, columns: Array) -> Array:
+        """Return the effects (len(at), len(by)) of some combinations of values on others.
+
+        Parameters
+        ----------
+        at, by : flat numbers of points, station * m + vertex
+        rows : (len(at), 3) weights of the effects' components
+        columns : (len(by), 3) components of the values
+        """
+        return between(self._blocks, at, rows, by, columns)
+
 
 OPEN, STICK, SLIP = map(int, PatchStatus)
 """Status of a point."""
@@ -36,15 +81,15 @@ NORMAL, TANGENTS = 1, (0, 2)
 """Places of the normal and of the tangents among local axes (x, normal, tangent across)."""
 
 _TOLERANCE = 1e-9
-"""Largest error of a condition over the largest pressure, for shear times the steepest slope of the
-friction bound."""
+"""Tolerance: largest error of a condition over the largest pressure; for shear, over that times the
+steepest slope of the friction bound."""
 _STEPS = 60
 _SHORTEST = 1 / 256
-"""Smallest share of a Newton step in the line search. Where all points slip, a creepage that is
-found by its moment may overshoot a hundredfold."""
+"""Smallest share of a Newton step in the line search. Where all points slip, a creepage that
+follows from a given moment may overshoot a hundredfold."""
 _LOST = 1e6
-"""Ratio of the largest |q - d w| to the first resultant on one point, a pressure that no contact
-reaches; above it motions grow without bound."""
+"""Motions grow without bound if |q - d w| exceeds this multiple of the pressure of the whole load
+on one point."""
 _LOOSE = "the contact forces are not determined: nothing holds the wheel"
 
 
@@ -60,8 +105,8 @@ class ConeProblem:
     offset : (n, m, 3) effects without tractions and motions [mm]
     lines : (n_lines, 1) lines of the largest shear over pressure
     motions : (k, n, m, 3) effects of the rigid motions
-    weights : (k, n, m, 3) sums of values that are given, such as areas [mm2]
-    resultants : (k,) what they are [N]; the first is the load
+    weights : (k, n, m, 3) weights of sums that are prescribed, such as areas [mm2]
+    resultants : (k,) prescribed values of the sums [N]; the first is the load
     """
 
     influence: Influence
@@ -132,7 +177,7 @@ def solve_cone(problem: ConeProblem, values: Array, rigid: Array) -> ConeSolutio
 
 
 class _Iterate:
-    """Values and rigid motions, and by how much they miss the conditions."""
+    """Values and rigid motions, and their errors in the conditions."""
 
     def __init__(self, problem: ConeProblem, values: Array, rigid: Array) -> None:
         self.problem, self.values, self.rigid = problem, values, rigid

@@ -7,9 +7,9 @@ the outward normal, the displacements are
     2 pi G u_y = (1 - nu) / r f_y - (1/2 - nu) (X f_x + Z f_z) / r^2
 
 and u_z as u_x. Tractions are uniform along x over the distance of two stations, and linear across
-between vertices. Their integrals over rectangles are in closed form; each is a double difference,
-over the corners, of a function F(X, Z) whose mixed derivative is the kernel. What lies between two
-stations depends on their distance alone.
+between vertices. Their integrals over rectangles have closed forms; each is a double difference,
+over the corners, of a function F(X, Z) whose mixed derivative is the kernel. The influence between
+two stations depends on their distance alone.
 
 K.L. Johnson, Contact Mechanics (1985), sections 3.2 (J. Boussinesq) and 3.6 (V. Cerruti); uniform
 pressure on a rectangle: section 3.3 (A.E.H. Love, 1929).
@@ -97,5 +97,5 @@ def _integrals(X: Array, Z: Array) -> tuple[tuple[Array, Array], ...]:
 
 
 def _over(a: Array, b: Array) -> Array:
-    """Return a / b, and 0 where b = 0: what it enters is then multiplied by b."""
+    """Return a / b, and 0 where b = 0; the result is later multiplied by b."""
     return np.divide(a, b, out=np.zeros_like(a), where=b != 0)

@@ -6,8 +6,8 @@ station 0 at x = 0; the load moves along +x. With the amplitudes U_m of
 
     u(x_c) = sum_m (i U_x, U_y, U_z)_m e^{i k_m x_c},    k_m = -2 pi m / L
 
-so that U_m is the discrete Fourier transform over c. Only a window of stations has forces and
-needs results, and only a zone of the section: all else of the section is condensed, wave by wave,
+so that U_m is the discrete Fourier transform over c. Forces act and results are needed only at a
+window of stations and in a zone of the section; the rest of the section is condensed, wave by wave,
 onto the rim of the zone. The transform from and to a window is a product with a matrix (stations,
 waves), which costs little more than a fast transform over all stations and leaves the waves
 together.
@@ -35,14 +35,14 @@ from solver.rolling.rail.section import I_AXIS, I_COMPONENTS, Carried, Section
 from solver.typing import Array, Bools, Ints
 
 _ORDER = (0, 1, 2, 4, *I_COMPONENTS)
-"""Mandel components inside: those that carry i come last."""
+"""Order of the Mandel components inside this module: those that carry i come last."""
 _PLAIN = len(_ORDER) - len(I_COMPONENTS)
 
 (weighted,) = late("rolling.kernels", "weighted")
 
 
 class ZoneResponse(NamedTuple):
-    """What eigenstress and forces make in the zone.
+    """The fields of eigenstress and forces in the zone.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ class Modes:
         return np.where(self.unknowns % 3 == I_AXIS, flat @ carrying, flat @ plain)
 
     def constant(self, eigenstress: Array) -> tuple[Array, Array]:
-        """Return strain (n_points, 6) and displacement (n_rows,) of what is constant along x.
+        """Return strain (n_points, 6) and displacement (n_rows,) by eigenstress constant along x.
 
         Parameters
         ----------
@@ -280,7 +280,7 @@ class Modes:
     def nodal(self, eigenstress: Array) -> Array:
         """Return the nodal forces (waves, 2, m) of an eigenstress (n_points, window, 6) [N/mm].
 
-        Only points that have some are counted: few yield.
+        Only points that have some are used, since few yield.
         """
         some = np.flatnonzero(eigenstress.any(axis=(1, 2)))
         s = self._amplitudes(eigenstress[some])

@@ -7,11 +7,11 @@ distance of two stations: with the displacements u of surface minus wheel, in lo
     slip[c] = (3 u_t[c] - 4 u_t[c - 1] + u_t[c - 2]) / 2 + rigid slip
     gap[c] = gap of the bodies - u_n[c]
 
-The difference is of second order at the station, and looks upstream, where material comes from: a
-difference across the station would not couple it to itself. The displacements are those without
-tractions, and linear in the tractions: the influence between two stations depends on their distance
-alone. The rest is the problem of `friction_cone`. The wheel is a half-space; its tractions are
-those of the surface, mirrored.
+The difference is of second order and one-sided, upstream, where material comes from: a central
+difference would not couple the station to itself. The displacements are those without tractions,
+and linear in the tractions: the influence between two stations depends on their distance alone. The
+rest is the problem of `friction_cone`. The wheel is a half-space; its tractions are those of the
+surface, mirrored.
 
 J.J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), sections 1.6 and 4.2.
 """
@@ -35,22 +35,24 @@ from solver.rolling.rail.friction_cone import (
     TANGENTS,
     ConeProblem,
     ConeSolution,
+    Influence,
     solve_cone,
 )
 from solver.rolling.rail.half_space import half_space
-from solver.rolling.rail.influence import Influence
 from solver.rolling.rail.patch_contact import PatchContact, PatchLoad
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from solver.typing import Array, Ints
 
 _MIRROR = np.array([1.0, -1.0, 1.0])
-"""Local axes of the wheel's surface, in those of the prism's; (shear, pressure, shear) likewise."""
+"""Signs from the local axes of the prism's surface to those of the wheel's; the same for (shear,
+pressure, shear)."""
 _PRESSED = 0.5
-"""Ratio of the interpenetration of undeformed bodies to their approach, over the expected contact.
-For a ball in contact over a radius a it is 0.5 at the edge (K.L. Johnson, 1985, section 4.2)."""
+"""Interpenetration of the undeformed bodies at the edge of the contact, over their approach. For a
+ball in contact over a radius a it is 0.5 at the edge (K.L. Johnson, 1985, section 4.2)."""
 UPSTREAM = (1.5, -2.0, 0.5)
-"""Weights of the slip at a station, at the one before and at the second before."""
+"""Weights of the displacement at a station, at the one before and at the second before, in the
+slip."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -116,7 +118,7 @@ class RollingPatch(PatchLoad):
 
     @cached_property
     def _rolling(self) -> tuple[Array, Array]:
-        """Slip and gap at rest, and of the rigid motions; see `ProfiledWheel.rolling`."""
+        """Slip and gap at rest, and by the rigid motions; see `ProfiledWheel.rolling`."""
         return self.wheel.rolling(self.grid)
 
     @property
@@ -194,7 +196,7 @@ class RollingPatch(PatchLoad):
 
     @staticmethod
     def _kernel(apart: Array) -> Array:
-        """Return slip and gap (w_x, g, w_s) by tractions, from the motions and gap they make."""
+        """Return slip and gap (w_x, g, w_s) by tractions, from displacements by tractions."""
         kernel = apart.copy()
         for axis in TANGENTS:
             motion = apart[:, :, axis]
@@ -211,7 +213,7 @@ class RollingPatch(PatchLoad):
 
     @cached_property
     def _sums(self) -> Array:
-        """Sums (3, n, m, 3) of (q_x, p, q_s) that height and creepages work with."""
+        """Weights (3, n, m, 3) of (q_x, p, q_s) in the forces along height and creepages."""
         rest, motions = self._rolling
         sin, cos = np.sin(self.grid.angle), np.cos(self.grid.angle)
         sums = np.zeros((3, *rest.shape))
@@ -278,7 +280,7 @@ class RollingPatch(PatchLoad):
     def _expected_edge(self, problem: ConeProblem) -> float:
         """Return the gap of undeformed bodies at the edge of the contact, roughly [mm].
 
-        It is a share of the approach, which is that of a uniform pressure on the same area.
+        It is a share of the approach by a uniform pressure on the same area.
         """
         gap = (problem.offset[..., NORMAL] / problem.motions[0, ..., NORMAL]).ravel()
         nearest = np.argsort(gap)
@@ -321,9 +323,9 @@ class RollingPatch(PatchLoad):
         if load.lateral_force is not None:
             lateral = float(np.tensordot(self._sums[2], found.values, 3))
             wanted_force = load.lateral_force
-            told = f"{wanted_force:.0f}" if abs(wanted_force) >= 1 else f"{wanted_force:.2g}"
+            shown = f"{wanted_force:.0f}" if abs(wanted_force) >= 1 else f"{wanted_force:.2g}"
             much = f"with all of its contact slipping the lateral force is {lateral:.0f} N"
-            much += f", not {told}: give one that a wheel at this position can have"
+            much += f", not {shown}: give one that a wheel at this position can have"
             raise Spins(f"the wheel slides off: {much}", carried, 1.0)
         raise spinning(carried)
 
@@ -338,7 +340,7 @@ def _check_rim(status: Ints) -> None:
 def _apart(grid: PatchGrid, compliance: Array, wheel: ProfiledWheel) -> Array:
     """Return the motion of the surface over the wheel, and the gap, by (q_x, p, q_s) of each point.
 
-    That of the wheel is equal; axes are those of `Influence`.
+    The wheel has the same tractions; axes are those of `Influence`.
     """
     n, m = grid.stations, len(grid.z)
     distances = np.fft.ifftshift(np.arange(-n, n)) % len(compliance)

@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.errors import WindowTooSmall
-from solver.kinds import check
-from solver.parameters import Length
+from solver.parameters import Length, check
 from solver.rolling.load import AppliedLoad, PassingLoad
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.friction_cone import NORMAL, OPEN, SLIP, TANGENTS
@@ -97,7 +96,7 @@ class AppliedPatch(AppliedLoad):
 
     @property
     def start(self) -> AppliedPatch:
-        """The same without what takes memory: it is taken as it is by another pass."""
+        """The same load without functions that hold much memory, as another pass begins with it."""
         return replace(self, contact=replace(self.contact, near=None))
 
 
@@ -139,7 +138,8 @@ class PatchLoad(PassingLoad):
 
 
 _POINTS = 8
-"""Points of an edge across at which the pressure is integrated: it falls to 0 as a root."""
+"""Number of points of an edge across for the integral of the pressure, which falls to 0 as a
+root."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -148,7 +148,7 @@ class EllipticPatch(PatchLoad):
 
     Across tractions are the nearest hats. Waves along take those of a station for a sample: that of
     a smooth pressure is its mean over the distance of stations, less a 24th of the second
-    difference of means. Their sum is exact. At the edge a vertex outside the ellipse may have a
+    difference of means. Their sum is exact. At the edge, a vertex outside the ellipse may have a
     tension of p0 / 16. Stress from half an element down is that of the ellipse within 1 % of p0;
     under its edge, with elements of b / 6, within 1.2 %.
 

@@ -11,14 +11,13 @@ from scipy import sparse
 
 from solver.errors import ModelError
 from solver.fem.surface import extract
-from solver.kinds import check
 from solver.mesh.edges import shape_derivatives, shape_functions
-from solver.parameters import Length
+from solver.parameters import Length, check
 from solver.rolling.rail.section import Section
 from solver.typing import Array
 
 SHARES = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
-"""Positions of the two Gauss points of an edge, over its length."""
+"""Positions of the two Gauss points of an edge, as shares of its length."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,13 +82,13 @@ class Hats:
 
 
 _FEWEST = 3
-"""Smallest number of vertices and of stations: the outermost ones must not touch."""
+"""Least number of vertices and of stations: the outermost ones must not touch."""
 _CUBIC = (
     [(t * (1 - t) ** 2, -(t**2) * (1 - t)) for t in SHARES],
     [((1 - t) * (1 - 3 * t), t * (3 * t - 2)) for t in SHARES],
 )
-"""Heights and slopes at the points of the hats, over the length of an edge, of the two cubics that
-are 0 at both ends, and have the slope 1 at one of them and 0 at the other."""
+"""Heights over the length of an edge, and slopes, at the points of the hats, of two cubics: both
+are 0 at the ends, with slope 1 at one end and 0 at the other."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -16,24 +16,23 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.kinds import check
 from solver.materials import Elasticity
-from solver.parameters import Infinite, Length
+from solver.parameters import Infinite, Length, check
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.typing import Array
 
 _FAR = 10.0
-"""Larger gaps are cut off here [mm]; no contact is so soft that one of them closes."""
+"""Gaps are capped at this value [mm]; such points never come into contact."""
 _STEPS, _CLOSE = 40, 1e-13
-"""Most Newton steps along a normal, and the length of the last one over the radius."""
+"""Largest number of Newton steps along a normal; length of the last step over the radius."""
 _STEEP = 4.0
-"""Largest slope of a profile beside which the lowest line of a yawed wheel is sought."""
+"""Largest slope of a profile for which the lowest place of a yawed wheel is within the search."""
 _SAMPLES, _FINE = 33, 1e-3
-"""Samples of a line along x for its lowest place, and their smallest distance [mm]."""
+"""Number of samples along x in the search for the lowest place, and their least distance [mm]."""
 _LONGEST, _LEAST = 1.0, 0.1
-"""Longest Newton step [mm], and smallest rate at which a gap is taken to close along a normal."""
+"""Longest Newton step [mm], and least assumed rate at which a gap closes along a normal."""
 _ASIDE = 1e-4
-"""Half the distance over which slopes of the wheel are differences [mm]."""
+"""Half the distance of the two points of a difference that gives the slope of the wheel [mm]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -105,7 +104,7 @@ class ProfiledWheel:
         return np.asarray(np.where(here, self.radius - np.sqrt(below) + curved, np.inf))
 
     def above(self, x: Array, z: Array, y: Array, angle: Array) -> tuple[Array, Array, float]:
-        """Return what lies above places on a surface, along its normals.
+        """Return the gap to the wheel above places on a surface, along its normals.
 
         The gap is that of the wheel at a height at which it touches one of the places.
 
@@ -121,7 +120,7 @@ class ProfiledWheel:
         Raises
         ------
         ModelError
-            for ``profile``, if there is nowhere a wheel above
+            for ``profile``, if no place has the wheel above it
         """
         x, z, y, angle = np.broadcast_arrays(x, z, y, angle)
         vertical = self.surface(x, z) - y
@@ -152,12 +151,12 @@ class ProfiledWheel:
         return t, z - t * sin, height
 
     def _axial(self, x: Array, z: Array) -> Array:
-        """Return the position along the axle, from that of the running circle, as of a profile."""
+        """Return the position along the axle, as profiles take it."""
         along = np.sin(self.yaw) * x + np.cos(self.yaw) * (z - self.middle)
         return np.asarray(self.middle + along)
 
     def _at(self, grid: PatchGrid) -> tuple[Array, Array]:
-        """Return gap at height 0 [mm], and rolling radius of what lies above over R, (n, m).
+        """Return gap at height 0 [mm], and rolling radius of the wheel above over R, (n, m).
 
         At height d the gap is larger by d cos(angle). It is exact at the height at which the
         undeformed bodies touch. Raises `ModelError` where there is no wheel above.
@@ -180,7 +179,7 @@ class ProfiledWheel:
         and across; the gap lies between, as the normal does among local axes. Motions are height
         [mm], longitudinal creepage, lateral creepage, spin [1/mm]. With a wheel that turns by w and
         advances by V per time, longitudinal creepage is 1 - w R / V, lateral creepage its velocity
-        along z over V, spin its rotation about -y over V. That of yaw is in what is at rest.
+        along z over V, spin its rotation about -y over V. The slip by yaw is part of that at rest.
         """
         h, sin, cos = grid.spacing, np.sin(grid.angle), np.cos(grid.angle)
         x, z = grid.x[:, None], grid.z - self.middle

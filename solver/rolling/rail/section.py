@@ -43,9 +43,10 @@ I_AXIS = 0
 I_COMPONENTS = (3, 5)
 """The Mandel components xy and zx, which carry the factor i."""
 _EDGE_POINTS = 3
-"""Points of an edge for springs: exact on straight edges."""
+"""Number of points of an edge for springs: exact on straight edges."""
 _LOOSE = 1e-9
-"""Singular value of held displacements of rigid motions; below it one of them is not held."""
+"""The supports and springs leave a rigid motion free if the smallest singular value of its held
+displacements is below this."""
 
 
 class Section:
@@ -154,7 +155,7 @@ class Section:
 
     @cached_property
     def loose(self) -> Array:
-        """Motions (n, q) of `rigid`, and sums of them, that no support holds: springs alone do."""
+        """Sums (n, q) of motions of `rigid` that springs alone hold, and no support."""
         motions = self.rigid / np.abs(self.rigid).max(axis=0)
         held = np.setdiff1d(np.arange(self.n), self.free)
         return np.asarray(motions @ null_space(np.vstack([motions[held], np.zeros(4)])))
@@ -259,11 +260,12 @@ class Section:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Carried:
-    """Motions of the whole section that only springs hold, taken out of a solve for k = 0.
+    """Motions of the whole section that only springs hold, separated from a solve for k = 0.
 
     On soft springs a section that is loaded every short length turns by radians. If the material is
-    nearly incompressible, rounding of its stiffness times that motion are forces that count. So the
-    reactions of the springs balance the forces first: ``K u = f`` is solved with K R = G as
+    nearly incompressible, rounding of its stiffness times that motion gives forces that are not
+    negligible. So the reactions of the springs balance the forces first: ``K u = f`` is solved with
+    K R = G as
 
         u = R a + v,    R' G a = R' f,    K v = f - G a,    G' v = 0
 

@@ -31,8 +31,7 @@ class SettledStress:
     given, held : (n, 6) arguments of `StraightPrism.settled` that led to it, Mandel [MPa]
     stress : (n, 6) stress, Mandel [MPa]
     strain : (n, 6) elastic strain of it, Mandel
-    change : largest component of the difference of the given stress from what equilibrium leaves of
-        it [MPa]
+    change : largest component of the change of the given stress by equilibrium [MPa]
     """
 
     given: Array
@@ -67,7 +66,7 @@ class StraightPrism:
         return np.einsum("eqab,eb->eqa", section.B0, u[section.dofs]).reshape(-1, 6)
 
     def settled(self, given: Array, held: Array) -> SettledStress:
-        """Return the initial stress that is left when given stresses come to equilibrium.
+        """Return the initial stress after given stresses have come to equilibrium.
 
         Parameters
         ----------

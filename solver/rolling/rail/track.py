@@ -1,9 +1,9 @@
-"""A prism over which a load passes: what `solver.rolling.passing` needs of it.
+"""A prism over which a load passes, as `solver.rolling.passing` uses it.
 
-Stations are numbered downstream from ``ahead`` of the load at x = 0. Only a zone of the section
-and a window of stations may yield. Behind the window plastic strain goes on as at its last station
-and fades to nothing where the length begins again: so the fields of the pass are periodic. What
-is constant along x, the state before the pass, is no wave but the section's own problem, k = 0.
+Stations are numbered downstream from ``ahead`` of the load at x = 0. Only a zone of the section and
+a window of stations may yield. Behind the window plastic strain goes on as at its last station and
+fades to nothing where the length begins again: so the fields of the pass are periodic. The state
+before the pass, constant along x, is no wave: it is the section's own problem, k = 0.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ class PrismTrack:
 
     @property
     def at_rest(self) -> PrismField:
-        """The prism without eigenstress and load; kept, it would hold its prism in a circle."""
+        """The prism without eigenstress and load; not cached, since it refers to its prism."""
         return PrismField(self)
 
     def flow(self, law: Law, before: PrismState, added: Array, parts: int) -> PrismFlow:
@@ -234,7 +234,7 @@ class PrismTrack:
 
 @dataclass(frozen=True, eq=False)
 class PrismField:
-    """What eigenstress and tractions make in a prism; solved when it is asked for.
+    """The field of eigenstress and tractions in a prism; solved when it is used.
 
     Attributes
     ----------
@@ -284,7 +284,7 @@ class PrismField:
         return self.prism.on_grid(self.prism.modes.displacement(self.nodal))
 
     def loaded(self, traction: Array) -> PrismField:
-        """Return the field with tractions; what is known of the eigenstress is not made again."""
+        """Return the field with tractions; fields of the eigenstress are not computed again."""
         other = replace(self, traction=traction)
         for name in {"nodal", "displacement"} & vars(self).keys():
             vars(other)[name] = vars(self)[name]

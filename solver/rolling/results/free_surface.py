@@ -47,7 +47,7 @@ from solver.tensors import SQRT2
 from solver.typing import Array, Ints
 
 _ONE_ROW = 1e-6
-"""Difference of reference coordinates; up to it points are in one row (rounding of the rules)."""
+"""Points are in one row if their reference coordinates differ by less (rounding of the rules)."""
 
 
 @dataclass(frozen=True, slots=True)

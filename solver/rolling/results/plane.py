@@ -1,4 +1,4 @@
-"""Adapter of a steady pass to samples and outputs: states of one body in the frame of the load."""
+"""The track of a steady pass as results see a body, in the frame of the load."""
 
 from __future__ import annotations
 
@@ -14,16 +14,15 @@ from solver.fem.frame import RigidMotion
 from solver.results.acting import Acting
 from solver.results.contact_result import contact_patches
 from solver.rolling.passing import Pass
-from solver.rolling.plane.fields import of_layers, under_load
 from solver.rolling.plane.layers import Layers
-from solver.rolling.plane.track import Track
+from solver.rolling.plane.track import Track, of_layers, under_load
 from solver.rolling.plane.wheel import RollingContact
 from solver.rolling.results.stage import PassStage, SteadyBody
 from solver.typing import Array, Ints
 
 _LEVEL = 1e-6
-"""Ratio of a difference of depth to the depth of the first row; up to it points and nodes are on
-one line."""
+"""Points and nodes are on one line if their depths differ by less than this share of the depth of
+the first row."""
 _MIRRORED = np.array([[1.0], [1.0], [1.0], [-1.0]])
 
 
@@ -50,8 +49,8 @@ class TrackBody(SteadyBody):
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n) from values at points and at the surface to nodes.
 
-        Nodes of the surface take the values at the surface: plastic strain, and thus stress, may
-        change too much between the first two rows of points for extrapolation.
+        Nodes of the surface take the values at the surface: between the first two rows of points
+        plastic strain, and thus stress, may change too much for extrapolation.
         """
         part, first = self.part, self._first
         points, y = part.points.reshape(2, -1), part.X[1]

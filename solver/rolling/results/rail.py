@@ -1,7 +1,7 @@
-"""Adapter of a steady pass over a prism to samples and outputs: states of one body at x = 0.
+"""The prism of a steady pass as results see a body, at x = 0.
 
-The body is the whole section, in x, y and z. Without load its fields are those of the section. At
-the load they are known in the zone that may yield; elsewhere they are NaN.
+The body is the whole section, in x, y and z. Without load fields are known in the whole section,
+under the load in the zone that may yield; elsewhere they are NaN.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One body in the frame of a load that passes over it, as results see bodies, and its states."""
+"""A body in the frame of the load that passes over it, as results see bodies; its states."""
 
 from __future__ import annotations
 

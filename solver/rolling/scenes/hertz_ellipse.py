@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 _LONGEST = 1e6
-"""Largest ratio of the semi-axes that is found; a longer ellipse gets it."""
+"""Largest ratio of the semi-axes that is computed; longer ellipses get this ratio."""
 _HALVINGS = 60
 _MEANS = 9
 """Steps of the arithmetic-geometric mean; they converge quadratically."""
@@ -77,7 +77,7 @@ class HertzEllipse:
 def radii_of(ratio: float) -> float:
     """Return the ratio of relative radii, at least 1, of an ellipse with this ratio of semi-axes.
 
-    Either ratio of the semi-axes, longer over shorter or shorter over longer, gives the same.
+    The ratio of the semi-axes may be longer over shorter, or shorter over longer.
     """
     short = min(ratio, 1 / ratio)
     K, D = _integrals(short)

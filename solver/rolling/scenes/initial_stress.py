@@ -10,8 +10,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.kinds import Checked, check
-from solver.parameters import Pairs, described
+from solver.parameters import Checked, Pairs, check, described
 from solver.parts import Parts
 from solver.typing import Array
 
@@ -19,7 +18,7 @@ _XX = 0
 
 
 class SectionStress(Checked, ABC):
-    """A stress that does not change along x."""
+    """A stress that is constant along x."""
 
     __slots__ = ()
 
@@ -30,7 +29,7 @@ class SectionStress(Checked, ABC):
         Parameters
         ----------
         points : (2, n) positions z, y; the top is at y = 0 [mm]
-        area : (n,) area that each of them stands for [mm2]
+        area : (n,) area of the section that each point represents [mm2]
         """
 
 

@@ -26,15 +26,15 @@ from solver.scenes.scene import Monitor, Scene
 
 
 class Passes(ABC):
-    """The passes of a loading path in a window of one size, and what results need of them.
+    """The passes of a loading path in a window of one size, as results see them.
 
-    Making it raises `ModelError` if there is no room for the window.
+    The constructor raises `ModelError` if there is no room for the window.
 
     Attributes
     ----------
     parameters : those of the run with the most passes
     law : law of the material
-    extent : size of the window in words, for the error that the largest one is too small
+    extent : size of the window in words, for the error if the largest window is too small
     beside : (pass) -> fields of a further body, None without
     """
 
@@ -53,7 +53,7 @@ class Passes(ABC):
 
     @abstractmethod
     def trace(self, found: Pass[Any]) -> Any:
-        """Return what is kept of each pass."""
+        """Return the data of a pass that are kept."""
 
     @abstractmethod
     def audit(self, found: Pass[Any], previous: Pass[Any] | None, number: int) -> Audit:
@@ -67,7 +67,7 @@ class Passes(ABC):
 Window = Callable[[Any, View, float], Passes]
 """(parameters, positions of results, ratio of the window to its usual size) -> passes."""
 Otherwise = Callable[[Sequence[Any], NotConverged], Iterator[FinishedRun] | None]
-"""(remaining runs, why their passes are not found) -> the runs found in another way, or None."""
+"""(remaining runs, error of their passes) -> the runs computed in another way, or None."""
 
 
 def by_passes(
@@ -104,7 +104,7 @@ class _Path:
 
     Attributes
     ----------
-    error : why there are no more, or None
+    error : error that ended the passes, or None
     """
 
     def __init__(self, scene: Scene, last: Any, window: Window) -> None:
@@ -121,7 +121,7 @@ class _Path:
         self._previous: Pass[Any] | None = None
 
     def runs(self, runs: Sequence[Any], monitor: Monitor, reach: float) -> Iterator[FinishedRun]:
-        """Yield those of the runs whose passes are found; ``error`` says why others are not.
+        """Yield the runs whose passes are found; ``error`` is the reason if others are not.
 
         ``reach`` is the ratio of the size of the window to the usual size.
         """

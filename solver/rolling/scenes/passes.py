@@ -1,4 +1,4 @@
-"""What each pass leaves, its changes over a cycle, and the shakedown state they tend to."""
+"""The state after each pass, its change over a cycle, and the shakedown state of the passes."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ PASS_SURFACE_ADVANCE = declare(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PassTrace:
-    """What a pass leaves at n points: along depth under mid-track, or of the zone of a prism.
+    """The state after a pass at n points: along depth under mid-track, or in the zone of a prism.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class PassTrace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trace(PassTrace):
-    """What a pass over a half-space leaves, also at the stations of a view.
+    """The state after a pass over a half-space, also at the stations of a view.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ def passes(traces: Sequence[PassTrace], cycle: int) -> Values:
 
 
 def profiles(traces: Sequence[Trace], cycle: int) -> Values:
-    """Return the variables over passes and depth, and the shear that a cycle leaves."""
+    """Return the variables over passes and depth, and the shear after each cycle."""
     each = (added_by(traces, number, cycle)[1] for number in range(len(traces)))
     shear = np.array([SQRT2 * left[:, 3] for left in each])
     largest = np.abs(shear).argmax(axis=1)
@@ -148,12 +148,12 @@ def profiles(traces: Sequence[Trace], cycle: int) -> Values:
 
 
 def shakedown_of(parameters: Any, traces: Sequence[PassTrace], cycle: int | None) -> Shakedown:
-    """Return the shakedown state that the passes tend to, of a material with these parameters.
+    """Return the shakedown state that passes approach, of a material with these parameters.
 
     Parameters
     ----------
-    cycle : passes after which the loading repeats itself. With None it never does: if anything
-        yields no state is decided
+    cycle : number of passes after which the loading repeats itself. With None it never does: if
+        anything yields, no state is decided
     """
     length = cycle or 1
     ends = range((len(traces) - 1) % length, len(traces), length)
@@ -170,9 +170,9 @@ def shakedown_of(parameters: Any, traces: Sequence[PassTrace], cycle: int | None
 
 
 def mean_added(traces: Sequence[PassTrace], most: int) -> tuple[float, float]:
-    """Return the largest strain added in a pass, its mean over the last passes: half, or ``most``.
+    """Return the largest mean strain added in a pass, over the last half of the passes or ``most``.
 
-    It is that accumulated, and the equivalent of the signed one that is left.
+    The first number is accumulated strain, the second the equivalent of signed strain.
     """
     average = max(min(len(traces) // 2, most), 1)
     accumulated, left = added_by(traces, len(traces) - 1, average)
@@ -180,7 +180,7 @@ def mean_added(traces: Sequence[PassTrace], most: int) -> tuple[float, float]:
 
 
 def added_by(traces: Sequence[PassTrace], number: int, cycle: int) -> tuple[Array, Array]:
-    """Return what the cycle that ends with a pass adds: equivalent (n,), signed (n, components)."""
+    """Return the strain added in the cycle that ends with a pass: equivalent (n,), and signed."""
     after = traces[number]
     if number < cycle:
         return after.accumulated, after.plastic_strain

@@ -1,6 +1,7 @@
 """The bodies, the passes and the results of the raceway.
 
-Zone and window of the block are shares of the Hertz ellipse; runs of one geometry share its set-up.
+Zone and window of the block are multiples of the Hertz ellipse; runs of one geometry share its
+set-up.
 """
 
 from __future__ import annotations
@@ -28,26 +29,25 @@ from solver.rolling.rail.profiles.zone import Zone, raceway_mesh
 from solver.rolling.rail.section import Section
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.pass_runner import by_passes
-from solver.rolling.scenes.raceway_parameters import BESIDE, RacewayParameters
+from solver.rolling.scenes.raceway import BESIDE, RacewayParameters
 from solver.rolling.scenes.rail_outputs import sketched
-from solver.rolling.scenes.rail_passes import REACHES, RailPasses
+from solver.rolling.scenes.rail_passes import REACHES, RailPasses, RolledPrism
 from solver.rolling.scenes.rail_window import PrismGeometry, split_rows, whole
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
-from solver.scenes.effort import Effort
-from solver.scenes.scene import Method
+from solver.scenes.scene import Effort, Method
 from solver.scenes.sketch import Sketch
 
 _BLOCK = 32.0
-"""Depth and half the width of the block over the longer semi-axis: stress in the zone is within
-0.05 % of p0 of that in a half-space, as the mean; 16 makes 0.15 %, 64 makes 0.02 %."""
+"""Depth and half the width of the block, over the longer semi-axis. The mean error of stress in the
+zone against a half-space is 0.05 % of p0; with 16 it is 0.15 %, with 64 it is 0.02 %."""
 _DEPTH, _REACH = 1.8, 1.2
-"""Depth of the zone over `RacewayParameters.below`, and half the length where the load may act over
+"""Depth of the zone, over `RacewayParameters.below`; half the length where the load may act, over
 a."""
 _LEVELS = 2
 """Levels of the far field: the last one is 64 times 8 a long, and the block is held at its foot."""
 _GROOVE, _STEEPEST = 1.6, math.radians(75.0)
-"""Half the width of the groove along its arc over that of the zone, and the largest slope of its
-sides [rad]: the shoulders beyond are flat."""
+"""Half the width of the groove along its arc, over that of the zone; largest slope of its sides
+[rad]. The shoulders beyond are flat."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +85,8 @@ def geometry(parameters: RacewayParameters, reach: float = 1.0) -> RacewayGeomet
     Raises
     ------
     ModelError
-        for the load, if the zone would reach the steep sides of the groove or of the ball or roller
+        for the parameter of the load, if the zone would reach the steep sides of groove, ball or
+        roller
     """
     p, (a, b) = parameters, parameters.size
     count = p.elements
@@ -129,31 +130,16 @@ def track_of(own: RacewayGeometry) -> PrismTrack:
     return own.track(section_of(own), _LEVELS)
 
 
-class RolledRaceway:
-    """A ball or roller on a raceway, as `solver.rolling.scenes.rail_passes.RolledPrism`."""
-
-    def __init__(self, parameters: RacewayParameters) -> None:
-        self.parameters = parameters
-        self._made: tuple[PrismTrack, PatchLoad] | None = None
+class RolledRaceway(RolledPrism):
+    """A ball or roller on a raceway."""
 
     def track(self, reach: float) -> PrismTrack:
         """See `RolledPrism`."""
         return track_of(geometry(self.parameters, reach))
 
-    def load(self, track: PrismTrack, number: int) -> PatchLoad:
-        """See `RolledPrism`; all passes have the same load.
-
-        Raises
-        ------
-        LimitLoad
-            if a prescribed shear is above the shear strength of the material
-        """
-        if self._made is None or self._made[0] is not track:
-            self._made = track, self._load(track)
-        return self._made[1]
-
-    def _load(self, track: PrismTrack) -> PatchLoad:
-        p, ellipse = self.parameters, self.parameters.ellipse
+    def made(self, track: PrismTrack, own: RacewayParameters, last: Any) -> PatchLoad:
+        """See `RolledPrism`; a prescribed shear may be above the shear strength."""
+        p, ellipse = own, own.ellipse
         if p.load == "hertz":
             shear = p.traction * p.friction
             limit = too_much_shear(p.material(), abs(shear) * ellipse.peak_pressure)
@@ -182,10 +168,10 @@ HERTZ_APPROACH = declare(
     "hertz_approach", "approach of the bodies in the elastic Hertz contact of half-spaces", "mm"
 )
 _ALONG, _ACROSS, _DOWN = 1.6, 2.0, 2.4
-"""Half the length and half the width of maps over a and b, and their depth over
+"""Half the length of maps over a, half their width over b, and their depth over
 `RacewayParameters.below`."""
 _PIXELS = 24
-"""Positions of maps per semi-axis, and per `RacewayParameters.below` in depth."""
+"""Number of positions of maps per semi-axis; in depth, per `RacewayParameters.below`."""
 
 
 def method(parameters: RacewayParameters) -> Method:

@@ -87,7 +87,7 @@ MEAN_NET_INCREMENT = declare(
     "largest equivalent of the signed plastic strain left by a pass, mean over the last passes",
 )
 _AVERAGED = 100
-"""Largest number of passes in a mean over the last ones, which are at most half of all."""
+"""Largest number of passes in a mean over the last passes; it is at most half of all."""
 _YIELDED = 1e-6
 """Plastic strain above which a point counts as yielded."""
 
@@ -101,7 +101,7 @@ def sketched(name: str, section: Section, law: Law, curves: Mapping[str, Array])
 def patch(run: FinishedRun) -> Values:
     """Return pressure, shear and slip on the contact, its forces, its size, and the creepage.
 
-    Slip and status are those of the nearest station and vertex; slip is NaN where it is open.
+    Slip and status are those of the nearest station and vertex; slip is NaN in open places.
     """
     contact: Any = run.outcome.points[run.view.loaded].touching
     grid, pressure = contact.grid, contact.pressure
@@ -137,7 +137,7 @@ def patch(run: FinishedRun) -> Values:
 
 
 def _widened(places: Array) -> Array:
-    """Return rising places, the outermost moved out by rounding: a place on them is inside."""
+    """Return rising places, the outermost moved out by rounding to include them."""
     ends = 1e-9 * (places[-1] - places[0]) * np.array([-1.0, 1.0])
     return np.concatenate([places[:1] + ends[0], places[1:-1], places[-1:] + ends[1]])
 
@@ -173,8 +173,8 @@ def cycles(run: FinishedRun, cycle: int | None = 1) -> Values:
 
     Parameters
     ----------
-    cycle : passes after which the loading repeats itself; increments are those of the cycle that
-        ends with a pass. With None it never does: increments are those of a pass
+    cycle : number of passes after which the loading repeats itself; increments are those of the
+        cycle that ends with a pass. With None it never repeats: increments are those of a pass
     """
     traces = run.outcome.traces
     mean, mean_net = mean_added(traces, _AVERAGED)

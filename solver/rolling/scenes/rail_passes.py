@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -31,37 +32,49 @@ from solver.typing import Array
 REACHES = (1.0, 1.4, 2.0)
 """Ratios of the size of zone and window to the usual size, tried in turn."""
 _SETTLED = 1
-"""Number of Newton steps of a pass, up to which the next one is taken to be nearly the same."""
+"""Largest number of Newton steps of a pass after which the next pass begins with its strain."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RailTrace(PassTrace):
-    """What a pass over a prism leaves; ``lowest`` (6,) is the smallest residual stress [MPa]."""
+    """The state after a pass over a prism; ``lowest`` (6,) is the least residual stress [MPa]."""
 
     lowest: Array
 
 
-class RolledPrism(Protocol):
-    """What a scene says of its prism.
+class RolledPrism(ABC):
+    """The prism of a scene, and its loads.
 
     Attributes
     ----------
     parameters : parameters of the scene
     """
 
-    parameters: Any
+    def __init__(self, parameters: Any) -> None:
+        self.parameters, self._passes = parameters, parameters.each_pass()
+        self._made: tuple[PrismTrack, Any, PatchLoad] | None = None
 
+    @abstractmethod
     def track(self, reach: float) -> PrismTrack:
         """Return the prism; ``reach`` is the ratio of zone and window to their usual size.
 
         Raises `ModelError` if the section has no room for them.
         """
 
-    def load(self, track: PrismTrack, number: int) -> PatchLoad:
-        """Return the load of a pass over the prism, counted from 0.
+    @abstractmethod
+    def made(self, track: PrismTrack, own: Any, last: Any) -> PatchLoad:
+        """Return the load of a pass with these parameters; ``last`` is one on this prism, or None.
 
-        It is the same object as in the pass before if the load is the same.
+        Raises `LimitLoad` if no prism of the material can carry it.
         """
+
+    def load(self, track: PrismTrack, number: int) -> PatchLoad:
+        """Return the load of a pass, counted from 0: the same object as before if it is equal."""
+        own, known = self._passes[number], self._made
+        if known is None or known[:2] != (track, own):
+            last = known[2] if known is not None and known[0] is track else None
+            known = self._made = track, own, self.made(track, own, last)
+        return known[2]
 
 
 class RailPasses(Passes):
@@ -87,9 +100,9 @@ class RailPasses(Passes):
     def found(self, budget: SolveBudget) -> Iterator[Pass[PrismState]]:
         """See `Passes`.
 
-        A pass begins with the elastic solution of its load on the strain that is left. Only where
-        pass after pass is nearly the same it begins with the strain of the last one: of passes that
-        still yield, that is farther away, and of another load it leads nowhere.
+        A pass begins with the elastic solution of its load on the residual strain. If the passes
+        are nearly the same, it begins with the strain of the last pass; while passes still yield,
+        that guess is worse, and after another load it does not converge.
         """
         track, law = self._track, self.law
         before = track.virgin(law)

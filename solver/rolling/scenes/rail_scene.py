@@ -1,12 +1,70 @@
-"""What scenes of passes over a prism have in common."""
+"""What scenes of passes over a prism have in common: parameters, outputs, advice."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Self
+
+from annotated_types import Interval, Unit
 
 from solver.late import Late, late
+from solver.parameters import Fraction, Other, described
 from solver.results.record import Status
+from solver.rolling.load import FULL_SLIP, RollingLoad
+from solver.rolling.scenes.wheel_parameters import WheelParameters
 from solver.scenes.scene import Scene
+
+ROUGH = {"friction": Other(0.0), "cohesion": Other(0.0), "friction_law": Other("coulomb")}
+"""Parameters of which a creepage needs one to have an effect."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrismParameters(WheelParameters):
+    """Passes and motion of a wheel on a prism that yields (N, mm, MPa)."""
+
+    passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "number of passes")
+    friction: Fraction = described(0.17, "Coulomb friction coefficient")
+    given_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
+        0.0,
+        "prescribed creepage 1 - w R / V of a wheel that turns by w and advances by V",
+        needs=ROUGH,
+    )
+    lateral_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
+        0.0,
+        "velocity of the axle along z over that along x, as by skew; the yaw of a wheel adds to it",
+        needs=ROUGH,
+    )
+
+    def each_pass(self) -> Sequence[Self]:
+        """Return the parameters of each pass; those of equal passes are one object."""
+        return [self] * self.passes
+
+    @property
+    def contact_modulus(self) -> float:
+        """E* of the contact of wheel and prism [MPa]."""
+        return 1 / sum(
+            1 / each.plane_strain_modulus for each in (self.elasticity, self.wheel_elasticity)
+        )
+
+    def under(self, force: float) -> RollingLoad:
+        """Return the load with this vertical force [N], and the motion of the wheel."""
+        locked = self.traction == 1.0
+        drive = self.traction * self.friction * force
+        return RollingLoad(
+            force=force,
+            drive=None if locked or self.control == "creepage" else drive,
+            creepage=FULL_SLIP if locked else self.given_creepage,
+            lateral_creepage=self.lateral_creepage,
+        )
+
+    @property
+    def rubbing(self) -> Mapping[str, Any]:
+        """Friction and strength, as `RollingPatch` takes them."""
+        return {
+            "friction": self.friction_part,
+            "strength": self.material().shear_yield_stress,
+        }
 
 
 def rail_scene(
@@ -18,7 +76,7 @@ def rail_scene(
     Parameters
     ----------
     geometry : (parameters) -> what the set-up depends on
-    outputs : those beside maps, profiles, extremes, the contact patch and the section
+    outputs : further ones, after maps, profiles, extremes, the contact patch and the section
     advice : what to do if a pass does not converge
     """
     method, view, sketch, effort = late(

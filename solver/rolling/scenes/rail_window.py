@@ -1,4 +1,4 @@
-"""The prism of a scene: its zone, and the window around the load, in shares of the contact."""
+"""The prism of a scene: its zone, and the window around the load, in multiples of the contact."""
 
 from __future__ import annotations
 
@@ -13,36 +13,37 @@ from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
 from solver.rolling.rail.section import Section
 from solver.rolling.rail.track import PrismTrack
-from solver.rolling.scenes.rail_parameters import PrismParameters
-from solver.scenes.effort import Effort
+from solver.rolling.scenes.rail_scene import PrismParameters
+from solver.scenes.scene import Effort
 from solver.tensors import SQRT2
 
 _FIRST, _FACTOR = 0.5, 2.2e-5
-"""Seconds of a set-up: at least, and per wave and unknown of the zone."""
+"""Processor time of a set-up [s]: a constant, and the part per wave and unknown of the zone."""
 _LEAST_BYTES, _BYTES = 1.4e8, 4400.0
-"""Bytes of a path: at least, and per wave and unknown of the zone."""
+"""Memory of a path [bytes]: a constant, and the part per wave and unknown of the zone."""
 _STILL, _POINT = 0.01, 1.5e-6
-"""Seconds of a pass where nothing yields: at least, and per point and station of the window."""
+"""Processor time of an elastic pass [s]: a constant, and the part per point and station of the
+window."""
 _YIELDS = 28.0
-"""Work of all yielding under a wheel that rolls again and again, in passes where nothing yields.
-Half of it is in the first pass, a quarter in the second, and so on."""
+"""Work of all yielding under a wheel that rolls again and again, over that of an elastic pass. Half
+of it is in the first pass, a quarter in the second, and so on."""
 
 
 _AHEAD, _BEHIND, _LENGTH = 2.2, 2.6, 7.0
-"""The window ahead and behind, and the length after which waves repeat, over half the length where
-the load is expected to act."""
+"""Length of the window ahead and behind, and the length after which waves repeat, over half the
+length where the load is expected to act."""
 _WIDE = 4 / 3
-"""Least length after which waves repeat, over half the width of the zone: the far field takes the
-loads beyond it by their resultants alone. The pressure of a Hertz ellipse with a ratio of semi-axes
-of 25 then has an error of 0.1 %; with half the length it has 1.4 %, with a third 4 %."""
+"""Least length after which waves repeat, over half the width of the zone: the far field includes
+the loads beyond it by their resultants alone. The pressure of a Hertz ellipse with a ratio of
+semi-axes of 25 then has an error of 0.1 %; with half the length it has 1.4 %, with a third 4 %."""
 _LEAST = 4
 """Least number of elements in half a zone or reach."""
 _UPPER = 0.35
-"""Depth of the rows of elements that are divided, over the mean semi-axis of the contact."""
+"""Depth down to which rows of elements are divided, over the mean semi-axis of the contact."""
 _XY = 3
 _WEAK, _SHEARED, _PARTS = 0.05, 0.01, 20
-"""Rise of the shear stress over its value at first yield below which hardening is weak, the
-equivalent plastic strain at which it is taken, and the increments to there."""
+"""Hardening is weak if the shear stress rises by less than this share of its value at first yield,
+up to this equivalent plastic strain, in this number of increments."""
 
 
 def whole(length: float, size: float) -> float:
@@ -82,7 +83,7 @@ def _weak(law: Law) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrismGeometry(ABC):
-    """All that the set-up of a prism depends on; runs with equal geometry share it.
+    """All values that decide the set-up of a prism; runs with equal geometry share it.
 
     Attributes
     ----------

@@ -35,8 +35,8 @@ from solver.rolling.plane.wheel import Rim, RollingContact, RollingWheel
 from solver.rolling.results.plane import TrackBody, of_wheel
 from solver.rolling.scenes.pass_runner import Passes, by_passes
 from solver.rolling.scenes.passes import Trace, shakedown_of
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_model import wheel_body
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.rolling.search import search
 from solver.scenes.driver import by_increments
 from solver.scenes.scene import Monitor, Scene
@@ -44,7 +44,7 @@ from solver.tensors import to_tensor
 from solver.typing import Array
 
 _PARTS, _TOLERANCE = 4, 0.01
-"""Increments between two points of a row, and tolerance, of a pass on a coarser mesh."""
+"""Number of increments between two points of a row, and tolerance, of a pass on a coarser mesh."""
 
 
 def steady_passes(
@@ -75,7 +75,7 @@ def steady_passes(
 def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
     """Return the strain of the first pass as found with elements of twice the side, or None.
 
-    Half of Newton's steps only come near the solution; on the coarser mesh they cost a fifth.
+    Half of Newton's steps only approach the solution; on the coarser mesh they cost a fifth.
     """
     p = parameters
     try:
@@ -149,9 +149,10 @@ def load_on(track: Track, run: RollingParameters, parameters: RollingParameters)
 _REACHES = (1.0, 1.5, 2.5, 4.0)
 """Ratios of the size of the window to the usual size, tried in turn."""
 _LENGTH = 6.0
-"""Ratio of the length of a track rolled by increments to the half-width, as in published tests."""
+"""Length of a track rolled by increments, over the half-width, as in published tests."""
 _MOST_PASSES = 4
-"""Largest number of passes that are rolled by increments instead: each takes minutes."""
+"""Largest number of passes that are rolled by increments if no steady pass is found: each takes
+minutes."""
 
 
 def by_steady_passes(

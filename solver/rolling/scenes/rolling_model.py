@@ -1,32 +1,41 @@
-"""The model of the rolling scene: half-space and wheel."""
+"""The model of the rolling scene, half-space and wheel, and the work of its loading path."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from skfem import Mesh
 
+from solver.loading.program import HALVINGS
 from solver.materials.material import Material
-from solver.mesh.grids import grid, mapped, merged, within
+from solver.mesh.grids import grid, grid_size, mapped, merged, within
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.model.motion import Axle, TravellingPressure
-from solver.rolling.plane.lines import half_space_nodes, track_lines, wheel_nodes
+from solver.rolling.plane.lines import half_space_nodes, rim_elements, track_lines, wheel_nodes
 from solver.rolling.plane.track import CONTACT, half_space_body, standing_pressure
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
+from solver.scenes.scene import Effort
 from solver.scenes.sketch import Sketch
+from solver.typing import Array
+
+_DECIDED = 3
+"""Smallest number of passes after which a shakedown state may be decided."""
 
 
-def track_grid(parameters: RollingParameters) -> tuple[float, float, float, float, float]:
-    """Return the arguments of `half_space_nodes`."""
+def _lines(parameters: RollingParameters) -> tuple[Array, Array]:
+    """Return x and y of the grid lines of the half-space [mm]."""
     p, a = parameters, parameters.half_width
-    return p.fine, p.half_space_size * a, a, p.element_size, p.growth
+    if p.endless:
+        return track_lines(p.mesh_width, p.element_size, p.growth)
+    return half_space_nodes(p.fine, p.half_space_size * a, a, p.element_size, p.growth)
 
 
 def _half_space(parameters: RollingParameters) -> Body:
-    x, y = half_space_nodes(*track_grid(parameters))
+    x, y = _lines(parameters)
     travelling = None
     if parameters.load == "hertz":
         schedule = parameters.schedule
@@ -105,8 +114,7 @@ def sketch(parameters: RollingParameters) -> Sketch | None:
     p = parameters
     if not p.endless:
         return None
-    lines, a = track_lines(p.mesh_width, p.element_size, p.growth), p.mesh_width
-    body = half_space_body(*lines, CONTACT * a, p.material().elasticity)
+    body = half_space_body(*_lines(p), CONTACT * p.mesh_width, p.material().elasticity)
     half_space = replace(body, material=p.material())
     if p.load == "hertz":
         pressure = standing_pressure(p.peak_pressure, p.friction * p.traction, p.half_width)
@@ -129,3 +137,33 @@ def model(parameters: RollingParameters) -> Model:
         slave=("half_space", "track"), master=("wheel", "rim"), sliding="finite"
     )
     return Model(bodies=(_wheel(parameters), half_space), contacts=(contact,))
+
+
+def effort(parameters: RollingParameters, passes: Sequence[float]) -> Effort:
+    """Return the work of rolling up to the largest number of passes."""
+    p, n = parameters, int(max(passes))
+    track = grid_size(*_lines(p), p.element)
+    # x is held at both sides, x and y at the bottom, which shares its ends with the sides
+    elements, unknowns = track.elements, 2 * (track.nodes - track.up - track.along + 1)
+    if p.load == "contact":
+        ring = wheel_nodes(p.radius, p.widest.reach, p.element_size)
+        elements += grid_size(*ring, p.element).elements
+    if p.endless:  # passes are steady: the wheel is a compliance
+        least = min(n, _DECIDED) if p.until == "decided" else n
+        return Effort(elements=elements, unknowns=unknowns, increments=least, most_increments=n)
+    if p.load == "contact":
+        rim = range(rim_elements(p.reach, p.element_size) + 1)
+        unknowns += 2 * grid_size(rim, [0.0], p.element).along
+        unknowns += 1 if p.guided else 2  # height of the hub, and its rotation
+    schedule = p.schedule
+    fixed = schedule.press * (1 + schedule.driven) + schedule.release
+    rolled = 2 * schedule.half_steps
+    # the first pass is repeated for each halving; the other passes use the last halving
+    times = [2**k for k in range(HALVINGS + 1 if p.advance_tolerance else 1)]
+    first = sum(fixed + rolled * each for each in times)
+    return Effort(
+        elements=elements,
+        unknowns=unknowns,
+        increments=n * (fixed + rolled),
+        most_increments=first + (n - 1) * (fixed + rolled * times[-1]),
+    )

@@ -19,8 +19,8 @@ from solver.results.view import View
 from solver.rolling.plane.lines import recorded_step
 from solver.rolling.results.free_surface import FreeSurface
 from solver.rolling.scenes.passes import Trace, passes, profiles, shakedown_of
+from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import by_steady_passes
-from solver.rolling.scenes.rolling_parameters import RollingParameters
 from solver.scenes.driver import by_increments
 from solver.scenes.scene import Method
 from solver.typing import Array
@@ -177,7 +177,7 @@ def surface(run: FinishedRun) -> Values:
 
 
 def cycles(run: FinishedRun) -> Values:
-    """Return the results of every pass, and the shakedown state that the passes tend to."""
+    """Return the results of every pass, and the shakedown state that the passes approach."""
     parameters, traces = run.parameters, run.outcome.traces
     return {
         **passes(traces, parameters.cycle),
@@ -187,7 +187,7 @@ def cycles(run: FinishedRun) -> Values:
 
 
 def state_of(parameters: RollingParameters, traces: Sequence[Trace]) -> Shakedown:
-    """Return the shakedown state that passes over a half-space tend to.
+    """Return the shakedown state that passes over a half-space approach.
 
     On a track with ends a body that yields stays undecided: the ends constrain the layer that
     ratchetting moves, so that the cycle seems closed.
@@ -226,7 +226,7 @@ def advice(parameters: RollingParameters) -> dict[Status, str]:
 
 
 _EXTENT = 4.0
-"""Ratio of the largest x of results on an endless track to the Hertz half-width."""
+"""Largest x of results on an endless track, over the Hertz half-width."""
 
 
 def view(parameters: RollingParameters) -> View:

@@ -22,7 +22,7 @@ from solver.loading.program import Lap, Program, Stage
 from solver.model.amplitude import Amplitude
 
 _ROUNDING = 1e-6
-"""Difference below which two times are the same."""
+"""Difference of two times below which they are the same."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,10 +1,9 @@
 """Passes with different loads: a sequence, or random traffic about the parameters of a run.
 
-Those of random traffic scatter as a normal distribution that is cut off at three standard
-deviations. Dynamic wheel loads are distributed so: J. Eisenmann, Germans gain a better
-understanding of track structure, Railway Gazette International 128 (1972) 305-308. Their standard
-deviation is 0.1 (track in very good condition) to 0.3 (poor condition) of the load, more above
-60 km/h.
+In random traffic the loads have a normal distribution that is cut off at three standard deviations,
+as dynamic wheel loads have: J. Eisenmann, Germans gain a better understanding of track structure,
+Railway Gazette International 128 (1972) 305-308. Their standard deviation is 0.1 (track in very
+good condition) to 0.3 (poor condition) of the load, more above 60 km/h.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from statistics import NormalDist
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -69,17 +68,10 @@ CUT = 3.0
 """Largest deviation from the mean, in standard deviations."""
 
 
-class Scattered(Protocol):
-    """Parameters of passes that scatter."""
-
-    def deviating(self, deviation: Sequence[float]) -> object:
-        """Return the parameters of a pass; deviations are in standard deviations."""
-
-
 def deviations(seed: int, passes: int, count: int) -> Array:
     """Return deviations (passes, count) from the mean, in standard deviations.
 
-    Those of a pass do not depend on how many passes follow.
+    The deviations of a pass do not depend on the number of later passes.
     """
     normal = NormalDist()
     least, most = normal.cdf(-CUT), normal.cdf(CUT)
@@ -87,12 +79,12 @@ def deviations(seed: int, passes: int, count: int) -> Array:
     return np.array([normal.inv_cdf(each) for each in share.ravel()]).reshape(share.shape)
 
 
-def check_spreads(parameters: Scattered, spreads: Sequence[str]) -> None:
-    """Raise `ModelError` for a spread that takes a parameter beyond its limits.
+def check_spreads(parameters: Any, spreads: Sequence[str]) -> None:
+    """Raise `ModelError` for a spread that moves a parameter beyond its limits.
 
     Parameters
     ----------
-    spreads : names of the standard deviations, in the order of `Scattered.deviating`
+    spreads : names of the standard deviations, in the order of ``parameters.deviating``
     """
     for number, name in enumerate(spreads):
         for way in (-CUT, CUT):

@@ -1,4 +1,4 @@
-"""Where a wheel will touch a rail, as the gap of the undeformed bodies tells it."""
+"""Where a wheel will touch a rail, from the gap of the undeformed bodies."""
 
 from __future__ import annotations
 
@@ -22,30 +22,32 @@ from solver.rolling.rail.profiles.wheel_profile import (
     measured,
     s1002,
 )
-from solver.rolling.scenes.wheel_rail_parameters import Points, WheelRailParameters
+from solver.rolling.scenes.wheel_rail import Points, WheelRailParameters
 from solver.typing import Ints
 
 _PRESSED = 0.5
-"""Ratio of the gap of undeformed bodies at the edge of contact to their approach, as for a ball."""
+"""Gap of the undeformed bodies at the edge of contact, over their approach, as for a ball."""
 _APPROACH = 1.122
 """Approach in the middle of a uniform pressure p on a square of side s, over p s / E*: K.L.
 Johnson, Contact Mechanics (1985), section 3.3."""
 _STEP, _GRID = 0.05, 0.5
-"""Step with which gaps are searched, and to which the middle of the contact is rounded [mm]."""
+"""Distance of places at which gaps are computed, and step to which the middle of the contact is
+rounded [mm]."""
 _NEAR = 2.2
-"""Ratio of the gap at which a second contact may form, as the rail turns under the first one, to
-that at the edge of contact."""
+"""Gap at which a second contact may form, as the rail turns under the first one, over that at the
+edge of contact."""
 _TREAD, _RISE, _FLANGE = math.radians(20.0), 1.0, 10.0
-"""Largest slope of the top of the rail [rad]; largest height at which the wheel may be above it
-while it touches a side, and of its running circle over the rail in contact [mm]."""
+"""Largest slope of the top of the rail [rad]; largest height of the wheel above the top while it
+touches a side, and largest height of its running circle over the rail in contact [mm]."""
 _STEEPEST = math.radians(88.0)
 """Steepest slope of the surface that the wheel may touch [rad]."""
 _HALVINGS = 6
-"""Bisections by which the rail's way aside is found, which decides only the size of the zone."""
+"""Number of bisections for the lateral displacement of the rail, which decides only the size of the
+zone."""
 
 
 class _Touching(NamedTuple):
-    """What decides where a wheel touches: parameters, and what follows from them."""
+    """Values that decide where a wheel touches: parameters, and values derived from them."""
 
     load: float
     lateral_position: float
@@ -63,7 +65,7 @@ class _Touching(NamedTuple):
 
     @classmethod
     def of(cls, parameters: WheelRailParameters) -> _Touching:
-        """Return those of a pass."""
+        """Return the values of a pass."""
         return cls(*(getattr(parameters, name) for name in cls._fields))
 
 
@@ -186,7 +188,7 @@ class _Gap:
         self.level = self._edge(p)
 
     def _edge(self, p: _Touching) -> float:
-        """Return the gap at the edge of contact: it grows with it, its area's approach falls."""
+        """Return the gap at the edge of contact: a share of the approach on the area inside it."""
         level, square = np.sort(self.gap)[1:], np.cos(self.angle) ** 2
         first, last = 0, len(level) - 1
         while first < last:
@@ -292,7 +294,7 @@ def canted(profile: str | Points | SectionMesh, cant: float) -> RailSection | Me
             return MeshedRail.of(profile).canted(cant)
         except ModelError as error:
             allowed = f"must have a line {RUNNING} that fits the cant: it {error.allowed}"
-            raise ModelError("rail_profile", profile.told, allowed) from None
+            raise ModelError("rail_profile", profile.in_words, allowed) from None
     section = rail_60e1()
     if not isinstance(profile, str):
         section = section.worn(np.array(profile).T)

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values
 from solver.results.view import ACROSS_TRACK, View
+from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.patch_contact import PatchContact
+from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.pass_runner import by_passes
 from solver.rolling.scenes.rail_outputs import cycles, sketched
-from solver.rolling.scenes.rail_passes import REACHES, RailPasses
+from solver.rolling.scenes.rail_passes import REACHES, RailPasses, RolledPrism
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
+from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact, wheel_of
-from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
-from solver.rolling.scenes.wheel_rail_track import RolledRail, geometry, meshed
-from solver.scenes.effort import Effort
-from solver.scenes.scene import Method
+from solver.rolling.scenes.wheel_rail_track import geometry, meshed, stressed_track
+from solver.scenes.scene import Effort, Method
 from solver.scenes.sketch import Sketch
 from solver.typing import Array
 
@@ -47,6 +48,23 @@ _HALF_HEAD, _MAPPED, _ALONG = 36.0, 16.0, 20.0
 """Half the width of maps, their depth, and half their length along the rail [mm]."""
 _PIXEL = 0.5
 """Distance of positions of maps across and along [mm]; in depth it is half of that."""
+
+
+class RolledRail(RolledPrism):
+    """A wheel on a rail."""
+
+    def track(self, reach: float) -> PrismTrack:
+        """See `RolledPrism`."""
+        p, own = self.parameters, geometry(self.parameters, reach)
+        meshed(p, own)
+        return stressed_track(own, p.rail_stress, p.thermal_strain)
+
+    def made(self, track: PrismTrack, own: WheelRailParameters, last: Any) -> RollingPatch:
+        """See `RolledPrism`; wheels of other passes share the influences of tractions."""
+        rolls = {"wheel": wheel_of(own), "load": own.under(own.load), **own.rubbing}
+        if last is not None:
+            return cast("RollingPatch", last.changed(**rolls))
+        return RollingPatch(grid=track.grid, compliance=track.compliance, **rolls)
 
 
 def method(parameters: WheelRailParameters) -> Method:
@@ -94,7 +112,7 @@ def traffic(run: FinishedRun) -> Values:
 
 
 def wheel(run: FinishedRun) -> Values:
-    """Return the wheel of the last pass: its profile as it touches the rail, height, and slip.
+    """Return the wheel of the last pass: its profile at first touch, its height, and its slip.
 
     The height is that of the axle over the one at which the undeformed bodies touch; the moment is
     that about the vertical through the running circle.

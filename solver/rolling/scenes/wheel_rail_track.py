@@ -12,7 +12,6 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.memory import kept
-from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.profiles.meshed_rail import MeshedRail, ZonedMesh
 from solver.rolling.rail.profiles.points import SectionMesh
 from solver.rolling.rail.profiles.zone import Zone, rail_mesh
@@ -21,6 +20,7 @@ from solver.rolling.rail.straight import SettledStress, StraightPrism, check_ela
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.initial_stress import NoStress, SectionStress
 from solver.rolling.scenes.rail_window import PrismGeometry, split_rows, whole
+from solver.rolling.scenes.wheel_rail import Points, WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import (
     canted,
     expected_contact,
@@ -29,22 +29,22 @@ from solver.rolling.scenes.wheel_rail_contact import (
     wheel_of,
     wheel_profile,
 )
-from solver.rolling.scenes.wheel_rail_parameters import Points, WheelRailParameters
 from solver.tensors import to_mandel
 from solver.typing import Array
 
 _FOOT = 150.0
 """Width of the foot of 60E1, over which the foundation acts [mm]."""
 _COARSE = 2.0
-"""Largest ratio of the elements of a mesh under the wheel to those of the accuracy."""
+"""Largest side of elements of a given mesh under the wheel, over that of the accuracy."""
 _DEEPEST = 0.9
-"""Largest depth of the zone over the least radius of the surface there."""
+"""Largest depth of the zone, over the least radius of the surface there."""
 _BESIDE, _DEPTH = 0.35, 1.5
-"""Width of the zone beside the contact over half its width; depth over the mean half-axis."""
+"""Width of the zone on either side of the contact, over half the width of the contact; depth over
+its mean semi-axis."""
 _REACH = 1.15
-"""Half the length where the load may act over half that of the contact."""
+"""Half the length where the load may act, over half the length of the contact."""
 _STEP = 0.05
-"""Step with which the radius of the surface is searched [mm]."""
+"""Distance of places at which the radius of the surface is computed [mm]."""
 _SMOOTH = 4.0
 """Least radius of a curve through points in the zone, over the side of elements."""
 _APART = 6.0
@@ -153,7 +153,7 @@ def _places(parameters: WheelRailParameters) -> float | tuple[float, float]:
 def _check_points(
     name: str, points: str | Points | SectionMesh, z: Array, curvature: Array, size: float
 ) -> None:
-    """Raise `ModelError` for points that do not tell the profile to elements of a size [mm].
+    """Raise `ModelError` for points too rough or too far apart for elements of a size [mm].
 
     Parameters
     ----------
@@ -163,13 +163,13 @@ def _check_points(
         return
     at = int(abs(curvature).argmax())
     radius = 1 / max(float(abs(curvature[at])), 1e-9)
-    told = points.told if isinstance(points, SectionMesh) else f"{len(points)} points"
+    given_as = points.in_words if isinstance(points, SectionMesh) else f"{len(points)} points"
     if radius < _SMOOTH * size:
         allowed = (
             f"must be smooth: at z = {z[at]:.4g} mm the radius of the curve through them is "
             f"{radius:.2g} mm, below {_SMOOTH:g} sides of elements; smooth the points"
         )
-        raise ModelError(name, told, allowed)
+        raise ModelError(name, given_as, allowed)
     if isinstance(points, SectionMesh):  # `MeshedRail.zoned` looks at its edges
         return
     given = np.array(points)[:, 0]
@@ -180,7 +180,7 @@ def _check_points(
             f"must have points at most {_APART:g} mm apart where the bodies touch, not "
             f"{given[widest]:g} and {given[widest + 1]:g}"
         )
-        raise ModelError(name, told, allowed)
+        raise ModelError(name, given_as, allowed)
 
 
 @kept
@@ -219,7 +219,7 @@ def meshed(parameters: WheelRailParameters, own: RailGeometry) -> Section:
         section = section_of(own)
     except ModelError as error:
         if isinstance(own.profile, SectionMesh):
-            raise ModelError("rail_profile", own.profile.told, f"is refused: {error}") from None
+            raise ModelError("rail_profile", own.profile.in_words, f"is refused: {error}") from None
         allowed = f"leaves no room for the zone of small elements in the head: {error}"
         raise ModelError("lateral_position", _places(parameters), allowed) from None
     p = parameters
@@ -257,36 +257,6 @@ def stressed_track(own: RailGeometry, rail: SectionStress, thermal_strain: float
     """Return the rail with its stress before the first pass."""
     track, initial = track_of(own), settled_in(own, rail, thermal_strain)
     return track if initial is None else track.stressed(initial)
-
-
-class RolledRail:
-    """A wheel on a rail, as `solver.rolling.scenes.rail_passes.RolledPrism`."""
-
-    def __init__(self, parameters: WheelRailParameters) -> None:
-        self.parameters = parameters
-        self._passes = parameters.each_pass()
-        self._made: tuple[PrismTrack, WheelRailParameters, RollingPatch] | None = None
-
-    def track(self, reach: float) -> PrismTrack:
-        """See `RolledPrism`."""
-        p, own = self.parameters, geometry(self.parameters, reach)
-        meshed(p, own)
-        return stressed_track(own, p.rail_stress, p.thermal_strain)
-
-    def load(self, track: PrismTrack, number: int) -> RollingPatch:
-        """See `RolledPrism`; wheels of other passes share the influences of tractions."""
-        p, last = self._passes[number], self._made
-        if last is not None and last[:2] == (track, p):
-            return last[2]
-        wheel, rolls = wheel_of(p), p.under(p.load)
-        if last is not None and last[0] is track:
-            made = last[2].changed(wheel=wheel, load=rolls, **p.rubbing)
-        else:
-            made = RollingPatch(
-                grid=track.grid, compliance=track.compliance, wheel=wheel, load=rolls, **p.rubbing
-            )
-        self._made = track, p, made
-        return made
 
 
 def settled(section: Section, of: SectionStress, thermal_strain: float) -> SettledStress | None:

@@ -15,7 +15,7 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.kinds import check
+from solver.parameters import check
 from solver.results.record import Record, Status
 from solver.scenes.scene import Scene
 

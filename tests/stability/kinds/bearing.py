@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from solver.rolling.scenes.rolling_parameters import RollingParameters
+    from solver.rolling.scenes.rolling import RollingParameters
 
 STRAINED = 2.0
 """Plastic strain up to which hardening is counted: not much below where a pass counts as flow

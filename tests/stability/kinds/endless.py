@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from solver import NotConverged, Status
-from solver.rolling.scenes.rolling import ROLLING
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import ROLLING, RollingParameters
 from tests.stability.kinds import rolling, track
 from tests.stability.kinds.bearing import bears, flows_ahead
 from tests.stability.kinds.draws import POISSON, RATIOS, RULES, changed

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from solver import Record
     from solver.results.run import FinishedRun
-    from solver.rolling.scenes.rolling_parameters import RollingParameters
+    from solver.rolling.scenes.rolling import RollingParameters
 
     Array = NDArray[np.float64]
 

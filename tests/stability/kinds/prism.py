@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 
 from solver import NotConverged, Status
-from solver.rolling.scenes.raceway import RACEWAY
-from solver.rolling.scenes.raceway_parameters import RacewayParameters
-from solver.rolling.scenes.wheel_rail import WHEEL_RAIL
-from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
+from solver.rolling.scenes.raceway import RACEWAY, RacewayParameters
+from solver.rolling.scenes.wheel_rail import WHEEL_RAIL, WheelRailParameters
 from tests.stability.kinds.draws import POISSON, RATIOS
 from tests.stability.kinds.looked_at import looked_at
 from tests.stability.kinds.prism_oracle import Rolled, judge

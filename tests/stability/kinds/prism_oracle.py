@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import wheel_profile
-from solver.rolling.scenes.wheel_rail_parameters import WheelRailParameters
 from tests.stability.trial import Figure
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ import numpy as np
 
 from solver import LimitLoad, NotConverged, Record, System
 from solver.contact.state import Converged, State
-from solver.rolling.scenes.rolling import ROLLING
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import ROLLING, RollingParameters
 from tests.stability.kinds.bearing import BORNE, NEAR
 from tests.stability.kinds.draws import changed
 from tests.stability.kinds.looked_at import looked_at

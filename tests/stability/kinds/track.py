@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.rolling.scenes.rolling import ROLLING
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import ROLLING, RollingParameters
 from tests.stability.kinds.bearing import bears
 from tests.stability.kinds.draws import POISSON, RATIOS, RULES, changed
 from tests.stability.kinds.endless_oracle import STEEP, never_yields

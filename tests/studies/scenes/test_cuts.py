@@ -1,4 +1,4 @@
-"""Rectangles cut out of bodies, and the size of a mesh that is counted without making it."""
+"""Rectangles cut out of bodies, and the size of such a mesh."""
 
 from __future__ import annotations
 
@@ -7,11 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver import ModelError
+from solver import ModelError, System
 from studies.errors import SceneError
-from studies.scenes.body_size import is_grid, size_of_grid, size_of_mesh
-from studies.scenes.building import mesh_of_body
-from studies.scenes.tables import BodyTable
 from tests.studies.scenes.conftest import blocks, built
 
 GRID: dict[str, Any] = {
@@ -26,43 +23,22 @@ CUTS: dict[str, dict[str, list[float]]] = {
 }
 
 
-def body(**given: Any) -> BodyTable:
-    return BodyTable.model_validate({"material": "m", "shape": GRID} | given)
-
-
-def moved(box: dict[str, list[float]], way: tuple[float, float]) -> dict[str, list[float]]:
-    """Return a box where a body is moved to."""
-    return {axis: [at + by for at in box[axis]] for axis, by in zip("xy", way, strict=True)}
-
-
 @pytest.mark.parametrize("element", ["quad4", "quad8", "quad9", "tri3", "tri6"])
 @pytest.mark.parametrize("cuts", [(), ("notch",), ("side",)])
-@pytest.mark.parametrize("move", [(0.0, 0.0), (1.0, 0.5)])
-def test_the_counted_size_of_a_grid_is_that_of_the_mesh(
-    element: str, cuts: tuple[str, ...], move: tuple[float, float]
+def test_the_work_of_a_grid_with_cuts_is_that_of_its_system(
+    element: str, cuts: tuple[str, ...]
 ) -> None:
-    boundaries = {"near": {"of": ["top", "left", *cuts], "x": [-5, 1.5]}}
-    boxes = {name: moved(CUTS[name], move) for name in cuts}
-    table = body(element=element, boundaries=boundaries, move=move, cuts=boxes)
-    assert is_grid(table)
-    size, made = size_of_grid(table), size_of_mesh(mesh_of_body(table, None), element)
-    assert (size.elements, size.nodes) == (made.elements, made.nodes)
-    assert size.edges.keys() == made.edges.keys()
-    for name in size.edges:
-        assert size.count(size.on([name])) == made.count(made.on([name])), name
-        assert size.count(size.on([name, "left"])) == made.count(made.on([name, "left"])), name
-
-
-@pytest.mark.parametrize("symmetric", [True, False])
-@pytest.mark.parametrize("above", [True, False])
-def test_so_is_that_of_a_ball(symmetric: bool, above: bool) -> None:
-    shape = {"kind": "round", "radius": 3.0, "size": 0.2, "fine": 0.6, "growth": 1.6,
-             "symmetric": symmetric, "above": above}  # fmt: skip
-    table = body(shape=shape, boundaries={"back": {"of": ["cap", "right"]}})
-    size, made = size_of_grid(table), size_of_mesh(mesh_of_body(table, None), None)
-    assert (size.elements, size.nodes) == (made.elements, made.nodes)
-    for name in made.edges:
-        assert size.count(size.on([name])) == made.count(made.on([name])), name
+    tables = blocks()
+    tables["bodies"]["lower"] |= {
+        "shape": GRID, "element": element, "cuts": {name: CUTS[name] for name in cuts},
+    }  # fmt: skip
+    tables["bodies"]["upper"]["element"] = element
+    scene = built(tables)
+    parameters = scene.parameters()
+    system = System(scene.model(parameters))
+    work = scene.effort(parameters, [getattr(parameters, scene.branch, None)])
+    assert work.unknowns == system.n_unknowns
+    assert work.elements == sum(body.mesh.nelements for body in system.model.bodies)
 
 
 def cut(**box: Any) -> dict[str, Any]:

@@ -18,7 +18,7 @@ import numpy as np
 from solver import ModelError
 from solver.parameters import unmet
 from solver.scenes.punch import PunchParameters
-from solver.rolling.scenes.rolling_parameters import RollingParameters
+from solver.rolling.scenes.rolling import RollingParameters
 from tests.studies.scenes.conftest import blocks, built
 
 tables = blocks()

@@ -82,8 +82,10 @@ def test_increments_are_those_that_are_walked(
     assert len(calls) == told.increments + 1  # the end is told too
 
 
-def test_a_hundred_paths_are_estimated_without_a_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A mesh for each would take ten times as long."""
+def test_a_hundred_paths_on_as_many_lines_share_meshes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A mesh for each path would take ten times as long; a mesh is made of a few others."""
     scene = scene_named("ball")
     paths = [scene.parameters(radius=300.0 + k) for k in range(100)]
     assert scene.effort is not None
@@ -92,7 +94,7 @@ def test_a_hundred_paths_are_estimated_without_a_mesh(monkeypatch: pytest.Monkey
     with counted() as calls:
         for each in paths:
             scene.effort(each, [1, 2])
-    assert not meshes
+    assert len(meshes) < 20
     assert calls < 6_000_000
 
 

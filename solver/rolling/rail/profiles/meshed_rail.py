@@ -90,13 +90,13 @@ def facets_of(mesh: Mesh, edges: Ints) -> Ints:
 
 
 _DIGITS = 6
-"""Digits of a millimetre that are kept."""
+"""Number of decimals of positions in mm."""
 _SIDES = (4, 8)
 """Numbers of points of a cell: corners one after the other, then the middles of the sides."""
 
 
 def section_of(mesh: Mesh) -> SectionMesh:
-    """Return the numbers of a scikit-fem mesh with these lines, coordinates z and y."""
+    """Return a scikit-fem mesh with these lines as plain numbers, coordinates z and y."""
     nodes = mesh.dofs.element_dofs[:8]
     used, cells = np.unique(nodes, return_inverse=True)
     lines = (
@@ -113,7 +113,7 @@ def checked(section: SectionMesh, field: str) -> SectionMesh:
     count = len(section.points)
 
     def refuse(allowed: str) -> ModelError:
-        return ModelError(field, section.told, allowed)
+        return ModelError(field, section.in_words, allowed)
 
     if not np.isfinite(np.array(section.points, dtype=float)).all():
         raise refuse("must have finite points")
@@ -206,7 +206,7 @@ class MeshedRail(Rail):
         """
         found = cls(section, np.array(section.points))
         if not found.outline.area > 0:
-            raise ModelError(RUNNING, section.told, "must be above the section")
+            raise ModelError(RUNNING, section.in_words, "must be above the section")
         return found._on_top()
 
     def canted(self, slope: float) -> MeshedRail:
@@ -260,7 +260,7 @@ class MeshedRail(Rail):
         return float(lengths[: -arcs - 1].sum()), float(lengths[:-1].sum())
 
     def zoned(self, zone: Zone, largest: float) -> ZonedMesh:
-        """Return the mesh with the elements of a zone first; ``zone.size`` and rows do not count.
+        """Return the mesh with the elements of a zone first; ``zone.size`` has no effect.
 
         Raises
         ------
@@ -279,7 +279,7 @@ class MeshedRail(Rail):
         reaches = away < zone.half_width + (side - largest) / 2
         for k in np.flatnonzero(reaches & (side > largest))[:1]:
             raise ModelError(
-                "rail_profile", self.section.told,
+                "rail_profile", self.section.in_words,
                 f"must have elements at most {largest:g} mm wide where the wheel may touch, not "
                 f"{side[k]:.3g} at z = {X[k, 0, 0]:.3g} mm",
             )  # fmt: skip
@@ -301,7 +301,7 @@ class MeshedRail(Rail):
 
 
 def _nearest(points: Array, edges: Array) -> tuple[Bools, Array]:
-    """Return whether the nearest place of a chain to points (n, 2) is not its end, and how far.
+    """Return whether the place of a chain nearest to points (n, 2) is inside it, and its distance.
 
     Parameters
     ----------
@@ -324,8 +324,8 @@ def _walked(
 
     Parameters
     ----------
-    start, away, end : first corner, one beside it to which not to go, and last corner; by default
-        the edges are one chain from an end to the other
+    start, away, end : first corner, its neighbour in the other direction, and last corner; by
+        default the edges are one chain from an end to the other
 
     Raises
     ------

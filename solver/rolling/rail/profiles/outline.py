@@ -16,11 +16,12 @@ Pair = tuple[float, float]
 
 
 _POINTS = 16
-"""Gauss points of each piece in integrals; exact to rounding for arcs up to a half circle."""
+"""Number of Gauss points of a piece in integrals: exact to rounding for arcs up to a half
+circle."""
 _SAMPLES = 2001
-"""Points among which the highest one is looked for."""
+"""Number of samples in the search for the highest point."""
 _SHORT = 1e-9
-"""Ratio of a piece to the whole; shorter ones are left out."""
+"""Length of a piece over the whole length below which it is left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +134,7 @@ class Outline:
         return np.arctan2(chords[1], chords[0]) - self.bends * self.lengths / 2
 
     def _found(self, s: Array) -> tuple[Ints, Array]:
-        """Return the pieces at lengths ``s``, and the lengths from their beginnings."""
+        """Return the pieces at lengths ``s``, and the lengths from the beginnings of the pieces."""
         starts = np.cumsum([0.0, *self.lengths[:-1]])
         s = np.asarray(s, dtype=float) % self.length
         piece = np.searchsorted(starts, s, side="right") - 1
@@ -159,17 +160,12 @@ class Outline:
         return float(self._moments()[0])
 
     @property
-    def centroid(self) -> Array:
-        """Centroid (2,) [mm]."""
-        return self._moments()[1]
-
-    @property
     def second_moments(self) -> Array:
         """Second moments of area about the centroid (2, 2): integrals of products [mm4]."""
-        return self._moments()[2]
+        return self._moments()[1]
 
-    def _moments(self) -> tuple[float, Array, Array]:
-        """Return area, centroid and second moments, by Green's theorem.
+    def _moments(self) -> tuple[float, Array]:
+        """Return area and second moments about the centroid, by Green's theorem.
 
         The integral of a homogeneous function of degree d over the area is 1 / (d + 2) of its
         integral times the distance of the tangent from the origin over the curve.
@@ -183,7 +179,7 @@ class Outline:
         area = dA.sum() / 2
         centroid = X @ dA / 3 / area
         second = (X * dA) @ X.T / 4 - area * np.outer(centroid, centroid)
-        return area, centroid, second
+        return area, second
 
     # -- motions -------------------------------------------------------------------------------
 

@@ -1,8 +1,8 @@
 """Quadrilateral patches between four curves, and meshes joined of them.
 
 A patch is an array of nodes (2, n, m): corners and midsides of its elements in turn, from left to
-right and upwards; n and m are odd. The node in the middle of an element is where the other eight
-put it, so that the element may have 8 nodes or 9.
+right and upwards; n and m are odd. The node in the middle of an element follows from the other
+eight, so that the element may have 8 nodes or 9.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def joined_patches(patches: Sequence[Array], names: Mapping[str, Array]) -> Mesh
 
 
 def _mesh(X: Array) -> MeshQuad2:
-    """Return the mesh of a patch, its middle nodes where the other eight put them."""
+    """Return the mesh of a patch; nodes in the middle of elements follow from the others."""
     nodes = X.copy()
     nodes[:, 1::2, 1::2] = (
         (X[:, :-1:2, 1::2] + X[:, 2::2, 1::2] + X[:, 1::2, :-1:2] + X[:, 1::2, 2::2]) / 2

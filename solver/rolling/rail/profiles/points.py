@@ -10,18 +10,17 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.files import read_file
-from solver.kinds import require
-from solver.parameters import Pairs
+from solver.parameters import Pairs, require
 from solver.typing import Array
 
 _FEWEST = 4
-"""Smallest number of points of a curve."""
+"""Least number of points of a curve."""
 
 
 def read_points(path: str | Path) -> Array:
     """Return the points (2, n) of a text file: z, y in each line, with comma or space between [mm].
 
-    A first line without numbers is a heading. `checked_points` says what is allowed.
+    A first line without numbers is a heading. For the points see `checked_points`.
 
     Raises
     ------
@@ -79,7 +78,7 @@ def checked_points(points: Array, field: str = "points") -> Array:
 
 
 RUNNING, FOOT = "running", "foot"
-"""Lines that a section must have: where the wheel may touch, and where the foundation acts."""
+"""Names of the lines of a section: where the wheel may touch, and where the foundation acts."""
 
 
 class SectionMesh(NamedTuple):
@@ -99,6 +98,6 @@ class SectionMesh(NamedTuple):
     foot: tuple[tuple[int, int], ...]
 
     @property
-    def told(self) -> str:
+    def in_words(self) -> str:
         """The mesh in a few words, for errors."""
         return f"a mesh of {len(self.cells)} elements"

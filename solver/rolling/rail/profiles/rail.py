@@ -22,8 +22,6 @@ Pair = tuple[float, float]
 
 _HEIGHT, _FOOT, _HEAD, _WEB, _TOE = 172.0, 150.0, 72.0, 16.5, 11.5
 """Height; widths of foot, head and web; thickness of the foot at its ends [mm]."""
-_GAUGE = 14.3
-"""Depth below the top at which the head has its width and its straight sides begin [mm]."""
 _UPPER, _LOWER = 51.0, 31.5
 """Fishing surfaces, extended to the axis: depth below the top, height above the base [mm]."""
 _FISHING, _SIDE, _TAPER = 1 / 2.75, 1 / 20, 1 / 14
@@ -49,7 +47,7 @@ _PLACES = {
 
 
 class Rail(ABC):
-    """What a wheel needs of a rail."""
+    """The rail as a wheel sees it."""
 
     __slots__ = ()
 
@@ -197,7 +195,8 @@ def rail_60e1() -> RailSection:
 def _crown() -> tuple[tuple[float, ...], float]:
     """Return the turns of the arcs of the crown, and the half width of the sides at its top.
 
-    The last arc ends at z = 0, so that half the head is as wide as the tangent there is long.
+    The last arc ends at z = 0, so that half the width of the head is the length of the tangent
+    there.
     """
     side, (_, middle, last) = math.atan(_SIDE), _CROWN
     first = math.asin(_NARROW / 2 / last)

@@ -15,9 +15,8 @@ import numpy as np
 from skfem import MeshQuad2
 
 from solver.errors import ModelError
-from solver.kinds import check
 from solver.mesh.lines import graded
-from solver.parameters import Coordinate, Length
+from solver.parameters import Coordinate, Length, check
 from solver.rolling.rail.profiles.patches import (
     even,
     halved,
@@ -34,13 +33,13 @@ _GROWTH, _LARGEST = 2.0, 14.0
 _WEB_ROWS, _FOOT_ROWS, _FOOT_COLUMNS = 4, 3, 7
 """Elements along the web, across the foot, and along the foot on either side of the web."""
 _SOLE = 10.0
-"""Half of the part of the base below the web [mm]."""
+"""Half the width of the part of the base below the web [mm]."""
 _SHARE = 0.4
-"""Share of the columns of the zone in the width of the web."""
+"""Share of the width of the web that columns of the zone have."""
 _TURN = 0.6
-"""Largest ratio of the turn of columns to that of the surface, and of the part of their distance
-that they lose at the bottom of the zone. Columns in one direction meet those beside the zone at 20
-degrees where it reaches the side of the head."""
+"""Turn of columns over that of the surface, at most; and largest share of their distance that they
+lose at the bottom of the zone. Parallel columns would meet those next to the zone at 20 degrees
+where it reaches the side of the head."""
 _SHARPEST = math.sin(math.radians(15.0))
 """Least sine of the angles of elements."""
 
@@ -121,8 +120,8 @@ def rail_mesh(section: RailSection, zone: Zone) -> MeshQuad2:
     ------
     ModelError
         for ``at`` or ``half_width``, if the zone leaves the running surface, or reaches so far over
-        the side of the head that elements beside it are too sharp; for ``depth``, if it is deeper
-        than the head
+        the side of the head that the elements next to it have too sharp angles; for ``depth``, if
+        it is deeper than the head
     """
     outline, places, (right, left) = section.outline, section.places, section.running
     middle = section.place(zone.at)
@@ -183,7 +182,7 @@ def _head(
     ----------
     block : nodes of the zone
     neck : (2, n) nodes across the upper end of the web
-    beside : distances of the lines on the left and on the right from the zone [mm]
+    beside : distances from the zone of the lines on its left and on its right [mm]
     ends : lengths along the outline at the left and right end of the zone [mm]
     """
     outline, (right, _) = section.outline, section.running
