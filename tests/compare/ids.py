@@ -70,7 +70,9 @@ def study(draw: random.Random, number: int, before: list[dict[str, Any]]) -> dic
             label: {name: value(draw, name) for name in names[5:]} for label in ("soft", "hard")
         }
     content["sweep"] = sweep
-    form = draw.choice(("grid", "points", "sample", "extends", "goal", "refine", "fit", "both"))
+    form = draw.choice(
+        ("grid", "points", "sample", "extends", "goal", "refine", "fit", "both", "minimise")
+    )
     low, high = NUMBERS[names[3]][1:]
     if form == "points":
         content["points"] = [{name: value(draw, name) for name in names[3:5]} for _ in range(4)]
@@ -95,6 +97,15 @@ def study(draw: random.Random, number: int, before: list[dict[str, Any]]) -> dic
         content["refine"] = {"of": "peak_contact_pressure"} | draw.choice(
             ({}, {"until": 0.1, "most": 90}, {"halvings": 2}, {"of": ["max_plastic_strain"]})
         )
+    if form == "minimise":
+        content["sweep"].pop(names[3], None)
+        content["minimise"] = {
+            "of": "peak_contact_pressure",
+            "ranges": {names[3]: draw.choice(([low, high], {"start": low, "stop": high}))},
+        } | draw.choice(
+            ({}, {"where": "max_plastic_strain < 0.02"}, {"starts": 2, "most": 90},
+             {"where": ["peak_residual_tension <= 0.1 GPa"], "first": {names[3]: high}})
+        )  # fmt: skip
     if form == "fit":
         content["fit"] = {
             "measured": [{"rows": [{"peak_contact_pressure": "500"}]}],
