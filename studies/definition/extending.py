@@ -14,21 +14,14 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from studies.definition.identity import canonical
-from studies.definition.parameters import Parameter
-from studies.definition.points import MOST_POINTS, field_of, is_points, with_points
-from studies.definition.sweep import Axes, checked_axes, owners, positions
+from studies.definition.points import field_of, is_points
+from studies.definition.schema import MAXIMUM_RUNS
+from studies.definition.sweep import Axes, owners, positions
 from studies.errors import StudyError
 from studies.toml import CASE
 
 EXTENDS = "extends"
 """Entry of a study that names the one that it extends."""
-
-SCHEMA = {
-    "type": ["string", "object"],
-    "description": "name, id or content of a study whose runs are kept; the axes and points add to "
-    "them",
-}
-"""JSON Schema of the entry."""
 
 
 class Extended(NamedTuple):
@@ -48,14 +41,14 @@ class Extended(NamedTuple):
     fixed: Mapping[str, Any]
 
 
-def extended(content: Mapping[str, Any], base: Extended, known: Mapping[str, Parameter]) -> Any:
+def extended(content: Mapping[str, Any], base: Extended, added: Axes) -> Any:
     """Return the content of a study that has the runs of `base` and those that it adds.
 
     Parameters
     ----------
     content : of the study, with `EXTENDS`
     base : the study that is extended
-    known : the parameters of its scene
+    added : the axes of the content
 
     Raises
     ------
@@ -63,9 +56,8 @@ def extended(content: Mapping[str, Any], base: Extended, known: Mapping[str, Par
         if the study changes a parameter of `base`, adds nothing, or adds what does not fit
     """
     if parameters := content.get("parameters"):
-        allowed = "are those of the study that is extended: what shall vary goes to the sweep"
+        allowed = "cannot be changed when a study is extended: add values under sweep"
         raise StudyError("parameters", parameters, allowed)
-    added = checked_axes(with_points(content, known), known)
     if not added:
         raise StudyError(EXTENDS, base.name, "nothing is added: give axes, points or a sample")
     rest = {key: value for key, value in content.items() if key not in _ADDED}
@@ -115,8 +107,8 @@ def _with_points(base: Extended, added: Axes) -> dict[str, Any]:
     if own is not None and own != name:
         raise _refused(name, more, f"{theirs} has its points in {own}: add to these")
     kept = {name: axes.pop(name)} if own else axes
-    if math.prod(map(len, kept.values())) > MOST_POINTS:
-        raise _refused(name, more, f"{theirs} has more than {MOST_POINTS} runs")
+    if math.prod(map(len, kept.values())) > MAXIMUM_RUNS:
+        raise _refused(name, more, f"{theirs} has more than {MAXIMUM_RUNS} runs")
     every = [list(positions(axis, values)) for axis, values in kept.items()]
     points = [
         {key: v for at in run for key, v in at.sets.items()} for run in itertools.product(*every)
