@@ -13,7 +13,7 @@ from typing import Any
 from solver.scenes import Scene
 from studies import StudyError
 from studies.definition.cases import USUAL_AXES
-from studies.definition.parameters import Parameter, parameters_of, plain
+from studies.definition.parameters import Parameter, parameters_of
 from studies.toml import toml_text
 
 PREFIX = "p."
@@ -131,24 +131,13 @@ def _value(parameter: Parameter, texts: Sequence[str]) -> tuple[Any, bool]:
         raise StudyError(parameter.name, f"{size} characters", allowed)
     match = RANGE.fullmatch(texts[0]) if len(texts[0]) <= LONGEST_RANGE else None
     if match:
-        ends = {key: _checked(parameter, match[key]) for key in ("start", "stop")}
+        ends = {key: parameter.read(match[key], parameter.name) for key in ("start", "stop")}
         spacing = {"spacing": "log"} if match["log"] else {}
         return {**ends, "num": int(match["num"]), **spacing}, True
     whole = texts[0].startswith(("[", "{"))
     parts = texts if whole or len(texts) > 1 else texts[0].split(",")
-    values = [_checked(parameter, each.strip()) for each in parts if each.strip()]
+    values = [parameter.read(each.strip(), parameter.name) for each in parts if each.strip()]
     return (values, True) if len(values) > 1 else (values[0] if values else None, False)
-
-
-def _checked(parameter: Parameter, text: str) -> Any:
-    usual = parameter.default
-    number = "string" not in json.dumps(parameter.schema.get("type", "")) and not isinstance(
-        usual, str
-    )
-    value = parameter.normalise(plain(text, None) if number else text, parameter.name)
-    if not parameter.in_range(parameter.typed(value)):
-        raise parameter.refusal(parameter.name, value)
-    return value
 
 
 def _one(given: Mapping[str, Sequence[str]], name: str) -> str:

@@ -25,51 +25,26 @@ EXTENDS = "extends"
 
 
 class Extended(NamedTuple):
-    """The study that is extended.
-
-    Attributes
-    ----------
-    name, scene, parameters, sweep, choice : as those of `Study`
-    fixed : all parameters that are not swept
-    """
+    """The study that is extended: entries of `Study`, and all parameters that are not swept."""
 
     name: str
-    scene: str
-    parameters: Mapping[str, Any]
     sweep: Axes
-    choice: Mapping[str, Any]
     fixed: Mapping[str, Any]
 
+    def with_axes(self, added: Axes) -> Axes:
+        """Return the axes of the runs of this study and of those that others add.
 
-def extended(content: Mapping[str, Any], base: Extended, added: Axes) -> Any:
-    """Return the content of a study that has the runs of `base` and those that it adds.
-
-    Parameters
-    ----------
-    content : of the study, with `EXTENDS`
-    base : the study that is extended
-    added : the axes of the content
-
-    Raises
-    ------
-    StudyError
-        if the study changes a parameter of `base`, adds nothing, or adds what does not fit
-    """
-    if parameters := content.get("parameters"):
-        allowed = "cannot be changed when a study is extended: add values under sweep"
-        raise StudyError("parameters", parameters, allowed)
-    if not added:
-        raise StudyError(EXTENDS, base.name, "nothing is added: give axes, points or a sample")
-    rest = {key: value for key, value in content.items() if key not in _ADDED}
-    axes = _with_points(base, added) if any(map(is_points, added.values())) else dict(base.sweep)
-    for name, axis in added.items():
-        if not is_points(axis):
-            axes[name] = _longer(name, axis, base)
-    fixed = {key: value for key, value in base.parameters.items() if key not in owners(axes)}
-    return {**base.choice, **rest, "scene": base.scene, "parameters": fixed, "sweep": axes}
-
-
-_ADDED = (EXTENDS, "points", "sample", "sweep", "parameters", "scene")
+        Raises
+        ------
+        StudyError
+            if nothing is added, or what does not fit
+        """
+        if not added:
+            raise StudyError(EXTENDS, self.name, "nothing is added: give axes, points or a sample")
+        points = any(map(is_points, added.values()))
+        axes: Axes = _with_points(self, added) if points else dict(self.sweep)
+        longer = {n: _longer(n, axis, self) for n, axis in added.items() if not is_points(axis)}
+        return axes | longer
 
 
 def _longer(name: str, axis: list[Any] | dict[str, Any], base: Extended) -> Any:

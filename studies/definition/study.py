@@ -20,7 +20,7 @@ from pydantic import (
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
-from studies.definition.extending import EXTENDS, Extended, extended
+from studies.definition.extending import EXTENDS, Extended
 from studies.definition.files import read_study
 from studies.definition.identity import content_id
 from studies.definition.parameters import build, parameters_of
@@ -222,7 +222,7 @@ class Study(StudyTable):
         def add(field: str, value: Any, allowed: str) -> None:
             wrong.add("", StudyError(field, value, allowed))
 
-        _check_names(scene, self.sweep, add)
+        _check_names(scene, self.sweep, kind, add)
         chosen = kind.chooses and kind.of_runs
         points = chosen or POINT in self.sweep
         if points and scene.places is not None and scene.places(build(scene, {})).points:
@@ -259,13 +259,17 @@ class Study(StudyTable):
         if own != base.scene and name_of(scene_named(own, scenes)) != base.scene:
             allowed = f"must be that of {base.name}, which is extended, or left out"
             raise StudyError("scene", own, allowed)
-        added = {key: content[key] for key in ("sweep", *ENTRIES) if key in content}
-        axes = cls.known({"name": base.name, "scene": base.scene, **added}, scenes).sweep
-        before = Extended(
-            base.name, base.scene, base.parameters, base.sweep, base.choice, base.fixed
-        )
-        full: dict[str, Any] = extended(content, before, axes)
-        return full
+        if parameters := content.get("parameters"):
+            allowed = "cannot be changed when a study is extended: add values under sweep"
+            raise StudyError("parameters", parameters, allowed)
+        adds = ("sweep", *ENTRIES)
+        added = {key: content[key] for key in adds if key in content}
+        more = cls.known({"name": base.name, "scene": base.scene, **added}, scenes).sweep
+        axes = Extended(base.name, base.sweep, base.fixed).with_axes(more)
+        rest = {key: each for key, each in content.items() if key not in (EXTENDS, *adds)}
+        fixed = {key: value for key, value in base.parameters.items() if key not in owners(axes)}
+        own = {"scene": base.scene, "parameters": fixed, "sweep": axes}
+        return {**base.choice, **rest, **own}
 
     def checked(self) -> Self:
         """Return the study after a check of all its combinations.
@@ -427,9 +431,13 @@ def _with_points(sweep: Any, given: Mapping[str, Any], context: Context) -> Any:
     return {POINT: points, **sweep}
 
 
-def _check_names(scene: Scene, axes: Axes, add: Callable[[str, Any, str], None]) -> None:
-    """Refuse a parameter or an axis of labels if data sets have its name for something else."""
+def _check_names(
+    scene: Scene, axes: Axes, kind: Kind, add: Callable[[str, Any, str], None]
+) -> None:
+    """Refuse a parameter, a number or an axis if data sets have its name for something else."""
     known, numbers = parameters_of(scene), {each.name for each in scene.quantities}
+    if kind.chooses and (state := kind.ends[0]) in {*known, *numbers, *axes}:
+        add(kind.name, state, "the data set has a variable of this name: rename that of the scene")
     ours = scene.parameters.__module__.startswith("solver.")  # a test checks their names
     for name in known if not ours else ():
         if in_use(name, {*known, *numbers}):

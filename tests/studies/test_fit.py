@@ -295,7 +295,7 @@ def test_a_line_is_compared_with_its_own_piece_and_a_little_beyond() -> None:
     content = {"of": "increment_force", "over": "increment_approach", "values": [1.0] * 4}
     line = parsed(MeasuredLine, content | {"places": [0.5, 2.2, 1.5, 0.8]}, Context(FAKE, {}))
     assert line.seen(given.get) == pytest.approx([1.0, 4.6, 2.5, 0.4])
-    assert not line.told
+    assert not line.sigma
     far = parsed(MeasuredLine, content | {"places": [0.5, 3.2, 1.5, 0.8]}, Context(FAKE, {}))
     with pytest.raises(ValueError, match=r"from 0\.5 to 3\.2, and the run has it from 0 to 2"):
         far.seen(given.get)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import jsonschema_rs
 import pytest
 
+from solver.results.quantities import QUANTITIES
+from solver.shipped import SCENES
 from studies import Study, StudyError
 from studies.definition.files import read_study
 from studies.errors import MOST_MISTAKES
@@ -104,3 +107,11 @@ def test_of_many_mistakes_the_first_are_listed_and_all_are_counted() -> None:
     error = refused(points=[{"friction": "x"}] * 1000)
     assert (len(error.each), error.count) == (MOST_MISTAKES, 1000)
     assert str(error).endswith("and 980 more")
+
+
+def test_a_number_of_a_scene_has_no_name_that_a_kind_of_study_uses() -> None:
+    number = replace(QUANTITIES["plastic_work"], name="search_state")
+    scene = replace(SCENES["punch"], name="own", quantities=(number,))
+    content = {"name": "least", "minimise": {"of": "plastic_work", "ranges": BOUNDS}}
+    with pytest.raises(StudyError, match=r"minimise = 'search_state': .* rename that of the scene"):
+        Study.from_dict(content, scene)

@@ -97,7 +97,8 @@ def _content(
         ", ".join(f"{name} = {value}" for name, value in each.at.items()) for each in fit.measured
     ]
     add("line_at", ("lines",), at, "place on the other dimensions")
-    add("line_unit", ("lines",), [each.unit for each in fit.measured], "unit of what was measured")
+    units = [scene.known_quantities[each.of].units for each in fit.measured]
+    add("line_unit", ("lines",), units, "unit of what was measured")
     _add_tried(add, program)
     return variables
 

@@ -101,7 +101,7 @@ class Fit(Ranged):
     def spread(self, seen: Array) -> float:
         """Return the variance of differences over sigma if some sigma were not given; else 1."""
         freedom = len(self.values) - len(self.ranges)
-        if freedom <= 0 or all(each.told for each in self.measured):
+        if freedom <= 0 or all(each.sigma for each in self.measured):
             return 1.0
         return float(np.sum(((seen - self.values) / self.sigma) ** 2)) / freedom
 

@@ -106,7 +106,6 @@ class MeasuredLine(StudyTable):
         PlainValidator(_deviations, json_schema_input_type=float | str | list[float | str]),
     ] = Field(default_factory=list)
     at: dict[str, Any] = Field(default_factory=dict)
-    _unit: str = ""
 
     @model_validator(mode="before")
     @classmethod
@@ -130,18 +129,7 @@ class MeasuredLine(StudyTable):
         for name, value in self.at.items():
             if name not in axes and name not in quantity.dims:
                 raise StudyError(f"at.{name}", value, one_of(name, [*axes, *quantity.dims]))
-        self._unit = quantity.units
         return self
-
-    @property
-    def unit(self) -> str:
-        """The unit of the values."""
-        return self._unit
-
-    @property
-    def told(self) -> bool:
-        """Whether standard deviations are given."""
-        return bool(self.sigma)
 
     @property
     def deviations(self) -> list[float]:

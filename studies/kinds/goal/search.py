@@ -141,8 +141,7 @@ class Goal(Kind):
     first_below: _Threshold = None
     within: Annotated[Number, Interval(ge=1e-6, le=0.5)] = 0.01
     between: Annotated[list[float], PlainValidator(_between, json_schema_input_type=Ends)]
-    _whole: bool = False
-    _branch: bool = False
+    _branch: str = ""
     _goes_on: bool = False
 
     @model_validator(mode="before")
@@ -167,10 +166,8 @@ class Goal(Kind):
         if len(given) > 1 or bool(given) != bool(self.of):
             allowed = f"needs of and one of {', '.join(_KINDS)}; or neither, for the limit load"
             raise StudyError("", self.content, allowed)
-        scene, numbers = Context.of(info).scene, all(isinstance(each, int) for each in self.between)
-        self._whole = numbers and Context.of(info).known[self.parameter].whole
-        self._branch = self.parameter == scene.branch
-        self._goes_on = self._branch and scene.goes_on
+        scene = Context.of(info).scene
+        self._branch, self._goes_on = scene.branch, scene.goes_on
         return self
 
     @property
@@ -186,17 +183,17 @@ class Goal(Kind):
     @property
     def whole(self) -> bool:
         """Whether the parameter is an integer."""
-        return self._whole
+        return all(isinstance(each, int) for each in self.between)
 
     @property
     def branch(self) -> bool:
         """Whether the parameter is the branch of its scene."""
-        return self._branch
+        return self.parameter == self._branch
 
     @property
     def goes_on(self) -> bool:
         """Whether a path of the scene goes on from any of its states (`Scene.goes_on`)."""
-        return self._goes_on
+        return self.branch and self._goes_on
 
     @property
     def halves(self) -> bool:

@@ -7,17 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 from annotated_types import Interval
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from solver.late import Late
 from studies.definition.quantity import OneCondition, OneNumber
 from studies.definition.schema import Whole, listed
 from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import OK, taken
+from studies.errors import StudyError
 from studies.kinds.kind import Placed, Reading
 from studies.kinds.ranges import Ranged
 from studies.kinds.replayed import Evaluation, Lacking, Replayed
@@ -50,6 +51,12 @@ class Minimise(Ranged):
     ] = Field(default_factory=list)
     starts: Annotated[Whole, Interval(ge=1, le=100)] = 3
     most: Annotated[Whole, Interval(ge=1, le=10_000)] = 60
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.most < self.starts:
+            raise StudyError("most", self.most, f"must be at least {self.starts}, that of starts")
+        return self
 
     @property
     def value(self) -> str:
