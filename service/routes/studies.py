@@ -14,7 +14,7 @@ from annotated_types import Interval
 from fastapi import APIRouter, Body, Query, Request, Response
 from fastapi.responses import FileResponse, PlainTextResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
-from pydantic import ConfigDict, Field, GetJsonSchemaHandler
+from pydantic import GetJsonSchemaHandler
 
 from service import maps, overview
 from service.datasets import Datasets
@@ -75,17 +75,25 @@ MOST_FITTED = 1000
 
 
 class Priority(StudyTable):
-    """What of a submission is no part of what the study is."""
+    """What of a submission is no part of what the study is.
 
-    priority: Annotated[Whole, Interval(ge=-100, le=100)] = Field(
-        default=0, description="of two studies that wait, that of the greater number comes first"
-    )
+    Attributes
+    ----------
+    priority : of two studies that wait, that of the greater number comes first
+    """
+
+    priority: Annotated[Whole, Interval(ge=-100, le=100)] = 0
 
 
 class Submission(Priority, Study):
     """A study, and its priority."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE]})
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> Any:
+        """Add an example."""
+        found = super().__get_pydantic_json_schema__(core, handler)
+        handler.resolve_ref_schema(found)["examples"] = [EXAMPLE]
+        return found
 
 
 class _Described:

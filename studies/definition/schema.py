@@ -11,6 +11,7 @@ import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from inspect import getdoc
 from typing import Annotated, Any, Literal, Self, TypeGuard, TypeVar
 
 from annotated_types import Interval
@@ -37,10 +38,23 @@ _DIGITS = 12
 """Number of digits to which values are rounded."""
 
 
+def _documented(schema: dict[str, Any], table: type) -> None:
+    """Describe the entries of a table as its docstring does."""
+    summary, _, rest = (getdoc(table) or "").partition("\n\nAttributes\n----------\n")
+    schema["description"] = " ".join(summary.split())
+    for each in re.split(r"^(?=\w[\w, ]* : )", rest, flags=re.MULTILINE)[1:]:
+        names, _, text = each.partition(" : ")
+        for name in names.split(", "):
+            if name in schema["properties"]:
+                schema["properties"][name]["description"] = " ".join(text.split())
+
+
 class StudyTable(BaseModel):
     """A table of a study, without unknown entries; numbers are finite."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, json_schema_extra=_documented
+    )
 
 
 Read = TypeVar("Read", bound=BaseModel)

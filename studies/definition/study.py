@@ -59,15 +59,18 @@ def _distinct(tags: list[str]) -> list[str]:
 
 
 class Written(StudyTable):
-    """Entries of studies that `Study` keeps as others: as the axis ``point``, and in full."""
+    """Entries of studies that `Study` keeps as others.
 
-    points: list[dict[str, Any]] = Field(
-        min_length=1, description="tables of parameters: the axis `point` of the sweep"
-    )
+    Attributes
+    ----------
+    points : tables of parameters: the axis ``point`` of the sweep
+    sample : points that fill ranges of parameters evenly, instead of these
+    extends : name, id or content of a study whose runs are kept; axes and points add to it
+    """
+
+    points: list[dict[str, Any]] = Field(min_length=1)
     sample: Sample
-    extends: str | dict[str, Any] = Field(
-        description="name, id or content of a study whose runs are kept; axes and points add to it"
-    )
+    extends: str | dict[str, Any]
 
 
 class Study(StudyTable):

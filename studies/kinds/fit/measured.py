@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import ConfigDict, Field, PlainValidator, ValidationInfo, model_validator
+from pydantic import Field, GetJsonSchemaHandler, PlainValidator, ValidationInfo, model_validator
 
 from solver.scenes import Scene
 from solver.typing import Array
@@ -78,12 +78,6 @@ _Numbers = Annotated[
 ]
 
 
-def _with_rows(schema: dict[str, Any]) -> None:
-    """Add the rows of a file to the JSON Schema of a line."""
-    schema |= {"if": {"required": ["rows"]}, "else": {"required": schema.pop("required")}}
-    schema["properties"]["rows"] = {"type": "array", "items": {"type": "object"}}
-
-
 class MeasuredLine(StudyTable):
     """A measured line; ``rows`` of a file, as `read_table` returns them, stand for its lists.
 
@@ -95,8 +89,6 @@ class MeasuredLine(StudyTable):
     at : the place on other dimensions of the variable, and on the axes of the study
     """
 
-    model_config = ConfigDict(json_schema_extra=_with_rows)
-
     of: Variable
     over: Annotated[str, PlainValidator(_over, json_schema_input_type=str)] = ""
     values: _Numbers
@@ -106,6 +98,14 @@ class MeasuredLine(StudyTable):
         PlainValidator(_deviations, json_schema_input_type=float | str | list[float | str]),
     ] = Field(default_factory=list)
     at: dict[str, Any] = Field(default_factory=dict)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> Any:
+        """Add the rows of a file."""
+        found = handler.resolve_ref_schema(whole := handler(core))
+        found |= {"if": {"required": ["rows"]}, "else": {"required": found.pop("required")}}
+        found["properties"]["rows"] = {"type": "array", "items": {"type": "object"}}
+        return whole
 
     @model_validator(mode="before")
     @classmethod
