@@ -46,7 +46,7 @@ def _documented(schema: dict[str, Any], table: type) -> None:
         names, _, text = each.partition(" : ")
         for name in names.split(", "):
             if name in schema["properties"]:
-                schema["properties"][name]["description"] = " ".join(text.split())
+                schema["properties"][name]["description"] = " ".join(text.split()).replace("`", "")
 
 
 class StudyTable(BaseModel):

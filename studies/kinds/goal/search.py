@@ -117,7 +117,7 @@ class Goal(Kind):
     parameter : the parameter that is varied, by default the branch of the scene
     find : name of a goal, instead of the entries that it stands for
     of : number of the runs; empty if only equilibrium counts
-    at, first_above, first_below : its threshold, one of them; of ``at`` the number may rise or fall
+    at, first_above, first_below : the threshold: one of them; with ``at`` the number rises or falls
     within : largest ratio of the last bracket to its upper end; if the parameter may be 0 or
         negative, to the larger end of `between`
     between : the ends of the first bracket
