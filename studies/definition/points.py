@@ -13,10 +13,9 @@ from contextlib import suppress
 from typing import Any, TypeGuard
 
 from solver.parameters import is_number
-from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
 from studies.definition.sampling import METHOD, Sample
-from studies.definition.schema import Context, is_finite, known_name, parsed
+from studies.definition.schema import Context, filled, is_finite, known_name, parsed
 from studies.errors import Mistakes, StudyError
 from studies.toml import CASE
 from studies.units import UnitError, number_in, under
@@ -84,27 +83,19 @@ def checked_points(content: Any, context: Context) -> Points:
         with wrong.at(f"[{k}]"):
             given.append(_point(each, known, headings))
     wrong.report()
-    own = [key for key in known if key != CASE and any(key in point for point in given)]
-    if not own:
+    if not any(point.keys() - {CASE} for point in given):
         raise StudyError("", content[0], f"must set a parameter: one of {', '.join(known)}")
-    named = any(CASE in point for point in given)
-    points: Points = []
-    seen: dict[str, int] = {}
+    points = filled(dict(enumerate(given)), known)
+    if not any(CASE in point for point in given):
+        return [*points.values()]
     cases: dict[Any, int] = {}
     for k, point in enumerate(given):
-        settings = {key: point.get(key, known[key].default) for key in own}
-        with wrong.at(f"[{k}]"):
-            first = seen.setdefault(canonical(settings), k)
-            if first != k:
-                raise StudyError("", point, f"is the same as point {first}: keep one")
-            if named:
-                first = cases.setdefault(point.get(CASE), k)
-                if CASE not in point or first != k:
-                    what = "names point {} too" if CASE in point else "must be given for all points"
-                    raise StudyError(CASE, point.get(CASE), what.format(first))
-            points.append(({CASE: point[CASE]} if named else {}) | settings)
+        first = cases.setdefault(point.get(CASE), k)
+        if CASE not in point or first != k:
+            what = f"names point {first} too" if CASE in point else "must be given for all points"
+            wrong.add("", StudyError(f"[{k}].{CASE}", point.get(CASE), what))
     wrong.report()
-    return points
+    return [{CASE: given[k][CASE]} | point for k, point in points.items()]
 
 
 def _point(

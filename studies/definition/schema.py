@@ -28,6 +28,7 @@ from pydantic import (
 
 from solver.parameters import is_number
 from solver.scenes import Scene
+from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter, parameters_of
 from studies.errors import Mistakes, StudyError, Unchecked, encodable, nearest
 from studies.scenes.refusals import dotted, mistakes_of
@@ -179,6 +180,20 @@ def checked_settings(content: Any, known: Mapping[str, Parameter]) -> dict[str, 
         with wrong.at(str(name)):
             known_name(name, known, value)
             found[name] = known[name].normalise(value, "")
+    wrong.report()
+    return found
+
+
+def filled(given: Mapping[Any, Any], known: Mapping[str, Parameter]) -> dict[Any, dict[str, Any]]:
+    """Return positions of an axis that set the same parameters, with defaults; none twice."""
+    own = [key for key in known if any(key in each for each in given.values())]
+    found, seen, wrong = dict[Any, dict[str, Any]](), dict[str, Any](), Mistakes()
+    for at, settings in given.items():
+        found[at] = {key: settings.get(key, known[key].default) for key in own}
+        if (first := seen.setdefault(canonical(found[at]), at)) != at:
+            field = f"[{at}]" if isinstance(at, int) else at
+            allowed = f"sets the same parameters as {first}: keep one"
+            wrong.add("", StudyError(field, settings, allowed))
     wrong.report()
     return found
 

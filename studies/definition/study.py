@@ -27,7 +27,7 @@ from studies.definition.parameters import build, parameters_of
 from studies.definition.points import ENTRIES, POINT, Points
 from studies.definition.sampling import Sample
 from studies.definition.schema import Context, Settings, StudyTable, Text, parsed
-from studies.definition.sweep import Axes, Sweep, labels, linked_values, owners, run_count
+from studies.definition.sweep import Axes, Sweep, labels, linked_values, owners
 from studies.definition.vocabulary import taken
 from studies.errors import Mistakes, SceneError, StudyError
 from studies.kinds import KINDS
@@ -179,7 +179,6 @@ class Study(StudyTable):
             raise StudyError("study", content, "must be a table with name, scene and sweep")
         if EXTENDS in content:
             content = cls._extended(content, scenes, studies)
-        run_count(content)
         given, wrong, context = {**content}, Mistakes(), Context(None)
         try:
             context.found = scene_named(given.get("scene"), scenes)

@@ -20,7 +20,6 @@ from solver.results.quantities import QUANTITIES
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
 from studies.definition.points import (
-    ENTRIES,
     POINT,
     checked_points,
     describes_points,
@@ -34,6 +33,7 @@ from studies.definition.schema import (
     Steps,
     checked_settings,
     checked_text,
+    filled,
     known_name,
     parsed,
 )
@@ -144,6 +144,9 @@ def checked_axes(content: Any, context: Context) -> Axes:
                 allowed = f"sets {parameter}, {where}: keep one"
                 wrong.add("", StudyError(name, content[name], allowed))
     wrong.report()
+    if (runs := math.prod(map(len, axes.values()))) > MAXIMUM_RUNS:
+        sizes = " x ".join(f"{len(axis)} {name}" for name, axis in axes.items())
+        raise StudyError("", f"{runs} runs", f"at most {MAXIMUM_RUNS} runs ({sizes})")
     context.swept = axes
     return axes
 
@@ -193,38 +196,11 @@ def labels(name: str, axis: list[Any] | LinkedAxis) -> list[Any]:
     return [each.at for each in positions(name, axis)]
 
 
-def run_count(content: Mapping[str, Any]) -> int:
-    """Return the number of runs that the axes of a study describe, before one is made.
-
-    It is the product of the lengths of lists and tables, and of the ``num`` of ranges and samples.
-
-    Raises
-    ------
-    StudyError
-        if it is larger than `MAXIMUM_RUNS`
-    """
-    sweep = content.get("sweep", {})
-    axes = {entry: content[entry] for entry in ENTRIES if entry in content}
-    axes |= sweep if isinstance(sweep, Mapping) else {}
-    sizes = {str(name): _length(axis) for name, axis in axes.items()}
-    runs = math.prod(sizes.values())
-    if runs > MAXIMUM_RUNS:
-        listed = " x ".join(f"{size} {name}" for name, size in sizes.items())
-        raise StudyError("sweep", f"{runs} runs", f"at most {MAXIMUM_RUNS} runs ({listed})")
-    return runs
-
-
-def _length(axis: Any) -> int:
-    """Return the number of positions of an axis as it is given; 1 of what is no axis."""
-    num = axis.get("num") if isinstance(axis, Mapping) else None
-    if isinstance(num, int):  # of a range or a sample: a label of this name has a table
-        return num if 0 < num <= MAXIMUM_RUNS else 1  # what makes it refuses others
-    return max(len(axis), 1) if isinstance(axis, list | tuple | Mapping) else 1
-
-
 def _axis(name: Any, content: Any, context: Context) -> list[Any] | LinkedAxis:
     """Return an axis, normalised."""
     known = context.known
+    if isinstance(content, list | tuple | Mapping) and len(content) > MAXIMUM_RUNS:
+        raise StudyError("", f"{len(content)} values", f"at most {MAXIMUM_RUNS} are allowed")
     if name in known and isinstance(content, Mapping):
         if not {"start", "stop"} <= content.keys():
             allowed = (
@@ -273,17 +249,7 @@ def _labels(content: Mapping[str, Any], known: Mapping[str, Parameter]) -> Linke
         with wrong.at(str(label)):
             given[label] = checked_settings(settings, known)
     wrong.report()
-    together = [key for key in known if any(key in settings for settings in given.values())]
-    axis: LinkedAxis = {}
-    seen: dict[str, str] = {}
-    for label, settings in given.items():
-        axis[label] = {key: settings.get(key, known[key].default) for key in together}
-        first = seen.setdefault(canonical(axis[label]), label)
-        if first != label:
-            raise StudyError(
-                label, content[label], f"sets the same parameters as {first}: keep one"
-            )
-    return axis
+    return filled(given, known)
 
 
 def _check_name(name: Any, content: Any, known: Mapping[str, Parameter]) -> None:
