@@ -31,6 +31,7 @@ from studies.errors import (
     cut,
     worded,
 )
+from studies.scenes.refusals import dotted
 from studies.storage.room import FULL
 
 log = logging.getLogger(__name__)
@@ -175,18 +176,16 @@ def mistake(field: str, value: object, allowed: str) -> dict[str, Any]:
     return {"field": shown(field), "value": shown(value), "allowed": cut(allowed, LONGEST_TEXT)}
 
 
-def dotted(location: Sequence[str | int]) -> str:
-    """Return a pydantic location as ``sweep.friction[2]``, without ``body`` or ``query``."""
-    path = location[1:] if len(location) > 1 else location
-    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
-    return text.removeprefix(".")
-
-
 def validation_errors(exc: RequestValidationError) -> list[dict[str, Any]]:
     """Return field, value and what is allowed for each error FastAPI found."""
     errors = []
     for error in exc.errors()[:MOST_MISTAKES]:
-        field, value, allowed = dotted(error["loc"]), error.get("input"), worded(error)
+        # without ``body`` or ``query``
+        field, value, allowed = (
+            dotted(error["loc"][1:] or error["loc"]),
+            error.get("input"),
+            worded(error),
+        )
         if error["type"] == "json_invalid":
             reason = f"{error['ctx']['error']} at character {error['loc'][-1]}"
             field, value, allowed = "body", None, f"valid JSON ({reason})"

@@ -5,7 +5,7 @@ To check every run of a large study and to make its id takes seconds, and memory
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,6 @@ from service.settings import Settings
 from service.turns import Share
 from solver.scenes import Scene
 from studies import Bounds, Estimate, Store, Study, estimate
-from studies.definition.extending import EXTENDS
-from studies.scenes.registry import scene_named
 
 SECONDS = 120
 """Longest time of the check of a study [s]."""
@@ -72,21 +70,7 @@ def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examin
     def find(name: str) -> Scene | None:
         return store.scene(store.scene_id(name))
 
-    every = [*levels(content, store)]
-    if name := next((each["scene"] for each in every if "scene" in each), None):
-        for each in every:  # a study has the runs of the one that it extends, and its own
-            bounds.check_count(each, scene_named(name, find), store)
     study = Study.known(content, find, store.definition)
-    bounds.check_count(study.to_dict(), study.problem, store)
-    bounds.check_size(study)
+    bounds.check_size(study, store)
     cost = estimate(study.checked(), store, bounds)
     return Examined(study, list(study.run_ids()), cost)
-
-
-def levels(content: Any, store: Store) -> Iterator[Mapping[str, Any]]:
-    """Yield the content of a study, and of those that it extends."""
-    while isinstance(content, Mapping):
-        yield content
-        content = content.get(EXTENDS)
-        if isinstance(content, str):
-            content = store.definition(content)

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.job import StudyState
 from studies.definition.sweep import Axes
-from studies.kinds import DESCRIBED
+from studies.kinds import KINDS
 
 ContentId = Annotated[
     str, Path(pattern="^[0-9a-f]{32}$", description="content id, 32 hexadecimal digits")
@@ -224,8 +224,8 @@ class StudyRun(BaseModel):
 
 def _with_kinds(schema: dict[str, Any]) -> None:
     """Add the entries of kinds of study to the JSON Schema of a study."""
-    schema["properties"] |= DESCRIBED
-    schema["required"] += DESCRIBED
+    schema["properties"] |= {name: {"type": "object"} for name in KINDS}
+    schema["required"] += KINDS
 
 
 class StudyDetail(StudySummary):

@@ -15,6 +15,7 @@ from studies.errors import StudyError
 from studies.execution.cluster import Access
 from studies.execution.estimate import Bounds
 from studies.execution.limits import Limits
+from studies.scenes.refusals import mistakes_of
 
 
 def _words(given: Any) -> Any:
@@ -188,9 +189,8 @@ def chosen(**given: Any) -> Settings:
     except OSError as error:
         raise StudyError("RESIDUA_SCHEDULER_CA", error.filename, f"{error.strerror}") from None
     except ValidationError as error:
-        first = error.errors()[0]
-        name = f"RESIDUA_{first['loc'][0]}".upper()
-        raise StudyError(name, first["input"], first["msg"]) from None
+        found = StudyError.of([*mistakes_of(error, Settings).values()])
+        raise found.renamed(lambda name: f"RESIDUA_{name}".upper()) from None
     for part in ("limits", "outside_access", "bounds"):
         getattr(settings, part)  # raises errors now, not when a study needs it
     most_kept()

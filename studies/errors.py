@@ -5,7 +5,8 @@ from __future__ import annotations
 import difflib
 import re
 import reprlib
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -24,6 +25,11 @@ def cut(text: str, longest: int) -> str:
     return text if len(text) <= longest else f"{text[:longest]}…"
 
 
+def encodable(text: str) -> str:
+    """Return a text that UTF-8 can hold: lone surrogates, which JSON may have, are written out."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
 class StudyError(ValueError):
     """Bad input: which field, which value, what is allowed.
 
@@ -33,24 +39,27 @@ class StudyError(ValueError):
     value : what was given
     allowed : what would have been accepted, in words
     others : further mistakes of the same input, each in a line of its own of the text
+    count : number of all mistakes, if there are more
     """
 
     others: tuple[StudyError, ...] = ()
 
     def __init__(
-        self, field: str, value: object, allowed: str, others: Sequence[StudyError] = ()
+        self,
+        field: str,
+        value: object,
+        allowed: str,
+        others: Sequence[StudyError] = (),
+        count: int = 0,
     ) -> None:
-        field = field.encode("utf-8", "backslashreplace").decode()  # JSON may hold lone surrogates
-        field, allowed = cut(field, LONGEST_FIELD), cut(allowed, LONGEST_TEXT)
+        field, allowed = cut(encodable(field), LONGEST_FIELD), cut(allowed, LONGEST_TEXT)
         value = plain(value)
         self.field, self.value, self.allowed = field, value, allowed
-        self.others, self.count = tuple(others), 1 + len(others)
+        self.others, self.count = tuple(others[: MOST_MISTAKES - 1]), max(count, 1 + len(others))
         super().__init__("\n".join(self.listed))
 
-    def __reduce__(
-        self,
-    ) -> tuple[type[StudyError], tuple[str, object, str, tuple[StudyError, ...]]]:
-        return type(self), (self.field, self.value, self.allowed, self.others)
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.field, self.value, self.allowed, self.others, self.count)
 
     @property
     def each(self) -> list[StudyError]:
@@ -66,10 +75,56 @@ class StudyError(ValueError):
 
     def renamed(self, rename: Callable[[str], str]) -> StudyError:
         """Return the same mistakes of other fields."""
-        first, *others = (
-            StudyError(rename(each.field), each.value, each.allowed) for each in self.each
-        )
-        return StudyError(first.field, first.value, first.allowed, others)
+        every = [StudyError(rename(each.field), each.value, each.allowed) for each in self.each]
+        return StudyError.of(every, self.count)
+
+    def under(self, field: str) -> StudyError:
+        """Return the same mistakes, of entries of a field."""
+        return self.renamed(lambda own: joined(field, own)) if field else self
+
+    @staticmethod
+    def of(mistakes: Sequence[StudyError], count: int = 0) -> StudyError:
+        """Return the first of one or more mistakes with the others."""
+        first, *others = mistakes
+        return StudyError(first.field, first.value, first.allowed, others, count)
+
+
+def joined(field: str, entry: str) -> str:
+    """Return the name of an entry of a field: ``sweep.friction`` or ``tags[0]``."""
+    return f"{field}{'.' if field and entry and entry[0] != '[' else ''}{entry}"
+
+
+class Mistakes:
+    """Collects the mistakes of an input, so that all are reported."""
+
+    def __init__(self) -> None:
+        self.found: list[StudyError] = []
+        self.count, self.failed = 0, False
+
+    def add(self, field: str, error: StudyError) -> None:
+        """Keep the mistakes of an entry, but for those that another mistake causes."""
+        self.failed = True
+        if not isinstance(error, Unchecked):
+            self.found += error.under(field).each[: MOST_MISTAKES - len(self.found)]
+            self.count += error.count
+
+    @contextmanager
+    def at(self, field: str = "") -> Iterator[None]:
+        """Keep the mistakes of an entry that are raised."""
+        try:
+            yield
+        except StudyError as error:
+            self.add(field, error)
+
+    @property
+    def error(self) -> StudyError:
+        """All of them."""
+        return StudyError.of(self.found, self.count) if self.found else Unchecked()
+
+    def report(self) -> None:
+        """Raise `StudyError` if there are mistakes."""
+        if self.failed:
+            raise self.error
 
 
 class SceneError(StudyError):
@@ -99,8 +154,19 @@ class SceneError(StudyError):
         """The mistakes."""
         return [*self.mistakes]
 
-    def __reduce__(self) -> tuple[type[SceneError], tuple[str, tuple[StudyError, ...], int]]:  # type: ignore[override]
+    def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.name, self.mistakes, self.count)
+
+
+class Unchecked(StudyError):
+    """An entry that cannot be checked, for another one is wrong: it is not reported."""
+
+    def __init__(self) -> None:
+        super().__init__("", None, "cannot be checked")
+
+    def renamed(self, rename: Callable[[str], str]) -> StudyError:
+        """Return itself."""
+        return self
 
 
 class Unusable(StudyError):
@@ -185,13 +251,6 @@ def one_of(name: Any, names: Iterable[str]) -> str:
     return f"must be one of {listed or '(there is none)'}{nearest(name, known)}"
 
 
-def check_entries(field: str, table: Mapping[str, Any], known: Collection[str]) -> None:
-    """Raise `StudyError` for an entry of a table that is not one of the known."""
-    for key in table:
-        if key not in known:
-            raise StudyError(f"{field}.{key}", table[key], one_of(key, known))
-
-
 def nearest(name: Any, names: Iterable[str]) -> str:
     """Return ``"; did you mean …?"`` when one of `names` resembles `name`, else nothing."""
     matches = difflib.get_close_matches(str(name), list(names)[:COMPARED], n=1)
@@ -223,7 +282,6 @@ _WORDS = {
     "model_attributes_type": "must be a table",
     "dict_type": "must be a table",
     "tuple_type": "must be a list",
-    "literal_error": "must be {expected}",
     "enum": "must be {expected}",
     "extra_forbidden": "is not known here",
     "greater_than": "must be greater than {gt:g}",
@@ -241,6 +299,10 @@ _WORDS = {
 def worded(error: Mapping[str, Any]) -> str:
     """Return what is allowed for the input of a pydantic error."""
     words = _WORDS.get(error["type"])
+    if error["type"] == "literal_error":
+        return one_of(
+            error["input"], filter(None, re.findall(r"'([^']*)'", error["ctx"]["expected"]))
+        )
     if error["type"] in ("float_type", "int_type") and is_quantity(error["input"]):
         return f"{words} without a unit: in N, mm, MPa, t, s, K, degrees"
     return words.format(**error.get("ctx", {})) if words else str(error["msg"])

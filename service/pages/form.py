@@ -7,14 +7,17 @@ import pprint
 import re
 import shlex
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from solver.scenes import Scene
-from studies import StudyError
+from studies import Study, StudyError
 from studies.definition.cases import USUAL_AXES
-from studies.definition.parameters import Parameter, parameters_of, plain
-from studies.toml import toml_text
+from studies.definition.parameters import Parameter, parameters_of
+from studies.definition.points import ENTRIES
+from studies.kinds import KINDS
+from studies.toml import toml_of, toml_text
 
 PREFIX = "p."
 """What precedes the name of a parameter in the name of its field."""
@@ -30,7 +33,67 @@ LONGEST_RANGE = 200
 LONGEST = 100_000
 """Largest number of characters in the fields of a parameter."""
 
-OF = re.compile(r"(?:(?:parameters|sweep)\.)?(?P<name>\w+)")
+OF = re.compile(r"(?:(?:parameters|sweep)\.)?(?P<name>(?P<table>\w+)(?:\.\w+)?)")
+
+SCHEMA = Study.model_json_schema()
+CHOOSING = (*KINDS, *ENTRIES)
+"""Entries of a study that the form has tables for."""
+
+
+class TableField(NamedTuple):
+    """A field of an entry of a study, such as of ``goal``: its name, meaning, default and text."""
+
+    name: str
+    meaning: str
+    usual: str
+    text: str
+    wrong: str
+
+
+def tables(
+    given: Mapping[str, Sequence[str]], wrong: Mapping[str, str]
+) -> dict[str, tuple[str, list[TableField]]]:
+    """Return what each entry of `CHOOSING` means, and its fields, as the JSON Schema has them."""
+    found = {}
+    for table in CHOOSING:
+        own = _resolved(SCHEMA["properties"][table])
+        entries = {f"{table}.{entry}": each for entry, each in own.get("properties", {}).items()}
+        fields = [
+            _table_field(name, each, given, wrong)
+            for name, each in (entries or {table: own}).items()
+        ]
+        found[table] = own["description"], fields
+    return found
+
+
+def _table_field(
+    name: str, schema: Any, given: Mapping[str, Sequence[str]], wrong: Mapping[str, str]
+) -> TableField:
+    words = [word for each in (schema, *schema.get("anyOf", ())) for word in each.get("enum", ())]
+    meaning = schema.get("description", "") + (f": {', '.join(words)}" if words else "")
+    default = schema.get("default")
+    usual = toml_text(default) if default or default == 0 else ""
+    return TableField(name, meaning, usual, _one(given, name), wrong.get(name, ""))
+
+
+def _resolved(schema: Mapping[str, Any]) -> Any:
+    ref = schema.get("$ref", "").rpartition("/")[2]
+    return {**SCHEMA["$defs"][ref], **schema} if ref else schema
+
+
+def table_of(table: str, given: Mapping[str, Sequence[str]]) -> Any:
+    """Return what the fields of an entry say: values of TOML, or else texts."""
+    if table in given:
+        return _toml(_one(given, table))
+    texts = {name: _one(given, name) for name in given if name.startswith(f"{table}.")}
+    return {name.partition(".")[2]: _toml(text) for name, text in texts.items() if text}
+
+
+def _toml(text: str) -> Any:
+    for written in (text, f"{{{text}}}"):  # a table needs no braces
+        with suppress(StudyError):
+            return toml_of(f"x = {written}".encode(), "x", text)["x"]
+    return text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,6 +168,8 @@ def study_of(
         study["tags"] = tags
     if _one(given, "keep"):
         study["keep"] = "fields"
+    if (table := _one(given, "choose")) in CHOOSING:
+        study[table] = table_of(table, given)
     fixed: dict[str, Any] = {}
     swept: dict[str, Any] = {}
     wrong: dict[str, str] = {}
@@ -131,24 +196,13 @@ def _value(parameter: Parameter, texts: Sequence[str]) -> tuple[Any, bool]:
         raise StudyError(parameter.name, f"{size} characters", allowed)
     match = RANGE.fullmatch(texts[0]) if len(texts[0]) <= LONGEST_RANGE else None
     if match:
-        ends = {key: _checked(parameter, match[key]) for key in ("start", "stop")}
+        ends = {key: parameter.read(match[key], parameter.name) for key in ("start", "stop")}
         spacing = {"spacing": "log"} if match["log"] else {}
         return {**ends, "num": int(match["num"]), **spacing}, True
     whole = texts[0].startswith(("[", "{"))
     parts = texts if whole or len(texts) > 1 else texts[0].split(",")
-    values = [_checked(parameter, each.strip()) for each in parts if each.strip()]
+    values = [parameter.read(each.strip(), parameter.name) for each in parts if each.strip()]
     return (values, True) if len(values) > 1 else (values[0] if values else None, False)
-
-
-def _checked(parameter: Parameter, text: str) -> Any:
-    usual = parameter.default
-    number = "string" not in json.dumps(parameter.schema.get("type", "")) and not isinstance(
-        usual, str
-    )
-    value = parameter.normalise(plain(text, None) if number else text, parameter.name)
-    if not parameter.in_range(parameter.typed(value)):
-        raise parameter.refusal(parameter.name, value)
-    return value
 
 
 def _one(given: Mapping[str, Sequence[str]], name: str) -> str:
@@ -160,8 +214,10 @@ def beside(error: StudyError, scene: Scene) -> dict[str, str]:
     wrong: dict[str, str] = {}
     for each in error.each:
         match = OF.match(each.field)
-        name = match["name"] if match else ""
-        wrong.setdefault(name if name in parameters_of(scene) else each.field, each.allowed)
+        names = (match["table"], match["name"]) if match else ("", "")
+        name = names[names[0] in CHOOSING]
+        beside = name in parameters_of(scene) or names[0] in CHOOSING
+        wrong.setdefault(name if beside else each.field, each.allowed)
     return wrong
 
 

@@ -163,7 +163,9 @@ def _form(
     mistakes = {**early, **wrong}
     fields = form.entries(scene, given, mistakes)
     posted = [(each.id, f"{each.name} (posted)") for each in store.scenes(LISTED)]
+    choose = given.get("choose", [""])[0]
     own = {each.parameter.name for each in fields} | {"name"}
+    own |= {each for each in mistakes if choose and each.partition(".")[0] == choose}
     return page(
         request,
         "new",
@@ -176,6 +178,7 @@ def _form(
         query_of=urlencode({**given, "scene": [name]}, doseq=True),
         first=[each for each in fields if each.first],
         rest=[each for each in fields if not each.first],
+        tables=form.tables(given, mistakes),
         wrong=mistakes,
         general=[text for key, text in mistakes.items() if key not in own],
         estimate=found.estimate if found else None,

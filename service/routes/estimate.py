@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Annotated, Any
 
-from fastapi import APIRouter, Body
-from pydantic import WithJsonSchema
+from fastapi import APIRouter
 
 from service.dependencies import TheComputing, TheExaminer, TheKeeper
 from service.errors import REFUSED
-from service.routes.studies import SUBMISSION, taken_priority
+from service.routes.studies import Content, taken_priority
 from service.strict import StrictRoute
 from studies import Estimate
 
@@ -19,7 +17,7 @@ router = APIRouter(tags=["studies"], route_class=StrictRoute)
 
 @router.post("/estimate", responses=REFUSED)
 async def estimate(
-    content: Annotated[dict[str, Any], Body(), WithJsonSchema(SUBMISSION)],
+    content: Content,
     examiner: TheExaminer,
     computing: TheComputing,
     keeper: TheKeeper,

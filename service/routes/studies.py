@@ -10,10 +10,11 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Annotated, Any
 
+from annotated_types import Interval
 from fastapi import APIRouter, Body, Query, Request, Response
 from fastapi.responses import FileResponse, PlainTextResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
-from pydantic import WithJsonSchema
+from pydantic import GetJsonSchemaHandler
 
 from service import maps, overview
 from service.datasets import Datasets
@@ -53,6 +54,7 @@ from service.schemas import (
 )
 from service.strict import StrictRoute
 from studies import Store, Study, StudyError
+from studies.definition.schema import StudyTable, Whole, parsed
 from studies.errors import StoreFull
 from studies.storage.seal import digest
 from studies.storage.tiles import METADATA
@@ -61,47 +63,61 @@ log = logging.getLogger(__name__)
 
 router = APIRouter(prefix="/studies", tags=["studies"], route_class=StrictRoute)
 
-EXAMPLE = {
+EXAMPLE: dict[str, Any] = {
     "name": "two-frictions",
     "scene": "punch",
     "parameters": {"smallest_element": 0.02, "growth": 2.0, "hardening": "isotropic"},
     "sweep": {"load_ratio": [0.5714, 0.8571], "friction": [0.0, 0.3]},
 }
 
-PRIORITIES = range(-100, 101)
 MOST_FITTED = 1000
 """Largest number of runs to which a request may fit polynomials, which takes seconds."""
 
-SUBMISSION = Study.model_json_schema() | {"examples": [EXAMPLE]}
-SUBMISSION["properties"]["priority"] = {
-    "type": "integer",
-    "minimum": PRIORITIES[0],
-    "maximum": PRIORITIES[-1],
-    "default": 0,
-    "description": "of two studies that wait, the one with the greater number comes first; "
-    "no part of what the study is",
-}
+
+class Priority(StudyTable):
+    """What of a submission is no part of what the study is.
+
+    Attributes
+    ----------
+    priority : of two studies that wait, that of the greater number comes first
+    """
+
+    priority: Annotated[Whole, Interval(ge=-100, le=100)] = 0
+
+
+class Submission(Priority, Study):
+    """A study, and its priority."""
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> Any:
+        """Add an example."""
+        found = super().__get_pydantic_json_schema__(core, handler)
+        handler.resolve_ref_schema(found)["examples"] = [EXAMPLE]
+        return found
+
+
+class _Described:
+    """Describes a body that is checked in another process as a `Submission`."""
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: GetJsonSchemaHandler) -> Any:
+        written = Submission.__pydantic_core_schema__
+        return Submission.__get_pydantic_json_schema__(written, handler)
+
+
+Content = Annotated[dict[str, Any], Body(), _Described()]
+"""The body of a submission."""
 
 
 def taken_priority(content: dict[str, Any]) -> int:
-    """Take the priority out of a submission and return it.
-
-    Raises
-    ------
-    StudyError
-        for one that is not an integer in `PRIORITIES`
-    """
-    priority = content.pop("priority", 0)
-    if type(priority) is not int or priority not in PRIORITIES:
-        raise StudyError("priority", priority, "must be an integer >= -100 and <= 100")
-    return priority
+    """Take the priority out of a submission and return it."""
+    return parsed(Priority, {"priority": content.pop("priority", 0)}).priority
 
 
 @router.post(
     "", status_code=HTTPStatus.CREATED, responses={200: {"model": StudySummary}, **REFUSED}
 )
 async def submit(
-    content: Annotated[dict[str, Any], Body(), WithJsonSchema(SUBMISSION)],
+    content: Content,
     keeper: TheKeeper,
     examiner: TheExaminer,
     computing: TheComputing,

@@ -14,70 +14,37 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from studies.definition.identity import canonical
-from studies.definition.parameters import Parameter
-from studies.definition.points import MOST_POINTS, field_of, is_points, with_points
-from studies.definition.sweep import Axes, checked_axes, owners, positions
+from studies.definition.points import field_of, is_points
+from studies.definition.schema import MAXIMUM_RUNS
+from studies.definition.sweep import Axes, owners, positions
 from studies.errors import StudyError
 from studies.toml import CASE
 
 EXTENDS = "extends"
 """Entry of a study that names the one that it extends."""
 
-SCHEMA = {
-    "type": ["string", "object"],
-    "description": "name, id or content of a study whose runs are kept; the axes and points add to "
-    "them",
-}
-"""JSON Schema of the entry."""
-
 
 class Extended(NamedTuple):
-    """The study that is extended.
-
-    Attributes
-    ----------
-    name, scene, parameters, sweep, choice : as those of `Study`
-    fixed : all parameters that are not swept
-    """
+    """The study that is extended: entries of `Study`, and all parameters that are not swept."""
 
     name: str
-    scene: str
-    parameters: Mapping[str, Any]
     sweep: Axes
-    choice: Mapping[str, Any]
     fixed: Mapping[str, Any]
 
+    def with_axes(self, added: Axes) -> Axes:
+        """Return the axes of the runs of this study and of those that others add.
 
-def extended(content: Mapping[str, Any], base: Extended, known: Mapping[str, Parameter]) -> Any:
-    """Return the content of a study that has the runs of `base` and those that it adds.
-
-    Parameters
-    ----------
-    content : of the study, with `EXTENDS`
-    base : the study that is extended
-    known : the parameters of its scene
-
-    Raises
-    ------
-    StudyError
-        if the study changes a parameter of `base`, adds nothing, or adds what does not fit
-    """
-    if parameters := content.get("parameters"):
-        allowed = "are those of the study that is extended: what shall vary goes to the sweep"
-        raise StudyError("parameters", parameters, allowed)
-    added = checked_axes(with_points(content, known), known)
-    if not added:
-        raise StudyError(EXTENDS, base.name, "nothing is added: give axes, points or a sample")
-    rest = {key: value for key, value in content.items() if key not in _ADDED}
-    axes = _with_points(base, added) if any(map(is_points, added.values())) else dict(base.sweep)
-    for name, axis in added.items():
-        if not is_points(axis):
-            axes[name] = _longer(name, axis, base)
-    fixed = {key: value for key, value in base.parameters.items() if key not in owners(axes)}
-    return {**base.choice, **rest, "scene": base.scene, "parameters": fixed, "sweep": axes}
-
-
-_ADDED = (EXTENDS, "points", "sample", "sweep", "parameters", "scene")
+        Raises
+        ------
+        StudyError
+            if nothing is added, or what does not fit
+        """
+        if not added:
+            raise StudyError(EXTENDS, self.name, "nothing is added: give axes, points or a sample")
+        points = any(map(is_points, added.values()))
+        axes: Axes = _with_points(self, added) if points else dict(self.sweep)
+        longer = {n: _longer(n, axis, self) for n, axis in added.items() if not is_points(axis)}
+        return axes | longer
 
 
 def _longer(name: str, axis: list[Any] | dict[str, Any], base: Extended) -> Any:
@@ -115,8 +82,8 @@ def _with_points(base: Extended, added: Axes) -> dict[str, Any]:
     if own is not None and own != name:
         raise _refused(name, more, f"{theirs} has its points in {own}: add to these")
     kept = {name: axes.pop(name)} if own else axes
-    if math.prod(map(len, kept.values())) > MOST_POINTS:
-        raise _refused(name, more, f"{theirs} has more than {MOST_POINTS} runs")
+    if math.prod(map(len, kept.values())) > MAXIMUM_RUNS:
+        raise _refused(name, more, f"{theirs} has more than {MAXIMUM_RUNS} runs")
     every = [list(positions(axis, values)) for axis, values in kept.items()]
     points = [
         {key: v for at in run for key, v in at.sets.items()} for run in itertools.product(*every)

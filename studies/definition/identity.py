@@ -17,15 +17,13 @@ from dataclasses import fields
 from functools import cache, lru_cache
 from importlib.machinery import ModuleSpec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import solver
 from solver.files import read_file
 from solver.parts import own_files
+from solver.scenes import Scene
 from studies.definition.meaning import digest, digests_of
-
-if TYPE_CHECKING:
-    from solver.scenes import Scene
 
 ID_PATTERN = re.compile(r"[0-9a-f]{32}")
 

@@ -13,18 +13,15 @@ from contextlib import suppress
 from typing import Any, TypeGuard
 
 from solver.parameters import is_number
-from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
-from studies.definition.sampling import METHOD, METHODS, sampled
-from studies.definition.spaced import is_finite
-from studies.errors import StudyError, nearest
+from studies.definition.sampling import METHOD, Sample
+from studies.definition.schema import Context, filled, is_finite, known_name, parsed
+from studies.errors import Mistakes, StudyError
 from studies.toml import CASE
 from studies.units import UnitError, number_in, under
 
 POINT = "point"
 """Name of the axis of the entries ``points`` and ``sample``."""
-MOST_POINTS = 100_000
-"""Largest number of points of an axis."""
 
 Points = list[dict[str, Any]]
 
@@ -38,57 +35,6 @@ _LONGEST_CASE = 80
 _TRUTH = {"true": True, "false": False}
 _LONGEST_NUMBER = 1000
 """Largest length of a text that is an integer: Python takes none of many thousand digits."""
-
-
-SCHEMAS = {
-    "points": {
-        "type": "array",
-        "minItems": 1,
-        "maxItems": MOST_POINTS,
-        "items": {"type": "object"},
-        "description": "points: each a table of parameters; they are the axis `point` of the sweep",
-    },
-    "sample": {
-        "type": "object",
-        "properties": {
-            METHOD: {"enum": list(METHODS)},
-            "num": {"type": "integer", "minimum": 1, "maximum": MOST_POINTS},
-            "seed": {"type": "integer", "minimum": 0, "default": 0},
-            "ranges": {"type": "object", "additionalProperties": {"type": ["array", "object"]}},
-        },
-        "required": [METHOD, "num", "ranges"],
-        "additionalProperties": False,
-        "description": "points that fill ranges of parameters evenly, in place of `points`",
-    },
-}
-"""JSON Schemas of the entries `ENTRIES`."""
-
-
-def with_points(content: Mapping[str, Any], known: Mapping[str, Parameter]) -> Any:
-    """Return the sweep of a study, in which ``points`` or ``sample`` of the study is an axis.
-
-    Raises
-    ------
-    StudyError
-        if both are given, or the sweep has this axis too; if the sample is wrong, or ``points`` is
-        a table of something else
-    """
-    sweep = content.get("sweep", {})
-    given = [entry for entry in ENTRIES if entry in content]
-    if not given or not isinstance(sweep, Mapping):
-        return sweep
-    other = next((each for each in given[1:]), f"sweep.{POINT}" if POINT in sweep else "")
-    if other:
-        value = content.get(other, sweep.get(POINT))
-        allowed = f"{given[0]} is given too: keep one, or give one a name, [sweep.NAME]"
-        raise StudyError(other, value, allowed)
-    points = content[given[0]]
-    if given[0] == "sample":
-        points = sampled("sample", points, known, MOST_POINTS)
-    elif isinstance(points, Mapping) and "file" not in points:
-        allowed = "must be a list of points; a sample is [sample], labels are [sweep.NAME]"
-        raise StudyError("points", dict(points), allowed)
-    return {POINT: points, **sweep}
 
 
 def is_points(axis: Any) -> TypeGuard[Points]:
@@ -111,7 +57,7 @@ def field_of(axis: str) -> str:
     return "points" if axis == POINT else f"sweep.{axis}"
 
 
-def checked_points(name: str, content: Any, known: Mapping[str, Parameter]) -> Points:
+def checked_points(content: Any, context: Context) -> Points:
     """Return the points of an axis, normalised: all with the same parameters, in their order.
 
     A parameter that one point sets and another leaves out has the scene's default there. The key of
@@ -123,55 +69,54 @@ def checked_points(name: str, content: Any, known: Mapping[str, Parameter]) -> P
     StudyError
         for any mistake except in combinations of parameters, which are checked run by run
     """
-    field = field_of(name)
+    known = context.known
     if isinstance(content, Mapping) and METHOD in content:
-        content = sampled(f"sweep.{name}", content, known, MOST_POINTS)
+        content = parsed(Sample, content, context).points
     if isinstance(content, Mapping) and "file" in content:
         allowed = "names a file, which only a study file can: give the points themselves"
-        raise StudyError(field, dict(content), allowed)
+        raise StudyError("", dict(content), allowed)
     if not isinstance(content, list | tuple) or not content:
-        raise StudyError(field, content, "must be a list of points, each a table of parameters")
+        raise StudyError("", content, "must be a list of points, each a table of parameters")
     headings: dict[Any, tuple[str, str]] = {}
-    given = [_point(f"{field}[{k}]", each, known, headings) for k, each in enumerate(content)]
-    own = [key for key in known if key != CASE and any(key in point for point in given)]
-    if not own:
-        raise StudyError(field, content[0], f"must set a parameter: one of {', '.join(known)}")
-    named = any(CASE in point for point in given)
-    points: Points = []
-    seen: dict[str, int] = {}
+    given, wrong = list[dict[str, Any]](), Mistakes()
+    for k, each in enumerate(content):
+        with wrong.at(f"[{k}]"):
+            given.append(_point(each, known, headings))
+    wrong.report()
+    if not any(point.keys() - {CASE} for point in given):
+        raise StudyError("", content[0], f"must set a parameter: one of {', '.join(known)}")
+    points = filled(dict(enumerate(given)), known)
+    if not any(CASE in point for point in given):
+        return [*points.values()]
     cases: dict[Any, int] = {}
     for k, point in enumerate(given):
-        settings = {key: point.get(key, known[key].default) for key in own}
-        first = seen.setdefault(canonical(settings), k)
-        if first != k:
-            raise StudyError(f"{field}[{k}]", point, f"is the same as point {first}: keep one")
-        if named:
-            first = cases.setdefault(point.get(CASE), k)
-            if CASE not in point or first != k:
-                what = "names point {} too" if CASE in point else "must be given for all points"
-                raise StudyError(f"{field}[{k}].{CASE}", point.get(CASE), what.format(first))
-        points.append(({CASE: point[CASE]} if named else {}) | settings)
-    return points
+        first = cases.setdefault(point.get(CASE), k)
+        if CASE not in point or first != k:
+            what = f"names point {first} too" if CASE in point else "must be given for all points"
+            wrong.add("", StudyError(f"[{k}].{CASE}", point.get(CASE), what))
+    wrong.report()
+    return [{CASE: given[k][CASE]} | point for k, point in points.items()]
 
 
 def _point(
-    field: str,
-    content: Any,
-    known: Mapping[str, Parameter],
-    headings: dict[Any, tuple[str, str]],
+    content: Any, known: Mapping[str, Parameter], headings: dict[Any, tuple[str, str]]
 ) -> dict[str, Any]:
     """Return the parameters that a point sets, normalised, and its case."""
     if not isinstance(content, Mapping):
-        raise StudyError(field, content, "must be a table of parameters")
-    point: dict[str, Any] = {}
+        raise StudyError("", content, "must be a table of parameters")
+    point, wrong = dict[str, Any](), Mistakes()
     for key, value in content.items():
-        if key not in headings:
-            headings[key] = _heading(field, key, known)
-        name, unit = headings[key]
-        if name in point:
-            raise StudyError(f"{field}.{key}", value, f"{name} is given twice")
-        own = f"{field}.{name}"
-        point[name] = _case(own, value) if name == CASE else _value(own, value, known[name], unit)
+        with wrong.at():
+            if key not in headings:
+                headings[key] = _heading(key, known)
+            name, unit = headings[key]
+            if name in point:
+                raise StudyError(str(key), value, f"{name} is given twice")
+            if name == CASE:
+                point[name] = _case(value)
+            else:
+                point[name] = _value(name, value, known[name], unit)
+    wrong.report()
     return point
 
 
@@ -202,28 +147,28 @@ def _plain(text: str) -> float | bool | None:
     return int(text) if whole else float(text)
 
 
-def _heading(field: str, key: Any, known: Mapping[str, Parameter]) -> tuple[str, str]:
+def _heading(key: Any, known: Mapping[str, Parameter]) -> tuple[str, str]:
     """Return the parameter of a key such as ``"radius [mm]"``, and the unit of its numbers."""
     heading = _HEADING.fullmatch(key) if isinstance(key, str) else None
     name = heading["name"] if heading else key
     if name == CASE and not heading:
         return CASE, ""
-    if name not in known:
-        allowed = f"the scene has no such parameter; it has {', '.join(known)}"
-        raise StudyError(f"{field}.{name}", key, allowed + nearest(name, known))
-    own = known[name].unit
-    unit = heading["unit"].strip() if heading else own
-    try:
-        under(unit, 1.0, own)
-    except UnitError as error:
-        allowed = f"must be {number_in(own)}; {error}"
-        raise StudyError(f"{field}.{name}", key, allowed) from None
+    wrong = Mistakes()
+    with wrong.at(str(name)):
+        known_name(name, known, key)
+        own = known[name].unit
+        unit = heading["unit"].strip() if heading else own
+        try:
+            under(unit, 1.0, own)
+        except UnitError as error:
+            raise StudyError("", key, f"must be {number_in(own)}; {error}") from None
+    wrong.report()
     return name, unit
 
 
-def _case(field: str, value: Any) -> str:
+def _case(value: Any) -> str:
     """Return the name of a point; a number is text."""
     text = str(value) if is_number(value) else value
     if isinstance(text, str) and text.isprintable() and 0 < len(text) <= _LONGEST_CASE:
         return text
-    raise StudyError(field, value, f"must be a text of 1 to {_LONGEST_CASE} letters")
+    raise StudyError(CASE, value, f"must be a text of 1 to {_LONGEST_CASE} letters")

@@ -3,44 +3,65 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
+from pydantic import (
+    BeforeValidator,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    ValidationInfo,
+    model_serializer,
+    model_validator,
+)
 
 from solver.scenes import Scene
 from studies.definition.line import Read, picked
 from studies.definition.parameters import in_unit
-from studies.definition.spaced import is_finite
-from studies.errors import StudyError, check_entries, nearest, one_of
+from studies.definition.schema import Context, StudyTable, is_finite, parsed
+from studies.errors import StudyError, nearest, one_of
 
 _LARGEST = {"largest": np.max, "smallest": np.min}
 """What may be taken of a variable over dimensions."""
 
 
-def number_of_a_run(field: str, name: Any, scene: Scene) -> type[IntEnum] | None:
-    """Return the words of the values of a variable; None for numbers.
+def known_variable(name: Any, info: ValidationInfo) -> str:
+    """Return the name of a variable of the runs."""
+    known = Context.of(info).scene.known_quantities
+    if not isinstance(name, str) or name not in known:
+        raise StudyError("", name, f"must be a variable of the runs{nearest(name, known)}")
+    return name
 
-    Raises
-    ------
-    StudyError
-        naming ``field``, if there is none, or if it has dimensions
-    """
+
+Variable = Annotated[str, PlainValidator(known_variable, json_schema_input_type=str)]
+"""The name of a variable of the runs."""
+
+
+def number_of_a_run(name: Any, scene: Scene) -> tuple[str, type[IntEnum] | None]:
+    """Return the unit of a variable without dimensions, and the words of its values."""
     quantities = scene.known_quantities
     quantity = quantities.get(name) if isinstance(name, str) else None
     if quantity is not None and not quantity.dims:
-        return quantity.flags
+        return quantity.units, quantity.flags
     what = "is no variable" if quantity is None else f"is over {', '.join(quantity.dims)}"
     numbers = [own for own, each in quantities.items() if not each.dims]
     allowed = f"{what}: must be a variable with one number a run{nearest(name, numbers)}"
-    raise StudyError(field, name, allowed)
+    raise StudyError("", name, allowed)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunNumber:
+def _one_number(name: Any, info: ValidationInfo) -> str:
+    number_of_a_run(name, Context.of(info).scene)
+    return str(name)
+
+
+OneNumber = Annotated[str, PlainValidator(_one_number, json_schema_input_type=str)]
+"""The name of a variable with one number a run."""
+
+
+class RunNumber(StudyTable):
     """A number of a run: a variable without dimensions, or one of its values.
 
     Attributes
@@ -50,9 +71,27 @@ class RunNumber:
     take : ``largest`` or ``smallest`` over those that ``at`` does not name
     """
 
-    of: str
-    at: Mapping[str, Any] = field(default_factory=dict)
-    take: str = ""
+    of: Variable
+    at: dict[str, Any] = Field(default_factory=dict)
+    take: Literal["", "largest", "smallest"] = ""
+
+    @model_validator(mode="after")
+    def _check(self, info: ValidationInfo) -> Self:
+        quantities = Context.of(info).scene.known_quantities
+        dims, content = quantities[self.of].dims, self.content
+        for dim, place in self.at.items():
+            if dim not in dims:
+                raise StudyError(f"at.{dim}", place, one_of(dim, dims))
+        left = [dim for dim in dims if dim not in self.at]
+        if left and not self.take:
+            named = ", ".join(f"{dim} = …" for dim in left)
+            allowed = f'is over {", ".join(dims)}: give at = {{{named}}}, or take = "largest"'
+            raise StudyError("", content, allowed)
+        if self.take and not left:
+            raise StudyError("take", self.take, "is of one number: leave it out")
+        if not self.whole and self.name in quantities:
+            raise StudyError("", content, f"would be named {self.name}, as another variable is")
+        return self
 
     @property
     def whole(self) -> bool:
@@ -67,11 +106,13 @@ class RunNumber:
 
     @property
     def content(self) -> Any:
-        """What `checked_number` reads."""
-        if self.whole:
-            return self.of
-        at = {"at": dict(self.at)} if self.at else {}
-        return {"of": self.of, **at, **({"take": self.take} if self.take else {})}
+        """What is read: the name of the variable, or a table."""
+        given = {"of": self.of, "at": self.at, "take": self.take}
+        return self.of if self.whole else {key: each for key, each in given.items() if each}
+
+    @model_serializer
+    def _content(self) -> Any:
+        return self.content
 
     def seen(self, read: Read) -> float | None:
         """Return the number of a run; None if the run has not this variable.
@@ -91,41 +132,20 @@ class RunNumber:
         return float(_LARGEST[self.take or "largest"](there)) if there.size else None
 
 
-def checked_number(field: str, content: Any, scene: Scene) -> RunNumber:
-    """Return a number of the runs: the name of a variable, or a table ``{of, at, take}``.
+def _one_of_runs(content: Any, info: ValidationInfo) -> RunNumber:
+    if not isinstance(content, str):
+        return parsed(RunNumber, content, Context.of(info))
+    try:
+        return parsed(RunNumber, {"of": content}, Context.of(info))
+    except StudyError as error:
+        raise error.renamed(lambda field: field.removeprefix("of")) from None
 
-    Raises
-    ------
-    StudyError
-        naming the entry, its value and what is allowed
-    """
-    given = {"of": content} if isinstance(content, str) else content
-    if not isinstance(given, Mapping):
-        raise StudyError(field, content, "must be the name of a variable, or {of, at, take}")
-    check_entries(field, given, ("of", "at", "take"))
-    of, at, take = given.get("of"), given.get("at", {}), given.get("take", "")
-    quantities = scene.known_quantities
-    if not isinstance(of, str) or of not in quantities:
-        raise StudyError(field, of, f"must be a variable of the runs{nearest(of, quantities)}")
-    dims = quantities[of].dims
-    if not isinstance(at, Mapping):
-        raise StudyError(f"{field}.at", at, "must be a table: a place on each dimension")
-    for dim, place in at.items():
-        if dim not in dims:
-            raise StudyError(f"{field}.at.{dim}", place, one_of(dim, dims))
-    if take not in ("", *_LARGEST):
-        raise StudyError(f"{field}.take", take, one_of(take, _LARGEST))
-    left = [dim for dim in dims if dim not in at]
-    if left and not take:
-        named = ", ".join(f"{dim} = …" for dim in left)
-        allowed = f'is over {", ".join(dims)}: give at = {{{named}}}, or take = "largest"'
-        raise StudyError(field, content, allowed)
-    if take and not left:
-        raise StudyError(f"{field}.take", take, "is of one number: leave it out")
-    found = RunNumber(of=of, at=dict(at), take=take)
-    if not found.whole and found.name in quantities:
-        raise StudyError(field, content, f"would be named {found.name}, as another variable is")
-    return found
+
+OneOf = Annotated[
+    RunNumber,
+    BeforeValidator(_one_of_runs, json_schema_input_type=str | RunNumber),
+]
+"""A number of a run: the name of a variable, or a table."""
 
 
 class Condition(NamedTuple):
@@ -148,20 +168,25 @@ class Condition(NamedTuple):
 CONDITION = re.compile(r"\s*(?P<name>\w+)\s*(?P<sign><=|>=|!=|<|>|=)\s*(?P<value>.*?)\s*")
 
 
-def checked_condition(field: str, text: Any, scene: Scene) -> Condition:
-    """Return a condition on a variable with one number a run, such as ``"rigid_shift < 20 um"``.
-
-    Raises
-    ------
-    StudyError
-        naming ``field``, the condition and what is allowed
-    """
+def checked_condition(text: Any, scene: Scene) -> Condition:
+    """Return a condition on a variable with one number a run, such as ``"rigid_shift < 20 um"``."""
     found = CONDITION.fullmatch(text) if isinstance(text, str) else None
     if found is None or found["sign"][0] not in "<>":
-        raise StudyError(field, text, "must be NAME < NUMBER, with <, <=, > or >=")
-    number_of_a_run(field, found["name"], scene)
-    given = in_unit(scene.known_quantities[found["name"]].units, found["value"], field)
+        raise StudyError("", text, "must be NAME < NUMBER, with <, <=, > or >=")
+    unit, _ = number_of_a_run(found["name"], scene)
+    given = in_unit(unit, found["value"], "")
     with suppress(ValueError):
         if is_finite(limit := float(given)):
             return Condition(found["name"], found["sign"], limit)
-    raise StudyError(field, text, "must end with a finite number")
+    raise StudyError("", text, "must end with a finite number")
+
+
+OneCondition = Annotated[
+    Condition,
+    PlainValidator(
+        lambda text, info: checked_condition(text, Context.of(info).scene),
+        json_schema_input_type=str,
+    ),
+    PlainSerializer(lambda condition: condition.text),
+]
+"""A condition, see `checked_condition`."""

@@ -18,144 +18,109 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from annotated_types import Interval
+from pydantic import PlainValidator, ValidationInfo
 
 from solver.parameters import is_number
+from solver.typing import Array
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
-from studies.definition.spaced import SPACINGS, between, rounded
-from studies.errors import StudyError, check_entries, nearest, one_of
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Block = NDArray[np.float64]
+from studies.definition.schema import MAXIMUM_RUNS, Context, Range, StudyTable, Whole, known_name
+from studies.errors import Mistakes, StudyError
 
 METHOD = "method"
-METHODS = ("sobol", "lhs", "halton")
-_KEYS = (METHOD, "num", "ranges", "seed")
-_MOST_SEED = 2**32 - 1
 _BITS = 40
 """Number of times that an interval of a Latin hypercube can be halved."""
 _TIRED = 64
 """Points of the sequence drawn for each one wanted, after which the rest are all repetitions."""
 
 
-class _Range(NamedTuple):
-    """Makes a value of a number from 0 to 1; ``different`` tells of how many, 0 if endless."""
+class _Values(NamedTuple):
+    """Makes a value of a number from 0 to 1; ``different`` is how many, 0 if endless."""
 
     value: Callable[[float], Any]
     different: int = 0
 
 
-def sampled(
-    field: str, content: Any, known: Mapping[str, Parameter], most: int
-) -> list[dict[str, Any]]:
-    """Return the points of a sample ``{method, num, ranges, seed}``, no two of them equal.
-
-    Parameters
-    ----------
-    field : of the sample, for errors
-    content : ``ranges`` has, for each parameter, ``[lowest, highest]``, a table ``{start, stop,
-        spacing}``, or a list of words; ``seed`` is 0 if it is left out
-    known : the parameters of the scene
-    most : largest number of points
-
-    Raises
-    ------
-    StudyError
-        naming the entry, its value and what is allowed
-    """
-    if not isinstance(content, Mapping):
-        allowed = "must be a table {method, num, ranges, seed}; a list of points is `points`"
-        raise StudyError(field, content, allowed)
-    check_entries(field, content, _KEYS)
-    method, seed = content.get(METHOD), content.get("seed", 0)
-    if not isinstance(method, str) or method not in METHODS:
-        raise StudyError(f"{field}.{METHOD}", method, one_of(method, METHODS))
-    num = _whole(f"{field}.num", content.get("num"), 1, most)
-    _whole(f"{field}.seed", seed, 0, _MOST_SEED)
-    ranges = content.get("ranges")
-    if not isinstance(ranges, Mapping) or not ranges:
-        raise StudyError(f"{field}.ranges", ranges, "must be a table: a range for each parameter")
-    for name in ranges:
-        if name not in known:
-            allowed = "the scene has no such parameter" + nearest(name, known)
-            raise StudyError(f"{field}.ranges.{name}", ranges[name], allowed)
-    # the order of the scene: that of a table does not count in JSON
-    names = [name for name in known if name in ranges]
-    scales = [_range(f"{field}.ranges.{name}", ranges[name], known[name]) for name in names]
-    if all(scale.different for scale in scales):
-        different = math.prod(scale.different for scale in scales)
-        if num > different:
-            allowed = f"at most {different}, which are all combinations: sweep them as axes"
-            raise StudyError(f"{field}.num", num, allowed)
-    found: dict[str, dict[str, Any]] = {}
-    for row in itertools.islice(_sequence(method, len(names), num, seed), _TIRED * num):
-        values = (scale.value(share) for scale, share in zip(scales, row, strict=True))
-        point = dict(zip(names, values, strict=True))
-        found.setdefault(canonical(point), point)
-        if len(found) == num:
-            return list(found.values())
-    allowed = f"only {len(found)} different points were found: use fewer, or sweep them as axes"
-    raise StudyError(f"{field}.num", num, allowed)
+def _scales(content: Any, info: ValidationInfo) -> dict[str, _Values]:
+    """Return the range, or the words, of each parameter in the order of the scene."""
+    if not isinstance(content, dict) or not content:
+        raise StudyError("", content, "must be a table: a range for each parameter")
+    known, found, wrong = Context.of(info).known, {}, Mistakes()
+    for name, given in content.items():
+        with wrong.at(str(name)):
+            known_name(name, known, given)
+            found[name] = _scale(given, known[name])
+    wrong.report()
+    return {name: found[name] for name in known if name in found}  # that of JSON does not count
 
 
-def _range(field: str, content: Any, parameter: Parameter) -> _Range:
-    """Return the range of a parameter."""
-    listed = isinstance(content, list | tuple)
-    if listed:
-        content = [parameter.in_own_unit(value, f"{field}[{k}]") for k, value in enumerate(content)]
-    if listed and content and not any(map(is_number, content)):
-        values = [parameter.normalise(value, f"{field}[{k}]") for k, value in enumerate(content)]
-        for k, value in enumerate(values):
-            if not parameter.in_range(value):
-                raise parameter.refusal(f"{field}[{k}]", value)
-            if value in values[:k]:
-                raise StudyError(f"{field}[{k}]", value, "is there already: keep one")
-        return _Range(lambda share: values[int(share * len(values))], len(values))
-    spacing: Any = "linear"
-    if listed and len(content) == 2:
-        ends = dict(zip(("start", "stop"), content, strict=True))
-    elif isinstance(content, Mapping) and {"start", "stop"} <= content.keys():
-        ends = {key: value for key, value in content.items() if key != "spacing"}
-        spacing = content.get("spacing", "linear")
-    else:
-        ends = {}
-    if len(ends) != 2:
-        allowed = "must be [lowest, highest], {start, stop, spacing = linear or log}, or words"
-        raise StudyError(field, content, allowed)
-    if spacing not in SPACINGS:
-        raise StudyError(f"{field}.spacing", spacing, one_of(spacing, SPACINGS))
-    for key, value in ends.items():
-        own = f"{field}.{key}" if isinstance(content, Mapping) else field
-        ends[key] = parameter.number(value, own)
-        if spacing == "log" and not ends[key] > 0:
-            raise StudyError(own, value, "must be > 0 for spacing = log")
-    start, stop = ends["start"], ends["stop"]
-    if not start < stop:
-        raise StudyError(field, content, "must begin with its lowest value")
+def _scale(content: Any, parameter: Parameter) -> _Values:
+    if isinstance(content, list | tuple):
+        content = [parameter.in_own_unit(each, f"[{k}]") for k, each in enumerate(content)]
+        if content and not any(map(is_number, content)):
+            return _words(content, parameter)
+    ends = Range.read(content, parameter)
     if not parameter.whole:
-        return _Range(_spread(start, stop, spacing))
-    whole = _spread(start, stop + 1, spacing)  # all integers have the same share, or ratio
-    return _Range(lambda share: min(int(whole(share)), stop), stop - start + 1)
+        return _Values(ends.inside)
+    # all integers have the same share, or ratio
+    start, stop, longer = ends.start, ends.stop, ends.model_copy(update={"stop": ends.stop + 1})
+    return _Values(lambda share: min(int(longer.inside(share)), stop), int(stop - start) + 1)
 
 
-def _spread(start: float, stop: float, spacing: str) -> Callable[[float], float]:
-    """Return what makes a number between the ends of a share of the way."""
+def _words(content: list[Any], parameter: Parameter) -> _Values:
+    values: list[Any] = []
+    for k, given in enumerate(content):
+        value = parameter.normalise(given, own := f"[{k}]")
+        if not parameter.in_range(value):
+            raise parameter.refusal(own, value)
+        if value in values:
+            raise StudyError(own, value, "is there already: keep one")
+        values.append(value)
+    return _Values(lambda share: values[int(share * len(values))], len(values))
 
-    def value(share: float) -> float:
-        return min(max(rounded(between(start, stop, spacing, share)), start), stop)
 
-    return value
+class Sample(StudyTable):
+    """Points that fill ranges of parameters evenly.
 
+    Attributes
+    ----------
+    method : kind of sequence
+    num : number of points
+    ranges : of each parameter ``[lowest, highest]``, a table ``{start, stop, spacing}``, or words
+    seed : another one gives other points
+    """
 
-def _whole(field: str, value: Any, least: int, most: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        raise StudyError(field, value, f"must be an integer >= {least} and <= {most}")
-    return value
+    method: Literal["sobol", "lhs", "halton"]
+    num: Annotated[Whole, Interval(ge=1, le=MAXIMUM_RUNS)]
+    ranges: Annotated[
+        dict[str, Any],
+        PlainValidator(_scales, json_schema_input_type=dict[str, Range | list[Any]]),
+    ]
+    seed: Annotated[Whole, Interval(ge=0, le=2**32 - 1)] = 0
+
+    @property
+    def points(self) -> list[dict[str, Any]]:
+        """The points, no two of them equal."""
+        scales, num = self.ranges.values(), self.num
+        different = math.prod(scale.different for scale in scales)
+        if all(scale.different for scale in scales) and num > different:
+            allowed = f"at most {different}, which are all combinations: sweep them as axes"
+            raise StudyError("num", num, allowed)
+        found: dict[str, dict[str, Any]] = {}
+        sequence = _sequence(self.method, len(scales), num, self.seed)
+        for row in itertools.islice(sequence, _TIRED * num):
+            values = (scale.value(share) for scale, share in zip(scales, row, strict=True))
+            point = dict(zip(self.ranges, values, strict=True))
+            found.setdefault(canonical(point), point)
+            if len(found) == num:
+                return list(found.values())
+        allowed = f"only {len(found)} different points were found: use fewer, or sweep them as axes"
+        raise StudyError("num", num, allowed)
 
 
 def _sequence(method: str, dimensions: int, num: int, seed: int) -> Iterator[list[float]]:
@@ -165,7 +130,7 @@ def _sequence(method: str, dimensions: int, num: int, seed: int) -> Iterator[lis
         yield from block.tolist()
 
 
-def _low_discrepancy(method: str, dimensions: int, num: int, seed: int) -> Iterator[Block]:
+def _low_discrepancy(method: str, dimensions: int, num: int, seed: int) -> Iterator[Array]:
     """Yield blocks of a scrambled sequence."""
     from scipy.stats import qmc  # takes half a second to load
 
@@ -178,15 +143,13 @@ def _low_discrepancy(method: str, dimensions: int, num: int, seed: int) -> Itera
         size *= 2
 
 
-def _hypercubes(method: str, dimensions: int, num: int, seed: int) -> Iterator[Block]:
+def _hypercubes(method: str, dimensions: int, num: int, seed: int) -> Iterator[Array]:
     """Yield a Latin hypercube, then the points that double it, again and again.
 
     A hypercube of n points has one in each of n intervals of each dimension, so that of 2 n
     intervals n are empty: in each dimension the new points take these in random order. Places are
     whole numbers, so that none is rounded into the next interval.
     """
-    import numpy as np
-
     del method
     random = np.random.default_rng(seed)
     size = odd = num // (num & -num)

@@ -2,44 +2,35 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, reduce
 from operator import getitem
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
+    AfterValidator,
     Field,
+    GetJsonSchemaHandler,
     PrivateAttr,
-    ValidationError,
-    ValidationInfo,
-    model_validator,
+    StringConstraints,
 )
 
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
-from studies.definition.extending import EXTENDS, SCHEMA, Extended, extended
+from studies.definition.extending import EXTENDS, Extended
 from studies.definition.files import read_study
 from studies.definition.identity import content_id
-from studies.definition.labels import checked_labels
 from studies.definition.parameters import build, parameters_of
-from studies.definition.points import ENTRIES, POINT, SCHEMAS, Points, with_points
-from studies.definition.sweep import (
-    Axes,
-    checked_axes,
-    checked_table,
-    checked_text,
-    labels,
-    linked_values,
-    owners,
-    run_count,
-)
+from studies.definition.points import ENTRIES, POINT, Points
+from studies.definition.sampling import Sample
+from studies.definition.schema import Context, Settings, StudyTable, Text, parsed
+from studies.definition.sweep import Axes, Sweep, labels, linked_values, owners
 from studies.definition.vocabulary import taken
-from studies.errors import StudyError, one_of
-from studies.kinds import DESCRIBED, KINDS
+from studies.errors import Mistakes, SceneError, StudyError
+from studies.kinds import KINDS
 from studies.kinds.kind import Kind
 from studies.kinds.sweep import SweepStudy
 from studies.scenes.names import in_use
@@ -54,13 +45,35 @@ def _none(name: str) -> None:
     return
 
 
-def _described(schema: dict[str, Any]) -> None:
-    """Add entries that are not kept to the JSON Schema of a study."""
-    schema["properties"].pop("choice", None)
-    schema["properties"] |= DESCRIBED | SCHEMAS | {EXTENDS: SCHEMA}
+def _printable(text: str) -> str:
+    if all(letter.isprintable() or letter in "\n\t" for letter in text):
+        return text
+    raise StudyError("", text, "must have no control characters")
 
 
-class Study(BaseModel):
+def _distinct(tags: list[str]) -> list[str]:
+    for k, tag in enumerate(tags):
+        if tag in tags[:k]:
+            raise StudyError(f"[{k}]", tag, "is there already")
+    return tags
+
+
+class Written(StudyTable):
+    """Entries of studies that `Study` keeps as others.
+
+    Attributes
+    ----------
+    points : tables of parameters: the axis ``point`` of the sweep
+    sample : points that fill ranges of parameters evenly, instead of these
+    extends : name, id or content of a study whose runs are kept; axes and points add to it
+    """
+
+    points: list[dict[str, Any]] = Field(min_length=1)
+    sample: Sample
+    extends: str | dict[str, Any]
+
+
+class Study(StudyTable):
     """One scene swept over some of its parameters.
 
     Build it with `from_toml` or `from_dict`, which raise `StudyError` for bad input.
@@ -77,21 +90,33 @@ class Study(BaseModel):
     keep : ``fields`` keeps the fields at all nodes in the file of each run
     allow : ``large_strain`` makes runs outside small-strain theory count as ok (see `taken`); it
         includes what the scene allows
-    choice : the entry of a kind of `KINDS`, by the name of the kind; empty for a plain sweep
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_described)
-
-    name: str
+    name: Text
     scene: str
-    parameters: dict[str, Any] = Field(default_factory=dict)
-    sweep: Axes = Field(default_factory=dict)
-    note: str = ""
-    tags: list[str] = Field(default_factory=list)
+    parameters: Settings = Field(default_factory=dict)
+    sweep: Sweep = Field(default_factory=dict)
+    note: Annotated[str, StringConstraints(max_length=4000), AfterValidator(_printable)] = ""
+    tags: Annotated[list[Text], Field(max_length=20), AfterValidator(_distinct)] = Field(
+        default_factory=list
+    )
     keep: Literal["", "fields"] = ""
-    allow: list[Literal["large_strain"]] = Field(default_factory=list)
-    choice: dict[str, dict[str, Any]] = Field(default_factory=dict, exclude=True)
+    allow: Annotated[list[Literal["large_strain"]], Field(max_length=1)] = Field(
+        default_factory=list
+    )
     _problem: Scene = PrivateAttr()
+    _kind: Kind = PrivateAttr()
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> Any:
+        """Describe the entries of kinds too, and those that are kept as others."""
+        found = handler.resolve_ref_schema(whole := handler(core))
+        others = handler.resolve_ref_schema(handler(Written.__pydantic_core_schema__))
+        of_kinds = {name: handler(kind.__pydantic_core_schema__) for name, kind in KINDS.items()}
+        found["properties"] |= others["properties"] | of_kinds
+        found["required"].remove("scene")
+        found |= {"if": {"required": ["extends"]}, "else": {"required": ["scene"]}}
+        return whole
 
     @classmethod
     def from_toml(
@@ -154,16 +179,72 @@ class Study(BaseModel):
             raise StudyError("study", content, "must be a table with name, scene and sweep")
         if EXTENDS in content:
             content = cls._extended(content, scenes, studies)
-        run_count(content)
+        given, wrong, context = {**content}, Mistakes(), Context(None)
         try:
-            return cls.model_validate(dict(content), context={"scenes": scenes})
-        except ValidationError as error:
-            first = error.errors()[0]
-            cause = first.get("ctx", {}).get("error")
-            if isinstance(cause, StudyError):
-                raise cause from None
-            field = ".".join(str(part) for part in first["loc"])
-            raise StudyError(field, first["input"], first["msg"]) from None
+            context.found = scene_named(given.get("scene"), scenes)
+            given["scene"] = name_of(context.found)
+        except SceneError:
+            raise
+        except StudyError as error:
+            wrong.add("", error)
+            given["scene"] = ""
+        entries = {name: given.pop(name) for name in KINDS if name in given}
+        of_points = {entry: given.pop(entry) for entry in ENTRIES if entry in given}
+        with wrong.at():
+            given["sweep"] = _with_points(given.get("sweep", {}), of_points, context)
+        lacks, study = wrong.failed, None
+        with wrong.at():
+            try:
+                study = parsed(cls, given, context)
+            except StudyError as error:
+                own = "points" if "points" in of_points else f"sweep.{POINT}"
+                raise error.renamed(lambda field: _POINT.sub(own, field)) from None
+        if lacks:
+            context.swept = None
+        kind: Kind = SweepStudy()
+        for name, entry in list(entries.items())[:1]:
+            with wrong.at(name):
+                kind = KINDS[name].read(entry, context.found, context.swept)
+        for other in list(entries)[1:]:
+            allowed = f"chooses the runs, and so does the {next(iter(entries))}: keep one"
+            wrong.add("", StudyError(other, entries[other], allowed))
+        wrong.report()
+        assert study is not None and context.found is not None
+        study._problem, study._kind = context.found, kind
+        study._check_together(wrong)
+        wrong.report()
+        if context.found.allow:
+            return study.model_copy(update={"allow": [*context.found.allow]})
+        return study
+
+    def _check_together(self, wrong: Mistakes) -> None:
+        """Find the entries that do not go together."""
+        scene, kind, swept = self.problem, self.kind, owners(self.sweep)
+
+        def add(field: str, value: Any, allowed: str) -> None:
+            wrong.add("", StudyError(field, value, allowed))
+
+        _check_names(scene, self.sweep, kind, add)
+        chosen = kind.chooses and kind.of_runs
+        points = chosen or POINT in self.sweep
+        if points and scene.places is not None and scene.places(build(scene, {})).points:
+            allowed = "the runs of this scene have a dimension `point`, that of "
+            if chosen:
+                add(kind.name, kind.content, f"{allowed}the runs chosen")
+            else:
+                allowed += "the scene file: give the points of the study another one, [sweep.NAME]"
+                add(f"sweep.{POINT}", f"{len(self.sweep[POINT])} points", allowed)
+        for parameter, axis in swept.items():
+            if parameter in self.parameters:
+                allowed = "the points" if axis == POINT else f"sweep.{axis}"
+                allowed = f"is swept too, by {allowed}: keep one"
+                add(f"parameters.{parameter}", self.parameters[parameter], allowed)
+        for name, field in kind.searched(kind.content).items():
+            if name in self.parameters or name in swept:
+                where = "parameters" if name in self.parameters else f"sweep.{swept[name]}"
+                allowed = f"is what the {kind.name} searches: take it out of {where}"
+                value: Any = reduce(getitem, field.split(".")[1:], kind.content)
+                add(field, value, allowed)
 
     @classmethod
     def _extended(cls, content: Mapping[str, Any], scenes: Find, studies: Kept) -> dict[str, Any]:
@@ -180,11 +261,17 @@ class Study(BaseModel):
         if own != base.scene and name_of(scene_named(own, scenes)) != base.scene:
             allowed = f"must be that of {base.name}, which is extended, or left out"
             raise StudyError("scene", own, allowed)
-        before = Extended(
-            base.name, base.scene, base.parameters, base.sweep, base.choice, base.fixed
-        )
-        full: dict[str, Any] = extended(content, before, parameters_of(base.problem))
-        return full
+        if parameters := content.get("parameters"):
+            allowed = "cannot be changed when a study is extended: add values under sweep"
+            raise StudyError("parameters", parameters, allowed)
+        adds = ("sweep", *ENTRIES)
+        added = {key: content[key] for key in adds if key in content}
+        more = cls.known({"name": base.name, "scene": base.scene, **added}, scenes).sweep
+        axes = Extended(base.name, base.sweep, base.fixed).with_axes(more)
+        rest = {key: each for key, each in content.items() if key not in (EXTENDS, *adds)}
+        fixed = {key: value for key, value in base.parameters.items() if key not in owners(axes)}
+        own = {"scene": base.scene, "parameters": fixed, "sweep": axes}
+        return {**base.choice, **rest, **own}
 
     def checked(self) -> Self:
         """Return the study after a check of all its combinations.
@@ -209,81 +296,20 @@ class Study(BaseModel):
             raise error.renamed(told) from None
         return self
 
-    @model_validator(mode="before")
-    @classmethod
-    def _check(cls, content: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
-        known_entries = [*cls.model_fields.keys() - {"choice"}, *KINDS, *ENTRIES]
-        for key in content:
-            if key not in known_entries:
-                raise StudyError(str(key), content[key], one_of(key, known_entries))
-        context = info.context if info.context is not None else {}
-        scene = scene_named(content.get("scene"), context.get("scenes", nothing))
-        context["found"] = scene
-        known = parameters_of(scene)
-        fixed = checked_table("parameters", content.get("parameters", {}), known)
-        axes = checked_axes(with_points(content, known), known)
-        _check_names(scene, axes)
-        kinds = [kind for name, kind in KINDS.items() if name in content]
-        of_runs = [kind.name for kind in kinds if kind.of_runs]
-        own_points = (
-            (of_runs or POINT in axes)
-            and scene.places is not None
-            and scene.places(build(scene, {})).points
-        )
-        if own_points and of_runs:
-            allowed = "the runs of this scene have a dimension `point`, that of the runs chosen"
-            raise StudyError(of_runs[0], content[of_runs[0]], allowed)
-        if own_points:
-            allowed = (
-                "the runs of this scene have a dimension of this name, the points of the scene "
-                "file: give the points of the study another one, [sweep.NAME]"
-            )
-            raise StudyError(f"sweep.{POINT}", f"{len(axes[POINT])} points", allowed)
-        for parameter, axis in owners(axes).items():
-            if parameter in fixed:
-                by = "the points" if axis == POINT else f"sweep.{axis}"
-                allowed = f"is swept too, by {by}: keep one"
-                raise StudyError(f"parameters.{parameter}", fixed[parameter], allowed)
-        name = checked_text("name", content.get("name"))
-        parameters = {
-            key: known[key].normalise(value, f"parameters.{key}") for key, value in fixed.items()
-        }
-        labels = checked_labels(content) | ({"allow": [*scene.allow]} if scene.allow else {})
-        own = {"name": name, "scene": name_of(scene), "parameters": parameters, "sweep": axes}
-        if kinds:
-            kind, *others = kinds
-            found = kind.read(content[kind.name], scene, axes)
-            own["choice"] = {kind.name: found.content}
-            for name, field in kind.searched(found.content).items():
-                if name in fixed or name in owners(axes):
-                    where = "parameters" if name in fixed else f"sweep.{owners(axes)[name]}"
-                    allowed = f"is what the {kind.name} searches: take it out of {where}"
-                    given = {**found.content, **content[kind.name]}
-                    value = reduce(getitem, field.split(".")[1:], given)
-                    raise StudyError(field, value, allowed)
-            for other in others:
-                allowed = f"chooses the runs, and so does the {kind.name}: keep one"
-                raise StudyError(other.name, content[other.name], allowed)
-            context["kind"] = found
-        return own | labels
-
-    def model_post_init(self, context: Any) -> None:
-        """Store the scene that was found."""
-        self._problem = context["found"] if context else scene_named(self.scene)
-        if context and "kind" in context:
-            self.__dict__["kind"] = context["kind"]
-
     @property
     def problem(self) -> Scene:
         """The scene that is swept."""
         return self._problem
 
-    @cached_property
+    @property
     def kind(self) -> Kind:
         """What kind of study it is, with what chooses its runs."""
-        for name, content in self.choice.items():
-            return KINDS[name].read(content, self.problem, self.sweep)
-        return SweepStudy()
+        return self._kind
+
+    @property
+    def choice(self) -> dict[str, dict[str, Any]]:
+        """The entry of its kind, by the name of the kind; empty for a plain sweep."""
+        return {self.kind.name: self.kind.content} if self.kind.chooses else {}
 
     @cached_property
     def expansion(self) -> Expansion:
@@ -303,7 +329,8 @@ class Study(BaseModel):
             for name, axis in self.sweep.items()
         }
         source = self.expansion.source
-        labels = checked_labels(self.model_dump(include={"note", "tags", "keep", "allow"}))
+        own = self.model_dump(include={"note", "tags", "keep", "allow"})
+        labels = {name: each for name, each in own.items() if each}
         beside = [each for each in (labels, *self.choice.values()) if each]
         return content_id("study", self.name, self.scene, self.fixed, axes, source, *beside)
 
@@ -311,10 +338,7 @@ class Study(BaseModel):
     def fixed(self) -> dict[str, Any]:
         """All parameters that are not swept, the scene's defaults included."""
         known = parameters_of(self.problem)
-        swept = {
-            *owners(self.sweep),
-            *self.kind.searched(self.choice.get(self.kind.name, {})),
-        }
+        swept = {*owners(self.sweep), *self.kind.searched(self.kind.content)}
         defaults = {name: p.default for name, p in known.items() if name not in swept}
         return defaults | self.parameters
 
@@ -385,14 +409,42 @@ class Study(BaseModel):
         return self.model_dump(exclude_defaults=True) | whole | self.choice
 
 
-def _check_names(scene: Scene, axes: Axes) -> None:
-    """Refuse a parameter or an axis of labels if data sets have its name for something else."""
+_POINT = re.compile(rf"^sweep\.{POINT}(?=$|[.[])")
+"""The axis of the entries `ENTRIES`, in the name of a field."""
+
+
+def _with_points(sweep: Any, given: Mapping[str, Any], context: Context) -> Any:
+    """Return the sweep of a study, in which ``points`` or ``sample`` is an axis."""
+    if not given or not isinstance(sweep, Mapping):
+        return sweep
+    (entry, points), *others = given.items()
+    if others or POINT in sweep:
+        other, value = others[0] if others else (f"sweep.{POINT}", sweep[POINT])
+        allowed = f"{entry} is given too: keep one, or give one a name, [sweep.NAME]"
+        raise StudyError(other, value, allowed)
+    if entry == "sample":
+        try:
+            points = parsed(Sample, points, context).points
+        except StudyError as error:
+            raise error.under(entry) from None
+    elif isinstance(points, Mapping) and "file" not in points:
+        allowed = "must be a list of points; a sample is [sample], labels are [sweep.NAME]"
+        raise StudyError(entry, dict(points), allowed)
+    return {POINT: points, **sweep}
+
+
+def _check_names(
+    scene: Scene, axes: Axes, kind: Kind, add: Callable[[str, Any, str], None]
+) -> None:
+    """Refuse a parameter, a number or an axis if data sets have its name for something else."""
     known, numbers = parameters_of(scene), {each.name for each in scene.quantities}
+    if kind.chooses and (state := kind.ends[0]) in {*known, *numbers, *axes}:
+        add(kind.name, state, "the data set has a variable of this name: rename that of the scene")
     ours = scene.parameters.__module__.startswith("solver.")  # a test checks their names
     for name in known if not ours else ():
         if in_use(name, {*known, *numbers}):
             allowed = f"has a parameter {name}: data sets have something else of this name"
-            raise StudyError("scene", name_of(scene), allowed)
+            add("scene", name_of(scene), allowed)
     for axis in numbers & axes.keys():
         allowed = "the data set has a variable of this name: give the axis another one"
-        raise StudyError(f"sweep.{axis}", f"{len(axes[axis])} values", allowed)
+        add(f"sweep.{axis}", f"{len(axes[axis])} values", allowed)

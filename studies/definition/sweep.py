@@ -11,27 +11,35 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import PlainValidator
 
 from solver.results.quantities import QUANTITIES
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
 from studies.definition.points import (
-    ENTRIES,
     POINT,
     checked_points,
     describes_points,
     field_of,
     is_points,
 )
-from studies.definition.spaced import spaced
-from studies.errors import StudyError, nearest
+from studies.definition.sampling import Sample
+from studies.definition.schema import (
+    MAXIMUM_RUNS,
+    Context,
+    Steps,
+    checked_settings,
+    checked_text,
+    filled,
+    known_name,
+    parsed,
+)
+from studies.errors import Mistakes, StudyError
 from studies.scenes.names import in_use
 from studies.toml import CASE
-
-MAXIMUM_RUNS = 100_000
-"""Largest number of points a sweep may have."""
 
 LinkedAxis = dict[str, dict[str, Any]]
 """Label -> values of the parameters that the axis sets: the same ones for every label."""
@@ -99,13 +107,12 @@ def standings(axes: Axes) -> list[Standing]:
     return found
 
 
-_TEXT = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,79}")
 _OF_LABELS = (CASE, "mesh")
 """Names that axes of labels may have: only points and files of runs have something else."""
 _AXIS = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,79}")
 
 
-def checked_axes(content: Any, known: Mapping[str, Parameter]) -> Axes:
+def checked_axes(content: Any, context: Context) -> Axes:
     """Return the axes of a sweep, normalised.
 
     Linked axes come first, by name; then the others, in the order in which the scene declares its
@@ -117,37 +124,16 @@ def checked_axes(content: Any, known: Mapping[str, Parameter]) -> Axes:
     StudyError
         for any mistake except in combinations of parameters, which are checked case by case
     """
+    known = context.known
     if not isinstance(content, Mapping):
-        raise StudyError("sweep", content, "must be a table of axes")
-    given: dict[Any, Any] = {}
+        raise StudyError("", content, "must be a table of axes")
+    given, wrong = dict[str, Any](), Mistakes()
     for name, axis in content.items():
-        if name in known and isinstance(axis, Mapping):
-            ends = {
-                key: known[name].in_own_unit(value, f"sweep.{name}.{key}")
-                for key, value in axis.items()
-            }
-            given[name] = spaced(name, ends)
-        elif name not in known and describes_points(name, axis):
-            _check_name(name, axis, known)
-            given[name] = checked_points(name, axis, known)
-        else:
-            given[name] = axis
-    tables = {
-        name: axis
-        for name, axis in sorted(given.items(), key=lambda each: str(each[0]))
-        if isinstance(axis, Mapping) or (name not in known and describes_points(name, axis))
-    }
-    lists = {name: axis for name, axis in given.items() if name not in tables}
-    lists = checked_table("sweep", lists, known)
-    for name, axis in given.items():
-        if not isinstance(axis, list | tuple | Mapping) or not axis:
-            allowed = "must be a list of one value or more, or a table of one label or more"
-            raise StudyError(f"sweep.{name}", axis, allowed)
-    linked = {
-        name: _linked_axis(name, axis, known) if isinstance(axis, Mapping) else axis
-        for name, axis in tables.items()
-    }
-    axes: Axes = linked | {key: _axis(known[key], lists[key]) for key in known if key in lists}
+        with wrong.at(str(name)):
+            given[name] = _axis(name, axis, context)
+    wrong.report()
+    order = [*sorted(given.keys() - known.keys()), *(name for name in known if name in given)]
+    axes: Axes = {name: given[name] for name in order}
     first: dict[str, str] = {}
     for name, axis in axes.items():
         at = next(positions(name, axis))
@@ -156,31 +142,28 @@ def checked_axes(content: Any, known: Mapping[str, Parameter]) -> Axes:
             if other != name or (parameter == CASE and CASE in axes):
                 where = f"which {_field(other if other != name else CASE, axes)} sets too"
                 allowed = f"sets {parameter}, {where}: keep one"
-                raise StudyError(_field(name, axes), content[name], allowed)
+                wrong.add("", StudyError(name, content[name], allowed))
+    wrong.report()
+    if (runs := math.prod(map(len, axes.values()))) > MAXIMUM_RUNS:
+        sizes = " x ".join(f"{len(axis)} {name}" for name, axis in axes.items())
+        raise StudyError("", f"{runs} runs", f"at most {MAXIMUM_RUNS} runs ({sizes})")
+    context.swept = axes
     return axes
+
+
+Sweep = Annotated[
+    dict[str, Any],
+    PlainValidator(
+        lambda given, info: checked_axes(given, Context.of(info)),
+        json_schema_input_type=dict[str, list[Any] | Steps | Sample | dict[str, dict[str, Any]]],
+    ),
+]
+"""The axes of a study, see `checked_axes`."""
 
 
 def _field(name: str, axes: Axes) -> str:
     """Return the entry of a study that has an axis."""
     return field_of(name) if is_points(axes[name]) else f"sweep.{name}"
-
-
-def checked_table(field: str, content: Any, known: Mapping[str, Parameter]) -> dict[str, Any]:
-    """Return a table whose keys are parameters of the scene, its values unchecked."""
-    if not isinstance(content, Mapping):
-        raise StudyError(field, content, "must be a table of parameters")
-    for name, value in content.items():
-        if name not in known:
-            allowed = f"the scene has no such parameter; it has {', '.join(known)}"
-            raise StudyError(f"{field}.{name}", value, allowed + nearest(name, known))
-    return dict(content)
-
-
-def checked_text(field: str, text: Any) -> str:
-    """Return the name of a study or a label, if files and command lines can have it."""
-    if isinstance(text, str) and _TEXT.fullmatch(text):
-        return text
-    raise StudyError(field, text, "must be 1 to 80 of A-Z a-z 0-9 . _ -, not beginning with a dot")
 
 
 def owners(axes: Axes) -> dict[str, str]:
@@ -213,71 +196,60 @@ def labels(name: str, axis: list[Any] | LinkedAxis) -> list[Any]:
     return [each.at for each in positions(name, axis)]
 
 
-def run_count(content: Mapping[str, Any]) -> int:
-    """Return the number of runs that the axes of a study describe, before one is made.
+def _axis(name: Any, content: Any, context: Context) -> list[Any] | LinkedAxis:
+    """Return an axis, normalised."""
+    known = context.known
+    if isinstance(content, list | tuple | Mapping) and len(content) > MAXIMUM_RUNS:
+        raise StudyError("", f"{len(content)} values", f"at most {MAXIMUM_RUNS} are allowed")
+    if name in known and isinstance(content, Mapping):
+        if not {"start", "stop"} <= content.keys():
+            allowed = (
+                "must be a list of values or a range {start, stop, num}, with spacing = linear or "
+                "log; a table of labels needs a name that is no parameter"
+            )
+            raise StudyError("", dict(content), allowed)
+        content = parsed(Steps, content, known[name]).values
+    points = name not in known and describes_points(name, content)
+    if name not in known:
+        if not points and not isinstance(content, Mapping):
+            known_name(name, known, content)
+        _check_name(name, content, known)
+    if points:
+        return checked_points(content, context)
+    if not isinstance(content, list | tuple | Mapping) or not content:
+        allowed = "must be a list of one value or more, or a table of one label or more"
+        raise StudyError("", content, allowed)
+    return (
+        _labels(content, known) if isinstance(content, Mapping) else _values(known[name], content)
+    )
 
-    It is the product of the lengths of lists and tables, and of the ``num`` of ranges and samples.
 
-    Raises
-    ------
-    StudyError
-        if it is larger than `MAXIMUM_RUNS`
-    """
-    sweep = content.get("sweep", {})
-    axes = {entry: content[entry] for entry in ENTRIES if entry in content}
-    axes |= sweep if isinstance(sweep, Mapping) else {}
-    sizes = {str(name): _length(axis) for name, axis in axes.items()}
-    runs = math.prod(sizes.values())
-    if runs > MAXIMUM_RUNS:
-        listed = " x ".join(f"{size} {name}" for name, size in sizes.items())
-        raise StudyError("sweep", f"{runs} runs", f"at most {MAXIMUM_RUNS} runs ({listed})")
-    return runs
-
-
-def _length(axis: Any) -> int:
-    """Return the number of positions of an axis as it is given; 1 of what is no axis."""
-    num = axis.get("num") if isinstance(axis, Mapping) else None
-    if isinstance(num, int):  # of a range or a sample: a label of this name has a table
-        return num if 0 < num <= MAXIMUM_RUNS else 1  # what makes it refuses others
-    return max(len(axis), 1) if isinstance(axis, list | tuple | Mapping) else 1
-
-
-def _axis(parameter: Parameter, values: list[Any]) -> list[Any]:
+def _values(parameter: Parameter, given: Sequence[Any]) -> list[Any]:
     seen: dict[str, int] = {}
-    axis = []
-    for position, value in enumerate(values):
-        field = f"sweep.{parameter.name}[{position}]"
-        normal = parameter.normalise(value, field)
-        if normal is None:
-            raise parameter.refusal(field, value)
-        first = seen.setdefault(canonical(normal), position)
-        if first != position:
-            raise StudyError(field, value, f"occurs already at position {first}: keep one")
-        axis.append(normal)
+    axis, wrong = list[Any](), Mistakes()
+    for position, value in enumerate(given):
+        with wrong.at():
+            field = f"[{position}]"
+            normal = parameter.normalise(value, field)
+            if normal is None:
+                raise parameter.refusal(field, value)
+            first = seen.setdefault(canonical(normal), position)
+            if first != position:
+                raise StudyError(field, value, f"occurs already at position {first}: keep one")
+            axis.append(normal)
+    wrong.report()
     return axis
 
 
-def _linked_axis(
-    name: str, content: Mapping[str, Any], known: Mapping[str, Parameter]
-) -> LinkedAxis:
-    _check_name(name, content, known)
-    given: LinkedAxis = {}
+def _labels(content: Mapping[str, Any], known: Mapping[str, Parameter]) -> LinkedAxis:
+    given, wrong = LinkedAxis(), Mistakes()
     for label, settings in content.items():
-        field = f"sweep.{name}.{checked_text(f'sweep.{name}', label)}"
-        given[label] = {
-            key: known[key].normalise(value, f"{field}.{key}")
-            for key, value in checked_table(field, settings, known).items()
-        }
-    together = [key for key in known if any(key in settings for settings in given.values())]
-    axis: LinkedAxis = {}
-    seen: dict[str, str] = {}
-    for label, settings in given.items():
-        axis[label] = {key: settings.get(key, known[key].default) for key in together}
-        first = seen.setdefault(canonical(axis[label]), label)
-        if first != label:
-            allowed = f"sets the same parameters as {first}: keep one"
-            raise StudyError(f"sweep.{name}.{label}", content[label], allowed)
-    return axis
+        with wrong.at():
+            checked_text(label)
+        with wrong.at(str(label)):
+            given[label] = checked_settings(settings, known)
+    wrong.report()
+    return filled(given, known)
 
 
 def _check_name(name: Any, content: Any, known: Mapping[str, Parameter]) -> None:
@@ -290,4 +262,4 @@ def _check_name(name: Any, content: Any, known: Mapping[str, Parameter]) -> None
         allowed = "the name must be 1 to 80 of A-Z a-z 0-9 _, beginning with a letter"
     else:
         return
-    raise StudyError(f"sweep.{name}", content, allowed)
+    raise StudyError("", content, allowed)

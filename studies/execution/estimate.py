@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -13,17 +13,15 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.memory import most_kept
-from solver.scenes import Effort, Scene
+from solver.scenes import Effort
 from studies.definition.cases import LoadingPath
 from studies.definition.parameters import build
 from studies.definition.study import Study
-from studies.definition.sweep import run_count
 from studies.definition.vocabulary import OK, SOLVED
 from studies.errors import StudyError
 from studies.execution.bundles import most_together, setup_of
 from studies.execution.limits import LOADED
 from studies.execution.pace import pace_of
-from studies.kinds import kind_of
 from studies.storage.store import Store
 
 _PER_RUN, _PER_SETUP = 0.5, 1.0
@@ -93,32 +91,10 @@ class Bounds:
     cpu_seconds: float | None = None
     bytes: int | None = None
 
-    def check_count(self, content: Mapping[str, Any], scene: Scene, store: Store) -> None:
-        """Refuse a study by the number of its runs, before one of them is made.
+    def check_size(self, study: Study, store: Store) -> None:
+        """Refuse a study of too many runs, before each run is checked.
 
         What the runs that `store` can lack will store is at least that of the scene's usual files.
-
-        Parameters
-        ----------
-        content : the study, as `Study.from_dict` reads it
-
-        Raises
-        ------
-        StudyError
-            naming the bound, and the setting that holds it
-        """
-        if not kind_of(content).everywhere:  # its axes are no runs
-            return
-        runs = run_count(content)
-        self._refuse("runs", runs)
-        there = store.catalogue.counts()
-        lacking = runs - sum(there.get(status, 0) for status in SOLVED)
-        if lacking > 0:
-            usual = _file_size(scene.name, content.get("keep", ""), store)
-            self._refuse("bytes", lacking * usual * _COMBINED)
-
-    def check_size(self, study: Study) -> None:
-        """Refuse a study of too many runs, before each run is checked.
 
         Raises
         ------
@@ -126,6 +102,11 @@ class Bounds:
             naming the bound, and the setting that holds it
         """
         self._refuse("runs", study.size)
+        there = store.catalogue.counts()
+        lacking = study.expansion.size - sum(there.get(status, 0) for status in SOLVED)
+        if study.kind.everywhere and lacking > 0:  # else its axes are no runs
+            usual = _file_size(study.problem.name, study.keep, store)
+            self._refuse("bytes", lacking * usual * _COMBINED)
 
     def check(self, estimate: Estimate) -> None:
         """Refuse a study whose estimate exceeds a bound; None in the estimate is accepted.

@@ -15,9 +15,6 @@ from studies.kinds.sweep import SweepStudy
 KINDS: Mapping[str, type[Kind]] = {each.name: each for each in (Goal, Refine, Fit, Minimise)}
 """The kinds that choose their runs, by the entry of a study."""
 
-DESCRIBED = {name: {"type": "object", "description": of.meaning} for name, of in KINDS.items()}
-"""JSON Schema of these entries."""
-
 
 def kind_of(content: Mapping[str, Any]) -> type[Kind]:
     """Return the kind of a study of this content."""

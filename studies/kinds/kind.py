@@ -1,7 +1,7 @@
 """What a kind of study is: what it asks for, the programs that choose its runs, what it has found.
 
-A `SweepStudy` has the runs of its axes. All other kinds have an entry of their own in a study,
-which a subclass of `Kind` checks and holds, and programs (`studies.definition.place.Chooser`) that
+A `SweepStudy` has the runs of its axes. All other kinds have an entry of their own in a study, a
+table whose model is a subclass of `Kind`, and programs (`studies.definition.place.Chooser`) that
 ask for runs. Run, estimate, task, store, views and service know no more of a kind than this. A kind
 imports nothing that reads or draws results: its functions of results may be `Late`.
 """
@@ -20,9 +20,9 @@ from studies.definition.cases import Case
 from studies.definition.line import Read
 from studies.definition.place import Chooser
 from studies.definition.points import Points
+from studies.definition.schema import Context, StudyTable, parsed
 from studies.definition.sweep import Axes
 from studies.definition.vocabulary import STOPPED
-from studies.errors import StudyError, check_entries
 
 Reading = Callable[[Collection[str]], Callable[[Mapping[str, Any]], Read]]
 """Returns what gives some variables of a run, by its row."""
@@ -65,12 +65,12 @@ class Answers:
     of: str = ""
 
 
-class Kind:
-    """A kind of study, and of a study what its entry says.
+class Kind(StudyTable):
+    """A kind of study, and of a study what its entry says: its fields.
 
     Attributes
     ----------
-    name, meaning, entries : the entry of studies, what it says, and the names in its table
+    name : the entry of studies
     chooses : whether programs choose its runs by the outcomes of others
     everywhere : whether each place of its axes has runs of its own
     of_runs : whether its data set holds runs, not answers; if it chooses them, over ``point``
@@ -84,10 +84,7 @@ class Kind:
     table, figure : (data set) -> text, or figure, of its report; None for those of runs
     """
 
-    __slots__ = ()
     name: ClassVar[str]
-    entries: ClassVar[tuple[str, ...]] = ()
-    meaning: ClassVar[str] = ""
     chooses: ClassVar[bool] = True
     everywhere: ClassVar[bool] = False
     of_runs: ClassVar[bool] = False
@@ -102,23 +99,15 @@ class Kind:
     figure: ClassVar[Late | None] = None
 
     @classmethod
-    def read(cls, content: Any, scene: Scene, axes: Axes) -> Self:
-        """Return what the entry of a study says.
+    def read(cls, content: Any, scene: Scene | None, axes: Axes | None) -> Self:
+        """Return what the entry of a study says; a scene or axes with mistakes are None.
 
         Raises
         ------
         StudyError
             naming the entry, its value and what is allowed
         """
-        if not isinstance(content, Mapping):
-            raise StudyError(cls.name, content, "must be a table")
-        check_entries(cls.name, content, cls.entries)
-        return cls.checked(content, scene, axes)  # type: ignore[return-value]
-
-    @classmethod
-    def checked(cls, content: Mapping[str, Any], scene: Scene, axes: Axes) -> Kind:
-        """Return what a table without unknown names says; called by `read`."""
-        raise NotImplementedError
+        return parsed(cls, content, Context(scene, axes))
 
     @classmethod
     def with_files(cls, content: Any, folder: Path, given: Sequence[Path]) -> Any:
@@ -132,11 +121,11 @@ class Kind:
 
     @property
     def content(self) -> dict[str, Any]:
-        """What `checked` reads."""
-        raise NotImplementedError
+        """What is read, normalised."""
+        return self.model_dump()
 
     @property
-    def first(self) -> Mapping[str, Any]:
+    def begins(self) -> Mapping[str, Any]:
         """The parameters with which it begins at a place of the axes."""
         return {}
 
@@ -182,4 +171,4 @@ class Kind:
         """
         places = list(cases)
         for case in itertools.islice(itertools.cycle(places), self.most_runs(len(places))):
-            yield case, self.first, [{**case.values, **self.first}.get(branch)]
+            yield case, self.begins, [{**case.values, **self.begins}.get(branch)]

@@ -81,7 +81,7 @@ class Replayed(Chooser):
 
     def sets(self, key: Evaluation) -> dict[str, Any]:
         """Return the parameters that a run sets."""
-        own = dict(zip(self.asked.free, key.values, strict=True))
+        own = dict(zip(self.asked.ranges, key.values, strict=True))
         return {**self.positions[key.position].sets, **own}
 
     def key(self, parameters: Mapping[str, Any]) -> Evaluation:
@@ -89,7 +89,7 @@ class Replayed(Chooser):
         if not self._numbers:
             self._numbers = {_position(each.sets): k for k, each in enumerate(self.positions)}
         own = {name: parameters[name] for name in self.positions[0].sets}
-        values = tuple(parameters[name] for name in self.asked.free)
+        values = tuple(parameters[name] for name in self.asked.ranges)
         return Evaluation(values, self._numbers[_position(own)])
 
     @property

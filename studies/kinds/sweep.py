@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from studies.kinds.kind import Kind
 
 
 class SweepStudy(Kind):
     """A study without an entry of another kind."""
 
-    __slots__ = ()
     name = "sweep"
     chooses = False
     everywhere = True
     of_runs = True
-
-    @property
-    def content(self) -> dict[str, Any]:
-        """Nothing: the axes say all."""
-        return {}
 
     def most_runs(self, places: int) -> int:
         """Return the number of places."""

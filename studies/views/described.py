@@ -38,4 +38,4 @@ def _named(what: str) -> tuple[Scene, dict[str, Any]]:
     if not what.endswith(".toml") or _OF_STUDIES.isdisjoint(read_toml(path, "file")):
         return scene_named(what, beside(Path())), {}
     study = Study.from_toml(path)
-    return study.problem, {**next(study.cases()).values, **study.kind.first}
+    return study.problem, {**next(study.cases()).values, **study.kind.begins}

@@ -177,7 +177,7 @@ def test_a_study_may_allow_large_strain_and_its_runs_keep_their_own_status(
     assert found["total"] == 4
     wrong = service.client.post("/studies", json={**study, "allow": ["everything"]})
     assert wrong.status_code == 422
-    assert wrong.json()["errors"][0]["field"] == "allow"
+    assert wrong.json()["errors"][0]["field"] == "allow[0]"
 
 
 def test_events_tell_the_story_to_its_end(service: Server) -> None:
@@ -467,7 +467,7 @@ def test_a_study_that_chooses_its_runs_has_the_same_id_everywhere(
     study = Study.from_toml(file)
     assert (posted["id"], posted["size"]) == (study.id, study.size)
     assert refused.status_code == 422
-    assert refused.json()["errors"][0]["field"] == f"{entry}.peace"
+    assert f"{entry}.peace" in {each["field"] for each in refused.json()["errors"]}
 
 
 def test_a_study_holds_the_mesh_of_a_rail(service: Server) -> None:

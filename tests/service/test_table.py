@@ -12,6 +12,7 @@ import time
 import tomllib
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ from service.settings import Settings
 from service.turns import Share
 from studies import Store, open_netcdf, open_study
 from studies.definition.identity import content_id
+from studies.kinds import KINDS
 from studies.views.table import RunTable, column_of
 from studies.views.written import FORMS
 from tests.counted import counted, growth
@@ -360,6 +362,51 @@ def test_a_form_tells_all_that_the_scene_refuses_beside_its_fields(seen: Seen) -
     answer = seen.client.post("/ui/new", data=fields, headers={"accept": "application/json"})
     wrong = answer.json()["wrong"]
     assert {*wrong} == {*idle} and all("changes nothing" in each for each in wrong.values())
+
+
+def test_a_form_has_a_field_for_each_entry_of_what_chooses_runs(seen: Seen) -> None:
+    shown = seen.client.get("/ui/new").text
+    for kind, model in KINDS.items():
+        described = model.model_json_schema()
+        assert described["description"] in shown
+        for entry in described["properties"]:
+            assert f'name="{kind}.{entry}"' in shown
+    assert 'name="sample.num"' in shown and 'name="points"' in shown
+
+
+GOAL = {"goal.of": "peak_contact_pressure", "goal.at": "2 GPa", "goal.between": "[0.2, 0.9]"}
+
+
+@pytest.mark.parametrize(
+    ("fields", "content"),
+    [
+        (GOAL, {"of": "peak_contact_pressure", "at": "2 GPa", "between": [0.2, 0.9]}),
+        ({"goal.find": "limit_load", "goal.between": "[1, 2]", "goal.within": "0.1"},
+         {"find": "limit_load", "between": [1, 2], "within": 0.1}),
+        ({"minimise.where": '["a < 2", "b > 1"]', "minimise.ranges": "friction = [0, 0.3]"},
+         {"where": ["a < 2", "b > 1"], "ranges": {"friction": [0, 0.3]}}),
+        ({"points": "[{friction = 0.1}, {passes = 2}]"}, [{"friction": 0.1}, {"passes": 2}]),
+    ],
+)  # fmt: skip
+def test_fields_of_an_entry_are_values_as_in_a_study_file(fields: Any, content: Any) -> None:
+    table = next(iter(fields)).partition(".")[0]
+    given = {name: [text] for name, text in (fields | {"choose": table, "fit.most": ""}).items()}
+    study, wrong = study_of("punch", FAKE, given)
+    assert not wrong and study[table] == content
+    assert table not in study_of("punch", FAKE, given | {"choose": [""]})[0]
+
+
+def test_a_form_computes_a_goal_and_tells_its_mistakes_beside_its_fields(seen: Seen) -> None:
+    fields = {"scene": "punch", "name": "sought", "choose": "goal", "p.friction": "0, 0.2", **GOAL}
+    accepts = {"accept": "application/json"}
+    answer = seen.client.post("/ui/new", data=fields, headers=accepts).json()
+    assert answer["wrong"] == {} and answer["estimate"]["runs"] > 2
+    assert "goal = {of = " in answer["toml"]
+    fields |= {"goal.between": "[2, 1]", "goal.within": "7", "goal.at": "3 mm"}
+    answer = seen.client.post("/ui/new", data=fields, headers=accepts).json()
+    assert {*answer["wrong"]} == {"goal.between", "goal.within", "goal.at"}
+    page = seen.client.post("/ui/new", data=fields)
+    assert page.status_code == 422 and 'value="[2, 1]"' in page.text
 
 
 def test_studies_are_found_by_scene_and_text(seen: Seen) -> None:

@@ -111,7 +111,7 @@ def test_a_goal_is_searched_at_more_places() -> None:
         ({}, "extends = 'base': nothing is added"),
         (
             {"parameters": {"passes": 2}, "sweep": {"friction": [0.1]}},
-            "parameters = .*are those of",
+            "parameters = .*cannot be changed",
         ),
         ({"scene": "punch", "sweep": {"friction": [0.1]}}, "scene = 'punch': must be that of base"),
         ({"sweep": {"wheel": {"a": {"passes": 2}}}}, "sweep.wheel .*must be an axis of labels"),

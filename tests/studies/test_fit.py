@@ -19,13 +19,14 @@ from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, estimate, fit, open_study, run_study
 from studies.definition.identity import solver_hash
 from studies.definition.line import Line
+from studies.definition.schema import Context, parsed
 from studies.definition.sweep import standings
 from studies.execution.asking import Asking
 from studies.execution.result import answered
 from studies.execution.task import PathTask, walk
 from studies.kinds.fit.certainty import certainty
 from studies.kinds.fit.fitting import Fit, Fitted, Fitting
-from studies.kinds.fit.measured import checked_measured, pieces
+from studies.kinds.fit.measured import MeasuredLine, pieces
 from studies.views.picking import run_file
 from tests.studies.conftest import write_study
 from tests.studies.fakes import FAKE, Canned
@@ -165,7 +166,7 @@ def test_deviations_are_those_of_many_noisy_measurements() -> None:
             seen |= {name: Line((name,), each) for name, each in record.coordinates.items()}
             program.tell(wanted[0], {"status": "ok", "id": "", "message": ""})
         assert program.answer is not None
-        off = program.answer.values - np.array([TRUTH[name] for name in asked.free])
+        off = program.answer.values - np.array([TRUTH[name] for name in asked.ranges])
         distance += off @ np.linalg.solve(certainty(asked, program.answer).covariance, off)
     low, high = chi2.interval(0.99, 2 * count)
     assert low < distance < high
@@ -273,7 +274,9 @@ def test_lines_of_several_runs_are_fitted_together(store: Store) -> None:
     with open_study(store.directory) as dataset:
         assert dataset["slope"].item() == pytest.approx(30.0, rel=5e-3)
         assert dataset["line_at"].values.tolist() == ["angle = 0.0", "angle = 90.0"]
-    with pytest.raises(StudyError, match=r"measured\[0\].at = \{\}: must tell one run, and fits 2"):
+    with pytest.raises(
+        StudyError, match=r"measured\[0\].at = \{\}: must identify exactly one run; it matches 2"
+    ):
         study(measured()[:1], sweep={"angle": [0.0, 90.0]})
 
 
@@ -290,10 +293,10 @@ def test_a_line_is_compared_with_its_own_piece_and_a_little_beyond() -> None:
     }
     given = {n: Line(("increment",), v) for n, v in curve.items()}
     content = {"of": "increment_force", "over": "increment_approach", "values": [1.0] * 4}
-    (line,) = checked_measured([content | {"places": [0.5, 2.2, 1.5, 0.8]}], FAKE, [])
+    line = parsed(MeasuredLine, content | {"places": [0.5, 2.2, 1.5, 0.8]}, Context(FAKE, {}))
     assert line.seen(given.get) == pytest.approx([1.0, 4.6, 2.5, 0.4])
-    assert not line.told
-    (far,) = checked_measured([content | {"places": [0.5, 3.2, 1.5, 0.8]}], FAKE, [])
+    assert not line.sigma
+    far = parsed(MeasuredLine, content | {"places": [0.5, 3.2, 1.5, 0.8]}, Context(FAKE, {}))
     with pytest.raises(ValueError, match=r"from 0\.5 to 3\.2, and the run has it from 0 to 2"):
         far.seen(given.get)
 
@@ -303,8 +306,8 @@ def test_a_line_is_compared_with_its_own_piece_and_a_little_beyond() -> None:
     [
         ({"ranges": {"slop": [0, 1]}}, "fit.ranges.slop", "did you mean slope?"),
         ({"ranges": {"slope": [1, 0]}}, "fit.ranges.slope", "lowest value"),
-        ({"ranges": {"slope": [-1, 1]}}, "fit.ranges.slope", ">= 0"),
-        ({"ranges": {"slope": {"start": 0, "stop": 1, "spacing": "log"}}}, "fit.ranges.slope",
+        ({"ranges": {"slope": [-1, 1]}}, "fit.ranges.slope[0]", ">= 0"),
+        ({"ranges": {"slope": {"start": 0, "stop": 1, "spacing": "log"}}}, "fit.ranges.slope.start",
          "> 0"),
         ({"ranges": {}}, "fit.ranges", "bounds of each parameter"),
         ({"first": {"slope": 200.0}}, "fit.first.slope", "<= 100"),
@@ -313,10 +316,10 @@ def test_a_line_is_compared_with_its_own_piece_and_a_little_beyond() -> None:
             "fit.first.slope", "at most 190",
         ),
         ({"first": {"angle": 1.0}}, "fit.first.angle", "must be one of"),
-        ({"step": 0.0}, "fit.step", ">= 0.0001"),
+        ({"step": 0.0}, "fit.step", "at least 0.0001"),
         ({"most": 2}, "fit.most", "must be at least 3, the runs of the first round"),
         ({"mesured": []}, "fit.mesured", "did you mean measured?"),
-        ({"measured": []}, "fit.measured", "must be a list of measured lines"),
+        ({"measured": []}, "fit.measured", "must have 1 or more"),
         ({"measured": ["a.csv"]}, "fit.measured[0]", "only a study file can"),
         ({"measured": [{"of": "forc", "values": [1, 2]}]}, "fit.measured[0].of", "of the runs"),
         ({"measured": [{"rows": 5}]}, "fit.measured[0].rows", "the rows of a file"),
@@ -483,7 +486,7 @@ def test_measured_lines_of_the_command_replace_those_of_the_file(tmp_path: Path)
         Study.from_toml(file, [tmp_path / "p.csv@stage=loaded,pass"])
     with pytest.raises(StudyError, match=r"fit\.measured\[0\]\.at\.longest"):
         Study.from_toml(file, [tmp_path / f"p.csv@longest={'x' * 300}"])  # no name of a file
-    with pytest.raises(StudyError, match=r"fit\.measured = None: is missing"):
+    with pytest.raises(StudyError, match=r"fit\.measured = None: must be given"):
         Study.from_toml(file)
     for text, allowed in (
         ("contact_half_width [N]\n1\n2\n", "in mm; N is a force"),

@@ -168,9 +168,10 @@ def test_the_content_is_read_again_with_its_id() -> None:
     [
         ({"of": "peak"}, "minimise.of", "must be a variable"),
         ({"where": f"{BOUND} = 3"}, "minimise.where", "must be NAME < NUMBER"),
-        ({"where": [f"{BOUND} < 3 mm"]}, "minimise.where", "MPa"),
+        ({"where": [f"{BOUND} < 3 mm"]}, "minimise.where[0]", "MPa"),
         ({"where": f"{BOUND} < much"}, "minimise.where", "finite number"),
-        ({"starts": 0}, "minimise.starts", "integer >= 1"),
+        ({"starts": 0}, "minimise.starts", "at least 1"),
+        ({"starts": 9, "most": 8}, "minimise.most", "at least 9"),
         ({"ranges": {"friction": [0.5, 0.1]}}, "minimise.ranges.friction", "lowest value"),
         ({"ranges": {}}, "minimise.ranges", "bounds of each parameter"),
         ({"first": {"friction": 2.0}}, "minimise.first.friction", "<="),

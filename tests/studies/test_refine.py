@@ -24,7 +24,6 @@ from studies import (
     predict,
     run_study,
 )
-from studies.definition.quantity import RunNumber
 from studies.execution.asking import Asking
 from studies.kinds.refine.around import between
 from studies.kinds.refine.cells import weights
@@ -86,11 +85,9 @@ def slanting(x: float, y: float) -> float:
 def refined_by(number: Number, seed: int = 0, **asked: Any) -> Refinement:
     """Refine a function over the unit square; its runs end in random order."""
     entries = {"until": 0.02, "most": 1000, "halvings": 5} | asked
-    axes = {"x": [0.0, 1.0], "y": [0.0, 1.0]}
-    found, order = (
-        Refinement(Refine(of=(RunNumber(of=OF),), axes=axes, **entries), [{}]),
-        random.Random(seed),
-    )
+    axes: Any = {"load_ratio": [0.0, 1.0], "friction": [0.0, 1.0]}
+    found = Refinement(Refine.read({"of": OF, **entries}, FAKE, axes), [{}])
+    order = random.Random(seed)
     while wants := found.wants:
         wanted = order.choice(wants)
         value = number(*wanted.point)
@@ -252,8 +249,8 @@ def test_a_smooth_number_ends_with_the_first_round() -> None:
 def test_parts_are_asked_for_before_their_round_has_ended() -> None:
     """Except where the largest number of runs might not allow it."""
     for most, early in [(1000, True), (40, False)]:
-        axes = {"x": [0.0, 0.5, 1.0], "y": [0.0, 1.0]}
-        asked = Refine(of=(RunNumber(of=OF),), until=0.001, most=most, halvings=5, axes=axes)
+        axes: Any = {"load_ratio": [0.0, 0.5, 1.0], "friction": [0.0, 1.0]}
+        asked = Refine.read({"of": OF, "until": 0.001, "most": most}, FAKE, axes)
         found = Refinement(asked, [{}])
         first = len(found.asked)
 
@@ -271,7 +268,9 @@ def test_parts_are_asked_for_before_their_round_has_ended() -> None:
 
 
 def test_whole_numbers_are_divided_down_to_neighbours() -> None:
-    asked = Refine(of=(RunNumber(of=OF),), until=0.001, most=100, halvings=9, axes={"n": [1, 12]})
+    asked = Refine.read(
+        {"of": OF, "until": 0.001, "most": 100, "halvings": 9}, FAKE, {"passes": [1, 12]}
+    )
     found = Refinement(asked, [{}])
     while wants := found.wants:
         n = wants[0].point[0]
@@ -379,7 +378,7 @@ def test_runs_that_the_scene_refuses_count_as_failed(store: Store) -> None:
     sweep = {"load_ratio": [0.1, 1.0], "friction": [0.0, 0.9]}
     asked = study({"until": {OF: 0.01}}, sweep, state="plane_strain")
     program = Asking(asked, store).places[0].program
-    wide = Refinement(replace(program.refine, axes={"friction": [0.0, 1.0]}), [{}])
+    wide = Refinement(Refine.read(program.refine.content, FAKE, {"friction": [0.0, 1.0]}), [{}])
     assert wide.refuse(wide.wants[0], "at most 0.9 in plane strain")
     assert wide.number(Wanted(0, (0.0,))) is None
 
@@ -397,14 +396,14 @@ def test_the_estimate_is_the_most_that_it_may_take(store: Store) -> None:
     found = estimate(study({"most": 50}), store)
     assert found.runs == found.to_compute == 50
     with pytest.raises(StudyError, match="at most 10: use fewer values"):
-        Bounds(runs=10).check_size(study())
+        Bounds(runs=10).check_size(study(), store)
 
 
 @pytest.mark.parametrize(
     ("change", "field", "allowed"),
     [
         ({"off": 1}, "refine.off", "did you mean of?"),
-        ({"of": []}, "refine.of", "one number a run"),
+        ({"of": []}, "refine.of", "1 or more"),
         (
             {"of": ["contact_pressure"]},
             "refine.of[0]",
@@ -414,13 +413,13 @@ def test_the_estimate_is_the_most_that_it_may_take(store: Store) -> None:
         ({"of": PRESSURE | {"take": "mean"}}, "refine.of.take", "largest"),
         ({"of": PRESSURE | {"at": {"stag": "loaded"}}}, "refine.of.at.stag", "did you mean stage?"),
         ({"of": {"of": OF, "take": "largest"}}, "refine.of.take", "leave it out"),
-        ({"of": [7]}, "refine.of[0]", "{of, at, take}"),
+        ({"of": [7]}, "refine.of[0]", "must be a table"),
         ({"until": 0.0}, "refine.until", "a share of the range"),
         ({"until": {"other": 1.0}}, "refine.until", "for each of `of`"),
         ({"until": {OF: 10**400}}, "refine.until", "for each of `of`"),
         ({"most": 5}, "refine.most", "at least 9, the runs of the first round"),
         ({"most": True}, "refine.most", "an integer"),
-        ({"halvings": 0}, "refine.halvings", "an integer >= 1"),
+        ({"halvings": 0}, "refine.halvings", "at least 1"),
     ],
 )
 def test_a_wrong_refinement_is_refused_in_one_line(

@@ -13,7 +13,7 @@ import pytest
 from studies import Study, StudyError
 from studies.definition.parameters import parameters_of, read_values
 from studies.errors import SceneError
-from studies.kinds.fit.measured import checked_measured, content_of
+from studies.kinds.fit.fitting import Fit
 from studies.kinds.goal.search import Goal
 from studies.kinds.refine.refinement import Refine
 from studies.scenes.description import Description
@@ -199,6 +199,7 @@ def test_a_unit_that_is_the_name_of_a_parameter_is_refused(text: str) -> None:
 
 
 PUNCH = scene_named("punch")
+BOUNDS = {"yield_stress": [200.0, 600.0]}
 
 
 def test_what_chooses_runs_has_units_of_the_numbers_that_it_compares() -> None:
@@ -215,8 +216,10 @@ def test_what_chooses_runs_has_units_of_the_numbers_that_it_compares() -> None:
     line = {"of": "residual_profile", "over": "depth", "places": [0, 25.4], "values": [-50, 20],
             "sigma": 2.0, "at": {"component": "xx"}}  # fmt: skip
     units = {"places": [0, "1 in"], "values": [-50, "0.02 GPa"], "sigma": "2e6 Pa"}
-    lines = [checked_measured([each], PUNCH, ())[0] for each in (line, line | units)]
-    assert content_of(lines[0]) == content_of(lines[1])
+    fits = [
+        Fit.read({"measured": [each], "ranges": BOUNDS}, PUNCH, {}) for each in (line, line | units)
+    ]
+    assert fits[0] == fits[1]
 
 
 @pytest.mark.parametrize(
@@ -226,21 +229,21 @@ def test_what_chooses_runs_has_units_of_the_numbers_that_it_compares() -> None:
             lambda: Goal.read(
                 {"of": "peak_residual_tension", "at": "3 mm", "between": [0.1, 0.9]}, PUNCH, {}
             ),
-            "goal.at = '3 mm': must be a number in MPa; mm is a length",
+            "at = '3 mm': must be a number in MPa; mm is a length",
         ),
         (
             lambda: Refine.read(
                 {"of": "contact_half_width", "until": {"contact_half_width": "1 N"}}, PUNCH,
                 {"load_ratio": [0.5, 0.9]},
             ),
-            "refine.until.contact_half_width = '1 N': must be a number in mm; N is a force",
+            "until.contact_half_width = '1 N': must be a number in mm; N is a force",
         ),
         (
-            lambda: checked_measured(
-                [{"of": "residual_profile", "over": "depth", "places": ["1 s", 2], "values": [1, 2],
-                  "at": {}}], PUNCH, (),
+            lambda: Fit.read(
+                {"measured": [{"of": "residual_profile", "over": "depth", "places": ["1 s", 2],
+                  "values": [1, 2], "at": {}}], "ranges": BOUNDS}, PUNCH, {},
             ),
-            "fit.measured[0].places[0] = '1 s': must be a number in mm; s is a time",
+            "measured[0].places[0] = '1 s': must be a number in mm; s is a time",
         ),
     ],
 )  # fmt: skip

@@ -103,6 +103,13 @@ function mark() {
   }
 }
 
+function choose() {
+  const chosen = form.elements.choose.value;
+  for (const each of form.querySelectorAll("[data-table]")) each.hidden = each.dataset.table !== chosen;
+}
+form.elements.choose.addEventListener("change", choose);
+choose();
+
 let timer = 0;
 form.addEventListener("input", () => {
   mark();

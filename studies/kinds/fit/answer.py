@@ -42,7 +42,7 @@ def _outcome(program: Fitting, known: Certainty | None) -> tuple[str, str]:
         return MISSING, STOPPED
     bounds = [
         f"{name} is at its {'lowest' if share <= 0.0 else 'highest'} value"
-        for name, share in zip(program.asked.free, program.answer.shares, strict=True)
+        for name, share in zip(program.asked.ranges, program.answer.shares, strict=True)
         if not 1e-4 < share < 1.0 - 1e-4
     ] if program.answer else []  # fmt: skip
     told = [program.message, known.warning if known else "", *bounds]
@@ -54,7 +54,7 @@ def _content(
     study: Study, program: Fitting, known: Certainty | None, outcome: tuple[str, str]
 ) -> dict[str, Variable]:
     scene, fit, answer = study.problem, program.asked, program.answer
-    names, count = list(fit.free), len(fit.free)
+    names, count = list(fit.ranges), len(fit.ranges)
     variables: dict[str, Variable] = {}
 
     def add(name: str, dims: tuple[str, ...], values: Any, words: str, unit: str = "") -> None:
@@ -66,14 +66,14 @@ def _content(
     add("parameter_2", ("parameter_2",), np.array(names), "parameter that was searched")
     unknown = np.full((count, count), math.nan)
     covariance = known.covariance if known else unknown
-    for k, (name, free) in enumerate(fit.free.items()):
+    for k, (name, free) in enumerate(fit.ranges.items()):
         unit = layout.axis_attributes(scene, name).get("units", "")
         value = float(answer.values[k]) if answer else math.nan
         sigma = float(np.sqrt(covariance[k, k]))
         add(name, (), value, f"{name.replace('_', ' ')} that was found", unit)
         add(f"{name}_sigma", (), sigma, f"standard deviation of {name.replace('_', ' ')}", unit)
-        for end in ("low", "high"):
-            add(f"{name}_{end}", (), getattr(free, end), f"{end} bound of {name}", unit)
+        for end, bound in (("low", free.start), ("high", free.stop)):
+            add(f"{name}_{end}", (), bound, f"{end} bound of {name}", unit)
     both = ("parameter", "parameter_2")
     add("covariance", both, covariance, "covariance of the values that were found")
     add("correlation", both, known.correlation if known else unknown, "their correlation")
@@ -97,7 +97,8 @@ def _content(
         ", ".join(f"{name} = {value}" for name, value in each.at.items()) for each in fit.measured
     ]
     add("line_at", ("lines",), at, "place on the other dimensions")
-    add("line_unit", ("lines",), [each.unit for each in fit.measured], "unit of what was measured")
+    units = [scene.known_quantities[each.of].units for each in fit.measured]
+    add("line_unit", ("lines",), units, "unit of what was measured")
     _add_tried(add, program)
     return variables
 
@@ -105,7 +106,7 @@ def _content(
 def _add_tried(add: Any, program: Fitting) -> None:
     """Add the runs of the fit, in the order in which they were asked for."""
     keys = [key for key, row in program.rows.items() if row or key in program.refusals]
-    for k, name in enumerate(program.asked.free):
+    for k, name in enumerate(program.asked.ranges):
         values = np.array([key.values[k] for key in keys], dtype=float)
         add(f"tried_{name}", ("tried",), values, f"{name.replace('_', ' ')} of the runs")
     misfits = np.array([program.misfit(key.values) for key in keys], dtype=float)

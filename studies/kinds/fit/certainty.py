@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solver.typing import Array
 from studies.kinds.fit.fitting import Fit, Fitted
-from studies.kinds.fit.measured import Numbers
 
 _CONDITION = 30.0
 """Condition index from which parameters cannot be told apart (reference, section 3.2)."""
@@ -35,8 +35,8 @@ class Certainty(NamedTuple):
     warning : which parameters cannot be told apart, or change nothing; empty if there are none
     """
 
-    covariance: Numbers
-    correlation: Numbers
+    covariance: Array
+    correlation: Array
     condition: float
     warning: str
 
@@ -47,8 +47,8 @@ def certainty(fit: Fit, answer: Fitted) -> Certainty:
     Where not all standard deviations were given, they are scaled so that the differences have them.
     """
     assert answer.jacobian is not None
-    names, slopes = list(fit.free), [
-        each.slope(value) for each, value in zip(fit.free.values(), answer.values, strict=True)
+    names, slopes = list(fit.ranges), [
+        each.slope(value) for each, value in zip(fit.ranges.values(), answer.values, strict=True)
     ]  # fmt: skip
     lengths = np.linalg.norm(answer.jacobian, axis=0)
     idle = lengths <= _WEAK * max(lengths.max(initial=0.0), 1e-300)

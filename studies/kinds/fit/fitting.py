@@ -19,23 +19,24 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
+from annotated_types import Interval
+from pydantic import Field, ValidationInfo, model_validator
 
 from solver.late import Late
-from solver.parameters import is_number
-from solver.scenes import Scene
+from solver.typing import Array
 from studies.definition.line import Read
+from studies.definition.schema import Context, Number, Whole
 from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import SOLVED
-from studies.errors import StudyError
+from studies.errors import Mistakes, StudyError
 from studies.kinds.fit.files import with_files
-from studies.kinds.fit.measured import MeasuredLine, Numbers, checked_measured, content_of
+from studies.kinds.fit.measured import MeasuredLine
 from studies.kinds.kind import Placed, Reading
-from studies.kinds.ranges import DIGITS, Ranged, check_whole, checked_ranges
+from studies.kinds.ranges import DIGITS, Ranged
 from studies.kinds.replayed import Ends, Evaluation, Lacking, Replayed
 
 NO_FIT = "is missing: tell what was measured, and the ranges"
@@ -47,9 +48,8 @@ _WIDEST = 0.2
 """Widest difference to either side for the standard deviations, as a share of the range."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class Fit(Ranged):
-    """What is fitted.
+    """What was measured, and the parameters that are searched.
 
     Attributes
     ----------
@@ -59,8 +59,6 @@ class Fit(Ranged):
     """
 
     name = "fit"
-    entries = ("measured", "ranges", "first", "step", "most")
-    meaning = "what was measured, and the parameters it searches"
     rows = "answer"
     counted = "fits"
     answers = Late("studies.kinds.fit.answer:answers")
@@ -68,60 +66,44 @@ class Fit(Ranged):
     table = Late("studies.kinds.fit.shown:fit_table")
     figure = Late("studies.kinds.fit.figure:compared")
 
-    measured: list[MeasuredLine]
-    step: float = 0.05
-    most: int = 100
+    measured: Annotated[list[MeasuredLine], Field(min_length=1)]
+    step: Annotated[Number, Interval(ge=1e-4, le=0.5)] = 0.05
+    most: Annotated[Whole, Interval(ge=1, le=10_000)] = 100
 
-    @cached_property
-    def values(self) -> Numbers:
+    @model_validator(mode="after")
+    def _check(self, info: ValidationInfo) -> Self:
+        every, free, wrong = standings(Context.of(info).axes), len(self.ranges), Mistakes()
+        if (count := len(every) * (1 + free)) > self.most:
+            allowed = f"must be at least {count}, the runs of the first round"
+            raise StudyError("most", self.most, allowed)
+        for k, line in enumerate(self.measured):
+            with wrong.at(f"measured[{k}].at"):
+                if len(there := [each for each in every if each.has(line.at)]) != 1:
+                    some = "; ".join(str(dict(each.at)) for each in (there or every)[:3])
+                    allowed = f"must identify exactly one run; it matches {len(there)}: {some}"
+                    raise StudyError("", line.at, allowed)
+        wrong.report()
+        if sum(len(each.values) for each in self.measured) < free:
+            allowed = f"must have as many values as there are parameters: {free} at least"
+            raise StudyError("measured", f"{len(self.measured)} lines", allowed)
+        return self
+
+    @property
+    def values(self) -> Array:
         """Measured values of all lines."""
         return np.concatenate([each.values for each in self.measured])
 
-    @cached_property
-    def sigma(self) -> Numbers:
+    @property
+    def sigma(self) -> Array:
         """Their standard deviations."""
-        return np.concatenate([each.sigma for each in self.measured])
+        return np.concatenate([each.deviations for each in self.measured])
 
-    def spread(self, seen: Numbers) -> float:
+    def spread(self, seen: Array) -> float:
         """Return the variance of differences over sigma if some sigma were not given; else 1."""
-        freedom = len(self.values) - len(self.free)
-        if freedom <= 0 or all(each.told for each in self.measured):
+        freedom = len(self.values) - len(self.ranges)
+        if freedom <= 0 or all(each.sigma for each in self.measured):
             return 1.0
         return float(np.sum(((seen - self.values) / self.sigma) ** 2)) / freedom
-
-    @classmethod
-    def checked(cls, content: Mapping[str, Any], scene: Scene, axes: Axes) -> Fit:
-        """Return the fit that a study asks for.
-
-        Parameters
-        ----------
-        content : ``measured``, see `checked_measured`; ``ranges`` and ``first`` values, see
-            `checked_ranges`; ``step`` and ``most``, see `Fit`
-        scene, axes : of the study
-        """
-        free = checked_ranges("fit", content, scene)
-        step, most = content.get("step", Fit.step), content.get("most", Fit.most)
-        if not is_number(step) or not 1e-4 <= step <= 0.5:
-            raise StudyError("fit.step", step, "must be a number >= 0.0001 and <= 0.5")
-        check_whole("fit.most", most, 10_000)
-        if "measured" not in content:
-            allowed = "is missing: name files of measured lines here, or with --measured"
-            raise StudyError("fit.measured", None, allowed)
-        every = standings(axes)
-        if (count := len(every) * (1 + len(free))) > most:
-            raise StudyError(
-                "fit.most", most, f"must be at least {count}, the runs of the first round"
-            )
-        lines = checked_measured(content["measured"], scene, {n for each in every for n in each.at})
-        for k, line in enumerate(lines):
-            if len(there := [each for each in every if each.has(line.at)]) != 1:
-                some = "; ".join(str(dict(each.at)) for each in (there or every)[:3])
-                allowed = f"must tell one run, and fits {len(there)}: {some}"
-                raise StudyError(f"fit.measured[{k}].at", dict(line.at), allowed)
-        if sum(len(each.values) for each in lines) < len(free):
-            allowed = f"must have as many values as there are parameters: {len(free)} at least"
-            raise StudyError("fit.measured", f"{len(lines)} lines", allowed)
-        return Fit(free=free, measured=lines, step=float(step), most=most)
 
     @classmethod
     def with_files(cls, content: Any, folder: Path, given: Sequence[Path]) -> Any:
@@ -140,9 +122,9 @@ class Fit(Ranged):
 
     @property
     def content(self) -> dict[str, Any]:
-        """What `checked` reads."""
-        lines = [content_of(each) for each in self.measured]
-        return {"measured": lines, **super().content, "step": self.step, "most": self.most}
+        """What is read, normalised; of lines without what is left out."""
+        lines = [each.model_dump(exclude_defaults=True) for each in self.measured]
+        return super().content | {"measured": lines}
 
 
 class Fitted(NamedTuple):
@@ -156,10 +138,10 @@ class Fitted(NamedTuple):
         where the last step began; None if it is not known
     """
 
-    values: Numbers
-    shares: Numbers
-    seen: Numbers
-    jacobian: Numbers | None
+    values: Array
+    shares: Array
+    seen: Array
+    jacobian: Array | None
 
 
 @dataclass(slots=True)
@@ -192,7 +174,7 @@ class Fitting(Replayed):
             return math.nan
         return math.nan if seen is None else float(np.mean(self._over_sigma(seen) ** 2))
 
-    def seen(self, key: Evaluation, row: Mapping[str, Any]) -> list[Numbers] | None:
+    def seen(self, key: Evaluation, row: Mapping[str, Any]) -> list[Array] | None:
         """Return what a run says at the measured places of its lines; None if it failed."""
         if row["status"] not in SOLVED:
             self.refusals[key] = ": ".join(filter(None, (row["status"], row["message"])))
@@ -208,8 +190,7 @@ class Fitting(Replayed):
         """Begin anew with what is known."""
         from scipy.optimize import least_squares
 
-        free = list(self.asked.free.values())
-        first = np.array([each.share(each.first) for each in free]).round(DIGITS)
+        first = np.array(self.asked.first_shares).round(DIGITS)
         self.answer = None
         self._ask(
             [
@@ -228,7 +209,7 @@ class Fitting(Replayed):
         with suppress(Ends):  # no runs are left: narrow differences tell less well
             self.answer = self.answer._replace(jacobian=self._wide(self.answer))
 
-    def _differences(self, shares: Numbers) -> Numbers:
+    def _differences(self, shares: Array) -> Array:
         values = self.asked.values_at(shares)
         seen = self._all(values)
         if seen is None:
@@ -244,13 +225,13 @@ class Fitting(Replayed):
             self.answer = Fitted(np.array(values), shares.round(DIGITS), seen, last)
         return found
 
-    def _jacobian(self, shares: Numbers, *_: Any) -> Numbers:
+    def _jacobian(self, shares: Array, *_: Any) -> Array:
         here = self._all(self.asked.values_at(shares))
         assert here is not None
         steps = self._stepped(shares)
         self._ask([self.asked.values_at(step) for step in steps])
         columns = []
-        for k, name in enumerate(self.asked.free):
+        for k, name in enumerate(self.asked.ranges):
             at = float(shares[k].round(DIGITS))
             width = steps[k][k] - at
             for side in (1.0, -1.0):
@@ -270,7 +251,7 @@ class Fitting(Replayed):
             self.answer = self.answer._replace(jacobian=found)
         return found
 
-    def _wide(self, answer: Fitted) -> Numbers:
+    def _wide(self, answer: Fitted) -> Array:
         """Return the Jacobian matrix of central differences over what the parameters may be.
 
         That is two standard deviations to both sides. What a change of the mesh makes turns the
@@ -294,7 +275,7 @@ class Fitting(Replayed):
                 found[:, k] = (ends[0] - ends[1]) / (2.0 * widths[k]) / self.asked.sigma
         return found
 
-    def _stepped(self, shares: Numbers) -> list[Numbers]:
+    def _stepped(self, shares: Array) -> list[Array]:
         """Return the places of the differences: forward, or backward at the upper bounds."""
         found = []
         for k in range(len(shares)):
@@ -307,10 +288,10 @@ class Fitting(Replayed):
         """Ask for the runs of several places together."""
         self.ask([Evaluation(values, k) for values in every for k in range(len(self.positions))])
 
-    def _all(self, values: tuple[float, ...]) -> Numbers | None:
+    def _all(self, values: tuple[float, ...]) -> Array | None:
         """Return what runs say at all measured places; None if one of them failed."""
         self._ask([values])
-        found: list[Numbers] = [np.empty(0)] * len(self.asked.measured)
+        found: list[Array] = [np.empty(0)] * len(self.asked.measured)
         for k, of in enumerate(self._of):
             seen = self.known[Evaluation(values, k)]
             if seen is None:
@@ -319,5 +300,5 @@ class Fitting(Replayed):
                 found[line] = own
         return np.concatenate(found)
 
-    def _over_sigma(self, seen: Numbers) -> Numbers:
+    def _over_sigma(self, seen: Array) -> Array:
         return (seen - self.asked.values) / self.asked.sigma

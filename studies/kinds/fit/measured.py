@@ -10,23 +10,22 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from pydantic import Field, GetJsonSchemaHandler, PlainValidator, ValidationInfo, model_validator
 
 from solver.scenes import Scene
+from solver.typing import Array
 from studies.definition.line import Read, picked
 from studies.definition.parameters import in_unit
-from studies.definition.spaced import is_finite
-from studies.errors import StudyError, check_entries, nearest, one_of
+from studies.definition.quantity import Variable, known_variable
+from studies.definition.schema import Context, StudyTable, is_finite
+from studies.definition.sweep import standings
+from studies.errors import StudyError, Unchecked, one_of
 from studies.units import UnitError, number_in, under
 
-Numbers = NDArray[np.float64]
-
-_KEYS = ("of", "over", "at", "values", "places", "sigma")
 _HEADING = re.compile(r"(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
 SIGMA = "sigma"
 """Heading of the column with the standard deviations."""
@@ -39,30 +38,106 @@ _BEYOND = 0.5
 _MOST = 100_000
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class MeasuredLine:
-    """A measured line.
+def _numbers(content: Any, info: ValidationInfo) -> list[float]:
+    """Return a list of finite numbers in the unit of their variable."""
+    of = info.data.get("over" if info.field_name == "places" else "of")
+    if of is None:
+        raise Unchecked
+    if not of:
+        raise StudyError("", content, "needs over: the name of what they are")
+    unit = Context.of(info).scene.known_quantities[of].units
+    if isinstance(content, list | tuple):
+        content = [in_unit(unit, each, f"[{k}]") for k, each in enumerate(content[: _MOST + 1])]
+    known = isinstance(content, list) and len(content) <= _MOST and all(map(is_finite, content))
+    if not known or not content:
+        raise StudyError("", content, "must be a list of finite numbers, one or more")
+    return [*map(float, content)]
+
+
+def _deviations(content: Any, info: ValidationInfo) -> list[float]:
+    """Return the standard deviations; a number is that of all values."""
+    values, of = info.data.get("values", ()), info.data.get("of")
+    if not values or of is None:
+        raise Unchecked
+    if not isinstance(content, list | tuple):
+        own = in_unit(Context.of(info).scene.known_quantities[of].units, content, "")
+        found = [float(own)] * len(values) if is_finite(own) else []
+    else:
+        found = _numbers(content, info)
+    if len(found) != len(values) or not all(each > 0.0 for each in found):
+        raise StudyError("", content, "must be a number > 0, or one for each value")
+    return found
+
+
+def _over(name: Any, info: ValidationInfo) -> str:
+    return "" if name == "" else known_variable(name, info)
+
+
+_Numbers = Annotated[
+    list[float], PlainValidator(_numbers, json_schema_input_type=list[float | str])
+]
+
+
+class MeasuredLine(StudyTable):
+    """A measured line; ``rows`` of a file, as `read_table` returns them, stand for its lists.
 
     Attributes
     ----------
     of, over : variables; `over` is empty for one number a run
+    values, places : numbers of `of` and `over`; `places` is empty with it
+    sigma : standard deviations of the values
     at : the place on other dimensions of the variable, and on the axes of the study
-    places, values : (n,), of `over` and `of`; `places` is empty with it
-    sigma : (n,) standard deviations of the values
-    told : whether they were given
-    unit : of the values
     """
 
-    of: str
-    over: str
-    at: Mapping[str, Any]
-    places: Numbers
-    values: Numbers
-    sigma: Numbers
-    told: bool
-    unit: str
+    of: Variable
+    over: Annotated[str, PlainValidator(_over, json_schema_input_type=str)] = ""
+    values: _Numbers
+    places: _Numbers = Field(default_factory=list)
+    sigma: Annotated[
+        list[float],
+        PlainValidator(_deviations, json_schema_input_type=float | str | list[float | str]),
+    ] = Field(default_factory=list)
+    at: dict[str, Any] = Field(default_factory=dict)
 
-    def seen(self, read: Read) -> Numbers:
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> Any:
+        """Add the rows of a file."""
+        found = handler.resolve_ref_schema(whole := handler(core))
+        found |= {"if": {"required": ["rows"]}, "else": {"required": found.pop("required")}}
+        found["properties"]["rows"] = {"type": "array", "items": {"type": "object"}}
+        return whole
+
+    @model_validator(mode="before")
+    @classmethod
+    def _columns(cls, content: Any, info: ValidationInfo) -> Any:
+        """Return the columns of the rows of a file."""
+        if isinstance(content, str) or (isinstance(content, Mapping) and "file" in content):
+            allowed = "names a file, which only a study file can: give the lines themselves"
+            raise StudyError("", content, allowed)
+        if not isinstance(content, Mapping) or "rows" not in content:
+            return content
+        rest = {key: each for key, each in content.items() if key != "rows"}
+        return rest | _columns(content["rows"], Context.of(info).scene)
+
+    @model_validator(mode="after")
+    def _check(self, info: ValidationInfo) -> Self:
+        quantity, count = Context.of(info).scene.known_quantities[self.of], len(self.places)
+        if self.over and (count != len(self.values) or len({*self.places}) < 2):
+            two = f"must be as many as the values, {len(self.values)}, and two different ones"
+            raise StudyError("places", f"{count} numbers", f"{two} at least")
+        axes = dict.fromkeys(n for each in standings(Context.of(info).axes) for n in each.at)
+        for name, value in self.at.items():
+            if name not in axes and name not in quantity.dims:
+                raise StudyError(f"at.{name}", value, one_of(name, [*axes, *quantity.dims]))
+        return self
+
+    @property
+    def deviations(self) -> list[float]:
+        """The standard deviations of the values."""
+        usual = _USUAL * max(map(abs, self.values)) or 1.0
+        return self.sigma or [usual] * len(self.values)
+
+    def seen(self, read: Read) -> Array:
         """Return what a run says at the places (n,).
 
         Raises
@@ -80,17 +155,18 @@ class MeasuredLine:
         y = picked(read, self.of, self.at, keeps)
         known = np.isfinite(x) & np.isfinite(y)
         curve = pieces(x[known])
-        own = pieces(self.places)
+        places = np.array(self.places)
+        own = pieces(places)
         if len(own) > len(curve):
             there = f"{len(curve)} of the run, and {len(own)} of the measured line"
             raise ValueError(f"{self.over} turns more often than in the run: pieces are {there}")
-        seen = np.empty(len(self.places))
+        seen = np.empty(len(places))
         for mine, its in zip(own, curve, strict=False):
-            seen[mine] = _at(self.places[mine], x[known][its], y[known][its], self.over)
+            seen[mine] = _at(places[mine], x[known][its], y[known][its], self.over)
         return seen
 
 
-def pieces(x: Numbers) -> list[slice]:
+def pieces(x: Array) -> list[slice]:
     """Return the pieces of a curve between its turns, each with both of its ends.
 
     A way back of less than `_TURN` of the range is no turn.
@@ -109,7 +185,7 @@ def pieces(x: Numbers) -> list[slice]:
     return [*found, slice(start, len(x))]
 
 
-def _at(places: Numbers, x: Numbers, y: Numbers, over: str) -> Numbers:
+def _at(places: Array, x: Array, y: Array, over: str) -> Array:
     """Return a piece of a curve at places: between its points, and a little beyond its ends."""
     order = np.argsort(x, kind="stable")
     x, y = x[order], y[order]
@@ -128,103 +204,21 @@ def _at(places: Numbers, x: Numbers, y: Numbers, over: str) -> Numbers:
     return np.asarray(y[k] + slope * (places - x[k]))
 
 
-def checked_measured(content: Any, scene: Scene, axes: Collection[str]) -> list[MeasuredLine]:
-    """Return the measured lines of a study.
-
-    Parameters
-    ----------
-    content : a list of tables ``{of, values, over, places, sigma, at}``; or of the rows of a file
-        as `read_table` returns them, ``{rows, at}``
-    scene : its variables are known
-    axes : names by which `at` may tell a position on the axes of the study
-
-    Raises
-    ------
-    StudyError
-        naming the entry, its value and what is allowed
-    """
-    if not isinstance(content, list | tuple) or not content:
-        allowed = "must be a list of measured lines: names of files, or {of, over, places, values}"
-        raise StudyError("fit.measured", content, allowed)
-    return [_checked(f"fit.measured[{k}]", one, scene, axes) for k, one in enumerate(content)]
-
-
-def _checked(field: str, content: Any, scene: Scene, axes: Collection[str]) -> MeasuredLine:
-    if isinstance(content, str) or (isinstance(content, Mapping) and "file" in content):
-        allowed = "names a file, which only a study file can: give the lines themselves"
-        raise StudyError(field, content, allowed)
-    if not isinstance(content, Mapping):
-        raise StudyError(field, content, "must be a table {of, over, places, values, sigma, at}")
-    given = dict(content)
-    if "rows" in given:
-        given |= _columns(field, given.pop("rows"), scene)
-    check_entries(field, given, _KEYS)
-    of = _known(f"{field}.of", given.get("of"), scene)
-    over = _known(f"{field}.over", given["over"], scene) if given.get("over", "") != "" else ""
-    unit = scene.known_quantities[of].units
-    values = _numbers(f"{field}.values", given.get("values"), unit)
-    places = np.empty(0)
-    if over:
-        along = scene.known_quantities[over].units
-        places = _numbers(f"{field}.places", given.get("places", []), along)
-        if len(places) != len(values) or len(places) < 2 or not np.ptp(places) > 0.0:
-            allowed = (
-                f"must be as many as the values, {len(values)}, and two different ones at least"
-            )
-            raise StudyError(f"{field}.places", f"{len(places)} numbers", allowed)
-    elif "places" in given:
-        raise StudyError(
-            f"{field}.places", given["places"], "needs over: the name of what they are"
-        )
-    if not len(values):
-        raise StudyError(f"{field}.values", given.get("values"), "must be one number or more")
-    told = "sigma" in given
-    raw = given.get("sigma", _USUAL * float(np.abs(values).max()) or 1.0)
-    own = in_unit(unit, raw, f"{field}.sigma")
-    if not isinstance(own, list | tuple):
-        own = [own] * len(values) if is_finite(own) else []
-    sigma = _numbers(f"{field}.sigma", own, unit)
-    if len(sigma) != len(values) or not (sigma > 0.0).all():
-        allowed = "must be a number > 0, or one for each value"
-        raise StudyError(f"{field}.sigma", raw, allowed)
-    at = given.get("at", {})
-    if not isinstance(at, Mapping):
-        raise StudyError(f"{field}.at", at, "must be a table: a place on each other dimension")
-    quantity = scene.known_quantities[of]
-    for name, value in at.items():
-        if name not in axes and name not in quantity.dims:
-            raise StudyError(f"{field}.at.{name}", value, one_of(name, [*axes, *quantity.dims]))
-    return MeasuredLine(
-        of=of, over=over, at=dict(at), places=places, values=values, sigma=sigma, told=told,
-        unit=unit,
-    )  # fmt: skip
-
-
-def content_of(line: MeasuredLine) -> dict[str, Any]:
-    """Return what `checked_measured` reads."""
-    found: dict[str, Any] = {"of": line.of, "values": line.values.tolist()}
-    if line.over:
-        found |= {"over": line.over, "places": line.places.tolist()}
-    if line.told:
-        found["sigma"] = line.sigma.tolist()
-    return found | ({"at": dict(line.at)} if line.at else {})
-
-
-def _columns(field: str, rows: Any, scene: Scene) -> dict[str, Any]:
+def _columns(rows: Any, scene: Scene) -> dict[str, Any]:
     """Return a line of the rows of a file: the columns are `over`, `of` and `SIGMA`."""
     tables = isinstance(rows, list | tuple) and all(isinstance(row, Mapping) for row in rows)
     if not tables or not rows:
-        raise StudyError(f"{field}.rows", rows, "must be a list of tables: the rows of a file")
+        raise StudyError("rows", rows, "must be a list of tables: the rows of a file")
     headings = list(dict.fromkeys(key for row in rows for key in row))
     matches = [_HEADING.fullmatch(heading) for heading in headings]
     names = [m["name"] if m else h for m, h in zip(matches, headings, strict=True)]
     lines = [name for name in names if name != SIGMA]
     if not 1 <= len(lines) <= 2:
         allowed = "must have the columns PLACE and VALUE, named as variables of the runs, and sigma"
-        raise StudyError(field, ", ".join(headings), allowed)
+        raise StudyError("", ", ".join(headings), allowed)
     columns, known = {}, scene.known_quantities
     for name, heading, match in zip(names, headings, matches, strict=True):
-        columns[name] = [_number(field, heading, row.get(heading)) for row in rows]
+        columns[name] = [_number(heading, row.get(heading)) for row in rows]
         quantity = known.get(lines[-1] if name == SIGMA else name)
         if quantity and match and match["unit"] is not None:
             unit = match["unit"].strip()
@@ -232,33 +226,15 @@ def _columns(field: str, rows: Any, scene: Scene) -> dict[str, Any]:
                 columns[name] = [under(unit, each, quantity.units) for each in columns[name]]
             except UnitError as error:
                 allowed = f"must be {number_in(quantity.units)}; {error}"
-                raise StudyError(field, heading, allowed) from None
+                raise StudyError("", heading, allowed) from None
     found: dict[str, Any] = {"of": lines[-1], "values": columns[lines[-1]]}
     if len(lines) == 2:
         found |= {"over": lines[0], "places": columns[lines[0]]}
     return found | ({SIGMA: columns[SIGMA]} if SIGMA in columns else {})
 
 
-def _number(field: str, heading: str, text: Any) -> float:
+def _number(heading: str, text: Any) -> float:
     try:
         return float(text)
     except (TypeError, ValueError):
-        raise StudyError(f"{field}.{heading}", text, "must be a number in every row") from None
-
-
-def _known(field: str, name: Any, scene: Scene) -> str:
-    known = scene.known_quantities
-    if not isinstance(name, str) or name not in known:
-        raise StudyError(field, name, f"must be a variable of the runs{nearest(name, known)}")
-    return name
-
-
-def _numbers(field: str, values: Any, unit: str) -> Numbers:
-    if isinstance(values, list | tuple):
-        values = [
-            in_unit(unit, each, f"{field}[{k}]") for k, each in enumerate(values[: _MOST + 1])
-        ]
-    fits = isinstance(values, list | tuple) and len(values) <= _MOST and all(map(is_finite, values))
-    if not fits:
-        raise StudyError(field, values, "must be a list of finite numbers")
-    return np.array(values, dtype=float)
+        raise StudyError(heading, text, "must be a number in every row") from None

@@ -28,19 +28,20 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, Self
+
+from annotated_types import Interval
+from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from solver.late import Late
-from solver.parameters import is_number
-from solver.scenes import Scene
 from studies.definition.cases import Case
-from studies.definition.parameters import Parameter, in_unit, parameters_of
+from studies.definition.parameters import in_unit
 from studies.definition.place import Chooser
-from studies.definition.quantity import number_of_a_run
-from studies.definition.spaced import is_finite, rounded
+from studies.definition.quantity import OneNumber, number_of_a_run
+from studies.definition.schema import Context, Ends, Number, Range, is_finite, rounded
 from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import NO_EQUILIBRIUM, SOLVED
-from studies.errors import StudyError, one_of
+from studies.errors import StudyError, Unchecked, one_of
 from studies.kinds.kind import Kind, Placed, Reading, Trial
 
 FOUND: Mapping[str, Mapping[str, Any]] = {
@@ -70,27 +71,59 @@ _SLACK = 1
 """Runs that ITP may take beyond those of bisection (n0 of the reference)."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+def _parameter(name: Any, info: ValidationInfo) -> str:
+    """Return the parameter that is varied, by default the branch of the scene."""
+    name, known = Context.of(info).scene.branch if name is None else name, Context.of(info).known
+    if not isinstance(name, str) or name not in known:
+        raise StudyError("", name, one_of(name, known))
+    return name
+
+
+def _threshold(value: Any, info: ValidationInfo) -> float:
+    """Return the threshold of a number; of flags it may be a word."""
+    if "of" not in info.data:
+        raise Unchecked
+    if not info.data["of"]:
+        return math.nan  # of nothing: the goal is refused
+    unit, flags = number_of_a_run(info.data["of"], Context.of(info).scene)
+    if isinstance(value, str) and flags is not None:
+        words = {each.name.lower(): float(each) for each in flags}
+        if value not in words:
+            raise StudyError("", value, one_of(value, words))
+        return words[value]
+    number = in_unit(unit, value, "")
+    if not is_finite(number):
+        raise StudyError("", value, "must be a finite number")
+    return float(number)
+
+
+def _between(content: Any, info: ValidationInfo) -> list[float]:
+    if "parameter" not in info.data:
+        raise Unchecked
+    if not isinstance(content, list | tuple):
+        raise StudyError("", content, "must be [lowest, highest], the first bracket")
+    ends = Range.read(content, Context.of(info).known[info.data["parameter"]])
+    return [ends.start, ends.stop]
+
+
+_Threshold = Annotated[float | None, PlainValidator(_threshold, json_schema_input_type=float | str)]
+
+
 class Goal(Kind):
-    """What is asked for.
+    """What is searched at each place of the axes.
 
     Attributes
     ----------
-    parameter : the parameter that is varied
+    parameter : the parameter that is varied, by default the branch of the scene
+    find : name of a goal, instead of the entries that it stands for
     of : number of the runs; empty if only equilibrium counts
-    kind, threshold : ``at``, ``first_above`` or ``first_below``, and its value; of ``at`` the
-        number may rise or fall
+    at, first_above, first_below : the threshold: one of them; with ``at`` the number rises or falls
     within : largest ratio of the last bracket to its upper end; if the parameter may be 0 or
         negative, to the larger end of `between`
     between : the ends of the first bracket
-    whole : whether the parameter is an integer
-    branch : whether the parameter is the branch of its scene
-    goes_on : whether a path of the scene goes on from any of its states (`Scene.goes_on`)
     """
 
     name = "goal"
-    entries = ("parameter", "find", "of", "at", "first_above", "first_below", "within", "between")
-    meaning = "what is searched at each place of the axes"
     everywhere = True
     rows = "answers"
     counted = "searches"
@@ -98,15 +131,69 @@ class Goal(Kind):
     answers = Late("studies.kinds.goal.answer:answers")
     found = Late("studies.kinds.goal.shown:found")
 
-    parameter: str
-    of: str = ""
-    kind: str = ""
-    threshold: float = math.nan
-    within: float = 0.01
-    between: tuple[float, float]
-    whole: bool = False
-    branch: bool = False
-    goes_on: bool = False
+    parameter: Annotated[str, PlainValidator(_parameter, json_schema_input_type=str)] = Field(
+        default=None, validate_default=True
+    )
+    find: Literal["first_yield", "limit_load", "shakedown_limit"] | None = None
+    of: OneNumber = ""
+    at: _Threshold = None
+    first_above: _Threshold = None
+    first_below: _Threshold = None
+    within: Annotated[Number, Interval(ge=1e-6, le=0.5)] = 0.01
+    between: Annotated[list[float], PlainValidator(_between, json_schema_input_type=Ends)]
+    _branch: str = ""
+    _goes_on: bool = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named(cls, content: Any) -> Any:
+        """Return the content with what the name of a goal stands for."""
+        if not isinstance(content, Mapping):
+            return content
+        if not content:
+            allowed = "is empty: needs between, and find or of with a threshold; or take it out"
+            raise StudyError("", {}, allowed)
+        named = content.get("find")
+        if not isinstance(named, str) or named not in FOUND:
+            return content
+        for key in content.keys() & {"of", *_KINDS}:
+            raise StudyError(key, content[key], f"is what find = {named} says: keep one")
+        return {**content, **FOUND[named], "find": None}
+
+    @model_validator(mode="after")
+    def _check(self, info: ValidationInfo) -> Self:
+        given = [kind for kind in _KINDS if getattr(self, kind) is not None]
+        if len(given) > 1 or bool(given) != bool(self.of):
+            allowed = f"needs of and one of {', '.join(_KINDS)}; or neither, for the limit load"
+            raise StudyError("", self.content, allowed)
+        scene = Context.of(info).scene
+        self._branch, self._goes_on = scene.branch, scene.goes_on
+        return self
+
+    @property
+    def kind(self) -> str:
+        """Which threshold it has; empty if only equilibrium counts."""
+        return next((kind for kind in _KINDS if getattr(self, kind) is not None), "")
+
+    @property
+    def threshold(self) -> float:
+        """The threshold."""
+        return float(getattr(self, self.kind)) if self.kind else math.nan
+
+    @property
+    def whole(self) -> bool:
+        """Whether the parameter is an integer."""
+        return all(isinstance(each, int) for each in self.between)
+
+    @property
+    def branch(self) -> bool:
+        """Whether the parameter is the branch of its scene."""
+        return self.parameter == self._branch
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether a path of the scene goes on from any of its states (`Scene.goes_on`)."""
+        return self.branch and self._goes_on
 
     @property
     def halves(self) -> bool:
@@ -157,55 +244,6 @@ class Goal(Kind):
         return 1 + more, first + 1 + more * (self.parts - 1)
 
     @classmethod
-    def checked(cls, content: Mapping[str, Any], scene: Scene, axes: Axes) -> Goal:
-        """Return the goal that a study asks for."""
-        if not content:
-            allowed = "is empty: needs between, and find or of with a threshold; or take it out"
-            raise StudyError("goal", {}, allowed)
-        known = parameters_of(scene)
-        name = content.get("parameter", scene.branch)
-        if not isinstance(name, str) or name not in known:
-            raise StudyError("goal.parameter", name, one_of(name, known))
-        given = dict(content)
-        if "find" in given:
-            found = given.pop("find")
-            if not isinstance(found, str) or found not in FOUND:
-                raise StudyError("goal.find", found, one_of(found, FOUND))
-            for key in given.keys() & {"of", *_KINDS}:
-                raise StudyError(
-                    f"goal.{key}", given[key], f"is what find = {found} says: keep one"
-                )
-            given |= FOUND[found]
-        kinds = [kind for kind in _KINDS if kind in given]
-        of = given.get("of", "")
-        if len(kinds) > 1 or bool(kinds) != bool(of):
-            allowed = f"needs of and one of {', '.join(_KINDS)}; or neither, for the limit load"
-            raise StudyError("goal", dict(content), allowed)
-        try:
-            low, high = _ends(given.get("between"), known[name])
-        except StudyError as error:
-            if "parameter" in given:
-                raise
-            allowed = f"{error.allowed}, of {name}, as goal.parameter is left out"
-            raise StudyError(error.field, error.value, allowed) from None
-        within = given.get("within", 0.01)
-        if not is_number(within) or not 1e-6 <= within <= 0.5:
-            raise StudyError("goal.within", within, "must be a number >= 1e-06 and <= 0.5")
-        return Goal(
-            parameter=name,
-            of=of,
-            kind=kinds[0] if kinds else "",
-            threshold=_threshold(f"goal.{kinds[0]}", given[kinds[0]], of, scene)
-            if kinds
-            else math.nan,
-            within=float(within),
-            between=(low, high),
-            whole=isinstance(low, int) and isinstance(high, int) and known[name].whole,
-            branch=name == scene.branch,
-            goes_on=name == scene.branch and scene.goes_on,
-        )
-
-    @classmethod
     def searched(cls, content: Mapping[str, Any]) -> Mapping[str, str]:
         """Return the parameter that is searched, with its field."""
         return {content["parameter"]: "goal.parameter"}
@@ -213,7 +251,7 @@ class Goal(Kind):
     @property
     def trial(self) -> Trial:
         """The runs at the ends of the bracket."""
-        ends: Axes = {self.parameter: list(self.between)}
+        ends: Axes = {self.parameter: self.between}
         return Trial({}, ends, {f"sweep.{self.parameter}": "goal.between"})
 
     @property
@@ -257,12 +295,9 @@ class Goal(Kind):
 
     @property
     def content(self) -> dict[str, Any]:
-        """What `checked` reads."""
-        asked = {"of": self.of, self.kind: self.threshold} if self.of else {}
-        return {
-            "parameter": self.parameter, **asked, "within": self.within,
-            "between": list(self.between),
-        }  # fmt: skip
+        """What is read, normalised; without what is left out."""
+        given = self.model_dump(exclude_none=True)
+        return {name: each for name, each in given.items() if each != ""}
 
     def narrow(self, low: float, high: float) -> bool:
         """Whether a bracket is narrow enough, or cannot be divided."""
@@ -524,26 +559,3 @@ class Search(Chooser):
         xt = xf + sigma * min(0.2 / (last - first) * (b - a) ** 2, abs(middle - xf))
         x = xt if abs(xt - middle) <= radius else middle - sigma * max(radius, 0.0)
         return self.goal.inside(self.low, self.high, [x])
-
-
-def _ends(content: Any, parameter: Parameter) -> tuple[float, float]:
-    if not isinstance(content, list | tuple) or len(content) != 2:
-        raise StudyError("goal.between", content, "must be [lowest, highest], the first bracket")
-    low, high = (parameter.number(each, f"goal.between[{k}]") for k, each in enumerate(content))
-    if not low < high:
-        raise StudyError("goal.between", content, "must begin with its lowest value")
-    return low, high
-
-
-def _threshold(field_: str, value: Any, of: Any, scene: Scene) -> float:
-    """Return the threshold of a number; of flags it may be a word."""
-    flags = number_of_a_run("goal.of", of, scene)
-    if isinstance(value, str) and flags is not None:
-        words = {each.name.lower(): float(each) for each in flags}
-        if value not in words:
-            raise StudyError(field_, value, one_of(value, words))
-        return words[value]
-    number = in_unit(scene.known_quantities[of].units, value, field_)
-    if not is_finite(number):
-        raise StudyError(field_, value, "must be a finite number")
-    return float(number)

@@ -7,59 +7,56 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Self
 
 import numpy as np
+from annotated_types import Interval
+from pydantic import BeforeValidator, Field, model_validator
 
 from solver.late import Late
-from solver.scenes import Scene
-from studies.definition.quantity import Condition, checked_condition, number_of_a_run
+from studies.definition.quantity import OneCondition, OneNumber
+from studies.definition.schema import Whole, listed
 from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import OK, taken
+from studies.errors import StudyError
 from studies.kinds.kind import Placed, Reading
-from studies.kinds.ranges import Ranged, check_whole, checked_ranges
+from studies.kinds.ranges import Ranged
 from studies.kinds.replayed import Evaluation, Lacking, Replayed
 
 _RADII = {"initial_tr_radius": 0.2, "final_tr_radius": 0.01}  # of trust: shares of the ranges
 
 
-@dataclass(frozen=True, kw_only=True)
 class Minimise(Ranged):
-    """What is minimised: ``of``, where conditions hold, with ``most`` runs times the places."""
+    """A minimum of a number within bounds, where conditions hold.
+
+    Attributes
+    ----------
+    of : the number
+    where : conditions, such as ``peak_residual_tension < 200``
+    starts : number of first places
+    most : largest number of runs at a place of the axes
+    """
 
     name = "minimise"
-    entries = ("of", "where", "ranges", "first", "starts", "most")
-    meaning = "a number that is minimised, conditions, and the parameters that are searched"
     everywhere = True
     of_runs = True
     ends = ("search_state", "open", "run")
     answers = Late("studies.kinds.minimise.answer:answers")
     found = Late("studies.kinds.minimise.shown:found")
 
-    of: str
-    where: Sequence[Condition]
-    starts: int
-    most: int
+    of: OneNumber
+    where: Annotated[
+        list[OneCondition],
+        BeforeValidator(listed, json_schema_input_type=str | list[str]),
+    ] = Field(default_factory=list)
+    starts: Annotated[Whole, Interval(ge=1, le=100)] = 3
+    most: Annotated[Whole, Interval(ge=1, le=10_000)] = 60
 
-    @classmethod
-    def checked(cls, content: Mapping[str, Any], scene: Scene, axes: Axes) -> Minimise:
-        """Return what the entry of a study says."""
-        number_of_a_run("minimise.of", content.get("of"), scene)
-        where = content.get("where", [])
-        where = where if isinstance(where, list) else [where]
-        starts, most = content.get("starts", 3), content.get("most", 60)
-        check_whole("minimise.starts", starts, 100)
-        check_whole("minimise.most", most, 10_000)
-        return cls(
-            of=content["of"], where=[checked_condition("minimise.where", x, scene) for x in where],
-            free=checked_ranges("minimise", content, scene), starts=starts, most=most,
-        )  # fmt: skip
-
-    @property
-    def content(self) -> dict[str, Any]:
-        """What `checked` reads."""
-        whole = {"of": self.of, "where": [each.text for each in self.where], **super().content}
-        return whole | {"starts": self.starts, "most": self.most}
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.most < self.starts:
+            raise StudyError("most", self.most, f"must be at least {self.starts}, that of starts")
+        return self
 
     @property
     def value(self) -> str:
@@ -95,11 +92,11 @@ class Minimising(Replayed):
         """Carry out all searches to the first runs that lack, and ask for these together."""
         from scipy.stats import qmc
 
-        free = self.asked.free.values()
-        spread = qmc.Halton(len(free), scramble=False).random(self.asked.starts + 1)[2:]
+        first = np.array(self.asked.first_shares)
+        spread = qmc.Halton(len(first), scramble=False).random(self.asked.starts + 1)[2:]
         lacking: list[Evaluation] = []
         for position in range(len(self.positions)):
-            for start in (np.array([each.share(each.first) for each in free]), *spread):
+            for start in (first, *spread):
                 try:
                     self._search(start, position)
                 except Lacking as more:

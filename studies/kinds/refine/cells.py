@@ -20,7 +20,7 @@ import math
 from collections.abc import Collection, Container, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from studies.definition.spaced import rounded
+from studies.definition.schema import rounded
 
 Point = tuple[float, ...]
 """A value for each axis that is a number."""

@@ -27,22 +27,30 @@ import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, Self
+
+from annotated_types import Interval
+from pydantic import (
+    BeforeValidator,
+    Field,
+    PlainValidator,
+    PrivateAttr,
+    ValidationInfo,
+    model_validator,
+)
 
 from solver.late import Late
 from solver.parameters import is_number
-from solver.scenes import Scene
 from studies.definition.cases import Case
 from studies.definition.line import Read
-from studies.definition.parameters import in_unit, parameters_of
+from studies.definition.parameters import in_unit
 from studies.definition.place import Chooser
-from studies.definition.quantity import RunNumber, checked_number
-from studies.definition.spaced import is_finite
-from studies.definition.sweep import MAXIMUM_RUNS, Axes, standings
+from studies.definition.quantity import OneOf
+from studies.definition.schema import MAXIMUM_RUNS, Context, Whole, is_finite, listed
+from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import OK, taken
-from studies.errors import StudyError
+from studies.errors import StudyError, Unchecked
 from studies.kinds.kind import Kind, Placed, Reading
-from studies.kinds.ranges import check_whole
 from studies.kinds.refine.around import Around
 from studies.kinds.refine.cells import KINK, Cell, Point, edges
 
@@ -50,79 +58,85 @@ STATES = SETTLED, FAILED, SMALLEST, MOST, OPEN = "settled", "failed", "smallest"
 """What became of a cell: its runs are as foreseen; all failed; it would be divided, but is as small
 as is allowed; or no runs were left; or the refinement was stopped."""
 
-_UNTIL, _MOST, _HALVINGS = 0.02, 200, 5
-"""Entries that are left out."""
-_MOST_AXES, _MOST_HALVINGS = 4, 20
+_MOST_AXES = 4
 _ROUNDING = 1e-12
 """Part of a number that is rounding: it is the same in all runs if it varies by no more."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+def _until(until: Any, info: ValidationInfo) -> float | dict[str, float]:
+    """Return the largest misses: a share, or a number in its own unit for each that is refined."""
+    if "of" not in info.data:
+        raise Unchecked
+    if is_number(until) and 1e-6 <= until <= 1.0:
+        return float(until)
+    known = Context.of(info).scene.known_quantities
+    units = {each.name: known[each.of].units for each in info.data["of"]}
+    own = until if isinstance(until, Mapping) and until.keys() == units.keys() else {}
+    own = {name: in_unit(units[name], own[name], name) for name in own}
+    if own and all(is_finite(each) and each > 0.0 for each in own.values()):
+        return {name: float(own[name]) for name in units}
+    allowed = "must be a share of the range, >= 1e-06 and <= 1, or a number > 0 for each of `of`"
+    raise StudyError("", until, allowed)
+
+
 class Refine(Kind):
-    """What is asked for.
+    """Numbers of the runs, between which others are added.
 
     Attributes
     ----------
-    of : numbers of the runs
+    of : the numbers
     until : largest miss that is allowed, as a share of the range of the numbers in the first round;
         or, by number, in its unit
     most : largest number of runs
     halvings : how often a cell of the sweep may be halved along each axis
-    axes : values of the axes that are numbers, in increasing order
     """
 
     name = "refine"
-    entries = ("of", "until", "most", "halvings")
-    meaning = "numbers of the runs, between which it adds others"
     of_runs = True
     work = "refinement"
     ends = ("cell_state", OPEN, "run")
     answers = Late("studies.kinds.refine.answer:answers")
     found = Late("studies.kinds.refine.shown:found")
 
-    of: tuple[RunNumber, ...]
-    until: float | Mapping[str, float]
-    most: int
-    halvings: int
-    axes: Mapping[str, Sequence[float]]
+    of: Annotated[
+        list[OneOf],
+        BeforeValidator(listed, json_schema_input_type=OneOf | list[OneOf]),
+        Field(min_length=1),
+    ]
+    until: Annotated[
+        float | dict[str, float],
+        PlainValidator(_until, json_schema_input_type=float | dict[str, float | str]),
+    ] = 0.02
+    most: Annotated[Whole, Interval(ge=1, le=MAXIMUM_RUNS)] = 200
+    halvings: Annotated[Whole, Interval(ge=1, le=20)] = 5
+    _axes: dict[str, list[float]] = PrivateAttr()
 
-    @classmethod
-    def checked(cls, content: Mapping[str, Any], scene: Scene, axes: Axes) -> Refine:
-        """Return the refinement that a study asks for."""
-        of = content.get("of")
-        if isinstance(of, list | tuple):
-            numbers_of = [checked_number(f"refine.of[{k}]", one, scene) for k, one in enumerate(of)]
-        else:
-            numbers_of = [checked_number("refine.of", of, scene)]
-        names = [one.name for one in numbers_of]
-        if not names or len(set(names)) < len(names):
-            raise StudyError(
-                "refine.of", of, "must be a list of variables with one number a run, each once"
-            )
-        known = parameters_of(scene)
-        numbers = {
+    @model_validator(mode="after")
+    def _check(self, info: ValidationInfo) -> Self:
+        names = [each.name for each in self.of]
+        if len(set(names)) < len(names):
+            raise StudyError("of", names, "must have each number once")
+        axes, known = Context.of(info).axes, Context.of(info).known
+        self._axes = {
             name: sorted(values)
             for name, values in axes.items()
             if isinstance(values, list) and name in known and all(map(is_number, values))
         }
-        if not 1 <= len(numbers) <= _MOST_AXES or any(len(each) < 2 for each in numbers.values()):
+        if not 1 <= len(self.axes) <= _MOST_AXES or any(len(x) < 2 for x in self.axes.values()):
             allowed = (
                 f"needs 1 to {_MOST_AXES} axes of two numbers or more: the ends of their ranges"
             )
-            raise StudyError("refine", dict(content), allowed)
-        units = {each.name: scene.known_quantities[each.of].units for each in numbers_of}
-        until = _until(content.get("until", _UNTIL), units)
-        most, halvings = content.get("most", _MOST), content.get("halvings", _HALVINGS)
-        check_whole("refine.most", most, MAXIMUM_RUNS)
-        check_whole("refine.halvings", halvings, _MOST_HALVINGS)
-        found = Refine(
-            of=tuple(numbers_of), until=until, most=most, halvings=halvings, axes=numbers
-        )
-        others = math.prod(len(values) for name, values in axes.items() if name not in numbers)
-        if found.first_round(others) > most:
-            allowed = f"must be at least {found.first_round(others)}, the runs of the first round"
-            raise StudyError("refine.most", most, allowed)
-        return found
+            raise StudyError("", self.content, allowed)
+        others = math.prod(len(values) for name, values in axes.items() if name not in self.axes)
+        if (first := self.first_round(others)) > self.most:
+            allowed = f"must be at least {first}, the runs of the first round"
+            raise StudyError("most", self.most, allowed)
+        return self
+
+    @property
+    def axes(self) -> Mapping[str, Sequence[float]]:
+        """Values of the axes that are numbers, in increasing order."""
+        return self._axes
 
     @property
     def value(self) -> str:
@@ -151,15 +165,6 @@ class Refine(Kind):
         last = {name: values[-1] for name, values in self.axes.items()}
         places = [case for case in cases if case.values == {**case.values, **last}]
         return Kind.longest(self, places, branch)
-
-    @property
-    def content(self) -> dict[str, Any]:
-        """What `checked` reads."""
-        until = dict(self.until) if isinstance(self.until, Mapping) else self.until
-        return {
-            "of": [each.content for each in self.of], "until": until, "most": self.most,
-            "halvings": self.halvings,
-        }  # fmt: skip
 
     def cells(self, branches: int) -> Iterator[Cell]:
         """Yield the cells of the sweep."""
@@ -561,14 +566,3 @@ def _within(cell: Cell, points: Sequence[Point]) -> set[int]:
 def _volume(cell: Cell) -> float:
     """Return the size of a cell as a share of its cell of the sweep."""
     return 0.5 ** sum(cell.halved)
-
-
-def _until(until: Any, units: Mapping[str, str]) -> float | dict[str, float]:
-    if is_number(until) and 1e-6 <= until <= 1.0:
-        return float(until)
-    own = until if isinstance(until, Mapping) and until.keys() == units.keys() else {}
-    own = {name: in_unit(units[name], own[name], f"refine.until.{name}") for name in own}
-    if own and all(is_finite(each) and each > 0.0 for each in own.values()):
-        return {name: float(own[name]) for name in units}
-    allowed = "must be a share of the range, >= 1e-06 and <= 1, or a number > 0 for each of `of`"
-    raise StudyError("refine.until", until, allowed)
