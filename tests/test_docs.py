@@ -269,7 +269,7 @@ def test_the_first_command_that_fails_ends_a_page(
 
 
 def test_the_page_of_the_audit_names_every_figure_and_no_other():
-    named = set(re.findall(r"`(audit_\w+)`", (ROOT / "docs/audit.md").read_text()))
+    named = set(re.findall(r"`(audit_\w+)`", (ROOT / "docs/explanation/audit.md").read_text()))
     assert SCENES  # their modules declare the figures
     stored = {name for name in QUANTITIES if name.startswith("audit_")}
     assert named - {"audit_failed"} == stored
@@ -341,7 +341,7 @@ def test_functions_named_in_a_page_stand_in_the_files_named_with_them(page: Path
 def test_the_page_of_the_architecture_has_every_layer_in_its_place() -> None:
     rows = re.findall(
         r"^\| `(\w+)/([\w/*]+?)(?:/|\.py)` \|",
-        (ROOT / "docs/architecture.md").read_text(),
+        (ROOT / "docs/explanation/architecture.md").read_text(),
         re.MULTILINE,
     )
     parts = [(name, layer.replace("/", ".")) for name, layer in dict.fromkeys(rows)]
@@ -357,7 +357,7 @@ def test_the_page_of_the_architecture_has_every_layer_in_its_place() -> None:
 
 
 def test_the_glossary_is_in_order_and_has_each_word_once() -> None:
-    text = (ROOT / "docs/glossary.md").read_text()
+    text = (ROOT / "docs/reference/glossary.md").read_text()
     words = [word.lower() for word in re.findall(r"^\*\*(.+?)\*\*", text, re.MULTILINE)]
     assert len(words) > 50
     assert words == sorted(set(words))
