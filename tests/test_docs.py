@@ -56,6 +56,8 @@ LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 NAMED = re.compile(r"`((?:solver|studies|service|residua|tests|data|docs|examples)/[a-z0-9_./-]*)`")
 PLACE = re.compile(r"`((?:\w+/)*\w+\.py)`: ((?:`[\w.]+`(?:, )?)+)")
 """A file and what it holds, as in "`file.py`: `function`, `Class.method`"."""
+TICS = re.compile(r"\b(?:tells?|told|foreseen?|foresees?|in the place of|lets? expect)\b", re.I)
+"""Words for report, show, state; predicted; instead of; predict."""
 RUN = re.compile(r"run \S+ --out (?P<out>\S+)")
 LESS = {
     "ball.toml": {"load_ratio": [1.5, 6.0], "hardening": ["none", "kinematic"]},
@@ -435,6 +437,11 @@ def test_a_broken_link_is_found(tmp_path: Path) -> None:
     )
     wrong = ["gone.md", "../other.md#a-2", "#there", "../../outside.md", "also-gone.md"]
     assert broken_links(page, tmp_path) == wrong
+
+
+@pytest.mark.parametrize("page", [p for p in TEXTS if p.name != "CHANGELOG.md"], ids=str)
+def test_a_page_uses_plain_words(page: Path) -> None:
+    assert not TICS.findall(CODE.sub("", (ROOT / page).read_text()))
 
 
 @pytest.mark.parametrize("page", [p for p in TEXTS if p.name != "CHANGELOG.md"], ids=str)
