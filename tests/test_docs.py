@@ -1,17 +1,17 @@
 """What the pages show works, as a reader would try it.
 
-The blocks of a page run from top to bottom in one empty directory that holds a copy of the
-studies and scene files of `data`; so do those of every page that has any. All studies but the tours
-are on the coarsest meshes, those of punches in few increments, and with the values that the pages
-look at. What an earlier page has computed by the same command is there already. ``python`` blocks
-are programs, each in a file and a process of its own, as workers import it; in ``console`` blocks
-each line ``$ residua …`` runs in this process, studies too, and must succeed. A ``text`` block after
-one of these shows what it prints: its lines are printed in this order, among others, with equal
-words, and with numbers that differ by at most `SHOWN`. The ``sh`` block of the first page is sent
-to a service. A ``toml`` block after ``<!-- file NAME.toml -->`` is written to that file. A block
-after ``<!-- no-test -->`` is left out, which only those may be that need a server or compute for
-minutes. A block after ``<!-- from examples/NAME.py -->`` is not run: its lines stand in that
-script, which is. Links lead to files and headings that exist, and so do the files a page names.
+The blocks of a page run from top to bottom in one empty directory that holds a copy of the studies
+and scene files of `data`; so do those of every page that has any. All studies but the tours are on
+the coarsest meshes, those of punches in few increments, and with the values that the pages look at.
+What an earlier page has computed by the same command is there already. ``python`` blocks are
+programs, each in a file and a process of its own, as workers import it; in ``console`` blocks each
+line ``$ residua …`` runs in this process, studies too, and must succeed. A ``text`` block after one
+of these shows what it prints: its lines are printed in this order, among others, with equal words,
+and with numbers that differ by at most `SHOWN`. The ``sh`` block of the first page is sent to a
+service. A ``toml`` block after ``<!-- file NAME.toml -->`` is written to that file. A block after
+``<!-- no-test -->`` is left out, which only those may be that need a server or compute for minutes.
+A block after ``<!-- from examples/NAME.py -->`` is not run: its lines stand in that script, which
+is. Links lead to files and headings that exist, and so do the files a page names.
 """
 
 from __future__ import annotations
