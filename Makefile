@@ -36,8 +36,8 @@ lint: setup ## check style and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	@$(DENO) check --quiet --config service/pages/deno.json service/pages/static/*.js
-	@$(DENO) lint --quiet --config service/pages/deno.json service/pages/static
+	@$(DENO) check --quiet --config tests/architecture/deno.json service/pages/static/*.js
+	@$(DENO) lint --quiet --config tests/architecture/deno.json service/pages/static
 
 docs: setup ## write the reference of the public names as HTML into build/docs
 	$(BIN)/python -W error docs/reference/api.py build/docs

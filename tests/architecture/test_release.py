@@ -208,13 +208,15 @@ def test_a_mistake_in_a_script_of_the_pages_is_found(
     command: str, mistake: str, reason: str, tmp_path: Path
 ) -> None:
     lint = (ROOT / "Makefile").read_text().partition("\nlint:")[2].partition("\n\n")[0]
-    assert f"$(DENO) {command} --quiet --config service/pages/deno.json" in lint
-    pages = tmp_path / "pages"
-    shutil.copytree(ROOT / "service" / "pages", pages)
-    (pages / "static" / "wrong.js").write_text(mistake)
+    assert f"$(DENO) {command} --quiet --config tests/architecture/deno.json" in lint
+    static = tmp_path / "static"
+    shutil.copytree(ROOT / "service" / "pages" / "static", static)
+    (static / "wrong.js").write_text(mistake)
+    deno = [Path(sys.executable).parent / "deno", command]
+    config = Path(__file__).with_name("deno.json")
     done = subprocess.run(
-        [Path(sys.executable).parent / "deno", command, "--config", "deno.json", "static/wrong.js"],
-        cwd=pages, env=os.environ | {"DENO_DIR": str(tmp_path / "deno"), "NO_COLOR": "1"},
+        [*deno, "--config", config, static / "wrong.js"],
+        cwd=tmp_path, env=os.environ | {"DENO_DIR": str(tmp_path / "deno"), "NO_COLOR": "1"},
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 1
