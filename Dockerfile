@@ -21,7 +21,7 @@ COPY service service
 COPY residua residua
 COPY data data
 # Every file that is installed has a digest in a lock (`make lock`). `--build-arg MKL=yes` adds
-# Intel's PARDISO, whose licence is not free: docs/operations.md.
+# Intel's PARDISO, whose licence is not free: docs/howto/operations.md.
 ARG MKL=
 RUN pip install --require-hashes --requirement requirements.lock ${MKL:+--requirement mkl.lock} \
     && pip install --no-deps --no-build-isolation .

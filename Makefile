@@ -4,6 +4,7 @@ INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --con
 STAMP := .venv/installed
 COMPILED := .venv/compiled
 KERNELS := solver/rolling/kernels.py
+DENO = DENO_DIR=.venv/deno DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 # Python keeps what it has compiled, whatever the caller says: tests and studies start many processes.
 export PYTHONDONTWRITEBYTECODE :=
@@ -11,7 +12,7 @@ export PYTHONDONTWRITEBYTECODE :=
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run check test serve lint bench stress stress-service lock sbom clean
+.PHONY: help setup run check test serve lint docs gallery bench stress stress-service lock sbom clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -35,6 +36,14 @@ lint: setup ## check style and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	@$(DENO) check --quiet --config tests/architecture/deno.json service/pages/static/*.js
+	@$(DENO) lint --quiet --config tests/architecture/deno.json service/pages/static
+
+docs: setup ## write the reference of the public names as HTML into build/docs
+	$(BIN)/python -W error docs/reference/api.py build/docs
+
+gallery: setup ## compute and draw the pictures of docs/gallery.md that take minutes
+	$(BIN)/python docs/pictures/make.py
 
 bench: setup ## draw CPU time against error
 	$(BIN)/python -m tests.benchmarks
@@ -61,7 +70,7 @@ clean: ## remove the environment and caches; results in out/ stay
 # A new environment has the pip and the setuptools of the day when its Python was built.
 $(STAMP): pyproject.toml constraints.txt $(BIN)/python
 	$(INSTALL) pip setuptools
-	$(INSTALL) --editable '.[dev,mkl,parquet,zarr]'
+	$(INSTALL) --editable '.[dev,docs,mkl,parquet,zarr]'
 	@touch $@
 
 # Else the first run that needs a kernel would wait for the compiler, for 13 s.

@@ -10,12 +10,14 @@ from typing import Any, NoReturn
 
 from residua import commands, keys
 from residua.status import BAD_INPUT, complain
+from solver.version import __version__
 from studies.execution.limits import Limits
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser; `command` of its options is the function that carries them out."""
     whole = _Parser(prog="residua", description="Residual stress after elastic-plastic contact.")
+    whole.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     known = whole.add_subparsers(required=True, metavar="COMMAND")
 
     def add(name: str, command: Any, **defaults: Any) -> argparse.ArgumentParser:

@@ -1,11 +1,14 @@
 """What the pages show works, as a reader would try it.
 
-The blocks of a page run from top to bottom in one empty directory that holds a copy of the
-studies and scene files of `data`, the studies on the coarsest meshes, those of punches in few
-increments, and with the values that the pages look at; so do those of every page that has any. What
-an earlier page has computed by the same command is there already. ``python`` blocks are programs,
-each in a file and a process of its own, as workers import it; in ``console`` blocks each line
-``$ residua …`` runs in this process, studies too, and must succeed. A block after
+The blocks of a page run from top to bottom in one empty directory that holds a copy of the studies
+and scene files of `data`; so do those of every page that has any. All studies but the tours are on
+the coarsest meshes, those of punches in few increments, and with the values that the pages look at.
+What an earlier page has computed by the same command is there already. ``python`` blocks are
+programs, each in a file and a process of its own, as workers import it; in ``console`` blocks each
+line ``$ residua …`` runs in this process, studies too, and must succeed. A ``text`` block after one
+of these shows what it prints: its lines are printed in this order, among others, with equal words,
+and with numbers that differ by at most `SHOWN`. The ``sh`` block of the first page is sent to a
+service. A ``toml`` block after ``<!-- file NAME.toml -->`` is written to that file. A block after
 ``<!-- no-test -->`` is left out, which only those may be that need a server or compute for minutes.
 A block after ``<!-- from examples/NAME.py -->`` is not run: its lines stand in that script, which
 is. Links lead to files and headings that exist, and so do the files a page names.
@@ -14,13 +17,15 @@ is. Links lead to files and headings that exist, and so do the files a page name
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
+import runpy
 import shlex
 import shutil
+import subprocess
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -29,15 +34,19 @@ import pytest
 from residua.cli import main
 from solver.results.quantities import QUANTITIES
 from solver.shipped import SCENES
+from studies import open_netcdf
 from tests.architecture.sources import ROOT, tracked
 from tests.architecture.test_layers import LAYERS
 from tests.programs import Programs
+from tests.service.servers import Server
 
 TEXTS = [path for path in tracked() if path.suffix == ".md"]
 BLOCK = re.compile(
     r"(?P<skip><!-- no-test -->\n+)?"
     r"(?:<!-- from (?P<script>examples/\w+\.py) -->\n+)?"
-    r"^```(?P<language>python|console)\n(?P<text>.*?)^```",
+    r"(?:<!-- file (?P<file>[\w-]+\.toml) -->\n+)?"
+    r"^```(?P<language>(?(file)toml|(?:python|console|sh)))\n(?P<text>.*?)^```\n"
+    r"(?:\n```text\n(?P<shown>.*?)^```)?",
     re.DOTALL | re.MULTILINE,
 )
 COSTLY = re.compile(r"https?://|residua (?:run|serve|view|submit|status|cancel|fetch)")
@@ -47,6 +56,8 @@ LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 NAMED = re.compile(r"`((?:solver|studies|service|residua|tests|data|docs|examples)/[a-z0-9_./-]*)`")
 PLACE = re.compile(r"`((?:\w+/)*\w+\.py)`: ((?:`[\w.]+`(?:, )?)+)")
 """A file and what it holds, as in "`file.py`: `function`, `Class.method`"."""
+TICS = re.compile(r"\b(?:tells?|told|foreseen?|foresees?|in the place of|lets? expect)\b", re.I)
+"""Words for report, show, state; predicted; instead of; predict."""
 RUN = re.compile(r"run \S+ --out (?P<out>\S+)")
 LESS = {
     "ball.toml": {"load_ratio": [1.5, 6.0], "hardening": ["none", "kinematic"]},
@@ -63,6 +74,12 @@ lines that are left out."""
 TWO_SCREENS = 110
 """Lines of Markdown that the first page may have."""
 
+SHOWN = 1e-3
+"""Relative difference between a number that is printed and the one that a page shows."""
+
+TOUR = "run data/studies/tour.toml --out tour"
+"""The study of the first page."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
@@ -73,11 +90,13 @@ class Block:
     line: int
     skipped: bool
     script: str = ""
+    file: str = ""
+    shown: str = ""
 
     @property
     def runs(self) -> bool:
         """Whether it is run here."""
-        return not self.skipped and not self.script
+        return not self.skipped and not self.script and self.language != "sh"
 
     @property
     def commands(self) -> list[str]:
@@ -85,22 +104,22 @@ class Block:
         return re.findall(r"^\$ residua (.*)$", self.text, re.MULTILINE)
 
 
-def steps(page: list[Block], folder: Path) -> Iterator[tuple[int, list[str] | Path]]:
-    """Yield the line of what a page runs, in order, and commands or a file of Python.
+def steps(page: list[Block], folder: Path) -> Iterator[tuple[Block, list[str] | Path]]:
+    """Yield what a page runs, in order, and its commands or a file of Python.
 
-    Python is written to a file in a folder, before it is yielded.
+    Files are written to a folder, before it is yielded.
     """
-    together = groupby((block for block in page if block.runs), lambda block: block.language)
-    for language, group in together:
-        some = list(group)
-        if language == "console":
-            if commands := [command for block in some for command in block.commands]:
-                yield some[0].line, commands
+    for block in page:
+        if not block.runs:
             continue
-        for block in some:
+        if block.language == "toml":
+            (folder / block.file).write_text(block.text)
+        elif block.language == "python":
             # Empty lines in front: a traceback then names the line of the page.
             (folder / SNIPPET).write_text("\n" * block.line + block.text)
-            yield block.line, folder / SNIPPET
+            yield block, folder / SNIPPET
+        elif block.commands:
+            yield block, block.commands
 
 
 def carry_out(commands: list[str]) -> None:
@@ -111,10 +130,30 @@ def carry_out(commands: list[str]) -> None:
         assert main([*shlex.split(command), *alone]) == 0, f"$ residua {command}"
 
 
-def run_python(file: Path, programs: Programs) -> None:
-    """Run a file in its directory."""
+def alike(shown: str, printed: str) -> bool:
+    """Whether two words are equal, or two numbers nearly."""
+    try:
+        return math.isclose(float(shown), float(printed), rel_tol=SHOWN, abs_tol=1e-9)
+    except ValueError:
+        return shown == printed
+
+
+def not_printed(shown: str, printed: str) -> list[str]:
+    """Return the lines of a block that are not among those printed, in this order."""
+
+    def same(one: str, other: str) -> bool:
+        ours, theirs = (re.findall(r"[^\s,]+", line) for line in (one, other))
+        return len(ours) == len(theirs) and all(map(alike, ours, theirs))
+
+    rest = iter(printed.splitlines())
+    return [line for line in shown.splitlines() if not any(same(line, each) for each in rest)]
+
+
+def run_python(file: Path, programs: Programs) -> str:
+    """Run a file in its directory, and return what it prints."""
     done = programs.run(file, file.parent, os.environ | {"PYTHONPATH": str(ROOT)})
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
+    return done.stdout
 
 
 def blocks(text: str) -> list[Block]:
@@ -126,6 +165,8 @@ def blocks(text: str) -> list[Block]:
             line=text.count("\n", 0, match.start("text")),
             skipped=match["skip"] is not None,
             script=match["script"] or "",
+            file=match["file"] or "",
+            shown=match["shown"] or "",
         )
         for match in BLOCK.finditer(text)
     ]
@@ -136,7 +177,32 @@ PAGES = [page for page in TEXTS if blocks((ROOT / page).read_text())]
 
 def test_the_first_page_is_run_and_fits_two_screens() -> None:
     assert Path("README.md") in PAGES
-    assert len((ROOT / "README.md").read_text().splitlines()) <= TWO_SCREENS
+    text = (ROOT / "README.md").read_text()
+    assert len(text.splitlines()) <= TWO_SCREENS
+    assert len(LINK.findall(re.sub(r"!\[[^]]*\]\([^)]*\)", "", text))) <= 10
+
+
+def test_every_page_has_its_place_in_the_order_of_reading() -> None:
+    index = (ROOT / "docs/README.md").read_text()
+    linked = {Path("docs", target.partition("#")[0]) for target in LINK.findall(index)}
+    assert {page for page in TEXTS if page.parts[0] == "docs"} - linked == {Path("docs/README.md")}
+
+
+def test_the_gallery_has_every_picture_with_what_makes_it() -> None:
+    pictures = [path for path in tracked() if path.suffix in (".png", ".svg")]
+    assert sum((ROOT / path).stat().st_size for path in pictures) < 1.5e6
+    make = runpy.run_path(str(ROOT / "docs/pictures/make.py"))
+    sections = make["sections"]((ROOT / "docs/gallery.md").read_text())
+    made = [name for text in sections.values() for name in make["PICTURE"].findall(text)]
+    assert sorted(Path("docs/pictures", name) for name in made) == sorted(
+        path for path in pictures if path.parts[0] == "docs"
+    )
+    for name, text in sections.items():
+        page = text if make["BLOCK"].search(text) else (ROOT / f"docs/{name}.md").read_text()
+        written = "\n".join(block["text"] for block in make["BLOCK"].finditer(page))
+        for script in re.findall(r"examples/\w+\.py", written):
+            written += (ROOT / script).read_text()
+        assert all(picture in written for picture in make["PICTURE"].findall(text)), name
 
 
 def coarse(study: str) -> str:
@@ -183,12 +249,14 @@ def test_blocks_of_a_page_run(
     computed: dict[str, Path],
     programs: Programs,
     monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for folder in ("studies", "scenes"):
         shutil.copytree(ROOT / "data" / folder, tmp_path / "data" / folder)
     for study in (tmp_path / "data" / "studies").glob("*.toml"):
-        study.write_text(coarse(study.read_text()))
+        if not study.name.startswith("tour"):  # their pages show what they compute
+            study.write_text(coarse(study.read_text()))
     for name, entries in LESS.items():
         study = tmp_path / "data" / "studies" / name
         study.write_text(shortened(study.read_text(), entries))
@@ -196,13 +264,38 @@ def test_blocks_of_a_page_run(
     for command, out in results(found).items():
         if command in computed:
             shutil.copytree(computed[command], tmp_path / out)
-    for line, program in steps(found, tmp_path):
-        print(f"{page}:{line}")  # shown where it fails
+    for block, program in steps(found, tmp_path):
+        capsys.readouterr()
+        print(f"{page}:{block.line}")  # shown where it fails
         if isinstance(program, Path):
-            run_python(program, programs)
+            print(run_python(program, programs))
         else:
             carry_out(program)
+        printed = capsys.readouterr().out
+        assert not not_printed(block.shown, printed), printed
     computed |= {command: tmp_path / out for command, out in results(found).items()}
+
+
+@pytest.mark.pages
+def test_the_requests_of_the_first_page_are_answered_as_it_shows(
+    tmp_path: Path, computed: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if TOUR not in computed:
+        monkeypatch.chdir(ROOT)
+        carry_out([TOUR.replace("--out tour", f"--out {tmp_path / 'tour'}")])
+        computed[TOUR] = tmp_path / "tour"
+    (sent,) = (b for b in blocks((ROOT / "README.md").read_text()) if b.language == "sh")
+    shutil.copytree(computed[TOUR], tmp_path / "service" / "data")
+    server = Server(tmp_path / "service").start()
+    try:
+        requests = sent.text.replace("localhost:8000", f"localhost:{server.port}")
+        command = ["bash", "-euo", "pipefail", "-c", requests]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    finally:
+        server.close()
+    assert not not_printed(sent.shown, done.stdout), done.stdout
+    with open_netcdf(tmp_path / "tour.nc") as dataset:
+        assert dataset.sizes["friction"] == 2
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)
@@ -238,14 +331,41 @@ def test_every_kind_of_block_is_found(tmp_path: Path) -> None:
         "```console\n$ residua scenes punch\nthe answer\n```\n"
         "```console\n$ make run\n$ residua scenes 'a b'\n```\n```python\ny = 2\n```\n"
     )
-    program, server, command, _, last = found = blocks(page)
+    program, server, command, make, last = found = blocks(page)
     assert (program.language, program.text, program.line) == ("python", "x = 1\n", 3)
     assert (server.skipped, command.skipped) == (True, False)
     made = steps(found, tmp_path)
-    assert next(made) == (3, tmp_path / SNIPPET)
+    assert next(made) == (program, tmp_path / SNIPPET)
     assert (tmp_path / SNIPPET).read_text() == "\n\n\nx = 1\n"
-    assert next(made) == (command.line, ["scenes punch", "scenes 'a b'"])
-    assert list(made) == [(last.line, tmp_path / SNIPPET)]
+    assert next(made) == (command, ["scenes punch"])
+    assert next(made) == (make, ["scenes 'a b'"])
+    assert list(made) == [(last, tmp_path / SNIPPET)]
+
+
+def test_a_file_of_a_page_is_written_and_an_output_is_known(tmp_path: Path) -> None:
+    page = (
+        "<!-- file a.toml -->\n```toml\nb = 1\n```\n```toml\nnone = 1\n```\n"
+        "```python\nprint(1)\n```\n\n```text\n1\n```\n\nB\n\n```text\n2\n```\n"
+    )
+    file, program = blocks(page)
+    assert (program.shown, file.shown) == ("1\n", "")
+    assert [block for block, _ in steps([file, program], tmp_path)] == [program]
+    assert (tmp_path / "a.toml").read_text() == "b = 1\n"
+
+
+@pytest.mark.parametrize(
+    ("shown", "missing"),
+    [
+        ("a 1.000\nc -2,x\n", []),
+        ("a 1.0009\n", []),
+        ("a 1.002\n", ["a 1.002"]),
+        ("a 1\nd\n", ["d"]),
+        ("c -2,x\na 1\n", ["a 1"]),
+        ("a\n", ["a"]),
+    ],
+)
+def test_an_output_that_differs_from_what_is_shown_is_found(shown: str, missing: list[str]) -> None:
+    assert not_printed(shown, "a 1\nb\nc -2, x\n") == missing
 
 
 def test_the_results_of_a_page_are_known_by_the_command() -> None:
@@ -269,7 +389,7 @@ def test_the_first_command_that_fails_ends_a_page(
 
 
 def test_the_page_of_the_audit_names_every_figure_and_no_other():
-    named = set(re.findall(r"`(audit_\w+)`", (ROOT / "docs/audit.md").read_text()))
+    named = set(re.findall(r"`(audit_\w+)`", (ROOT / "docs/explanation/audit.md").read_text()))
     assert SCENES  # their modules declare the figures
     stored = {name for name in QUANTITIES if name.startswith("audit_")}
     assert named - {"audit_failed"} == stored
@@ -320,6 +440,11 @@ def test_a_broken_link_is_found(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("page", [p for p in TEXTS if p.name != "CHANGELOG.md"], ids=str)
+def test_a_page_uses_plain_words(page: Path) -> None:
+    assert not TICS.findall(CODE.sub("", (ROOT / page).read_text()))
+
+
+@pytest.mark.parametrize("page", [p for p in TEXTS if p.name != "CHANGELOG.md"], ids=str)
 def test_files_named_in_a_page_exist(page: Path) -> None:
     named = NAMED.findall((ROOT / page).read_text())
     assert not [name for name in named if not (ROOT / name).exists()]
@@ -341,7 +466,7 @@ def test_functions_named_in_a_page_stand_in_the_files_named_with_them(page: Path
 def test_the_page_of_the_architecture_has_every_layer_in_its_place() -> None:
     rows = re.findall(
         r"^\| `(\w+)/([\w/*]+?)(?:/|\.py)` \|",
-        (ROOT / "docs/architecture.md").read_text(),
+        (ROOT / "docs/explanation/architecture.md").read_text(),
         re.MULTILINE,
     )
     parts = [(name, layer.replace("/", ".")) for name, layer in dict.fromkeys(rows)]
@@ -357,7 +482,7 @@ def test_the_page_of_the_architecture_has_every_layer_in_its_place() -> None:
 
 
 def test_the_glossary_is_in_order_and_has_each_word_once() -> None:
-    text = (ROOT / "docs/glossary.md").read_text()
+    text = (ROOT / "docs/reference/glossary.md").read_text()
     words = [word.lower() for word in re.findall(r"^\*\*(.+?)\*\*", text, re.MULTILINE)]
     assert len(words) > 50
     assert words == sorted(set(words))

@@ -16,6 +16,11 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 
 
+def test_the_page_of_the_examples_names_each() -> None:
+    page = (ROOT / "examples/README.md").read_text()
+    assert not [path.name for path in EXAMPLES + NOTEBOOKS if f"]({path.name})" not in page]
+
+
 def test_there_are_examples() -> None:
     assert "own_law.py" in {path.name for path in EXAMPLES}
     assert "study_to_figure.ipynb" in {path.name for path in NOTEBOOKS}

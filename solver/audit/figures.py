@@ -1,4 +1,4 @@
-"""The figures of the audit, which every run has; `docs/audit.md` explains them."""
+"""The figures of the audit, which every run has; `docs/explanation/audit.md` explains them."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ _USUAL: Mapping[Accuracy, Mapping[str, float]] = {
     "standard": {"smallest_element": 5e-4, "growth": 1.4, "load_step": 0.05},
     "fine": {"smallest_element": 1e-4, "growth": 1.2, "load_step": 0.025},
 }
-"""Parameters of each accuracy; docs/accuracy.md has their errors."""
+"""Parameters of each accuracy; docs/explanation/accuracy.md has their errors."""
 _LARGEST, _PUNCH_LARGEST = 0.08, 0.25
 """Largest element sides along the contact, and along the height of the punch, over a."""
 _MOST_ELEMENTS = 60_000

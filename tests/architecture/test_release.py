@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import importlib
 import json
+import os
 import re
 import runpy
+import shutil
+import subprocess
+import sys
 from importlib.metadata import distribution
 from pathlib import Path
 
 import pytest
+import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
 import solver
+from residua.cli import main
 from tests.architecture.sources import PROJECT, ROOT, tracked
 
 CODE = re.compile(r"```.*?```|`[^`\n]+`", re.DOTALL)
@@ -157,3 +163,61 @@ def test_a_lock_is_made_where_the_image_is_at_home_and_never_empty(
     with pytest.raises(SystemExit, match=r"no package for a\.lock"):
         module["written"]({}, tmp_path / "a.lock", "", ())
     assert not list(tmp_path.iterdir())
+
+
+def test_the_command_prints_its_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match=r"^0$"):
+        main(["--version"])
+    assert capsys.readouterr().out == f"residua {solver.__version__}\n"
+
+
+def test_the_citation_has_what_the_format_requires_and_agrees_with_the_project() -> None:
+    """`CITATION.cff` is Citation File Format 1.2.0."""
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert cited["cff-version"] == "1.2.0" and cited["message"] and cited["title"]
+    assert cited["version"] == solver.__version__
+    assert cited["license"] == PROJECT["project"]["license"]
+    (holder,) = re.findall(r"^Copyright \(c\) \d+ (.+)$", (ROOT / "LICENSE").read_text(), re.M)
+    assert cited["authors"] == [{"name": holder}]
+
+
+@pytest.mark.processes
+def test_the_reference_of_public_names_is_written_without_a_warning(tmp_path: Path) -> None:
+    script = ROOT / "docs" / "reference" / "api.py"
+    done = subprocess.run(
+        [sys.executable, "-W", "error", script, tmp_path],
+        cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    for name in ("solver", "studies"):
+        page = (tmp_path / f"{name}.html").read_text()
+        shown = set(re.findall(r'<section id="(\w+)">', page))
+        assert shown == set(importlib.import_module(name).__all__)
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize(
+    ("command", "mistake", "reason"),
+    [
+        ("check", 'import { keep } from "./page.js";\nkeep(no);\n', "Cannot find name 'no'"),
+        ("lint", "let spare = 1;\n", "`spare` is never used"),
+    ],
+)
+def test_a_mistake_in_a_script_of_the_pages_is_found(
+    command: str, mistake: str, reason: str, tmp_path: Path
+) -> None:
+    lint = (ROOT / "Makefile").read_text().partition("\nlint:")[2].partition("\n\n")[0]
+    assert f"$(DENO) {command} --quiet --config tests/architecture/deno.json" in lint
+    static = tmp_path / "static"
+    shutil.copytree(ROOT / "service" / "pages" / "static", static)
+    (static / "wrong.js").write_text(mistake)
+    deno = [Path(sys.executable).parent / "deno", command]
+    config = Path(__file__).with_name("deno.json")
+    done = subprocess.run(
+        [*deno, "--config", config, static / "wrong.js"],
+        cwd=tmp_path, env=os.environ | {"DENO_DIR": str(tmp_path / "deno"), "NO_COLOR": "1"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert reason in done.stderr

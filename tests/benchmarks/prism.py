@@ -1,8 +1,8 @@
 """A steady pass over a prism: a given ellipse on a block, and a wheel on a rail, free rolling.
 
 The ellipse is that of the wheel on the rail of the thesis, p0 1 360 MPa, without hardening; the
-wheel is S1002 on 60E1 with 150 kN, kinematic hardening (docs/wheel-rail.md). Each series changes
-one thing of the base, elements and stations of 1 mm and a length of 64 mm with far field, and has
+wheel is S1002 on 60E1 with 150 kN, kinematic hardening. Each series changes one
+thing of the base, elements and stations of 1 mm and a length of 64 mm with far field, and has
 its own reference, finer in that thing.
 """
 

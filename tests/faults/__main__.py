@@ -19,7 +19,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.faults", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help="faults, or their beginnings")
     parser.add_argument("--tests", nargs="+", help="run these instead of the one of each fault")
-    parser.add_argument("--table", action="store_true", help="print the rows of docs/faults.md")
+    parser.add_argument("--table", action="store_true", help="print the rows of its page")
     given = parser.parse_args()
     chosen = [f for f in faults() if not given.names or f.name.startswith(tuple(given.names))]
     missed = 0

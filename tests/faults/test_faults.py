@@ -41,5 +41,5 @@ def test_a_text_that_is_not_there_once_is_refused() -> None:
 
 
 def test_the_documentation_has_the_table() -> None:
-    page = (ROOT / "docs/faults.md").read_text(encoding="utf-8").splitlines()
+    page = (ROOT / "docs/explanation/faults.md").read_text(encoding="utf-8").splitlines()
     assert [line for line in page if line.startswith("| `")] == [fault.row for fault in FAULTS]

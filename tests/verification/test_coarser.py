@@ -1,7 +1,8 @@
 """Contact of curved bodies in coarser steps and on coarser meshes: right, or not ok.
 
 Each scene is run with one, two and four times its increments' size, and with two on a mesh of twice
-the side. What is ok is within the errors that `docs/models.md` claims; what is coarser says so.
+the side. What is ok is within the errors that `docs/howto/models.md` claims; what is coarser says
+so.
 """
 
 from __future__ import annotations

@@ -1,6 +1,5 @@
 // Charts in the colours of the page, drawn by plotly.js.
 
-/* global Plotly */
 const RED_BLUE = ["#053061", "#2166ac", "#4393c3", "#92c5de", "#d1e5f0", "#f7f7f7", "#fddbc7", "#f4a582", "#d6604d", "#b2182b", "#67001f"];
 const WARM = ["#ffffcc", "#ffeda0", "#fed976", "#feb24c", "#fd8d3c", "#fc4e2a", "#e31a1c", "#bd0026", "#800026"];
 const VIRIDIS = ["#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"];
@@ -13,9 +12,11 @@ const own = () => getComputedStyle(document.documentElement);
 export const colour = (name) => own().getPropertyValue(`--${name}`).trim();
 export const KEYS = () => [1, 2, 3, 4, 5, 6].map((k) => colour(`k${k}`));
 
+/** @type {Map<Chart, (chart: Chart) => { traces: object[], layout: object }>} */
 const drawn = new Map();
 const sizes = new ResizeObserver((changes) => {
-  for (const { target } of changes) if (drawn.has(target) && target.data && target.clientWidth) draw(target, drawn.get(target));
+  const changed = new Set(changes.map(({ target }) => target));
+  for (const [chart, make] of drawn) if (changed.has(chart) && chart.data && chart.clientWidth) draw(chart, make);
 });
 
 function axis() {

@@ -1,8 +1,8 @@
 // The form of a new study: what it costs, and what is wrong in it, as one types.
 
-import { element, text } from "./page.js";
+import { element, encoded, text } from "./page.js";
 
-const form = document.querySelector("[data-study]");
+const form = /** @type {HTMLFormElement} */ (document.querySelector("[data-study]"));
 const REST = 450;
 const copies = form.querySelectorAll(".code pre");
 let asked = null;
@@ -16,7 +16,7 @@ const OF = {
 };
 let drawn = "";
 
-document.querySelector("[data-scene]").addEventListener("change", (event) => event.target.form.submit());
+document.querySelector("[data-scene]").addEventListener("change", (event) => /** @type {HTMLSelectElement} */ (event.target).form.submit());
 for (const each of document.querySelectorAll("[data-check], [data-take]")) each.hidden = true;
 
 const time = (seconds) => (seconds < 90 ? `${text(Number(seconds.toPrecision(2)))} s` : seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${text(Number((seconds / 3600).toPrecision(2)))} h`);
@@ -77,7 +77,7 @@ async function check() {
   const sent = new FormData(form); // one may type on before the answer comes
   try {
     const answer = await fetch(form.action, {
-      method: "POST", body: new URLSearchParams(sent), headers: { accept: "application/json" }, signal: asked.signal,
+      method: "POST", body: encoded(sent), headers: { accept: "application/json" }, signal: asked.signal,
     });
     if (!answer.ok || answer.redirected) {
       costs(null);
@@ -127,7 +127,7 @@ for (const name of ["dragover", "dragleave", "drop"]) {
   });
 }
 drop?.addEventListener("drop", ({ dataTransfer }) => {
-  const post = drop.querySelector("form");
+  const post = /** @type {HTMLFormElement} */ (drop.querySelector("form"));
   const files = [...dataTransfer.files];
   for (const [input, own] of [[post.scene, true], [post.meshes, false]]) {
     const list = new DataTransfer();

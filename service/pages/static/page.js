@@ -23,11 +23,14 @@ export function keep(changes, later = false) {
 
 const written = new Map(); // other names may be there more than once
 function write() {
-  const address = new URL(document.location);
+  const address = new URL(document.location.href);
   for (const [name, value] of written) value === null ? address.searchParams.delete(name) : address.searchParams.set(name, value);
   written.clear();
   history.replaceState(null, "", address);
 }
+
+// What a form without files sends.
+export const encoded = (/** @type {FormData} */ sent) => new URLSearchParams([...sent].map(([name, value]) => [name, String(value)]));
 
 // Replace the parts of this page that the service has changed, by the same page read anew.
 export async function renew(address, only) {

@@ -6,7 +6,7 @@ import { column, known, met, number, on, raw, shades, study, tell, told, value, 
 import { filter } from "./table.js";
 
 const TOP = 74, BOTTOM = 16, SIDE = 66, NEAR = 14, WIDE = 10, MOST = 9, NARROW = 96, SHADES = 24, MOVED = 4, END = 0.03;
-const canvas = document.querySelector("[data-parallel]");
+const canvas = /** @type {HTMLCanvasElement} */ (document.querySelector("[data-parallel]"));
 const tip = document.querySelector("[data-tip]");
 const section = canvas.closest("section");
 const pen = canvas.getContext("2d");
@@ -56,7 +56,9 @@ function paint() {
   Object.assign(canvas.style, { width: `${width}px`, height: `${height}px` });
   const at = picture.getContext("2d");
   at.scale(dense, dense);
-  const groups = new Map([["off", []], ["none", []], ...[...paints.keys()].map((key) => [key, []])]);
+  /** @type {Map<string | number, object[]>} */
+  const groups = new Map();
+  for (const key of ["off", "none", ...paints.keys()]) groups.set(key, []);
   for (const line of lines) groups.get(line.paint).push(line);
   const thin = lines.length > 300;
   for (const [key, group] of groups) {
@@ -257,7 +259,7 @@ const snapped = (share) => (share < END ? 0 : share > 1 - END ? 1 : share);
 function condition(axis, from, to) {
   const { low: least, high: most } = axis, [low, high] = [from, to].map(axis.at);
   const words = axis.labels ?? (Object.keys(axis.flags ?? {}).length ? axis.flags : null);
-  if (words) return Object.entries(words).filter(([code]) => code > low - 0.3 && code < high + 0.3).map(([, word]) => word).join(",") || null;
+  if (words) return Object.entries(words).filter(([code]) => Number(code) > low - 0.3 && Number(code) < high + 0.3).map(([, word]) => word).join(",") || null;
   const step = 10 ** Math.floor(Math.log10((most - least) / 1000));
   const said = (share, at) => (least === most || share === 0 ? least : share === 1 ? most : Number((Math.round(at / step) * step).toPrecision(12)));
   return `${said(from, low)}..${said(to, high)}`;

@@ -37,7 +37,7 @@ export class Pictures {
     try {
       this.fields = fields ?? (await json(`${root}/runs/${run}/fields`, signal));
     } catch (error) {
-      if (!signal.aborted) this.#each((part, chart) => fail(chart, error.message));
+      if (!signal.aborted) this.#each((chart) => fail(chart, error.message));
       return;
     }
     const empty = !this.fields.maps.length && !this.fields.lines.length;
@@ -47,7 +47,7 @@ export class Pictures {
 
   #each(act) {
     for (const chart of document.querySelectorAll("[data-chart]")) {
-      if (PARTS.includes(chart.dataset.chart)) act(chart.dataset.chart, chart);
+      if (PARTS.includes(chart.dataset.chart)) act(chart);
     }
   }
 

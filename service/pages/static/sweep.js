@@ -2,10 +2,10 @@
 
 import { colour, draw, fail, KEYS, named, ordered, plain } from "./charts.js";
 import { choice, element, keep, select, state, text, words } from "./page.js";
-import { holes, hover, known, met, number, on, shades, statusOf, study, reason, tell, unit, value, label, raw, wordsAt } from "./runs.js";
+import { holes, hover, known, met, number, on, shades, statusOf, study, reason, tell, unit, value, raw, wordsAt } from "./runs.js";
 
 const { axes, grid } = study;
-const chart = document.querySelector('[data-chart="sweep"]');
+const chart = /** @type {Chart} */ (document.querySelector('[data-chart="sweep"]'));
 const spot = (name) => document.querySelector(`[data-controls="${name}"]`);
 const strides = axes.map((_, k) => axes.slice(k + 1).reduce((size, { labels }) => size * labels.length, 1));
 const several = axes.filter(({ labels }) => labels.length > 1);
@@ -59,6 +59,8 @@ function held(x, y) {
   });
 }
 
+let latest = null, frame = 0;
+
 async function drawSweep() {
   const what = number(), possible = kinds();
   if (!what || !possible.length) {
@@ -68,10 +70,10 @@ async function drawSweep() {
   }
   document.querySelector(".study .sweep").classList.remove("bare");
   const kind = kindNow(possible);
-  const asked = (drawSweep.asked = Symbol(kind));
+  const asked = (latest = Symbol(kind));
   const [values] = await known(what);
   const kept = kind === "marks" ? await met() : null;
-  if (drawSweep.asked !== asked) return; // something else has been chosen meanwhile
+  if (latest !== asked) return; // something else has been chosen meanwhile
   const shown = kind === "marks" ? marked(what, values.length, kept) : gridded();
   document.getElementById("sweep-title").textContent = what.words.charAt(0).toUpperCase() + what.words.slice(1);
   controls(what, kind, possible, shown);
@@ -319,8 +321,8 @@ function holder(axis, at) {
 }
 
 function step() {
-  cancelAnimationFrame(step.asked);
-  step.asked = requestAnimationFrame(drawSweep);
+  cancelAnimationFrame(frame);
+  frame = requestAnimationFrame(drawSweep);
 }
 
 chart.addEventListener("keydown", (event) => {

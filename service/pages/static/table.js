@@ -1,6 +1,6 @@
 // The table of runs: its links and its form change the table alone, and what is drawn of its runs.
 
-import { keep, renew, state } from "./page.js";
+import { encoded, keep, renew, state } from "./page.js";
 import { study, tell } from "./runs.js";
 
 export async function filter(changes) {
@@ -10,14 +10,14 @@ export async function filter(changes) {
 }
 
 function turn(where) {
-  const wanted = new URL(where, document.location);
-  const own = ([name]) => name === "sort" || name === "page" || name.startsWith("where.");
+  const wanted = new URL(where, document.location.href);
+  const own = (/** @type {[string, string]} */ [name]) => name === "sort" || name === "page" || name.startsWith("where.");
   const before = [...state].filter(own).map(([name]) => [name, null]);
   return filter(Object.fromEntries([...before, ...[...wanted.searchParams].filter(own)]));
 }
 
 document.addEventListener("click", (event) => {
-  const link = event.target.closest("a");
+  const link = /** @type {Element} */ (event.target).closest("a");
   if (!link || event.ctrlKey || event.metaKey || event.shiftKey) return;
   if (link.dataset.choose) {
     event.preventDefault();
@@ -32,7 +32,8 @@ document.addEventListener("click", (event) => {
 });
 
 document.addEventListener("submit", (event) => {
-  if (!event.target.matches("[data-filters]")) return;
+  const form = /** @type {HTMLFormElement} */ (event.target);
+  if (!form.matches("[data-filters]")) return;
   event.preventDefault();
-  turn(`?${new URLSearchParams(new FormData(event.target))}`);
+  turn(`?${encoded(new FormData(form))}`);
 });
