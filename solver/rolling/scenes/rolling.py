@@ -202,7 +202,7 @@ class RollingParameters(WheelParameters):
             )  # fmt: skip
 
     def usual(self) -> Mapping[str, float]:
-        """Return element side, growth and advance of an accuracy; docs/explanation/accuracy.md has the errors.
+        """Return element side, growth and advance; for errors see docs/explanation/accuracy.md.
 
         The side is rounded to two digits.
         """
