@@ -22,7 +22,6 @@ from solver import (
     solve,
 )
 from solver.contact.problem import STICK
-from solver.fem.discretisation import Discretisation
 from solver.mesh import grid, mapped
 from solver.model.friction import Coulomb
 from solver.rolling.scenes.rolling import ROLLING, RollingParameters
@@ -188,7 +187,7 @@ def test_a_hot_wheel_that_is_dragged_keeps_the_limit(hot):
 
 @pytest.mark.solves
 def test_the_audit_asks_for_the_limit_of_the_hot_surface(monkeypatch):
-    monkeypatch.setattr(Discretisation, "hot", lambda self, surface: None)
+    monkeypatch.setattr("solver.contact.interface._hot", lambda part, surface: None)
     found = solve(heated(pushed_block(0.9 * FULL), "block", 200.0))
     assert any(text.startswith("audit_friction_excess") for text in found.audit().violations)
 

@@ -103,11 +103,11 @@ function mark() {
   }
 }
 
+const chooser = form.querySelector("select[name=choose]");
 function choose() {
-  const chosen = form.elements.choose.value;
-  for (const each of form.querySelectorAll("[data-table]")) each.hidden = each.dataset.table !== chosen;
+  for (const each of form.querySelectorAll("[data-table]")) each.hidden = each.dataset.table !== chooser.value;
 }
-form.elements.choose.addEventListener("change", choose);
+chooser.addEventListener("change", choose);
 choose();
 
 let timer = 0;
