@@ -17,10 +17,12 @@ from studies.views.summary import bar
 
 _REDRAW = 0.1
 """Seconds between two drawings of the bar."""
+_QUIET = 10.0
+"""Seconds after which a log gets a line although no run has ended."""
 
 
 class Progress:
-    """A bar on one line of a terminal; otherwise a plain line for each run.
+    """A bar on one line of a terminal; otherwise a plain line for each run, or each 10 s.
 
     Parameters
     ----------
@@ -38,6 +40,7 @@ class Progress:
         self._begun: float | None = None
         self._progress = 0.0
         self._drawn = 0.0
+        self._written = self._started
         self._seen = 0
         self._reused = 0
         self._failed = 0
@@ -57,6 +60,7 @@ class Progress:
             self._waits.add(event.message)
             left = "\n" if self._bar and self._drawn else ""
             print(f"{left}waiting: {event.message}", file=self._stream, flush=True)
+        now = time.monotonic()
         if event.kind == "run":
             self._seen += 1
             self._failed += event.status != OK
@@ -64,12 +68,18 @@ class Progress:
                 reason = f": {event.message}" if event.status != OK else ""
                 place = event.place or self._names[event.run]
                 line = f"{100 * event.progress:3.0f} %  {event.status}  {place}{reason}"
-                print(f"{line}{self._remaining(event.progress)}", file=self._stream, flush=True)
-        now = time.monotonic()
+                self._write(line, event, now)
+        elif event.kind == "path" and not self._bar and now - self._written > _QUIET:
+            self._write(f"{100 * event.progress:3.0f} %  computing", event, now)
         self._progress = event.progress
         if self._bar and now - self._drawn > _REDRAW:
             self._drawn = now
             self._draw()
+
+    def _write(self, line: str, event: StudyEvent, now: float) -> None:
+        """Write a line of a log, with the remaining time."""
+        self._written = now
+        print(f"{line}{self._remaining(event.progress)}", file=self._stream, flush=True)
 
     def close(self) -> None:
         """Draw the bar a last time and leave its line."""

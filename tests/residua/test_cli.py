@@ -367,6 +367,15 @@ def test_the_time_left_is_told_at_the_pace_so_far(
     assert left[0] in ("1:00:00", "1:30:00")
 
 
+def test_a_log_gets_a_line_while_a_long_run_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    study, screen, clock = fake_study(), io.StringIO(), [0.0]
+    monkeypatch.setattr("residua.progress.time", SimpleNamespace(monotonic=lambda: clock[0]))
+    progress = Progress(study, screen)
+    for clock[0], done in ((4.0, 0.0), (12.0, 0.01), (15.0, 0.1), (24.0, 0.2)):
+        progress(StudyEvent(kind="path", progress=done, path="a"))
+    assert screen.getvalue().splitlines() == ["  1 %  computing", " 20 %  computing  1:36 left"]
+
+
 @pytest.mark.parametrize("screen", [Terminal(), io.StringIO()])
 def test_runs_that_were_there_are_told(screen: io.StringIO) -> None:
     study = fake_study()
