@@ -364,6 +364,7 @@ def test_the_description_names_every_resource_and_its_problems(app: FastAPI) -> 
         "/runs/{run_id}/line.png",
         "/runs/{run_id}/fields",
         "/runs/{run_id}/values",
+        "/runs/{run_id}/values.csv",
         "/scenes",
         "/scenes/{name}",
         "/scenes/{name}/draw.png",

@@ -366,6 +366,7 @@ QUERIES = {
     "/studies/{study_id}/sensitivity": "?of=a",
     "/studies/{study_id}/plot.png": "?field=a",
     "/runs/{run_id}/values": "?field=a",
+    "/runs/{run_id}/values.csv": "?field=a",
     "/runs/{run_id}/map.png": "?field=a",
     "/runs/{run_id}/line.png": "?field=a",
     "/ui/scene.png": "?scene=punch",
