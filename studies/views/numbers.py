@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 import xarray as xr
 
 from studies.views.columns import unit_text
@@ -34,7 +35,11 @@ def _columns(dataset: xr.Dataset) -> Iterator[Column]:
 def _column(values: xr.DataArray, status: xr.DataArray, group: str) -> Column:
     """Return a column with a value for each run, also of a variable that not all axes change."""
     whole, _ = xr.broadcast(values, status)
-    flat = whole.transpose(*status.dims).to_numpy().ravel()
+    return column_over(values, whole.transpose(*status.dims).to_numpy().ravel(), group)
+
+
+def column_over(values: xr.DataArray, flat: np.ndarray, group: str) -> Column:
+    """Return the column of a variable, with its values as they are listed in ``flat``."""
     number = flat.dtype.kind in "fiu"
     return Column(
         name=str(values.name),

@@ -182,7 +182,7 @@ def _aligned(runs: xr.Dataset, axis: str, name: str, field: str, along: str | No
 
     values = xr.apply_ufunc(
         on_common, grid, runs[field], input_core_dims=[[name], [name]],
-        output_core_dims=[[name]], exclude_dims={name}, vectorize=True, keep_attrs=True,
+        output_core_dims=[[name]], exclude_dims={name}, vectorize=True,
     )  # fmt: skip
     found = runs.drop_dims(name).assign({field: values.assign_attrs(runs[field].attrs)})
     return found.assign_coords({name: xr.Variable(name, common, grid.attrs)})

@@ -11,7 +11,7 @@ import xarray as xr
 from solver.tensors import AXES
 from studies.errors import StudyError
 from studies.views.columns import unit_text
-from studies.views.picking import flags
+from studies.views.numbers import column_over
 from studies.views.plots.captions import DISTANCE
 from studies.views.plots.fields import (
     check_field,
@@ -26,7 +26,6 @@ from studies.views.plots.fields import (
     usual_field,
 )
 from studies.views.plots.mapped import mapped
-from studies.views.table import Column
 from studies.views.written import as_csv
 
 _NOTHING = {"MPa": 1e-3, "mm": 1e-9}
@@ -59,9 +58,9 @@ class Shown(NamedTuple):
         names = [*values.dims[: -len(self.places)], *self.places]
         there = values.notnull().to_numpy()
         at = [values[name].broadcast_like(values).transpose(*values.dims) for name in names]
-        columns = [_point(each, str(each.name), there) for each in at]
-        own = _point(values, self.head["name"], there)
-        yield from as_csv([*columns, own], np.arange(there.sum()))
+        every = (*at, values.rename(self.head["name"]))
+        columns = [column_over(each, each.to_numpy()[there], "point") for each in every]
+        yield from as_csv(columns, np.arange(there.sum()))
 
 
 def outline(run: xr.Dataset) -> dict[str, list[dict[str, Any]]]:
@@ -167,20 +166,6 @@ def _lines(run: xr.Dataset, field: str, component: str | None) -> Shown:
         "over": [_labels(values, name) for name in others],
     }
     return Shown(head, values, (at,))
-
-
-def _point(values: xr.DataArray, name: str, there: np.ndarray) -> Column:
-    """Return the column of a table of points."""
-    words, own = str(values.attrs.get("long_name", name)), values.to_numpy()[there]
-    kind = float if own.dtype.kind in "fiu" else object
-    return Column(
-        name=name,
-        words=words,
-        unit=_unit(values),
-        group="point",
-        flags=flags(values),
-        values=own.astype(kind),
-    )
 
 
 def _described(run: xr.Dataset, name: str) -> dict[str, Any]:

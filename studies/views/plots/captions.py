@@ -10,9 +10,8 @@ from typing import Any
 import xarray as xr
 
 from solver.errors import ModelError
-from solver.parameters import unmet
 from solver.tensors import AXES
-from studies.definition.parameters import build, defaults, parameters_of, plain
+from studies.definition.parameters import defaults, parameters_of, plain
 from studies.scenes.registry import scene_of
 from studies.storage.frame import FRACTION
 from studies.views.columns import counted
@@ -97,12 +96,12 @@ def setting(run: xr.Dataset) -> str:
     """Return the scene and what distinguishes this run from others, in words.
 
     These are its values on the axes of the sweep, and the parameters that differ from the scene's
-    defaults. The two-dimensional state is always named. Parameters without an effect are left out.
+    defaults. The two-dimensional state is always named.
     """
     scene = run.attrs["scene"]
     known = parameters_of(scene_of(run.attrs))
     given: Mapping[str, Any] = json.loads(run.attrs["parameters"])
-    usual, idle = _usual(run, given)
+    usual = _usual(run, given)
     plane = given.get("state")
     state = [words(plane)] if isinstance(plane, str) and "state" not in run.coords else []
     place = [
@@ -112,7 +111,7 @@ def setting(run: xr.Dataset) -> str:
             each.attrs.get("units", ""),
         )
         for name, each in run.coords.items()
-        if each.ndim == 0 and not str(name).endswith(FRACTION) and name not in idle
+        if each.ndim == 0 and not str(name).endswith(FRACTION)
     ]
     others = [
         named(name, value, known[name].unit)
@@ -120,18 +119,14 @@ def setting(run: xr.Dataset) -> str:
         if name in known
         and name not in run.coords
         and value not in (None, usual[name])
-        and name not in idle
         and not (state and name == "state")
     ]
     parts = [scene, *state, *place, *others]
     return f"{_STAY}· ".join(part.replace(" ", _STAY) for part in parts)
 
 
-def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> tuple[dict[str, Any], set[str]]:
-    """Return the default parameters of a run, and the names of those without an effect in it.
-
-    For several runs these are the defaults that they declare.
-    """
+def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the default parameters of a run; for several runs, the defaults that they declare."""
     scene = scene_of(run.attrs)
     known = parameters_of(scene)
     swept = {
@@ -139,12 +134,10 @@ def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> tuple[dict[str, Any], s
         for name, each in run.coords.items()
         if name in known and each.ndim == 0
     }
-    own = {name: value for name, value in {**given, **swept}.items() if name in known}
     try:
-        usual, parameters = defaults(scene, own), build(scene, own)
+        return defaults(scene, {**given, **swept})
     except ModelError:  # the parameters are consistent only with the swept values
-        return {name: parameter.default for name, parameter in known.items()}, set()
-    return usual, {name for name in known if unmet(parameters, name)}
+        return {name: parameter.default for name, parameter in known.items()}
 
 
 def short_number(value: float, digits: int = 4) -> str:
