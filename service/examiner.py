@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +71,7 @@ def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examin
     def find(name: str) -> Scene | None:
         return store.scene(store.scene_id(name))
 
-    study = Study.known(content, find, store.definition)
-    bounds.check_size(study, store)
+    study = Study.known(content, find, store.definition, partial(bounds.check_count, store))
+    bounds.check_size(study)
     cost = estimate(study.checked(), store, bounds)
     return Examined(study, list(study.run_ids()), cost)

@@ -253,7 +253,8 @@ def one_of(name: Any, names: Iterable[str]) -> str:
 
 def nearest(name: Any, names: Iterable[str]) -> str:
     """Return ``"; did you mean …?"`` when one of `names` resembles `name`, else nothing."""
-    matches = difflib.get_close_matches(str(name), list(names)[:COMPARED], n=1)
+    text = name if isinstance(name, str) else ""
+    matches = difflib.get_close_matches(text, list(names)[:COMPARED], n=1)
     return f"; did you mean {cut(matches[0], LONGEST_FIELD)}?" if matches else ""
 
 
@@ -281,6 +282,7 @@ _WORDS = {
     "model_type": "must be a table",
     "model_attributes_type": "must be a table",
     "dict_type": "must be a table",
+    "list_type": "must be a list",
     "tuple_type": "must be a list",
     "enum": "must be {expected}",
     "extra_forbidden": "is not known here",
@@ -300,9 +302,8 @@ def worded(error: Mapping[str, Any]) -> str:
     """Return what is allowed for the input of a pydantic error."""
     words = _WORDS.get(error["type"])
     if error["type"] == "literal_error":
-        return one_of(
-            error["input"], filter(None, re.findall(r"'([^']*)'", error["ctx"]["expected"]))
-        )
+        known = [*filter(None, re.findall(r"'([^']*)'", error["ctx"]["expected"]))]
+        return one_of(error["input"], known) if len(known) > 1 else f"must be {known[0]}"
     if error["type"] in ("float_type", "int_type") and is_quantity(error["input"]):
         return f"{words} without a unit: in N, mm, MPa, t, s, K, degrees"
     return words.format(**error.get("ctx", {})) if words else str(error["msg"])

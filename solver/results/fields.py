@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -13,6 +13,7 @@ from solver.contact.state import BodyState, State
 from solver.fem.discretisation import Discretisation
 from solver.fem.fields import Sampler, recovered_beside
 from solver.results.body_fields import BodyValues
+from solver.results.mesh_fields import MeshFields, counterclockwise
 from solver.results.view import Places
 from solver.tensors import not_below_zero, to_tensor, von_mises
 from solver.typing import Array
@@ -112,6 +113,34 @@ class SystemFields:
             BodyValues(*(interpolated(sampler, values, name) for name in BodyValues._fields))
             for values in (self.at_nodes(at, places.body) for at in states)
         ]
+
+    def on_mesh(
+        self, states: Mapping[str, Solved], beside: Callable[[], MeshFields] | None = None
+    ) -> MeshFields:
+        """Return the fields of all bodies at the nodes of their meshes.
+
+        Parameters
+        ----------
+        states : state at each stage
+        beside : function that returns the fields of further bodies at the same stages
+        """
+        wholes = {name: self.system.full(name) for name in self.system.names}
+        bodies, first = {}, 0
+        for name, whole in wholes.items():
+            cells = whole.basis.element_dofs.T
+            if len(whole.X) == 2:  # cells in three dimensions have no orientation to correct
+                cells = counterclockwise(cells, whole.X)
+            bodies[name] = (whole.body.element, first + cells)
+            first += whole.X.shape[1]
+        stages = {}
+        for stage, at in states.items():
+            each = [self.at_nodes(at, name)._asdict() for name in wholes]
+            stages[stage] = {
+                name: np.concatenate([f[name] for f in each], axis=-1) for name in each[0]
+            }
+        X = np.hstack([whole.X for whole in wholes.values()])
+        found = MeshFields(X=X, bodies=bodies, stages=stages)
+        return found if beside is None else found.joined(beside())
 
 
 def interpolated(sampler: Sampler, values: BodyValues, name: str) -> Array:

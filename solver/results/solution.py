@@ -36,7 +36,7 @@ from solver.results.cycles import decided, shakedown_of
 from solver.results.export import write_vtu
 from solver.results.fields import SystemFields
 from solver.results.history import Observed, observe
-from solver.results.mesh_fields import MeshFields, mesh_fields
+from solver.results.mesh_fields import MeshFields
 from solver.results.shakedown import Shakedown
 from solver.results.view import Places
 from solver.tensors import to_tensor
@@ -193,7 +193,7 @@ class Solution:
 
     def mesh_fields(self) -> MeshFields:
         """Return the fields at the nodes of all bodies at all stages."""
-        return mesh_fields(self._fields, self.stages)
+        return self._fields.on_mesh(self.stages)
 
     def save(self, path: str | Path) -> None:
         """Write the model and its states to a file, for `load`."""

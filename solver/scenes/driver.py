@@ -19,7 +19,6 @@ from solver.loading.program import Program, walked
 from solver.loading.walker import Walker
 from solver.results.acting import acting_on
 from solver.results.cycles import decided
-from solver.results.mesh_fields import mesh_fields
 from solver.results.outlines import outlines, singular_points
 from solver.results.quantities import Quantity
 from solver.results.record import Record, Status
@@ -47,7 +46,7 @@ def record(scene: Scene, run: FinishedRun) -> Record:
     messages = run.doubts + check.violations + check.outside + run.notes + check.warnings + own
     return replace(
         _labelled(scene, run, status, messages, values),
-        mesh=partial(mesh_fields, run.samples.fields, states, run.beside),
+        mesh=partial(run.samples.fields.on_mesh, states, run.beside),
     )
 
 

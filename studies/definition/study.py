@@ -27,10 +27,10 @@ from studies.definition.parameters import build, parameters_of
 from studies.definition.points import ENTRIES, POINT, Points
 from studies.definition.sampling import Sample
 from studies.definition.schema import Context, Settings, StudyTable, Text, parsed
-from studies.definition.sweep import Axes, Sweep, labels, linked_values, owners
+from studies.definition.sweep import Axes, Sweep, labels, linked_values, owners, run_count
 from studies.definition.vocabulary import taken
 from studies.errors import Mistakes, SceneError, StudyError
-from studies.kinds import KINDS
+from studies.kinds import KINDS, kind_of
 from studies.kinds.kind import Kind
 from studies.kinds.sweep import SweepStudy
 from studies.scenes.names import in_use
@@ -39,10 +39,17 @@ from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
 Kept = Callable[[str], Mapping[str, Any] | None]
 """Returns the content of a study that is known by its name or its id; None if there is none."""
 
+Count = Callable[[int, Scene, Any], None]
+"""Accepts a number of runs of a scene, which keep what the entry ``keep`` says, or raises."""
+
 
 def _none(name: str) -> None:
     """Know no study."""
     return
+
+
+def _any_count(runs: int, scene: Scene, keep: Any) -> None:
+    """Accept any number of runs."""
 
 
 def _printable(text: str) -> str:
@@ -168,17 +175,22 @@ class Study(StudyTable):
 
     @classmethod
     def known(
-        cls, content: Mapping[str, Any], scenes: Find = nothing, studies: Kept = _none
+        cls,
+        content: Mapping[str, Any],
+        scenes: Find = nothing,
+        studies: Kept = _none,
+        count: Count = _any_count,
     ) -> Self:
         """Return the study without checking its combinations; the rest is checked.
 
         Use it for content that `from_dict` has accepted before, and to get the size of a study
-        before `checked`.
+        before `checked`. ``count`` can refuse it before the values of its axes are read.
         """
         if not isinstance(content, Mapping):
             raise StudyError("study", content, "must be a table with name, scene and sweep")
         if EXTENDS in content:
-            content = cls._extended(content, scenes, studies)
+            content = cls._extended(content, scenes, studies, count)
+        runs = run_count(content)
         given, wrong, context = {**content}, Mistakes(), Context(None)
         try:
             context.found = scene_named(given.get("scene"), scenes)
@@ -188,6 +200,8 @@ class Study(StudyTable):
         except StudyError as error:
             wrong.add("", error)
             given["scene"] = ""
+        if context.found is not None and kind_of(given).everywhere:  # else its axes are no runs
+            count(runs, context.found, given.get("keep", ""))
         entries = {name: given.pop(name) for name in KINDS if name in given}
         of_points = {entry: given.pop(entry) for entry in ENTRIES if entry in given}
         with wrong.at():
@@ -247,14 +261,16 @@ class Study(StudyTable):
                 add(field, value, allowed)
 
     @classmethod
-    def _extended(cls, content: Mapping[str, Any], scenes: Find, studies: Kept) -> dict[str, Any]:
+    def _extended(
+        cls, content: Mapping[str, Any], scenes: Find, studies: Kept, count: Count
+    ) -> dict[str, Any]:
         """Return the content of a study that extends another one, in full."""
         named = content[EXTENDS]
         theirs = studies(named) if isinstance(named, str) else named
         if not isinstance(theirs, Mapping):
             allowed = "must be a study file, or name or id of a study of the output directory"
             raise StudyError(EXTENDS, named, allowed)
-        base = cls.known(theirs, scenes, studies)
+        base = cls.known(theirs, scenes, studies, count)
         if not base.kind.everywhere:
             raise StudyError(EXTENDS, base.name, "chooses its runs itself: extend another study")
         own = content.get("scene", base.scene)
@@ -266,7 +282,8 @@ class Study(StudyTable):
             raise StudyError("parameters", parameters, allowed)
         adds = ("sweep", *ENTRIES)
         added = {key: content[key] for key in adds if key in content}
-        more = cls.known({"name": base.name, "scene": base.scene, **added}, scenes).sweep
+        added |= {"name": base.name, "scene": base.scene}
+        more = cls.known(added, scenes, count=count).sweep
         axes = Extended(base.name, base.sweep, base.fixed).with_axes(more)
         rest = {key: each for key, each in content.items() if key not in (EXTENDS, *adds)}
         fixed = {key: value for key, value in base.parameters.items() if key not in owners(axes)}

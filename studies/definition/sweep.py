@@ -20,6 +20,7 @@ from solver.results.quantities import QUANTITIES
 from studies.definition.identity import canonical
 from studies.definition.parameters import Parameter
 from studies.definition.points import (
+    ENTRIES,
     POINT,
     checked_points,
     describes_points,
@@ -144,9 +145,6 @@ def checked_axes(content: Any, context: Context) -> Axes:
                 allowed = f"sets {parameter}, {where}: keep one"
                 wrong.add("", StudyError(name, content[name], allowed))
     wrong.report()
-    if (runs := math.prod(map(len, axes.values()))) > MAXIMUM_RUNS:
-        sizes = " x ".join(f"{len(axis)} {name}" for name, axis in axes.items())
-        raise StudyError("", f"{runs} runs", f"at most {MAXIMUM_RUNS} runs ({sizes})")
     context.swept = axes
     return axes
 
@@ -196,11 +194,38 @@ def labels(name: str, axis: list[Any] | LinkedAxis) -> list[Any]:
     return [each.at for each in positions(name, axis)]
 
 
+def run_count(content: Mapping[str, Any]) -> int:
+    """Return the number of runs that the axes of a study describe, before one is made.
+
+    It is the product of the lengths of lists and tables, and of the ``num`` of ranges and samples.
+
+    Raises
+    ------
+    StudyError
+        if it is larger than `MAXIMUM_RUNS`
+    """
+    sweep = content.get("sweep", {})
+    axes = {entry: content[entry] for entry in ENTRIES if entry in content}
+    axes |= sweep if isinstance(sweep, Mapping) else {}
+    sizes = {str(name): _length(axis) for name, axis in axes.items()}
+    runs = math.prod(sizes.values())
+    if runs > MAXIMUM_RUNS:
+        listed = " x ".join(f"{size} {name}" for name, size in sizes.items())
+        raise StudyError("sweep", f"{runs} runs", f"at most {MAXIMUM_RUNS} runs ({listed})")
+    return runs
+
+
+def _length(axis: Any) -> int:
+    """Return the number of positions of an axis as it is given; 1 of what is no axis."""
+    num = axis.get("num") if isinstance(axis, Mapping) else None
+    if isinstance(num, int):  # of a range or a sample: a label of this name has a table
+        return num if 0 < num <= MAXIMUM_RUNS else 1  # what makes it refuses others
+    return max(len(axis), 1) if isinstance(axis, list | tuple | Mapping) else 1
+
+
 def _axis(name: Any, content: Any, context: Context) -> list[Any] | LinkedAxis:
     """Return an axis, normalised."""
     known = context.known
-    if isinstance(content, list | tuple | Mapping) and len(content) > MAXIMUM_RUNS:
-        raise StudyError("", f"{len(content)} values", f"at most {MAXIMUM_RUNS} are allowed")
     if name in known and isinstance(content, Mapping):
         if not {"start", "stop"} <= content.keys():
             allowed = (

@@ -13,7 +13,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.memory import most_kept
-from solver.scenes import Effort
+from solver.scenes import Effort, Scene
 from studies.definition.cases import LoadingPath
 from studies.definition.parameters import build
 from studies.definition.study import Study
@@ -91,8 +91,8 @@ class Bounds:
     cpu_seconds: float | None = None
     bytes: int | None = None
 
-    def check_size(self, study: Study, store: Store) -> None:
-        """Refuse a study of too many runs, before each run is checked.
+    def check_count(self, store: Store, runs: int, scene: Scene, keep: Any) -> None:
+        """Refuse a number of runs, before one of them is made.
 
         What the runs that `store` can lack will store is at least that of the scene's usual files.
 
@@ -101,12 +101,21 @@ class Bounds:
         StudyError
             naming the bound, and the setting that holds it
         """
-        self._refuse("runs", study.size)
+        self._refuse("runs", runs)
         there = store.catalogue.counts()
-        lacking = study.expansion.size - sum(there.get(status, 0) for status in SOLVED)
-        if study.kind.everywhere and lacking > 0:  # else its axes are no runs
-            usual = _file_size(study.problem.name, study.keep, store)
-            self._refuse("bytes", lacking * usual * _COMBINED)
+        lacking = runs - sum(there.get(status, 0) for status in SOLVED)
+        if lacking > 0:
+            self._refuse("bytes", lacking * _file_size(scene.name, keep, store) * _COMBINED)
+
+    def check_size(self, study: Study) -> None:
+        """Refuse a study of too many runs, before each run is checked.
+
+        Raises
+        ------
+        StudyError
+            naming the bound, and the setting that holds it
+        """
+        self._refuse("runs", study.size)
 
     def check(self, estimate: Estimate) -> None:
         """Refuse a study whose estimate exceeds a bound; None in the estimate is accepted.

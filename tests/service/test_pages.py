@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import re
@@ -16,56 +17,44 @@ from studies import open_netcdf
 from tests.architecture.sources import ROOT
 from tests.service.servers import Server
 
-BLOCK = re.compile(r"^```sh\n(?P<text>.*?)^```", re.DOTALL | re.MULTILINE)
-PLACEHOLDER = re.compile(r"(?P<name>ID|RUN)=\.\.\.")
-FOUND_IN = {
-    "ID": re.compile(r"^location: /studies/([0-9a-f]{32})\s*$", re.IGNORECASE | re.MULTILINE),
-    "RUN": re.compile(r'"items":\[\{"id":"([0-9a-f]{32})"'),
-}
-"""Where the reader finds what a placeholder stands for in the answer just received."""
+BLOCK = re.compile(
+    r"^```sh\n(?P<text>.*?)^```(?:\n\n```text\n(?P<answer>.*?)^```)?", re.DOTALL | re.M
+)
 
 
-def commands(page: str) -> list[str]:
-    """Return the commands of the page's one block of curl lines."""
-    (block,) = (match["text"] for match in BLOCK.finditer(page) if "curl" in match["text"])
-    return [text.strip() for text in re.split(r"^(?=curl |[A-Z]+=)", block, flags=re.M) if text]
+def curl_blocks(page: str) -> list[tuple[str, str]]:
+    """Return the blocks of curl lines of a page, each with the answer that the page shows."""
+    found = BLOCK.finditer((ROOT / page).read_text())
+    return [(each["text"], each["answer"] or "") for each in found if "curl" in each["text"]]
 
 
 @pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
-@pytest.mark.parametrize("page", ["README.md", "service/README.md"])
-def test_the_curl_lines_of_a_page_work(service: Server, page: str, tmp_path: Path) -> None:
-    (tmp_path / ".curlrc").write_text("fail-with-body\nsilent\nshow-error\nmax-time = 120\n")
-    (tmp_path / "data").symlink_to(ROOT / "data")
-    environment = os.environ | {"CURL_HOME": str(tmp_path)}
-    answers: list[str] = []
-    lines = commands((ROOT / page).read_text())
-    for command in lines:
-        if placeholder := PLACEHOLDER.match(command):
-            name = placeholder["name"]
-            found = FOUND_IN[name].search(answers[-1])
-            assert found, answers[-1]
-            environment[name] = found[1]
-            continue
-        done = subprocess.run(
-            ["bash", "-eu", "-c", command.replace("localhost:8000", f"127.0.0.1:{service.port}")],
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=150,
-            check=False,
-        )
-        assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
-        answers.append(done.stdout)
+def test_the_curl_lines_of_the_pages_work(service: Server, tmp_path: Path) -> None:
+    """Those of the page of the service are for the study of the first page."""
+    (tmp_path / ".curlrc").write_text("fail-with-body\nshow-error\nmax-time = 120\n")
 
-    assert re.match(r"HTTP/1.1 20[01] ", answers[0])
-    assert re.search(r'"status": ?"successful"', answers[1])
-    assert any(json.loads(text)["total"] > 0 for text in answers if text.startswith("{"))
-    data_sets, pictures = list(tmp_path.glob("*.nc")), list(tmp_path.glob("*.png"))
-    assert len(data_sets) == 1
-    with open_netcdf(data_sets[0]) as dataset:
-        assert dataset.attrs["id"] == environment["ID"]
-        assert (dataset["status"] == "ok").all()
-    for picture in pictures:
-        assert matplotlib.image.imread(picture).std() > 0.01
-    assert len(data_sets) + len(pictures) == sum(" -o " in line for line in lines)
+    def typed(text: str, **given: str) -> str:
+        done = subprocess.run(
+            ["bash", "-eu", "-c", text.replace("localhost:8000", f"127.0.0.1:{service.port}")],
+            cwd=tmp_path, env=os.environ | {"CURL_HOME": str(tmp_path)} | given, timeout=150,
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, f"{text}\n{done.stdout}\n{done.stderr}"
+        return done.stdout
+
+    ((posting, shown),) = curl_blocks("README.md")
+    rows, expected = (list(csv.DictReader(text.splitlines())) for text in (typed(posting), shown))
+    assert [sorted(row) for row in rows] == [sorted(row) for row in expected]
+    for row, other in zip(rows, expected, strict=True):
+        assert {name: float(value) for name, value in row.items()} == pytest.approx(
+            {name: float(value) for name, value in other.items()}, rel=1e-6
+        )
+    with open_netcdf(tmp_path / "tour.nc") as dataset:
+        assert dataset["status"].size == len(rows) and (dataset["status"] == "ok").all()
+
+    (looking, _), *_ = curl_blocks("service/README.md")
+    listing, placeholder, drawing = re.split(r"^(RUN=.*\n)", looking, flags=re.M)
+    runs = json.loads(typed(listing))["items"]
+    assert placeholder and len(runs) == 2
+    typed(drawing, RUN=runs[0]["id"])
+    assert matplotlib.image.imread(tmp_path / "map.png").std() > 0.01

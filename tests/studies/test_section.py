@@ -21,7 +21,6 @@ from solver.results.export import to_meshio
 from solver.results.extremes import residual_extremes
 from solver.results.fields import SystemFields
 from solver.results.maps import isochromatics, maps, profiles, surfaces
-from solver.results.mesh_fields import mesh_fields
 from solver.results.named_places import NamedPlaces, at_named_places
 from solver.results.record import Status
 from solver.results.requested import RequestedNumber
@@ -176,7 +175,7 @@ def records(parameters: RailParameters, values: Any, monitor: Any) -> Iterator[A
         outputs = (maps, isochromatics, profiles, surfaces, residual_extremes)
         found = {**_merged(run, outputs), **at_named_places(run, PLACES, ())}
         record = _labelled(RAIL, run, Status.OK, (), found)
-        fields = mesh_fields(run.samples.fields, run.outcome.points)
+        fields = run.samples.fields.on_mesh(run.outcome.points)
         yield replace(record, mesh=lambda fields=fields: fields)
 
 

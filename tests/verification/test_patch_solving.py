@@ -188,7 +188,7 @@ def test_bad_input_is_named() -> None:
     cases = (
         ({"friction": 11.0}, "friction = 11.0: must be at least 0 and at most 10"),
         ({"friction": Worn()}, "must not depend on slip or plastic strain on a track without ends"),
-        ({"force": 0.0}, "force = 0.0: must be positive"),
+        ({"force": 0.0}, "force = 0.0: must be greater than 0"),
         ({"compliance": np.ones((5, 15, 3, 15, 3))}, "must be (15 or more, 15, 3, 15, 3)"),
         ({"compliance": 0 * surface_of(grid), "wheel": replace(wheel, elasticity=rigid)},
          "surface and wheel must not both be rigid"),

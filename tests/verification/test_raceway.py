@@ -197,7 +197,7 @@ def test_the_scene_is_a_pass_of_the_given_ellipse() -> None:
 def test_all_passes_have_one_load_so_that_each_begins_with_the_strain_of_the_last(
     load: Literal["hertz", "contact"],
 ) -> None:
-    raceway = RolledRaceway(SCENE.parameters(accuracy="draft", load=load))
+    raceway = RolledRaceway(SCENE.parameters(accuracy="draft", load=load, passes=2))
     track = raceway.track(1.0)
     assert raceway.load(track, 0) is raceway.load(track, 1)
 

@@ -131,7 +131,7 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "rigid.plate.surfaces.face.points[0][1]",
         "must be a number",
     ),
-    "unknown word": (put("kinematics", "flat"), "kinematics", "'plane_strain'"),
+    "unknown word": (put("kinematics", "flat"), "kinematics", "one of plane_strain, "),
     "unknown element": (
         put("bodies", "upper", "element", "hex9"),
         "bodies.upper.element",

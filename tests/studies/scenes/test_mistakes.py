@@ -199,7 +199,7 @@ def test_of_thousands_of_names_ten_are_told() -> None:
 
 
 def test_names_that_the_documentation_lists_as_taken_are_refused() -> None:
-    text = (Path(__file__).parents[3] / "docs" / "scene-files.md").read_text()
+    text = (Path(__file__).parents[3] / "docs" / "reference" / "scene-files.md").read_text()
     _, _, listed = text.partition("name of a variable or dimension of a data set:")
     names = {*re.findall(r"`(\w+)`", listed.partition(", nor a longer one")[0])}
     assert {"force", "depth", "s", "stage", "status"} < names < {*QUANTITIES, *IN_SPACE, *RESERVED}
