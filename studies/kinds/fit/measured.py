@@ -22,7 +22,7 @@ from studies.definition.line import Read, picked
 from studies.definition.parameters import in_unit
 from studies.definition.quantity import Variable, known_variable
 from studies.definition.schema import Context, StudyTable, is_finite
-from studies.definition.sweep import standings
+from studies.definition.sweep import linked_values
 from studies.errors import StudyError, Unchecked, one_of
 from studies.units import UnitError, number_in, under
 
@@ -125,7 +125,7 @@ class MeasuredLine(StudyTable):
         if self.over and (count != len(self.values) or len({*self.places}) < 2):
             two = f"must be as many as the values, {len(self.values)}, and two different ones"
             raise StudyError("places", f"{count} numbers", f"{two} at least")
-        axes = dict.fromkeys(n for each in standings(Context.of(info).axes) for n in each.at)
+        axes = {**(swept := Context.of(info).axes), **linked_values(swept)}
         for name, value in self.at.items():
             if name not in axes and name not in quantity.dims:
                 raise StudyError(f"at.{name}", value, one_of(name, [*axes, *quantity.dims]))

@@ -102,7 +102,14 @@ def _between(content: Any, info: ValidationInfo) -> list[float]:
         raise Unchecked
     if not isinstance(content, list | tuple):
         raise StudyError("", content, "must be [lowest, highest], the first bracket")
-    ends = Range.read(content, Context.of(info).known[info.data["parameter"]])
+    name = info.data["parameter"]
+    try:
+        ends = Range.read(content, Context.of(info).known[name])
+    except StudyError as error:
+        if name != Context.of(info).scene.branch:
+            raise
+        allowed = f"{error.allowed}, of {name}, which varies unless goal.parameter is another"
+        raise StudyError(error.field, error.value, allowed) from None
     return [ends.start, ends.stop]
 
 

@@ -48,6 +48,7 @@ class Minimise(Ranged):
     where: Annotated[
         list[OneCondition],
         BeforeValidator(listed, json_schema_input_type=str | list[str]),
+        Field(max_length=100),
     ] = Field(default_factory=list)
     starts: Annotated[Whole, Interval(ge=1, le=100)] = 3
     most: Annotated[Whole, Interval(ge=1, le=10_000)] = 60

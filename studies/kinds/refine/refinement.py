@@ -101,7 +101,7 @@ class Refine(Kind):
     of: Annotated[
         list[OneOf],
         BeforeValidator(listed, json_schema_input_type=OneOf | list[OneOf]),
-        Field(min_length=1),
+        Field(min_length=1, max_length=100),
     ]
     until: Annotated[
         float | dict[str, float],
