@@ -136,9 +136,8 @@ class Increment:
         self._least, _ = system.least(time)
         self._began: tuple[Vectors, Candidates] | None = None  # residuals, candidates
         self._pivoted, self._blended = 0, 0
-        self._softened = any(
-            part.body.law.surface.has_corners for part in system.parts
-        )  # no tangent there
+        # corners of a yield surface have no tangent
+        self._softened = any(part.body.law.surface.has_corners for part in system.parts)
         self._path: list[Vectors] = []  # displacements of all iterates so far
         self.compliance = {} if compliance is None else compliance
 
