@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from studies.kinds.fit.shown import fit
     from studies.storage.store import Store
     from studies.views.differing import Difference, diff
-    from studies.views.grids import to_grid
+    from studies.views.picking import to_grid
     from studies.views.predict import predict
     from studies.views.reading import open_netcdf, open_study
     from studies.views.sensitivity import sensitivity
@@ -62,7 +62,7 @@ _HOMES = {
     "sensitivity": "views.sensitivity",
     "summary": "views.summary",
     "sweep": "execution.function",
-    "to_grid": "views.grids",
+    "to_grid": "views.picking",
     "to_xarray": "views.solution",
 }
 

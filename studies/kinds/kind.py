@@ -17,9 +17,9 @@ from typing import Any, ClassVar, NamedTuple, Self
 from solver.late import Late
 from solver.scenes import Scene
 from studies.definition.cases import Case
-from studies.definition.line import Read
 from studies.definition.place import Chooser
 from studies.definition.points import Points
+from studies.definition.quantity import Read
 from studies.definition.schema import Context, StudyTable, parsed
 from studies.definition.sweep import Axes
 from studies.definition.vocabulary import STOPPED

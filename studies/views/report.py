@@ -97,11 +97,11 @@ def _drawn(dataset: xr.Dataset, path: Path | None) -> dict[str, bytes]:
     Nothing is drawn if no run succeeded. With the path of the data set it is drawn on the mesh of
     the run, which its own file has.
     """
-    from studies.views.kept import drawn_from
     from studies.views.picking import one_run
     from studies.views.plots.fields import usual_field
     from studies.views.plots.maps import map_figure
-    from studies.views.plots.saved import png
+    from studies.views.plots.picture import drawn_from
+    from studies.views.plots.sheets import png
 
     field = usual_field(dataset)
     try:
@@ -117,7 +117,7 @@ def _drawn(dataset: xr.Dataset, path: Path | None) -> dict[str, bytes]:
 
 def _found(kind: Kind, dataset: xr.Dataset) -> dict[str, bytes]:
     """Draw what was found; nothing if it cannot be drawn."""
-    from studies.views.plots.saved import png
+    from studies.views.plots.sheets import png
     from studies.views.plots.sweep import sweep_figure
 
     if kind.figure:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from studies.definition.sweep import labels
 from studies.definition.vocabulary import MISSING, OK
-from studies.views.audited import Worst, worst
 from studies.views.columns import aligned, unit_text, value_text
+from studies.views.figures import Worst, worst
 
 if TYPE_CHECKING:
     import xarray as xr
