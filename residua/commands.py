@@ -11,13 +11,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from residua.status import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
 from studies.errors import StudyError
-
-if TYPE_CHECKING:
-    from studies.definition.study import Study
 
 
 def run(options: argparse.Namespace) -> int:
@@ -96,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
     return OK if outcome.ok else FAILED
 
 
-def _part(study: Study, options: argparse.Namespace) -> int:
+def _part(study: Any, options: argparse.Namespace) -> int:
     """Compute as one of several processes."""
     from residua.progress import Progress
     from studies.execution.part import run_part

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from studies.views.reading import open_netcdf, open_study
     from studies.views.sensitivity import sensitivity
     from studies.views.solution import to_xarray
-    from studies.views.summary import summary
+    from studies.views.tables import summary
 
 _HOMES = {
     "Access": "execution.cluster",
@@ -60,7 +60,7 @@ _HOMES = {
     "run_study": "execution.run",
     "scene_schema": "definition.parameters",
     "sensitivity": "views.sensitivity",
-    "summary": "views.summary",
+    "summary": "views.tables",
     "sweep": "execution.function",
     "to_grid": "views.picking",
     "to_xarray": "views.solution",

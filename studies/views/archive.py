@@ -26,8 +26,15 @@ from studies.views.plots.lines import line_figure
 from studies.views.plots.maps import map_figure
 from studies.views.plots.sheets import png
 from studies.views.plots.sweep import sweep_figure
-from studies.views.summary import place_of, placed, values_text
-from studies.views.tables import BY_ACCURACY, FOOTNOTE, messages, run_cells, set_by_accuracy
+from studies.views.summary import placed, values_text
+from studies.views.tables import (
+    BY_ACCURACY,
+    FOOTNOTE,
+    messages,
+    place_of,
+    run_cells,
+    set_by_accuracy,
+)
 
 LISTED = 500
 """Largest number of runs in the table."""

@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from studies.errors import StudyError, one_of
+from studies.kinds.kind import Kind
 from studies.storage.ugrid import keeps
 from studies.views.picking import (
     file_of,
@@ -37,7 +38,7 @@ from studies.views.plots.lines import line_figure
 from studies.views.plots.mapped import STAGE
 from studies.views.plots.maps import map_figure
 from studies.views.plots.meshed import MESH_MAPS, mesh_maps
-from studies.views.plots.sheets import resolved
+from studies.views.plots.sheets import png, resolved
 from studies.views.plots.sweep import sweep_figure
 from studies.views.reading import find_study, open_netcdf
 
@@ -248,3 +249,23 @@ def _run_of(
     swept = sweep_coordinates(dataset)
     chosen = {name: each for name, each in selection.items() if name in swept}
     return file_of(dataset, study, store, chosen)
+
+
+def report_pictures(dataset: xr.Dataset, kind: Kind, path: Path | None) -> dict[str, bytes]:
+    """Return the picture of a report as PNG by the name of its file; none if none can be drawn.
+
+    Of a study that chose its runs it shows what was found; else the residual stress of the run of
+    `one_run`, or the stress if bodies are not unloaded. With the path of the data set it is drawn
+    on the mesh of the run, which its own file has.
+    """
+    try:
+        if kind.chooses:
+            name = kind.name if kind.figure else kind.value
+            figure = kind.figure(dataset) if kind.figure else sweep_figure(dataset, kind.value)
+        else:
+            name = f"{(field := usual_field(dataset))}_xx"
+            with drawn_from(path or "", dataset, field, {}) as (run, _):
+                figure = map_figure(run, field, "xx")
+    except StudyError:
+        return {}
+    return {f"{name}.png": png(figure)} if figure else {}
