@@ -108,7 +108,7 @@ def draw_map(path: Path, query: MapQuery) -> bytes:
     """
     from studies import open_netcdf
     from studies.views.plots.maps import map_figure  # matplotlib takes a second to import
-    from studies.views.plots.saved import png
+    from studies.views.plots.sheets import png
 
     verify(path)
     with open_netcdf(path) as run:
@@ -120,7 +120,7 @@ def draw_lines(path: Path, query: LineQuery) -> bytes:
     from studies import open_netcdf
     from studies.views.plots.fields import check_field, line_fields
     from studies.views.plots.picture import picture
-    from studies.views.plots.saved import png
+    from studies.views.plots.sheets import png
 
     verify(path)
     with open_netcdf(path) as run:
@@ -132,9 +132,8 @@ def draw_lines(path: Path, query: LineQuery) -> bytes:
 def draw_study(path: Path, query: PlotQuery) -> bytes:
     """Return a field of the study in ``path`` as PNG; raise `StudyError` as `picture` does."""
     from studies import open_netcdf
-    from studies.views.kept import drawn_from
-    from studies.views.plots.picture import picture
-    from studies.views.plots.saved import png
+    from studies.views.plots.picture import drawn_from, picture
+    from studies.views.plots.sheets import png
 
     with (
         open_netcdf(path) as dataset,
@@ -152,8 +151,8 @@ def draw_scene(scene: Scene, values: Mapping[str, Any], query: SketchQuery) -> b
     StudyError
         If a parameter or the part is refused, or the scene has nothing to draw.
     """
-    from studies.views.plots.saved import png
     from studies.views.plots.setup import setup_figure
+    from studies.views.plots.sheets import png
 
     try:
         figure = setup_figure(scene, values, query.zoom, query.window)

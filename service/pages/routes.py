@@ -12,7 +12,7 @@ from contextlib import suppress
 from functools import lru_cache
 from http import HTTPStatus
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Form, Query, Request, Response
@@ -39,9 +39,8 @@ from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.pages import study as chosen
 from service.pages.assets import asset
-from service.pages.compare import MOST, compared
 from service.pages.rendering import COOKIE, ROOT, PageRoute, number_text, page, to_study
-from service.pages.run import audited, numbers_shown, parameters_shown
+from service.pages.run import MOST, audited, compared, numbers_shown, parameters_shown
 from service.routes.health import health
 from service.routes.numbers import outlined
 from service.scenes import scene_name, scene_of
@@ -49,13 +48,11 @@ from service.schemas import ContentId, Health, StudyFilter, Window
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
-from studies.kinds import kind_of
+from studies.kinds import found_of, kind_of
+from studies.kinds.kind import Found
 from studies.scenes.registry import known_names
 from studies.storage.seal import State, state_of
 from studies.views.table import MESSAGE, RUN, STATUS, RunTable, varied
-
-if TYPE_CHECKING:
-    from studies.views.found import Found
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
 home = APIRouter(include_in_schema=False)
@@ -161,7 +158,6 @@ def _found(job: Job, datasets: Datasets) -> Found | None:
 def _found_in(path: Path, state: State | None) -> Found | None:
     """Return the same of a data set in a state of its file."""
     from studies import open_netcdf  # xarray takes half a second to import
-    from studies.views.found import found_of
 
     with open_netcdf(path) as dataset:
         return found_of(dataset)

@@ -239,7 +239,7 @@ def _predicted(
 ) -> Prediction:
     """Return what `predict` tells; called in a process."""
     from studies import open_netcdf  # xarray takes half a second to import
-    from studies.views.answers import answer
+    from studies.views.predict import answer
 
     asked, store = query.model_dump(), Store(directory, aside=aside)
     at = {name: asked.pop(name) for name in query.model_extra or {}}

@@ -300,7 +300,7 @@ class Range(StudyTable):
         return self.stop - self.start
 
 
-Ends = tuple[float | str, float | str]
+Limits = tuple[float | str, float | str]
 """``[lowest, highest]``, in JSON Schemas."""
 
 

@@ -28,16 +28,14 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from solver.late import Late
 from solver.typing import Array
-from studies.definition.line import Read
+from studies.definition.quantity import Read
 from studies.definition.schema import Context, Number, Whole
 from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import SOLVED
 from studies.errors import Mistakes, StudyError
-from studies.kinds.fit.files import with_files
-from studies.kinds.fit.measured import MeasuredLine
+from studies.kinds.fit.measured import MeasuredLine, with_files
 from studies.kinds.kind import Placed, Reading
-from studies.kinds.ranges import DIGITS, Ranged
-from studies.kinds.replayed import Ends, Evaluation, Lacking, Replayed
+from studies.kinds.ranged import DIGITS, Ends, Evaluation, Lacking, Ranged, Replayed
 
 NO_FIT = "is missing: tell what was measured, and the ranges"
 """What a command of fits says of a study without one."""
