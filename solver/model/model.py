@@ -8,6 +8,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.materials.doubts import doubts
+from solver.mesh.elements import element_type
 from solver.model.body import Body
 from solver.model.contact_pair import ContactPair
 from solver.model.link import Link
@@ -78,6 +79,16 @@ class Model:
             if pair.sliding == "small" and large & {pair.slave[0], pair.master[0]}:
                 allowed = "must be auto or finite: the strain of a body in this contact is large"
                 raise ModelError(f"contacts[{k}].sliding", pair.sliding, allowed)
+        for body in self.bodies if self.singular else ():
+            kind = element_type(body.element)
+            reduced = kind.cells == "quad" and kind.order < kind.full_order
+            if body.large and reduced and not body.full_integration:
+                allowed = (
+                    f"must be quad4 or have full_integration: body {body.name!r} has large strain, "
+                    "and next to singular points its elements lose their stability with fewer "
+                    "points"
+                )
+                raise ModelError("element", body.element, allowed)
         for k, link in enumerate(self.links):
             turns = link.local or (link.rigid is not None and self._turns(link.rigid))
             if turns and large & {of for of, _ in link.sides}:
