@@ -75,7 +75,7 @@ $(STAMP): pyproject.toml constraints.txt $(BIN)/python
 
 # Else the first run that needs a kernel would wait for the compiler, for 13 s.
 $(COMPILED): $(STAMP) $(KERNELS)
-	$(BIN)/python -c "import $(subst /,.,$(KERNELS:.py=))"
+	for kernels in $(subst /,.,$(KERNELS:.py=)); do $(BIN)/python -c "import $$kernels" || exit 1; done
 	@touch $@
 
 $(BIN)/python:
