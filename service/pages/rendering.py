@@ -20,6 +20,7 @@ from service.errors import STATUS, answer_to
 from service.headers import CHARTS as POLICY
 from service.keys import Scope
 from service.pages import assets
+from studies.views import rules
 from studies.views.columns import value_text
 
 ROOT = "/ui"
@@ -75,6 +76,7 @@ def page(
         .get_template(f"{template}.html")
         .render(
             link=link,
+            rules=rules.PAGES,
             asset=lambda file: link("get_asset", version=assets.version(), name=file),
             here=request.url.path,
             query=request.query_params,

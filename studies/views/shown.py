@@ -14,6 +14,7 @@ from studies.views.best import column_over
 from studies.views.columns import unit_text
 from studies.views.plots.captions import DISTANCE
 from studies.views.plots.fields import (
+    REPEATED,
     check_field,
     component_names,
     component_of,
@@ -30,6 +31,11 @@ from studies.views.written import as_csv
 
 _NOTHING = {"MPa": 1e-3, "mm": 1e-9}
 """Largest value of lines that are only rounding, by unit."""
+
+_COURSES = ("increment", *REPEATED)
+"""Dimensions of lines over time."""
+_FIRST = {"depth": "residual_profile", "contact": "pressure", "line": "surface_residual"}
+"""What a picture of lines shows first: a part of the name of a variable."""
 
 
 class Shown(NamedTuple):
@@ -67,7 +73,8 @@ def outline(run: xr.Dataset) -> dict[str, list[dict[str, Any]]]:
     """Return the variables of a run that are drawn as maps and as lines, with their labels.
 
     The usual field of a map comes first, and stress of lines; what is only rounding comes last. Of
-    lines `along` is the dimension along which they go.
+    lines `along` is the dimension along which they go; `pictures` are those of a run that can show
+    them, `usual` those that show them first.
     """
     first, sweep = usual_field(run), run["status"].dims
     lines = [name for name in line_fields(run) if run[name].notnull().any()]
@@ -75,10 +82,17 @@ def outline(run: xr.Dataset) -> dict[str, list[dict[str, Any]]]:
     return {
         "maps": [_described(run, name) for name in maps if run[name].notnull().any()],
         "lines": [
-            _described(run, name) | {"along": line_axis(run[name], sweep)}
+            _described(run, name) | _pictures(name, line_axis(run[name], sweep))
             for name in sorted(lines, key=lambda name: _rank(run[name]))
         ],
     }
+
+
+def _pictures(name: str, along: str | None) -> dict[str, Any]:
+    """Return the pictures of a run that show a line: of the contact, below it, over time, any."""
+    kind = "depth" if along == "depth" else "history" if along in _COURSES else "contact"
+    usual = [part for part, word in _FIRST.items() if word in name and part in (kind, "line")]
+    return {"along": along, "pictures": [kind, "line"], "usual": usual}
 
 
 def _rank(values: xr.DataArray) -> int:

@@ -1,12 +1,11 @@
 // Charts in the colours of the page, drawn by plotly.js.
 
-const RED_BLUE = ["#053061", "#2166ac", "#4393c3", "#92c5de", "#d1e5f0", "#f7f7f7", "#fddbc7", "#f4a582", "#d6604d", "#b2182b", "#67001f"];
-const WARM = ["#ffffcc", "#ffeda0", "#fed976", "#feb24c", "#fd8d3c", "#fc4e2a", "#e31a1c", "#bd0026", "#800026"];
-const VIRIDIS = ["#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"];
+import { rules } from "./page.js";
+
 const scale = (colours) => colours.map((each, i) => [i / (colours.length - 1), each]);
-export const SIGNED = scale(RED_BLUE);
-export const SEQUENTIAL = scale(WARM);
-export const NUMBERS = scale(VIRIDIS);
+export const SIGNED = scale(rules.signed);
+export const SEQUENTIAL = scale(rules.sequential);
+export const NUMBERS = scale(rules.numbers);
 
 const own = () => getComputedStyle(document.documentElement);
 export const colour = (name) => own().getPropertyValue(`--${name}`).trim();

@@ -1,7 +1,6 @@
 // The chosen run of a study: where it is, its main numbers, its pictures, and the list to compare.
 
-import { json } from "./octets.js";
-import { element, keep, root, state, words } from "./page.js";
+import { element, json, keep, root, state, words } from "./page.js";
 import { Pictures } from "./pictures.js";
 import { address, columnsOf, known, label, number, on, study } from "./runs.js";
 

@@ -1,8 +1,7 @@
 // Runs compared: lines over each other, and the difference of two maps.
 
-import { json, octets, rows } from "./octets.js";
 import { fail } from "./charts.js";
-import { choice, data, keep, root, select, state, words } from "./page.js";
+import { choice, data, json, keep, octets, root, rows, select, state, words } from "./page.js";
 import { combinations, drawLines, drawMap, valuesOf } from "./pictures.js";
 
 const { runs } = data();
@@ -18,7 +17,7 @@ async function start() {
 
 async function showLine(known) {
   if (!known.length) return fail(charts.line, "These runs have no line in common.");
-  const field = known.find(({ name }) => name === state.get("line")) ?? known.find(({ name }) => name === "residual_profile") ?? known[0];
+  const field = known.find(({ name }) => name === state.get("line")) ?? known.find(({ usual }) => usual.includes("depth")) ?? known[0];
   const components = field.components ?? [];
   const component = components.includes(state.get("line.component")) ? state.get("line.component") : components[0];
   const again = (changes) => { keep(changes); showLine(known); };

@@ -3,6 +3,8 @@
 const found = document.location.pathname.match(/^(.*)\/ui(?:\/|$)/);
 export const root = found ? found[1] : "";
 
+export const rules = JSON.parse(document.getElementById("rules").textContent); // see studies/views/rules.py
+
 export const data = (page = document) => JSON.parse(page.getElementById("data").textContent);
 
 export const state = new Map(new URLSearchParams(document.location.search));
@@ -98,4 +100,44 @@ for (const button of document.querySelectorAll("[data-copy]")) {
     button.textContent = "Copied";
     setTimeout(() => (button.textContent = "Copy"), 1500);
   });
+}
+
+
+// What the service sends as octets: a line of JSON, then arrays, little endian.
+
+export async function octets(address, signal) {
+  const answer = await fetch(address, { signal });
+  if (!answer.ok) throw new Error(await reason(answer));
+  const content = await answer.arrayBuffer();
+  const end = new Uint8Array(content).indexOf(10);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(content, 0, end)));
+  const arrays = {};
+  let at = end + 1;
+  for (const { name, type, shape } of head.arrays) {
+    const length = shape.reduce((a, b) => a * b, 1);
+    const Kind = type === "<f8" ? Float64Array : Float32Array;
+    arrays[name] = { shape, values: new Kind(content, at, length) };
+    at += length * Kind.BYTES_PER_ELEMENT;
+  }
+  return { head, arrays };
+}
+
+export async function json(address, signal) {
+  const answer = await fetch(address, { signal });
+  if (!answer.ok) throw new Error(await reason(answer));
+  return answer.json();
+}
+
+async function reason(answer) {
+  try {
+    return (await answer.json()).detail;
+  } catch {
+    return `${answer.status} ${answer.statusText}`;
+  }
+}
+
+// Rows of an array of two dimensions, without copies.
+export function rows({ shape, values }) {
+  const width = shape[shape.length - 1];
+  return Array.from({ length: values.length / width }, (_, i) => values.subarray(i * width, (i + 1) * width));
 }

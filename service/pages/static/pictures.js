@@ -1,21 +1,12 @@
 // The pictures of a run: a map, depth profiles, contact pressure, any other line.
 
-import { octets, json, rows } from "./octets.js";
 import { bar, colour, draw, fail, KEYS, named, plain, SEQUENTIAL, SIGNED, titled } from "./charts.js";
-import { choice, element, keep, root, select, state, text, words } from "./page.js";
+import { choice, element, json, keep, octets, root, rows, select, state, text, words } from "./page.js";
 
 const MOST_LINES = 8;
 const GREEK = "σ";
 const DASHES = ["solid", "dash", "dot", "dashdot"];
-const FIRST = { depth: /^residual_profile$/, contact: /pressure$/, line: /^surface_residual$/ };
-const REPEATED = ["increment", "cycle", "pass"];
-const BELONGS = {
-  depth: ({ along }) => along === "depth",
-  contact: ({ along }) => along !== "depth" && !REPEATED.includes(along),
-  history: ({ along }) => REPEATED.includes(along),
-  line: () => true,
-};
-const PARTS = ["map", ...Object.keys(BELONGS)];
+const PARTS = ["map", "depth", "contact", "history", "line"];
 
 const query = (given) => new URLSearchParams(Object.entries(given).filter(([, value]) => value)).toString();
 
@@ -54,10 +45,10 @@ export class Pictures {
   async #part(part) {
     const chart = document.querySelector(`[data-chart="${part}"]`);
     if (!chart) return;
-    const known = part === "map" ? this.fields.maps : this.fields.lines.filter(BELONGS[part]);
+    const known = part === "map" ? this.fields.maps : this.fields.lines.filter(({ pictures }) => pictures.includes(part));
     chart.closest("figure").hidden = !known.length;
     if (!known.length) return;
-    const field = known.find((each) => each.name === state.get(part)) ?? known.find(({ name }) => FIRST[part]?.test(name)) ?? known[0];
+    const field = known.find((each) => each.name === state.get(part)) ?? known.find(({ usual }) => usual?.includes(part)) ?? known[0];
     const components = field.components ?? [];
     const component = components.includes(state.get(`${part}.component`)) ? state.get(`${part}.component`) : components[0];
     const stages = (part === "map" && field.stages) || [];
@@ -160,21 +151,13 @@ export function drawLines(chart, found, names = [], label = null) {
     return {
       traces,
       layout: {
-        xaxis: { title: titled(chart, along.words, along.unit), zeroline: false, showgrid: false, ...(along.name === "depth" ? { range: decayed(traces) } : {}) },
+        xaxis: { title: titled(chart, along.words, along.unit), zeroline: false, showgrid: false },
         yaxis: { title: { text: head.unit ? named("", head.unit).trim() : "" } },
         showlegend: traces.length > 1,
         legend: { title: { text: names.length ? "" : over.filter(({ labels }) => labels.length > 1).map(({ name }) => words(name)).join(", ") + "&nbsp;" } },
       },
     };
   });
-}
-
-// The depth below which no line is seen to differ from zero.
-function decayed(traces) {
-  let most = 0, depth = 0;
-  for (const { y } of traces) for (const each of y) most = Math.max(most, Math.abs(each) || 0);
-  for (const { x, y } of traces) y.forEach((each, k) => Math.abs(each) > 0.01 * most && (depth = Math.max(depth, x[k])));
-  return depth ? [0, 1.1 * depth] : null;
 }
 
 export function combinations(over) {

@@ -1,16 +1,14 @@
 // The runs of a study: a column each for places, numbers and statuses, asked for once.
 
 import { colour, NUMBERS, plain, SIGNED, bar } from "./charts.js";
-import { octets } from "./octets.js";
-import { data, root, state, text, words } from "./page.js";
+import { data, octets, root, rules, state, text, words } from "./page.js";
 
 export const study = data();
 export const address = `${root}/studies/${study.id}`;
 export const STATUS = "status";
-export const NONE = {
-  limit_load: ["square-open", "no equilibrium"], outside_theory: ["triangle-up-open", "outside small-strain theory"],
-  not_converged: ["x-thin-open", "not converged"], audit_failed: ["cross-thin-open", "audit failed"], error: ["diamond-open", "error"],
-  pending: ["circle-open", "not computed yet"], ok: ["circle-open-dot", "no value"],
+const SYMBOLS = {
+  limit_load: "square-open", outside_theory: "triangle-up-open", not_converged: "x-thin-open", audit_failed: "cross-thin-open",
+  error: "diamond-open", pending: "circle-open", ok: "circle-open-dot",
 };
 const heard = new EventTarget();
 export const tell = (what) => heard.dispatchEvent(new Event(what));
@@ -55,7 +53,7 @@ export const value = (run, { name }) => (statusOf(run) === "ok" ? column(name)[r
 export const raw = (run, { name }) => column(name)[run];
 export const wordsAt = (name) => texts[name];
 export const unit = (said, { unit: its }) => (its ? `${said} ${its}` : said);
-export const reason = (status) => NONE[status]?.[1] ?? words(status);
+export const reason = (status) => rules.reasons[status] ?? words(status);
 
 export function label(run, place) {
   const found = raw(run, place);
@@ -103,6 +101,6 @@ export function holes(runs, what, spot) {
   }
   return [...found].map(([status, each]) => ({
     ...each, type: "scatter", mode: "markers", name: reason(status), showlegend: true, hovertemplate: "%{text}<extra></extra>",
-    marker: { symbol: NONE[status]?.[0] ?? "x", size: 9, color: colour("soft"), line: { width: 1.6, color: colour("soft") } },
+    marker: { symbol: SYMBOLS[status] ?? "x", size: 9, color: colour("soft"), line: { width: 1.6, color: colour("soft") } },
   }));
 }

@@ -1,7 +1,7 @@
 // A number over the runs of a study: cells, contours or lines over its axes, or marks over any two places.
 
 import { colour, draw, fail, KEYS, named, ordered, plain } from "./charts.js";
-import { choice, element, keep, select, state, text, words } from "./page.js";
+import { choice, element, keep, rules, select, state, text, words } from "./page.js";
 import { holes, hover, known, met, number, on, shades, statusOf, study, reason, tell, unit, value, raw, wordsAt } from "./runs.js";
 
 const { axes, grid } = study;
@@ -11,7 +11,6 @@ const strides = axes.map((_, k) => axes.slice(k + 1).reduce((size, { labels }) =
 const several = axes.filter(({ labels }) => labels.length > 1);
 const KINDS = { cells: "Cells", contours: "Contours", lines: "Lines", marks: "Marks" };
 const GROUPS = { result: "Results", effort: "Effort", audit: "Audit" };
-const MOST_LINES = 12;
 const MOST_MARKS = 2500;
 
 const places = (run) => axes.map(({ labels }, k) => Math.floor(run / strides[k]) % labels.length);
@@ -235,7 +234,7 @@ function limits(x) {
 
 function lines(what, shown) {
   const { x, y, rows, xs } = shown;
-  const some = rows.length > MOST_LINES ? rows.filter((_, j) => j % Math.ceil(rows.length / MOST_LINES) === 0) : rows;
+  const some = rows.length > rules.most_lines ? rows.filter((_, j) => j % Math.ceil(rows.length / rules.most_lines) === 0) : rows;
   const keys = y?.number ? ordered(some.length) : KEYS();
   const traces = some.map((row, k) => ({
     type: "scatter", mode: "lines+markers", x: xs, y: row.map((run) => value(run, what)), customdata: row, text: row.map((run) => hover(run, what)),

@@ -33,7 +33,6 @@ from studies.views.plots.fields import (
 from studies.views.plots.mapped import STAGE
 from studies.views.plots.maps import entitle
 from studies.views.plots.sheets import (
-    MOST_LINES,
     STYLES,
     add_bar,
     add_legend,
@@ -42,6 +41,7 @@ from studies.views.plots.sheets import (
     is_number,
     plain_axes,
 )
+from studies.views.rules import MOST_LINES
 
 _EACH = len(STYLES)
 """Largest number of values drawn of a dimension of the field."""

@@ -34,6 +34,7 @@ from studies.views.plots.fields import (
 )
 from studies.views.plots.mapped import STAGE, STATUS, Mapped, is_patch, mapped
 from studies.views.plots.meshed import Box, MappedMesh, mesh_maps, on_mesh
+from studies.views.rules import SEQUENTIAL, SIGNED
 
 _SHEAR, _SLIP = "patch_shear", "patch_slip"
 _ARROWS = 16
@@ -157,8 +158,6 @@ def reaching(values: xr.DataArray, curves: list[Array]) -> xr.DataArray:
     return whole.copy(data=filled)
 
 
-SIGNED = "RdBu_r"
-SEQUENTIAL = "YlOrRd"
 _OUTSIDE = "0.86"
 _AREA, _LONGEST = 26.0, 8.0
 """Area of a map and its longest side [in]."""

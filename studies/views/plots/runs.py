@@ -17,7 +17,7 @@ from studies.definition.vocabulary import OK, OUTSIDE_THEORY, STATUSES
 from studies.errors import StudyError
 from studies.views.picking import flags, parameters_over, point_axes, sweep_axes, sweep_coordinates
 from studies.views.plots.captions import words
-from studies.views.plots.maps import SIGNED
+from studies.views.rules import NUMBERS, REASONS, SIGNED
 
 _CATEGORIES = (
     ("o", "#56B4E9"), ("s", "#0072B2"), ("D", "#E69F00"), ("^", "#D55E00"),
@@ -61,9 +61,9 @@ class Style:
 
 _FAILED = RunMark(name="failed or missing", marker="x")
 _ABSENT = {
-    OK: RunMark(name="no value", marker="."),
-    "limit_load": RunMark(name="no equilibrium", marker="s", filled=False),
-    OUTSIDE_THEORY: RunMark(name="outside small-strain theory", marker="^", filled=False),
+    OK: RunMark(name=REASONS[OK], marker="."),
+    "limit_load": RunMark(name=REASONS["limit_load"], marker="s", filled=False),
+    OUTSIDE_THEORY: RunMark(name=REASONS[OUTSIDE_THEORY], marker="^", filled=False),
 }
 """Marks of runs without a value by status; all others have `_FAILED`."""
 
@@ -142,7 +142,7 @@ def style_of(dataset: xr.Dataset, field: str) -> Style:
     if low < 0.0 < high:
         low, high = min(low, -high), max(high, -low)
         return Style(flags=kinds, norm=Normalize(low, high), colours=SIGNED)
-    return Style(flags=kinds, norm=Normalize(low, high), colours="viridis")
+    return Style(flags=kinds, norm=Normalize(low, high), colours=NUMBERS)
 
 
 def absent(known: np.ndarray, status: np.ndarray) -> dict[RunMark, np.ndarray]:

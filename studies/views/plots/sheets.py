@@ -19,9 +19,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from studies.errors import StudyError
 from studies.views.picking import sweep_axes
 from studies.views.plots.captions import capitalised, setting, short_label, words, wrapped
-
-MOST_LINES = 12
-"""Largest number of lines in a legend; more values of a number have a colour bar instead."""
+from studies.views.rules import MOST_LINES, NUMBERS
 
 STYLES: Sequence[Any] = ("-", "--", ":", "-.", (0, (8, 2, 1, 2, 1, 2)), (0, (1, 4)))
 """Line styles that can be distinguished."""
@@ -39,12 +37,12 @@ def colours_of(coordinate: xr.DataArray) -> Sequence[Any]:
     """Return a colour for each value of a coordinate; the colours of numbers follow their order."""
     if is_number(coordinate):
         rank = np.argsort(np.argsort(coordinate.to_numpy()))
-        return list(colormaps["viridis"](np.linspace(0.0, 0.85, coordinate.size)[rank]))
+        return list(colormaps[NUMBERS](np.linspace(0.0, 0.85, coordinate.size)[rank]))
     return [f"C{number}" for number in range(coordinate.size)]
 
 
 def has_bar(coordinate: xr.DataArray) -> bool:
-    """Whether a colour bar explains the values of a coordinate."""
+    """Whether a colour bar explains the values of a coordinate, in place of a legend."""
     return is_number(coordinate) and coordinate.size > MOST_LINES
 
 

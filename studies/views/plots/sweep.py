@@ -43,7 +43,6 @@ from studies.views.plots.runs import (
     style_of,
 )
 from studies.views.plots.sheets import (
-    MOST_LINES,
     add_legend,
     colours_of,
     head_of,
@@ -52,6 +51,7 @@ from studies.views.plots.sheets import (
     plain_axes,
     setting_of,
 )
+from studies.views.rules import MOST_LINES
 
 MOST_PANELS = 6
 
