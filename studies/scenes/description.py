@@ -143,7 +143,7 @@ class Description:
         given = self.content.get("parameters", {})
         stub = {"parameters": given}
         try:
-            return SceneFile.model_validate_json(_json(_LEAST | stub), strict=True).parameters
+            return SceneFile.model_validate_json(_json({**_LEAST, **stub}), strict=True).parameters
         except ValidationError as error:
             raise SceneError(self.file, [*mistakes_of(error, SceneFile).values()]) from None
 
