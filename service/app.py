@@ -40,6 +40,7 @@ from service.recovery import Mender, open_queue
 from service.retention import Keeper
 from service.routes.manual import ASSETS
 from service.runner import Runner
+from service.sandbox import READERS
 from service.settings import Settings, chosen
 from service.table import Tables
 from service.turns import COMBINING, COMPUTING, READING, Turns
@@ -197,6 +198,7 @@ def serve(
     except OSError as error:
         refuse(f"data = {str(settings.data)!r}: must be a directory to write in ({error.strerror})")
     check_port(settings.host, settings.port)
+    READERS.prepare()  # loads while this process begins to listen
     uvicorn.run(
         app,
         host=settings.host,

@@ -20,9 +20,7 @@ from service.turns import MINUTE, Share, beyond
 from solver.late import Late
 from studies import StudyError
 from studies.errors import SceneError
-from studies.scenes.description import Description
 from studies.scenes.formats import FORMATS
-from studies.scenes.meshfile import TABLE, MeshFile
 from studies.scenes.table import FILE_NAME
 from studies.scratch import scratch
 
@@ -50,7 +48,7 @@ class Inspector:
 
     async def inspect(
         self, text: bytes, meshes: Mapping[str, bytes], share: Share
-    ) -> tuple[KeptScene, Description]:
+    ) -> tuple[KeptScene, Any]:
         """Return the scene of a file and its meshes, and their content.
 
         Raises
@@ -60,6 +58,9 @@ class Inspector:
         Busy
             if the budget of the caller is used, or the process was killed
         """
+        from studies.scenes.description import Description  # loads scipy
+        from studies.scenes.meshfile import TABLE, MeshFile
+
         if len(text) > LONGEST:
             raise StudyError("scene", f"{len(text)} bytes", f"must have at most {LONGEST} bytes")
         known = (*FORMATS, TABLE)

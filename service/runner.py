@@ -31,6 +31,9 @@ SILENCE_SECONDS = 20.0
 SMALL = 100
 """Largest number of runs of a study for which the last place is reserved."""
 
+READY_SECONDS = 0.5
+"""Time without a study after which what the next one needs is loaded [s]."""
+
 SILENT = "its process says nothing: it is frozen, or the machine is overloaded"
 
 
@@ -106,7 +109,6 @@ class Runner:
 
     async def _work(self) -> None:
         idle, trouble = 0.0, ""
-        await self.starter.prepare()
         while not self._stopping.is_set():
             pause = self.settings.poll_seconds
             try:
@@ -116,6 +118,8 @@ class Runner:
                 idle = 0.0 if self._studies else idle + pause
                 if idle >= self.settings.idle_seconds:
                     await self.pool.close()
+                if idle >= READY_SECONDS:
+                    await self.starter.prepare()
                 trouble = ""
             except (CatalogueDamaged, QueueLost, StoreBusy, StoreFull, Unusable, OSError) as error:
                 if trouble != (trouble := str(error)):  # log it only once

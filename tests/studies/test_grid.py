@@ -19,10 +19,10 @@ import pytest
 from distributed.system import MEMORY_LIMIT
 
 from studies import Access, GridLost, Limits, StudyError, own_workers
-from studies.execution.workers import connect
-from studies.execution.forks import variables
 from studies.execution.executor import Finished, Message, Waiting
+from studies.execution.forks import variables
 from studies.execution.grid import Grid
+from studies.execution.workers import connect
 from tests.studies.chores import chatter, freeze, nap, need
 
 pytestmark = pytest.mark.processes
