@@ -22,14 +22,12 @@ from service.connections import limited
 from service.datasets import Datasets
 from service.errors import QueueLost
 from service.examiner import Examiner
-from service.headers import SecurityHeaders
 from service.inspector import Inspector
 from service.jobs import Jobs
 from service.keys import Keys, KeysError
-from service.limits import body_limit
 from service.maps import Pictures
-from service.methods import head_is_get
 from service.metrics import Metrics
+from service.middleware import SecurityHeaders, body_limit, head_is_get
 from service.overview import Details
 from service.pages import new
 from service.pages import routes as pages

@@ -34,7 +34,6 @@ from service.dependencies import (
 )
 from service.errors import REFUSED, Busy, Conflict, NotFound, QueueLost
 from service.files import NETCDF, UNCHANGED, netcdf, tagged, unchanged
-from service.history import log_of
 from service.maps import PICTURE
 from service.octets import MEDIA_TYPE
 from service.schemas import (
@@ -50,7 +49,7 @@ from service.schemas import (
 )
 from service.strict import StrictRoute
 from solver.late import Late
-from studies import Study, StudyError
+from studies import Estimate, Study, StudyError
 from studies.definition.schema import StudyTable, Whole, parsed
 from studies.errors import StoreFull
 from studies.storage.seal import digest
@@ -59,6 +58,7 @@ from studies.storage.tiles import METADATA
 log = logging.getLogger(__name__)
 
 router = APIRouter(prefix="/studies", tags=["studies"], route_class=StrictRoute)
+costs = APIRouter(tags=["studies"], route_class=StrictRoute)
 
 EXAMPLE: dict[str, Any] = {
     "name": "two-frictions",
@@ -206,7 +206,7 @@ async def events(
 @in_turn
 def tell_log(job: TheJob, jobs: TheJobs, store: TheStore) -> str:
     """Return a line for each thing that happened: states, what was waited for, ends of runs."""
-    return log_of(job, jobs, store)
+    return overview.log_of(job, jobs, store)
 
 
 @router.get("/{study_id}/predict", responses=REFUSED)
@@ -323,3 +323,21 @@ async def tile(
         raise NotFound("nothing is stored under this key")
     kind = "application/json" if key.endswith(METADATA) else MEDIA_TYPE
     return Response(content, media_type=kind, headers=dict(headers))
+
+
+@costs.post("/estimate", responses=REFUSED)
+async def estimate(
+    content: Content,
+    examiner: TheExaminer,
+    computing: TheComputing,
+    keeper: TheKeeper,
+) -> Estimate:
+    """Tell what a study asks for beyond the runs that are there; nothing is stored.
+
+    `cpu_seconds` are low, likely and high. A study that asks for more than the service allows is
+    refused as it is when it is submitted.
+    """
+    taken_priority(content)
+    found = await examiner.examine(content, computing)
+    await asyncio.to_thread(keeper.check_room, found)
+    return found.estimate
