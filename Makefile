@@ -3,7 +3,7 @@ BIN := .venv/bin
 INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 STAMP := .venv/installed
 COMPILED := .venv/compiled
-KERNELS := solver/rolling/kernels.py
+KERNELS := solver/rolling/kernels.py solver/fatigue/kernels.py
 DENO = DENO_DIR=.venv/deno DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 # Python keeps what it has compiled, whatever the caller says: tests and studies start many processes.
@@ -75,7 +75,7 @@ $(STAMP): pyproject.toml constraints.txt $(BIN)/python
 
 # Else the first run that needs a kernel would wait for the compiler, for 13 s.
 $(COMPILED): $(STAMP) $(KERNELS)
-	$(BIN)/python -c "import $(subst /,.,$(KERNELS:.py=))"
+	for kernels in $(subst /,.,$(KERNELS:.py=)); do $(BIN)/python -c "import $$kernels" || exit 1; done
 	@touch $@
 
 $(BIN)/python:

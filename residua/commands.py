@@ -11,13 +11,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from residua.status import BAD_INPUT, FAILED, INTERRUPTED, OK, complain
 from studies.errors import StudyError
-
-if TYPE_CHECKING:
-    from studies.definition.study import Study
 
 
 def run(options: argparse.Namespace) -> int:
@@ -93,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
     return OK if outcome.ok else FAILED
 
 
-def _part(study: Study, options: argparse.Namespace) -> int:
+def _part(study: Any, options: argparse.Namespace) -> int:
     """Compute as one of several processes."""
     from residua.progress import Progress
     from studies.execution.part import run_part
@@ -147,9 +144,9 @@ def scenes(options: argparse.Namespace) -> int:
 
 def draw(options: argparse.Namespace) -> int:
     """Draw a scene before anything is computed: meshes, boundaries, supports, loads, contacts."""
-    from studies.views.described import described_scene
-    from studies.views.plots.saved import resolved
     from studies.views.plots.setup import setup_figure
+    from studies.views.plots.sheets import resolved
+    from studies.views.scene_tables import described_scene
 
     scene, values = described_scene(options.what, _selection(options.set, "--set"))
     sheet = setup_figure(scene, values, options.zoom, options.window)
@@ -179,8 +176,7 @@ def show(options: argparse.Namespace) -> int:
 
 def plot(options: argparse.Namespace) -> int:
     """Draw a field of one run, or one value per run over the sweep."""
-    from studies.views.kept import drawn_from
-    from studies.views.plots.picture import picture
+    from studies.views.plots.picture import drawn_from, picture
     from studies.views.reading import open_study
 
     selection = _selection(options.select)
@@ -214,7 +210,7 @@ def best(options: argparse.Namespace) -> int:
 
 def table(options: argparse.Namespace) -> int:
     """Write the numbers of the runs of a study as CSV or JSON."""
-    from studies.views.numbers import table_of
+    from studies.views.best import table_of
     from studies.views.reading import open_study
     from studies.views.written import FORMS
 
@@ -256,9 +252,8 @@ def diff(options: argparse.Namespace) -> int:
 def predict(options: argparse.Namespace) -> int:
     """Tell a number between the runs of a study, with its error."""
     from studies.execution.task import compute_here
-    from studies.views.answers import answer
     from studies.views.picking import study_of
-    from studies.views.predict import ERROR_IS
+    from studies.views.predict import ERROR_IS, answer
     from studies.views.reading import find_study, open_netcdf
 
     at, path = _selection(options.at, "NAME=VALUE"), find_study(options.path)
@@ -431,7 +426,7 @@ def _interruption(*others: signal.Signals) -> Iterator[list[int]]:
 
 def _save(drawn: Any, path: Path) -> None:
     """Write a figure in the format given by the ending of the file name."""
-    from studies.views.plots.saved import save
+    from studies.views.plots.sheets import save
 
     kinds = drawn.canvas.get_supported_filetypes()
     kind = path.suffix.removeprefix(".").lower() or "png"

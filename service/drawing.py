@@ -13,12 +13,11 @@ from studies import Store, Study, StudyError, open_netcdf
 from studies.definition.parameters import read_values
 from studies.scenes.registry import scene_named
 from studies.storage.runfile import verify
-from studies.views.kept import drawn_from
 from studies.views.plots.fields import check_field, line_fields
 from studies.views.plots.maps import map_figure
-from studies.views.plots.picture import picture
-from studies.views.plots.saved import png
+from studies.views.plots.picture import drawn_from, picture
 from studies.views.plots.setup import setup_figure
+from studies.views.plots.sheets import png
 
 
 def draw_map(path: Path, query: MapQuery) -> bytes:

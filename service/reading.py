@@ -16,13 +16,13 @@ from service.octets import octets
 from service.schemas import Prediction, PredictQuery
 from solver.results.export import vtu_of
 from studies import Store, Study, StudyError, open_netcdf, sensitivity
+from studies.kinds import found_of
 from studies.kinds.fit.shown import told as told_fit
 from studies.storage.combine import combine
 from studies.storage.runfile import verify
 from studies.storage.ugrid import read
-from studies.views.answers import answer
-from studies.views.found import found_of
 from studies.views.picking import sweep_axes
+from studies.views.predict import answer
 from studies.views.sensitivity import told as told_indices
 from studies.views.shown import outline, shown
 

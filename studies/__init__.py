@@ -31,12 +31,12 @@ if TYPE_CHECKING:
     from studies.kinds.fit.shown import fit
     from studies.storage.store import Store
     from studies.views.differing import Difference, diff
-    from studies.views.grids import to_grid
+    from studies.views.picking import to_grid
     from studies.views.predict import predict
     from studies.views.reading import open_netcdf, open_study
     from studies.views.sensitivity import sensitivity
     from studies.views.solution import to_xarray
-    from studies.views.summary import summary
+    from studies.views.tables import summary
 
 _HOMES = {
     "Access": "execution.access",
@@ -61,9 +61,9 @@ _HOMES = {
     "run_study": "execution.run",
     "scene_schema": "definition.parameters",
     "sensitivity": "views.sensitivity",
-    "summary": "views.summary",
+    "summary": "views.tables",
     "sweep": "execution.function",
-    "to_grid": "views.grids",
+    "to_grid": "views.picking",
     "to_xarray": "views.solution",
 }
 

@@ -278,6 +278,7 @@ _WORDS = {
     "int_parsing": "must be an integer",
     "bool_type": "must be true or false",
     "string_type": "must be a text",
+    "string_unicode": "must be a text of Unicode",
     "finite_number": "must be finite",
     "model_type": "must be a table",
     "model_attributes_type": "must be a table",

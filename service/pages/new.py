@@ -167,7 +167,8 @@ def _form(
     posted = [(each.id, f"{each.name} (posted)") for each in store.scenes(LISTED)]
     choose = given.get("choose", [""])[0]
     own = {each.parameter.name for each in fields} | {"name"}
-    own |= {each for each in mistakes if choose and each.partition(".")[0] == choose}
+    tables = form.tables(given, mistakes)
+    own |= {each.name for each in tables[choose][1]} if choose in tables else set()
     return page(
         request,
         "new",
@@ -180,7 +181,7 @@ def _form(
         query_of=urlencode({**given, "scene": [name]}, doseq=True),
         first=[each for each in fields if each.first],
         rest=[each for each in fields if not each.first],
-        tables=form.tables(given, mistakes),
+        tables=tables,
         wrong=mistakes,
         general=[text for key, text in mistakes.items() if key not in own],
         estimate=found.estimate if found else None,

@@ -36,9 +36,8 @@ from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.pages import study as chosen
 from service.pages.assets import asset
-from service.pages.compare import MOST, compared
 from service.pages.rendering import COOKIE, ROOT, PageRoute, number_text, page, to_study
-from service.pages.run import audited, numbers_shown, parameters_shown
+from service.pages.run import MOST, audited, compared, numbers_shown, parameters_shown
 from service.routes.health import health
 from service.routes.numbers import OUTLINED
 from service.scenes import scene_name, scene_of

@@ -1,9 +1,9 @@
-"""What the page of a run shows: parameters, numbers, and its audit in words."""
+"""What pages of runs show: parameters, numbers, the audit in words, and what differs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,3 +102,26 @@ def words_of(name: str, scene: Scene | None) -> str:
 def unit_of(name: str, scene: Scene | None) -> str:
     """Return the unit of a number; empty for a ratio."""
     return unit_text(attributes_of(name, scene).get("units"))
+
+
+MOST = 6
+"""Largest number of runs that are compared."""
+
+
+def compared(rows: Sequence[Mapping[str, Any]], scene: Scene | None) -> dict[str, Any]:
+    """Return parameters and numbers that are not the same in all runs, with the values of each."""
+    return {
+        "parameters": _different([parameters_shown(each, scene) for each in rows]),
+        "numbers": _different([numbers_shown(each, scene) for each in rows]),
+    }
+
+
+def _different(runs: Sequence[Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
+    every: dict[str, Mapping[str, Any]] = {each["name"]: each for run in runs for each in run}
+    values = [{each["name"]: each["value"] for each in run} for run in runs]
+    found = []
+    for name, each in every.items():
+        own = [run.get(name) for run in values]
+        if any(value != own[0] for value in own):
+            found.append({**each, "values": own})
+    return found

@@ -41,6 +41,11 @@ class AuditedBody:
         """Whether the body is not condensed: the system solves for all of its nodes."""
         return isinstance(self.part, Discretisation)
 
+    @property
+    def _displacement(self) -> Array:
+        """Displacements (n,) of the whole body [mm]."""
+        return self._system.displacement(self.name, self._converged.state)
+
     @cached_property
     def _law(self) -> Law:
         return self.plain.law(self._converged.state.time)
@@ -49,7 +54,7 @@ class AuditedBody:
     def _reached(self) -> Array:
         """Mandel strain (n_components, n_points) from displacements, without eigenstrain."""
         state = self._converged.state
-        strain = self.plain.strain(self._system.displacement(self.name, state))
+        strain = self.plain.strain(self._displacement)
         return strain.reshape(len(strain), -1) - self.plain.eigenstrain(state.time)
 
     @cached_property
@@ -67,13 +72,12 @@ class AuditedBody:
     @property
     def rounding(self) -> float:
         """The nodal force that rounding can cause [N]."""
-        u = self._system.displacement(self.name, self._converged.state)
-        return self.plain.part.rounding(u)
+        return self.plain.part.rounding(self._displacement)
 
     @cached_property
     def balancing(self) -> Array:
         """Nodal forces (n_nodes, dim) that balance the stress of the body [N]."""
-        return self.plain.forces(self.stress)
+        return self.plain.forces(self.stress, self._displacement)
 
     @property
     def force_of_removed(self) -> float:
@@ -81,7 +85,8 @@ class AuditedBody:
         kept = np.isfinite(self.plain.known(self.stress, self._converged.state.time))
         if kept.all():
             return 0.0
-        return float(np.linalg.norm(self.plain.forces(np.where(kept, 0.0, self.stress))))
+        removed = self.plain.forces(np.where(kept, 0.0, self.stress), self._displacement)
+        return float(np.linalg.norm(removed))
 
     @cached_property
     def linked(self) -> Array:
@@ -95,8 +100,13 @@ class AuditedBody:
         """Nodal forces (n_nodes, dim) that contact and supports must exert for balance [N]."""
         whole = self.plain.part
         wheel = self.plain.body.axle is not None  # the load of a wheel acts on its hub
-        external = np.zeros(whole.n) if wheel else whole.external(self._converged.state.time)
+        external = np.zeros(whole.n) if wheel else self._external
         return self.balancing - vectors(external, whole.dim).T - self.linked
+
+    @cached_property
+    def _external(self) -> Array:
+        """Nodal forces (n,) of the loads [N]."""
+        return self.plain.part.external(self._converged.state.time, self._displacement)
 
     def applied(self) -> Array:
         """Return the resultant of the loads (dim,) [N]."""
@@ -109,7 +119,7 @@ class AuditedBody:
 
     @cached_property
     def _declared(self) -> Array:
-        return self.plain.applied(self._converged.state.time)
+        return self.plain.applied(self._converged.state.time, self._displacement)
 
     def misapplied(self) -> Array:
         """Return the error (dim, dim) of first moments of nodal forces, over the body's size [N].
@@ -120,8 +130,15 @@ class AuditedBody:
         body, whole = self.plain.body, self.plain.part
         if body.axle or body.travelling:
             return np.zeros((2, 2))
-        force = vectors(whole.external(self._converged.state.time), whole.dim)
-        moments = self.plain.moments(force, whole.X) - self._declared
+        fixed = np.zeros(whole.n)  # forces at the places before loading; others follow
+        for load, field in zip(whole.loads.cases, whole.loads.fields.T, strict=True):
+            if not (body.large and load.follows):
+                fixed += load_factor(load.amplitude, self._converged.state.time) * field
+        follows = vectors(self._external - fixed, whole.dim)
+        moments = self.plain.moments(vectors(fixed, whole.dim), whole.X) - self._declared
+        if body.large:
+            x = whole.X + vectors(self._displacement, whole.dim)
+            moments += self.plain.moments(follows, x)
         return np.asarray(moments[1:] / body.box.max())
 
     @cached_property
@@ -149,7 +166,7 @@ class AuditedBody:
         law = self.plain.body.law
         if not law.elastic:
             return law.yield_stress
-        u = self._system.displacement(self.name, self._converged.state)
+        u = self._displacement
         rounded = LEAST * law.elasticity.youngs_modulus * self.plain.steepest * np.abs(u).max()
         return float(max(np.abs(self.stress).max(), rounded))
 

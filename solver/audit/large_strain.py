@@ -66,7 +66,12 @@ _FLAT = 1e-6
 def large_strain(
     system: System, plain: Sequence[PlainBody], states: Iterable[Converged]
 ) -> Neglected:
-    """Return the largest estimate of a body in some states of a system."""
+    """Return the largest estimate of a body in some states of a system.
+
+    Bodies of large strain neglect nothing; next to others they respond as their elastic stiffness.
+    """
+    if all(body.body.large for body in plain):
+        return Neglected()
     return _largest(_in_state(system, plain, state) for state in states)
 
 
@@ -153,7 +158,12 @@ class _Deformed:
         counts = plain.remaining(state.time) > GHOST
         for point in system.model.singular:
             counts &= ~point.reaches(plain.points)
+        counts &= not plain.body.large
         self.volume = np.where(counts, plain.volume.ravel(), 0.0)
+        if plain.body.large:
+            self.force = np.zeros(self.part.n)
+            self.nominal = self.strain = np.zeros_like(self.stress)
+            return
 
         H, hoop = plain.gradient(system.displacement(self.name, state))
         T = plain.level(self.stress.reshape(4, *hoop.shape))

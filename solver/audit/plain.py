@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from solver.audit.stretched import logarithmic, nominal
 from solver.fem.cells import smooth_cells
 from solver.fem.discretisation import Discretisation
 from solver.fem.dofs import vectors
@@ -124,6 +125,8 @@ class PlainBody:
     def strain(self, u: Array) -> Array:
         """Return Mandel strain (n_components, n_elements, n_points) for displacements (n,) [mm]."""
         H, hoop = self.gradient(u)
+        if self.body.large:
+            return self.level(logarithmic(H, hoop))
         normal = [*(H[axis, axis] for axis in range(len(H))), hoop][:3]
         shears = [(H[a, b] + H[b, a]) / SQRT2 for a, b in _SHEARS[: 2 * len(H) - 3]]
         return self.level(np.array([*normal, *shears]))
@@ -196,9 +199,15 @@ class PlainBody:
             return self.body.law
         return Heated(law=self.body.law, stiff=stiff, strong=strong)
 
-    def forces(self, stress: Array) -> Array:
-        """Return the nodal forces (n_nodes, dim) that balance a Mandel stress of the points [N]."""
+    def forces(self, stress: Array, u: Array | None = None) -> Array:
+        """Return the nodal forces (n_nodes, dim) that balance a Mandel stress of the points [N].
+
+        With large strain it is conjugate to logarithmic strain at the displacements u (n,), which
+        are needed then.
+        """
         each = self.level(to_tensor(stress).reshape(len(stress), *self.volume.shape))
+        if self.body.large and u is not None:
+            return self.nominal_forces(*nominal(each, *self.gradient(u)))
         dim = len(each) // 2
         return self.nominal_forces(each[_COMPONENT[:dim, :dim]], each[2])
 
@@ -218,16 +227,22 @@ class PlainBody:
         nodes = self._nodes.ravel()
         return np.stack([np.bincount(nodes, f.ravel(), count) for f in each], axis=1)
 
-    def applied(self, time: float) -> Array:
+    def applied(self, time: float, u: Array | None = None) -> Array:
         """Return the resultant [N] and the first moments [N mm] of the loads (1 + dim, dim).
 
+        Loads that follow a body of large strain act at its displacements u (n,).
         First moments are force times x, y (and z) relative to the centre of the body. A pressure p
         has the force p times depth times length, against the outward normal, at the Gauss points of
         many chords of each edge.
         """
         total = np.zeros((1 + self.part.dim, self.part.dim))
         for load, own in zip(self.body.every_load, self._on_body, strict=True):
-            total += load_factor(load.amplitude, time) * own
+            at_factor_one = own
+            if self.body.large and load.follows and u is not None:
+                x = self.part.X + vectors(u, self.part.dim)
+                each = [self._on_boundary(load, b, x) for b in load.boundaries]
+                at_factor_one = np.sum(each, axis=0)
+            total += load_factor(load.amplitude, time) * at_factor_one
         return total
 
     @cached_property
@@ -236,7 +251,10 @@ class PlainBody:
         if self.part.dim == 3:  # loads in space have no forces
             return [np.zeros((4, 3)) for _ in self.body.every_load]
         return [
-            sum((self._on_boundary(load, b) for b in load.boundaries), self._on_volume(load))
+            sum(
+                (self._on_boundary(load, b, self.part.X) for b in load.boundaries),
+                self._on_volume(load),
+            )
             for load in self.body.every_load
         ]
 
@@ -245,9 +263,9 @@ class PlainBody:
         arm = x - self.part.X.mean(axis=1, keepdims=True)
         return np.asarray(np.vstack([np.ones_like(arm[:1]), arm]) @ force.T)
 
-    def _on_boundary(self, load: Load, boundary: str) -> Array:
+    def _on_boundary(self, load: Load, boundary: str, x_nodes: Array) -> Array:
         """Return the `moments` (3, 2) of the forces on a boundary, by Gauss's rule on chords."""
-        edges = self.part.X[:, edges_of(self.part, boundary)]
+        edges = x_nodes[:, edges_of(self.part, boundary)]
         row = np.repeat(np.arange(edges.shape[1]), _CHORDS)
         start, width = (
             np.tile(np.linspace(-1.0, 1.0, _CHORDS + 1)[:-1], edges.shape[1]),

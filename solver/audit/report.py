@@ -124,6 +124,8 @@ def audit(
     figures["audit_error_contact"] = contact_error(system, loaded)
     neglected = [plastic_strain(system, every).neglected]
     neglected += [large_strain(system, plain, every)] if plane else []
+    fixed = any(body.axle or body.travelling or body.dim == 3 for body in system.model.bodies)
+    mend = "" if fixed else ' or set strain = "large"'
     figures["audit_plastic_strain"] = accumulated_strain(system, states[1])
     figures["audit_large_strain"] = _largest(*(each.share for each in neglected))
     figures["audit_small_sliding"] = max(
@@ -133,7 +135,7 @@ def audit(
         figures,
         violations=_violations(system, figures, loaded, pairs) + _severed([*bodies, *released]),
         warnings=sum((pair.warnings for pair in pairs), warnings(figures)),
-        outside=sum((each.outside for each in neglected), ())
+        outside=tuple(text + mend for each in neglected for text in each.outside)
         + sum((pair.outside for pair in pairs), turned(system, loaded)),
     )
 
@@ -220,7 +222,7 @@ def _violations(
     limits = limits_at(
         loaded.state.force_scale or 1.0,
         travelling=any(body.travelling for body in system.model.bodies),
-        turning=any(contact.finite for contact in loaded.state.contacts),
+        turning=system.model.large or any(contact.finite for contact in loaded.state.contacts),
     )
     yield_stress = max(
         (p.body.material.yield_stress for p in system.parts if not p.body.material.elastic),
@@ -251,7 +253,7 @@ def limits_at(scale: float, *, travelling: bool = False, turning: bool = False) 
     ----------
     scale : force level [N]
     travelling : whether a pressure moves along a body
-    turning : whether contact normals rotate within an increment
+    turning : whether contact normals or bodies rotate within an increment
     """
     return LIMITS | {
         "audit_reactions": _TRAVELLING if travelling else _REACTIONS,

@@ -84,9 +84,10 @@ def accumulated_strain(system: System, converged: Converged) -> float:
 
 
 def plastic_strain(system: System, states: Iterable[Converged]) -> Strained:
-    """Return the largest equivalent plastic strain (of the tensor) in some states."""
+    """Return the largest equivalent plastic strain (of the tensor) of bodies of small strain."""
     each = (body for converged in states for body in _yielding(system, converged.state))
-    bodies = ((name, X, equivalent(plastic)) for name, X, plastic in each)
+    small = {body.name for body in system.model.bodies if not body.large}
+    bodies = ((name, X, equivalent(plastic)) for name, X, plastic in each if name in small)
     return largest_strain(bodies, system.model.singular)
 
 

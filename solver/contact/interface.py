@@ -12,6 +12,7 @@ from solver.contact.normals import is_curved
 from solver.contact.overlap import check_overlap, largest_overlap
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
+from solver.fem.large import LargeDiscretisation
 from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
 from solver.fem.softening import Softening
@@ -183,6 +184,7 @@ def interface_of(
     reference, reach = None, sizes[0] if np.isfinite(sizes[0]) else sizes[1]
     curved = any(is_curved(chain) for _, chain in sides)
     small = contact.sliding == "small" or (contact.sliding == "auto" and not curved)
+    small &= not any(isinstance(part, LargeDiscretisation) for part in both)
     if small:
         reach = largest_overlap(both[0].body, both[1].body)
     if small or not any(part.rigid.shape[1] or part.driven.fields.any() for part in both):

@@ -20,6 +20,7 @@ from solver.contact.state import BodyState, ContactState, Converged, State
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.fields import Sampler, recovery
+from solver.fem.large import LargeDiscretisation
 from solver.fem.operators import Operators, operators_of
 from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
@@ -53,7 +54,7 @@ def _part(whole: Discretisation | RigidPart, own: list[Surface], linear_solver: 
     body = whole.body
     if body.axle is not None:
         return Wheel(whole, own, linear_solver)
-    constant = not (whole.driven.cases or whole.softening)
+    constant = not (whole.driven.cases or whole.softening or body.large)
     if body.material.elastic and body.condense and own and constant:
         return Substructure(whole, own, linear_solver)
     return whole
@@ -80,7 +81,10 @@ class System:
 
     def __init__(self, model: Model, linear_solver: str = "auto") -> None:
         round_axis = model.bodies[0].kinematics == "axisymmetric"
-        self._wholes = {body.name: Discretisation(body) for body in model.bodies}
+        self._wholes = {
+            body.name: LargeDiscretisation(body) if body.large else Discretisation(body)
+            for body in model.bodies
+        }
         linked = surfaces_of_links(model, self._wholes)
         rigid = {
             body.name: RigidPart(body, round_axis, _reach(body, model, linked))
@@ -206,9 +210,7 @@ class System:
     def during(self, start: State) -> System:
         """Return the system for an increment from ``start``; it locks motions of rigid bodies."""
         each = zip(self.parts, start.u, strict=True)
-        parts = tuple(
-            part.during(start.time, u) if isinstance(part, RigidPart) else part for part, u in each
-        )
+        parts = tuple(part.during(start.time, u) for part, u in each)
         unchanged = all(one is other for one, other in zip(parts, self.parts, strict=True))
         return self if unchanged else self.within(parts)
 
@@ -296,10 +298,15 @@ class System:
         True without friction, or if all facing vertices touch before loading: their status does not
         change while the load grows. False if the friction bound is not proportional to the pressure
         (cohesion, shear limit), if bodies overlap before loading, or if sliding is declared finite:
-        normals rotate, and the work of contact needs increments.
+        normals rotate, and the work of contact needs increments. False with large strain.
         """
         finite = any(i.declared.sliding == "finite" for i in self.interfaces)
-        if finite or self.overlapping or not all(i.law.proportional for i in self.interfaces):
+        if (
+            self.model.large
+            or finite
+            or self.overlapping
+            or not all(i.law.proportional for i in self.interfaces)
+        ):
             return False
         gaps = np.concatenate([np.zeros(0), *(c.gap for c in self.initial().contacts)])
         conforming = (np.isinf(gaps) | (np.abs(gaps) < self.gap_tolerance)).all()
@@ -382,7 +389,10 @@ class System:
         return self.full(name).positions
 
     def state(self, name: str, converged: Converged) -> BodyState:
-        """Return the state of a whole body; its fields are NaN in elements that are removed."""
+        """Return the state of a whole body; its fields are NaN in elements that are removed.
+
+        With large strain, stress is the Cauchy stress and strain is logarithmic.
+        """
         number, whole, time = self.part(name), self.full(name), converged.state.time
         u, found = self.displacement(name, converged.state), converged.responses[number]
         if not isinstance(self.parts[number], Discretisation):
@@ -397,7 +407,11 @@ class System:
             )
         law = whole.law(time)
         strain = law.elasticity.strain(stress) / law.stiff + plastic.plastic_strain
-        return BodyState(time, u, stress, strain + whole.eigenstrain(time), plastic)
+        strain = strain + whole.eigenstrain(time)
+        if whole.body.large:
+            across = strain[2] * (whole.body.kinematics == "plane_stress")
+            stress = whole.kinematics.at(u).cauchy(stress, across)
+        return BodyState(time, u, stress, strain, plastic)
 
     def initial(self) -> State:
         """Return the unloaded, undeformed state."""

@@ -3,14 +3,13 @@
 With the Mandel strain E at the points, its derivative B with respect to displacements and the
 volume w of the points, a stress S has the nodal forces ``sum w B' S``. Their derivative is
 ``sum w B' D B``, with the tangent D of the law, plus a geometric term, the change of B at constant
-S. For small strain B is constant and this term is zero.
+S. For small strain B is constant and this term is zero; `log_strain` has large strain.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
@@ -32,9 +31,6 @@ class Deformation:
     strain : (n_components, n_points) Mandel strain
     B : (n_elements, n_points, n_components, m) derivative of the strain by the unknowns [1/mm]
     weights : (n_elements, n_points) volume of the points [mm3]
-    geometric : (stress (n_components, n_points) [MPa], elements) -> geometric stiffness (k, m, m)
-        of some elements [N/mm]; None for small strain
-    linear : whether strain is linear in displacements
     """
 
     n: int
@@ -42,8 +38,8 @@ class Deformation:
     strain: Array
     B: Array
     weights: Array
-    geometric: Callable[[Array, Some], Array] | None = None
-    linear: bool = True
+    linear: ClassVar[bool] = True
+    """Whether strain is linear in displacements."""
 
     @property
     def _flat(self) -> Array:
@@ -73,10 +69,19 @@ class Deformation:
         B = self.B[elements]
         DB = np.matmul(tangent, B) * self.weights[elements][:, :, None, None]
         flat = B.reshape(len(B), -1, B.shape[-1])
-        stiffness = np.matmul(flat.swapaxes(1, 2), DB.reshape(flat.shape))
-        if self.geometric is None or stress is None:
-            return stiffness
-        return np.asarray(stiffness + self.geometric(stress, elements))
+        return np.asarray(np.matmul(flat.swapaxes(1, 2), DB.reshape(flat.shape)))
+
+    def geometric_energy(self, step: Array, stress: Array) -> float:
+        """Return twice the energy of a small displacement (n,) in the geometric term [N mm]."""
+        return 0.0
+
+    def cauchy(self, stress: Array, across: Array) -> Array:
+        """Return the true stress (n_components, n_points) of ``stress``, in space [MPa].
+
+        ``across`` (n_points,) is the strain across the plane that the displacements do not give:
+        in plane stress that of the thickness, else zero.
+        """
+        return stress
 
 
 class Kinematics(Protocol):
@@ -102,10 +107,14 @@ class SmallStrain:
 
 
 class PartResponse(NamedTuple):
-    """The response of the law of a part to its strain, and the part at its displacements."""
+    """The response of the law of a part to its strain, and the part at its displacements.
+
+    ``place`` are displacements (n,) and time, which loads that follow the part need.
+    """
 
     law: Response
     deformation: Deformation
+    place: tuple[Array, float] = (np.zeros(0), 0.0)
 
     @property
     def linear(self) -> Bools:

@@ -25,7 +25,7 @@ from solver.fem.softening import Softening
 from solver.fem.surface import Surface, extract, gathered
 from solver.linear import solvers as linear
 from solver.linear.solvers import LinearSolver
-from solver.materials import Law, PlasticState
+from solver.materials import Law, PlasticState, Response
 from solver.mesh.elements import element_type
 from solver.model.body import Body
 from solver.typing import Array, Bools, Ints
@@ -55,6 +55,7 @@ class Discretisation(Nodes, Part):
     """
 
     body: Body
+    kinematics: Kinematics
 
     def __init__(self, body: Body) -> None:
         super().__init__(body)
@@ -64,10 +65,8 @@ class Discretisation(Nodes, Part):
         values = np.array([np.broadcast_to(np.asarray(b[0]), self.basis.dx.shape)
                            for b in self.basis.basis])  # fmt: skip
         gradients = np.array([b[0].grad for b in self.basis.basis]).swapaxes(0, 1)
-        B = kinematics.strain_operator(values, gradients, self.points[0], body.kinematics)
-        if kind.mean_dilatation and body.kinematics != "plane_stress":
-            B = kinematics.mean_dilatation(B, self.weights)
-        self._strain_by(B)
+        mean = kind.mean_dilatation and body.kinematics != "plane_stress"
+        self.kinematics = self._measure(values, gradients, mean=mean)
         self.moves = body.travelling is not None
         self._travelling: tuple[float, Array] = (np.nan, np.zeros(0))
         self.loads = nodal_forces(self)
@@ -78,10 +77,21 @@ class Discretisation(Nodes, Part):
         self.softening = Softening.of(self, self.positions, elements)
         self._hold()
 
-    def _strain_by(self, B: Array) -> None:
-        """Set the kinematics to small strain with the operator B of the elements."""
+    def _measure(self, values: Array, gradients: Array, *, mean: bool) -> Kinematics:
+        """Return how strain follows from displacements, given the shape functions at the points.
+
+        Parameters
+        ----------
+        values, gradients : as `kinematics.strain_operator` needs them
+        mean : whether the volumetric strain is the mean over each element
+        """
+        B = kinematics.strain_operator(values, gradients, self.points[0], self.body.kinematics)
+        return self._small_strain(kinematics.mean_dilatation(B, self.weights) if mean else B)
+
+    def _small_strain(self, B: Array) -> SmallStrain:
+        """Return small strain with the operator B of the elements."""
         at_rest = np.zeros((self.components, self.weights.size))
-        self.kinematics: Kinematics = SmallStrain(
+        return SmallStrain(
             Deformation(n=self.n, dofs=self.dofs, strain=at_rest, B=B, weights=self.weights)
         )
 
@@ -93,12 +103,16 @@ class Discretisation(Nodes, Part):
     def _hold(self) -> None:
         """Find the held unknowns, the free rigid motions, and one pin for each of these."""
         self.driven, self._held = prescribed(self)
-        motions = kinematics.rigid_motions(self.X, self.body.kinematics)
+        self.rigid = self._motions(self.X)
+        self.free = np.flatnonzero(~self._held)
+        self.active = choose_pins(self.rigid, self.free)
+
+    def _motions(self, x: Array) -> Array:
+        """Return the rigid motions (n, n_rigid) that supports leave free, with nodes at x."""
+        motions = kinematics.rigid_motions(x, self.body.kinematics)
         if self._held.any():
             motions = motions @ linalg.null_space(motions[self._held], rcond=1e-9)
-        self.rigid = motions
-        self.free = np.flatnonzero(~self._held)
-        self.active = choose_pins(motions, self.free)
+        return motions
 
     def chain(self, boundary: str, any_shape: bool = False) -> Surface:
         """Return the surface of a named boundary: one open chain, unless any shape is allowed."""
@@ -109,8 +123,8 @@ class Discretisation(Nodes, Part):
         """Volume of the points (n_points,) [mm3]."""
         return self.weights.ravel()
 
-    def external(self, time: float) -> Array:
-        """Return the external nodal forces (n,) at a time [N]."""
+    def external(self, time: float, u: Array | None = None) -> Array:
+        """See `Part.external`."""
         if self.body.travelling is None:
             return super().external(time)
         if self._travelling[0] != time:  # an increment needs it many times
@@ -146,14 +160,17 @@ class Discretisation(Nodes, Part):
     def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
         """Return stress, tangent and new state at all points; the tangent is symmetric."""
         deformation = self.kinematics.at(u)
-        strain = deformation.strain
+        return PartResponse(self._stressed(deformation.strain, state, time), deformation, (u, time))
+
+    def _stressed(self, strain: Array, state: PlasticState, time: float) -> Response:
+        """Return the response of the law to the strain (n_components, n_points)."""
         if self.eigenstrains.cases:
             strain = strain - self.eigenstrain(time)
         response = self.law(time).respond(strain, state)
         if not self.body.law.symmetric:
             tangent = response.tangent
             response = response._replace(tangent=0.5 * (tangent + tangent.swapaxes(0, 1)))
-        return PartResponse(response, deformation)
+        return response
 
     @cached_property
     def condensable(self) -> Superposed:
@@ -218,20 +235,17 @@ class Discretisation(Nodes, Part):
 
     def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,), without contact forces [N]."""
-        return self.external(time) - response.deformation.internal_force(response.law.stress)
+        return self.external(time, u) - response.deformation.internal_force(response.law.stress)
 
     def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
-        (law, deformation), linear = response, response.linear
+        law, deformation, linear = response.law, response.deformation, response.linear
         strain = deformation.change(step)
         C = self.body.law.stiffness(len(strain))
         elastic = (strain * (C @ strain)).sum(axis=0) * self.volumes
         some, D = strain[:, ~linear], law.tangent[:, :, ~linear]
         tangent = float(np.einsum("ap,abp,bp->p", some, D, some) @ self.volumes[~linear])
-        if deformation.geometric is not None:
-            each = step[self.dofs]
-            geometric = deformation.geometric(law.stress, slice(None))
-            tangent += float(np.einsum("ei,eij,ej", each, geometric, each))
+        tangent += deformation.geometric_energy(step, law.stress)
         return float(elastic[linear].sum() + tangent), float(elastic.sum())
 
     # -- stiffness ---------------------------------------------------------------------------
@@ -264,12 +278,16 @@ class Discretisation(Nodes, Part):
         """Return the elastic stiffness on all unknowns (n, n), supports not applied."""
         return self._elastic_matrix
 
-    def tangent_data(self, response: PartResponse) -> Array:
-        """Return the values of the consistent tangent on `pattern`.
+    def tangent_data(self, response: PartResponse, blend: float = 0.0) -> Array:
+        """Return the values of ``(1 - blend) tangent + blend elastic stiffness`` on `pattern`.
 
         Elements whose points are all linear keep their elastic matrix.
         """
-        (law, deformation), shape = response, self.weights.shape
+        data = self._tangent_data(response)
+        return (1 - blend) * data + blend * self.elastic_data if blend else data
+
+    def _tangent_data(self, response: PartResponse) -> Array:
+        law, deformation, shape = response.law, response.deformation, self.weights.shape
         elements = np.flatnonzero(~response.linear.reshape(shape).all(axis=1))
         if len(elements) == 0:
             return self.elastic_data

@@ -131,12 +131,9 @@ class Assembled(Operators):
 
     def tangent(self, response: PartResponse, blend: float) -> Operator:
         """Return the operator of ``(1 - blend) tangent + blend elastic stiffness``."""
-        if blend >= 1 or response.linear.all():
+        if response.deformation.linear and (blend >= 1 or response.linear.all()):
             return self.elastic
-        data = self._part.tangent_data(response)
-        if blend:
-            data = (1 - blend) * data + blend * self._part.elastic_data
-        return Factored(self._analysed, data)
+        return Factored(self._analysed, self._part.tangent_data(response, blend))
 
 
 class Dense:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 import scipy  # loads scipy.spatial at its first use: few models need it
@@ -85,6 +86,10 @@ class Part(ABC):
         energy = float(step @ (self.elastic_matrix() @ step))
         return energy, energy
 
+    def during(self, time: float, u: Array) -> Self:
+        """Return the part for an increment from a time and unknowns u (n,)."""
+        return self
+
     def surface(self, surface: Surface) -> Surface:
         """Return a surface of the whole body in this part's numbering."""
         return surface
@@ -106,8 +111,11 @@ class Part(ABC):
         """Return the unknowns (n,) before any load."""
         return np.zeros(self.n)
 
-    def external(self, time: float) -> Array:
-        """Return the external nodal forces (n,) at a time [N]."""
+    def external(self, time: float, u: Array | None = None) -> Array:
+        """Return the external nodal forces (n,) at a time and displacements (n,) [N].
+
+        Without displacements they are those on the undeformed body.
+        """
         return self.loads.at(time)
 
     def force_level(self, time: float) -> float:

@@ -7,6 +7,7 @@ motion with a force (`Pushed`) is free, a motion with a value (`Moved`) is presc
 from __future__ import annotations
 
 from copy import copy
+from typing import Self
 
 import numpy as np
 from scipy import sparse
@@ -56,7 +57,7 @@ class RigidPart(Part):
         self.active = np.zeros(0, dtype=np.int64)
         self.rigid = np.eye(3)[:, self.free]
 
-    def during(self, time: float, u: Array) -> RigidPart:
+    def during(self, time: float, u: Array) -> Self:
         """Return the part for an increment from a time and unknowns u, which may be locked."""
         each = self.body.every_load
         stays = np.array([isinstance(m, Pushed) and m.locked <= time for m in each])

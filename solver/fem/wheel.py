@@ -42,7 +42,7 @@ class Wheel(Substructure):
         self.rigid[self._hub + np.array(free), np.arange(len(free))] = 1.0
         self.free = np.concatenate([self.free, self._hub + np.array(free)])
 
-    def external(self, time: float) -> Array:
+    def external(self, time: float, u: Array | None = None) -> Array:
         """Return the external nodal forces (n,) at a time [N]: force and moment on the hub."""
         force = np.zeros(self.n)
         force[self._hub + _Y] = -self.axle.force.at(time)

@@ -123,7 +123,7 @@ class Windowed(Discretisation):
         """Set the elements of the window, and the quantities at their points."""
         self.dofs = number[whole.dofs[self.elements]]
         self.weights = whole.weights[self.elements]
-        self._strain_by(whole.undeformed.B[self.elements])
+        self.kinematics = self._small_strain(whole.undeformed.B[self.elements])
         self.points = whole.points[:, self.elements]
         per_element = whole.weights.shape[1]
         elements = np.repeat(np.flatnonzero(self.elements), per_element)
@@ -195,7 +195,7 @@ class Windowed(Discretisation):
         force[self._edge] -= self._rest @ (u - self._begin[self.kept])[self._edge]
         return force
 
-    def external(self, time: float) -> Array:
+    def external(self, time: float, u: Array | None = None) -> Array:
         """Return the external nodal forces (n,) at a time, including the condensed rest [N]."""
         return self._schur.begin(self.whole.external(time)).condensed
 

@@ -67,10 +67,16 @@ _DIVERGED = 1e4
 _LESS = 0.8
 """Out-of-balance forces after a whole step over those before: a step with a smaller ratio needs no
 line search. Close to a limit load the energy rises along many steps that approach the solution."""
+_SHORTEST = 1e-3
+"""Least share of a step to which it is shortened until its forces are finite."""
 _UNBALANCED = 100.0
 _ROUNDED = 10.0
 """Force level of bodies without load, over the level at which rounding errors alone would exceed
 the tolerance."""
+
+
+def _finite(forces: Vectors) -> bool:
+    return all(bool(np.isfinite(each).all()) for each in forces)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,9 +142,8 @@ class Increment:
         self._least, _ = system.least(time)
         self._began: tuple[Vectors, Candidates] | None = None  # residuals, candidates
         self._pivoted, self._blended = 0, 0
-        self._softened = any(
-            part.body.law.surface.has_corners for part in system.parts
-        )  # no tangent there
+        # corners of a yield surface have no tangent
+        self._softened = any(part.body.law.surface.has_corners for part in system.parts)
         self._path: list[Vectors] = []  # displacements of all iterates so far
         self.compliance = {} if compliance is None else compliance
 
@@ -211,9 +216,10 @@ class Increment:
             forces = (1 - share) * candidates.forces + share * step.forces
             ahead = series.sum(before, candidates, step, share)
             if ahead is not None:
-                u, forces = ahead
-                responses = self._respond(u)
-                residuals = self._residuals(u, responses)
+                farther = self._respond(ahead[0])
+                beyond = self._residuals(ahead[0], farther)
+                if _finite(beyond):
+                    (u, forces), responses, residuals = ahead, farther, beyond
             contacts = candidates.states(contacts, forces, step.status)
             links = forces[candidates.linked]
             if self.elastic_only and any(r.law.yielding.any() for r in responses):
@@ -256,10 +262,11 @@ class Increment:
 
         Motions lead from each iterate to the last one and to the next one. Iterates of a flowing
         body scatter about its mechanism; in a long motion the scatter is relatively small. In
-        windows of bodies nothing is proven: the rest of a body could flow too.
+        windows of bodies nothing is proven: the rest of a body could flow too. Nor is it for large
+        strain: the power of a mechanism changes with the shape of the bodies.
         """
         system, best, path = self.system, Mechanism(), self._path
-        if any(isinstance(part, Windowed) for part in system.parts):
+        if system.model.large or any(isinstance(part, Windowed) for part in system.parts):
             return best
         for start, end in (*((at, path[-1]) for at in path[:-1]), *pairwise(path)):
             moved = tuple(after - before for before, after in zip(start, end, strict=True))
@@ -395,8 +402,11 @@ class Increment:
             trial = moved, responses, self._residuals(moved, responses)
             return trial[-1]
 
-        whole = residuals_at(1.0)
-        if self._unbalanced(whole, candidates, step.forces) < _LESS * out:
+        most, whole = 1.0, residuals_at(1.0)
+        while not _finite(whole) and most > _SHORTEST:  # a part is inverted
+            most /= 4
+            whole = residuals_at(most)
+        if most == 1 and self._unbalanced(whole, candidates, step.forces) < _LESS * out:
             return 1.0, *trial
         # if vertices change status, the slope with the contact forces before the step may be
         # negative; with those after it the slope is the quadratic form of the tangent, positive
@@ -408,9 +418,9 @@ class Increment:
             forces = (1 - share) * before + share * step.forces
             return step.slope(self.system, residual, candidates, forces)
 
-        start, end = along(0.0, residuals), along(1.0, whole)
-        share = search(lambda s: along(s, residuals_at(s)), start, end)
-        return share, *trial
+        start, end = along(0.0, residuals), along(most, whole)
+        share = search(lambda s: along(most * s, residuals_at(most * s)), start, end)
+        return most * share, *trial
 
     # -- 6: the converged state ----------------------------------------------------------------
 
@@ -426,10 +436,10 @@ class Increment:
         ]
         inner = on_parts(self.system, candidates, candidates.forces)
         plastic = tuple(response.law.state for response in responses)
-        held = zip(self.system.parts, found.residuals, inner, strict=True)
+        held = zip(self.system.parts, u, found.residuals, inner, strict=True)
         return Converged(
             start=self.start,
-            forces=tuple(part.external(self.time) - r - c for part, r, c in held),
+            forces=tuple(part.external(self.time, ui) - r - c for part, ui, r, c in held),
             contact_forces=inner,
             contact_work=candidates.work(self.start.contacts),
             plastic_work=sum(work for work, _ in spent),

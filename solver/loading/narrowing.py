@@ -53,16 +53,16 @@ def narrowed(
 ) -> Converged | None:
     """Return an increment from ``start`` to ``time`` that was solved in windows.
 
-    None if windows are unsuitable: there are links, nothing yields, windows would be large or grow
-    too often, a body loses its contacts, or the whole bodies are not in balance. Raises
-    `FailedInWindows` if the increment fails in them.
+    None if windows are unsuitable: there are links, a body has large strain (it is linear nowhere),
+    nothing yields, windows would be large or grow too often, a body loses its contacts, or the
+    whole bodies are not in balance. Raises `FailedInWindows` if the increment fails in them.
 
     Parameters
     ----------
     before : the last increment, which ended at ``start``
     guess : predicted state, if any
     """
-    if len(system.links):
+    if len(system.links) or system.model.large:
         return None
     windows = before.windows or (None,) * len(system.parts)
     begin, count = system.moved(start, time), np.zeros(3, dtype=int)

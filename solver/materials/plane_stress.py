@@ -18,7 +18,8 @@ _ROUNDING = float(np.finfo(float).eps)
 _SMALL = 1e-9
 """The same ratio for laws that iterate and are less exact: it counts if further steps do not reduce
 stress zz."""
-_MAX_ITERATIONS = 100
+_MOST_OF_STRAIN = 100
+"""Largest number of iterations for the strain across the plane."""
 
 
 def condensed(stiffness: Array) -> Array:
@@ -116,7 +117,7 @@ class PlaneStress(Wrapped):
         low, high = np.full(n, -np.inf), np.full(n, np.inf)
         best, least = zz.copy(), np.full(n, np.inf)
         going = np.arange(n)
-        for _ in range(_MAX_ITERATIONS):
+        for _ in range(_MOST_OF_STRAIN):
             trial = strain[:, going]
             trial[_ZZ] = zz[going]
             found = self.law.respond(trial, state.at(going))
@@ -146,7 +147,8 @@ _MODES = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, np.sqrt(2.0)]])
 _FROM_ALL = np.zeros((3, 4))
 _FROM_ALL[:, _IN_PLANE] = _MODES
 _P = np.array([1 / 3, 1.0, 1.0])[:, None]
-_MOST_STEPS = 50
+_MOST_OF_FLOW = 50
+"""Largest number of iterations for the plastic multiplier."""
 
 
 def plane_stiffness(elasticity: Elasticity) -> Array:
@@ -233,7 +235,7 @@ def projected_return(
 def _multiplier(trial: Array, radius: Array, rate: Array, Hi: float) -> tuple[Array, Array, Array]:
     """Solve step 2 for each point; return the multiplier, eta and phi."""
     g = np.zeros(trial.shape[1])
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MOST_OF_FLOW):
         eta = trial / (1 + g * rate)
         phi = np.sqrt((_P * eta**2).sum(axis=0))
         F = radius / phi + 2 / 3 * Hi * g - 1

@@ -16,7 +16,7 @@ from solver.mesh.check import check_mesh
 from solver.mesh.elements import element_type
 from solver.mesh.rounding import with_zeros
 from solver.model.amplitude import Amplitude
-from solver.model.loads import Displacement, Kinematics, Load, Pressure
+from solver.model.loads import Centrifugal, Displacement, Kinematics, Load, Pressure
 from solver.model.motion import Axle, TravellingPressure
 from solver.parameters import Thickness, check
 from solver.tensors import AXES
@@ -50,6 +50,7 @@ class Body:
     condense : whether to reduce the body to its contact surfaces if its material is elastic
     axle : makes an elastic body a wheel, which its supports connect to the hub
     travelling : a pressure that moves along a boundary
+    strain : ``small``, or ``large``: logarithmic strain and equilibrium in the deformed body
     """
 
     name: str
@@ -66,6 +67,7 @@ class Body:
     condense: bool = True
     axle: Axle | None = None
     travelling: TravellingPressure | None = None
+    strain: Literal["small", "large"] = "small"
 
     def __post_init__(self) -> None:
         check(self)
@@ -103,10 +105,26 @@ class Body:
             self.facets(self.travelling.boundary, "travelling", outer=True)
             if self.material.elastic and self.condense:
                 raise ModelError("travelling", self.name, "an elastic body needs condense=False")
+        if self.large:
+            self._check_large()
         moved = self.axle is not None or self.travelling is not None
         for load in self.every_load if moved else ():
             allowed = "must not be given on a body with an axle or a travelling pressure"
             raise ModelError(load.name, load.boundaries, allowed)
+
+    @property
+    def large(self) -> bool:
+        """Whether its strain is large."""
+        return self.strain == "large"
+
+    def _check_large(self) -> None:
+        """Refuse what bodies of large strain do not have yet."""
+        refused = {"axle": self.axle is not None, "travelling": self.travelling is not None}
+        refused |= {load.name: True for load in self.every_load if load.removes}
+        refused |= {load.name: True for load in self.every_load if isinstance(load, Centrifugal)}
+        for name in (name for name, given in refused.items() if given):
+            allowed = f'must be left out of body {self.name!r}, or its strain must be "small"'
+            raise ModelError(name, "given with large strain", allowed)
 
     @property
     def dim(self) -> int:
@@ -115,7 +133,7 @@ class Body:
 
     def _check_solid(self) -> None:
         """Refuse what bodies in space have not yet: all but supports and displacements."""
-        plane = ("kinematics", "thickness", "pressure", "axle", "travelling")
+        plane = ("kinematics", "thickness", "pressure", "axle", "travelling", "strain")
         defaults = {each.name: each.default for each in fields(self)} | {"pressure": {}}
         given = {name: getattr(self, name) for name in plane}
         given |= {

@@ -51,11 +51,14 @@ class Load:
     amplitude : load factor over time; by default the time itself
     varies : whether loads of this kind change with time, and have an amplitude
     outside : whether the boundaries of this kind must lie on the outside of the body
+    follows : whether `push` acts on the deformed boundary of a body of large strain; otherwise, as
+        in bodies of small strain, on the boundary before loading
     """
 
     amplitude: Amplitude | None = None
     varies: ClassVar[bool] = True
     outside: ClassVar[bool] = True
+    follows: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         """Raise `ModelError` for a value that is not allowed."""
@@ -135,9 +138,13 @@ class BoundaryLoad(Load):
 @LOADS.word("pressure")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pressure(BoundaryLoad):
-    """A pressure on a boundary, positive when it pushes: ``value`` [MPa]."""
+    """A pressure on a boundary, positive when it pushes: ``value`` [MPa].
+
+    With large strain it follows the boundary, and a value that varies is that at the deformed one.
+    """
 
     value: StressValue
+    follows: ClassVar[bool] = True
 
     def push(self, x: Array, along: Array) -> Array:
         """Return the forces (2, n) on pieces of the boundary [N/mm]."""

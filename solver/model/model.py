@@ -8,10 +8,11 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.materials.doubts import doubts
+from solver.mesh.elements import element_type
 from solver.model.body import Body
 from solver.model.contact_pair import ContactPair
 from solver.model.link import Link
-from solver.model.rigid import Pushed, RigidBody
+from solver.model.rigid import Moved, Pushed, RigidBody
 from solver.model.singular import SingularPoint
 from solver.parameters import check
 
@@ -58,12 +59,51 @@ class Model:
             elastic = all(self.body(name, side).material.elastic for side, (name, _) in sides)
             contact.law.check_bodies(elastic=elastic)
         self._check_pairs()
+        self._check_large()
         for k, link in enumerate(self.links):
             self._check_link(f"links[{k}]", link)
         for body in self.rigid:
             if not body.surfaces and all(link.rigid != body.name for link in self.links):
                 allowed = "must be 1 or more, unless a link moves a boundary with the body"
                 raise ModelError(f"rigid.{body.name}.surfaces", {}, allowed)
+
+    @property
+    def large(self) -> bool:
+        """Whether the strain of a body is large."""
+        return any(body.large for body in self.bodies)
+
+    def _check_large(self) -> None:
+        """Raise `ModelError` for contact and links that bodies of large strain do not have yet."""
+        large = {body.name for body in self.bodies if body.large}
+        for k, pair in enumerate(self.contacts):
+            if pair.sliding == "small" and large & {pair.slave[0], pair.master[0]}:
+                allowed = "must be auto or finite: the strain of a body in this contact is large"
+                raise ModelError(f"contacts[{k}].sliding", pair.sliding, allowed)
+        for body in self.bodies if self.singular else ():
+            kind = element_type(body.element)
+            reduced = kind.cells == "quad" and kind.order < kind.full_order
+            if body.large and reduced and not body.full_integration:
+                allowed = (
+                    f"must be quad4 or have full_integration: body {body.name!r} has large strain, "
+                    "and next to singular points its elements lose their stability with fewer "
+                    "points"
+                )
+                raise ModelError("element", body.element, allowed)
+        for k, link in enumerate(self.links):
+            turns = link.local or (link.rigid is not None and self._turns(link.rigid))
+            if turns and large & {of for of, _ in link.sides}:
+                allowed = (
+                    "must not move along normals or with a body that rotates: the strain of the "
+                    "body it moves is large. Prescribe rotation = 0, or leave normal out"
+                )
+                raise ModelError(f"links[{k}]", link.rigid or link.components, allowed)
+
+    def _turns(self, name: str) -> bool:
+        """Whether a rigid body may rotate."""
+        body = self.body(name)
+        return isinstance(body, RigidBody) and (
+            not isinstance(body.rotation, Moved) or body.rotation.value != 0
+        )
 
     def _check_solids(self) -> None:
         """Raise `ModelError` for contact, links and rigid bodies in a model of bodies in space."""

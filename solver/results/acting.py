@@ -27,7 +27,7 @@ def _nothing(x: Array) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Acting:
-    """What acts on the lower body in a state, whose surface runs along x; by default nothing does.
+    """What acts, in a state, on the lower body, whose surface runs along x: by default nothing.
 
     Attributes
     ----------

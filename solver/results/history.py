@@ -54,7 +54,7 @@ def observe(system: System, converged: Converged) -> Observed:
         elif not isinstance(part, Wheel):
             # from equilibrium: the supported nodes of a condensed body are eliminated
             whole = system.full(name)
-            loads = vectors(whole.external(state.time), whole.dim).sum(axis=1)
+            loads = vectors(whole.external(state.time, u), whole.dim).sum(axis=1)
             held = -loads - vectors(touch, whole.dim).sum(axis=1)
             reactions[name] = (*held.tolist(), np.nan)
     pairs = [(float(c.normal.sum()), float(c.tangential.sum())) for c in state.contacts]

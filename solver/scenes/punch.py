@@ -85,6 +85,11 @@ class PunchParameters(ContactParameters):
     element: Literal["quad8", "quad9", "quad4", "tri6", "tri3"] = described(
         "quad8", "element of both bodies"
     )
+    strain: Literal["small", "large"] = described(
+        "small",
+        "strain of both bodies: large strain is logarithmic, and forces balance in the deformed "
+        "bodies",
+    )
     load_step: Annotated[float, Interval(ge=1e-4, le=1.0), Unit("1")] = by_accuracy(
         "largest increment of load_ratio"
     )

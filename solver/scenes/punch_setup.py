@@ -37,6 +37,7 @@ def model(parameters: PunchParameters) -> Model:
         material=p.material(p.punch_stiffness, elastic=p.elastic_punch),
         kinematics=p.state,
         element=p.element,
+        strain=p.strain,
         supports={"left": "x"},
         pressure={"top": p.yield_stress},
     )
@@ -46,6 +47,7 @@ def model(parameters: PunchParameters) -> Model:
         material=p.material(),
         kinematics=p.state,
         element=p.element,
+        strain=p.strain,
         supports={"left": "x", "bottom": "y"},
     )
     contact = p.contact(slave=("punch", "bottom"), master=("half_plane", "top"))
@@ -65,7 +67,8 @@ def effort(parameters: PunchParameters, load_ratios: Sequence[float]) -> Effort:
     punch = grid_size(under, up, parameters.element)
     plane = grid_size([*under, *beyond[1:]], down, parameters.element)
     # an elastic punch is reduced to its contact surface; x is held on the line of symmetry
-    own = 2 * punch.along - 1 if parameters.elastic_punch else 2 * punch.nodes - punch.up
+    condensed = parameters.elastic_punch and parameters.strain == "small"
+    own = 2 * punch.along - 1 if condensed else 2 * punch.nodes - punch.up
     increments = _increments(tuple(load_ratios), parameters.load_step, parameters.unload_steps)
     return Effort(
         elements=punch.elements + plane.elements,

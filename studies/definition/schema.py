@@ -40,14 +40,15 @@ _DIGITS = 12
 
 
 def _documented(schema: dict[str, Any], table: type) -> None:
-    """Describe the entries of a table as its docstring does."""
-    summary, _, rest = (getdoc(table) or "").partition("\n\nAttributes\n----------\n")
-    schema["description"] = " ".join(summary.split())
-    for each in re.split(r"^(?=\w[\w, ]* : )", rest, flags=re.MULTILINE)[1:]:
-        names, _, text = each.partition(" : ")
-        for name in names.split(", "):
-            if name in schema["properties"]:
-                schema["properties"][name]["description"] = " ".join(text.split()).replace("`", "")
+    """Describe the entries of a table as the docstrings of the class and of its bases do."""
+    for base in reversed(table.__mro__):
+        summary, _, rest = (getdoc(base) or "").partition("\n\nAttributes\n----------\n")
+        schema["description"] = " ".join(summary.split())
+        for each in re.split(r"^(?=\w[\w, ]* : )", rest, flags=re.MULTILINE)[1:]:
+            names, _, text = each.partition(" : ")
+            for entry in map(schema["properties"].get, names.split(", ")):
+                if entry is not None:
+                    entry["description"] = " ".join(text.split()).replace("`", "")
 
 
 class StudyTable(BaseModel):
@@ -226,7 +227,7 @@ def _end(value: Any, info: ValidationInfo) -> float:
     assert isinstance(parameter, Parameter)
     number = parameter.in_own_unit(value, "")
     if not is_finite(number):
-        raise StudyError("", value, "must be a finite number")
+        raise parameter.refusal("", value)
     return number
 
 
@@ -299,12 +300,17 @@ class Range(StudyTable):
         return self.stop - self.start
 
 
-Ends = tuple[float | str, float | str]
+Limits = tuple[float | str, float | str]
 """``[lowest, highest]``, in JSON Schemas."""
 
 
 class Steps(Range):
-    """An axis: the values of a range in ``num - 1`` steps, in either direction."""
+    """An axis: the values of a range in ``num - 1`` steps, in either direction.
+
+    Attributes
+    ----------
+    num : number of values
+    """
 
     num: Annotated[int, Strict(), Interval(ge=2, le=MAXIMUM_RUNS)]
 

@@ -31,8 +31,7 @@ from studies.definition.sweep import Axes, Sweep, labels, linked_values, owners,
 from studies.definition.vocabulary import taken
 from studies.errors import Mistakes, SceneError, StudyError
 from studies.kinds import KINDS, kind_of
-from studies.kinds.kind import Kind
-from studies.kinds.sweep import SweepStudy
+from studies.kinds.kind import Kind, SweepStudy
 from studies.scenes.names import in_use
 from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
 

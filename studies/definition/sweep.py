@@ -208,6 +208,10 @@ def run_count(content: Mapping[str, Any]) -> int:
     axes = {entry: content[entry] for entry in ENTRIES if entry in content}
     axes |= sweep if isinstance(sweep, Mapping) else {}
     sizes = {str(name): _length(axis) for name, axis in axes.items()}
+    for name, size in sizes.items():
+        if size > MAXIMUM_RUNS:
+            field = name if name in ENTRIES else f"sweep.{name}"
+            raise StudyError(field, f"{size} values", f"at most {MAXIMUM_RUNS} are allowed")
     runs = math.prod(sizes.values())
     if runs > MAXIMUM_RUNS:
         listed = " x ".join(f"{size} {name}" for name, size in sizes.items())

@@ -19,8 +19,8 @@ import numpy as np
 
 from solver.late import Late
 from studies.definition.cases import Case, LoadingPath
-from studies.definition.line import Line, Read
 from studies.definition.place import Limit, Place
+from studies.definition.quantity import Line, Read
 from studies.definition.study import Study
 from studies.storage import runfile
 from studies.storage.store import Store

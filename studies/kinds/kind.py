@@ -17,9 +17,9 @@ from typing import Any, ClassVar, NamedTuple, Self
 from solver.late import Late
 from solver.scenes import Scene
 from studies.definition.cases import Case
-from studies.definition.line import Read
 from studies.definition.place import Chooser
 from studies.definition.points import Points
+from studies.definition.quantity import Read
 from studies.definition.schema import Context, StudyTable, parsed
 from studies.definition.sweep import Axes
 from studies.definition.vocabulary import STOPPED
@@ -65,6 +65,32 @@ class Answers:
     of: str = ""
 
 
+Mark = Mapping[str, tuple[Any, Any, Any]]
+"""A place by parameter: value, and lower and upper end of what is known of it, or None."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """What was found.
+
+    Attributes
+    ----------
+    about : what was asked for, and how the work ended, a sentence each
+    warning : what makes it doubtful; empty if nothing does
+    headings, units, rows : a table; its texts for each column
+    words : number of the first columns that are words
+    marks : a place for each answer that has one
+    """
+
+    about: Sequence[str]
+    headings: Sequence[str]
+    units: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    words: int
+    marks: Sequence[Mark] = ()
+    warning: str = ""
+
+
 class Kind(StudyTable):
     """A kind of study, and of a study what its entry says: its fields.
 
@@ -80,7 +106,7 @@ class Kind(StudyTable):
     ends : the variable of its data set that says whether it has ended, the word of what has not,
         and the variable of the ids of runs
     answers : (study, its choosers) -> `Answers`
-    found : (data set, entry) -> `studies.views.found.Found`
+    found : (data set, entry) -> `Found`
     table, figure : (data set) -> text, or figure, of its report; None for those of runs
     """
 
@@ -172,3 +198,20 @@ class Kind(StudyTable):
         places = list(cases)
         for case in itertools.islice(itertools.cycle(places), self.most_runs(len(places))):
             yield case, self.begins, [{**case.values, **self.begins}.get(branch)]
+
+
+class SweepStudy(Kind):
+    """A study without an entry of another kind."""
+
+    name = "sweep"
+    chooses = False
+    everywhere = True
+    of_runs = True
+
+    def most_runs(self, places: int) -> int:
+        """Return the number of places."""
+        return places
+
+    def stage(self, places: int, ended: int, told: str) -> str:
+        """Return nothing: its progress says all."""
+        return ""

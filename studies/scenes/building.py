@@ -152,7 +152,8 @@ class Builder:
                 mesh=mesh,
                 material=law,
                 kinematics=self.scene.kinematics,
-                element=table.element or default_element(mesh),
+                element=table.element or default_element(mesh, table.strain),
+                strain=table.strain,
                 thickness=self.scene.thickness,
                 supports=supports,
                 loads=(*filter(None, loads), *self._removals(name)),
@@ -442,9 +443,13 @@ def _table_of(field: str, given: TabulatedTable, files: Mapping[str, MeshFile] |
         raise ModelError(field, given.file, allowed) from None
 
 
-def default_element(mesh: Mesh) -> str:
-    """Return the element of a body that names none."""
-    return "quad8" if mesh.t.shape[0] == 4 else "tri6"
+def default_element(mesh: Mesh, strain: str) -> str:
+    """Return the element of a body that names none.
+
+    With large strain it is ``quad4``: ``quad8`` with 2 x 2 points loses its stability at corners.
+    """
+    quadrilateral = "quad4" if strain == "large" else "quad8"
+    return quadrilateral if mesh.t.shape[0] == 4 else "tri6"
 
 
 def mesh_of_body(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) -> Mesh:

@@ -60,7 +60,8 @@ def effort_of(
         driven = any(each.components or each.softening(np.zeros((2, 0))) is not None
                      for each in loads)  # fmt: skip
         # an elastic body is condensed to its surfaces in contact and links
-        condensed = size.on(own) if own and not driven and is_elastic(scene, body) else None
+        whole = driven or body.strain == "large" or not is_elastic(scene, body)
+        condensed = size.on(own) if own and not whole else None
         held = [(b, "xy".index(axis)) for b, axes in body.supports.items() for axis in axes]
         held += [(b, axis) for each in loads for b in each.boundaries for axis in each.components]
         for axis in (0, 1):
@@ -101,6 +102,8 @@ def in_one_increment(scene: tables.SceneFile) -> bool:
     """
     if scene.loading is None or scene.loading.cycles is not None:
         return False
+    if any(body.strain == "large" for body in scene.bodies.values()):
+        return False
     laws = [(friction_of(pair), pair) for pair in scene.contacts]
     flat = [pair.sliding == "small" and not pair.gap for law, pair in laws if law.rough]
     proportional = all(law.proportional for law, _ in laws) and all(flat)
@@ -131,9 +134,9 @@ class _BodySize(NamedTuple):
         return frozenset().union(*each)
 
 
-def _size_of_mesh(mesh: Mesh, element: str | None) -> _BodySize:
-    """Return the size of a mesh with an element; None is the default element of a body."""
-    nodes = Dofs(mesh, element_type(element or default_element(mesh)).element)
+def _size_of_mesh(mesh: Mesh, element: str) -> _BodySize:
+    """Return the size of a mesh with an element."""
+    nodes = Dofs(mesh, element_type(element).element)
     boundaries = {
         name: frozenset(nodes.get_facet_dofs(np.asarray(facets)).flatten().tolist())
         for name, facets in (mesh.boundaries or {}).items()
@@ -164,7 +167,7 @@ def _size_of(description: Description, name: str, body: tables.BodyTable) -> _Bo
             mesh = mesh_of_body(body, description.meshes)
             if body.shape is not None:
                 few(mesh.nelements)
-            known[key] = _size_of_mesh(mesh, body.element)
+            known[key] = _size_of_mesh(mesh, body.element or default_element(mesh, body.strain))
     except ModelError as error:
         beside = body.shape is None or error.field.startswith(("boundaries.", "cuts."))
         where = f"bodies.{name}" if beside else f"bodies.{name}.shape"

@@ -92,6 +92,7 @@ class BodyTable(SceneTable):
     mesh: FileName | None = None
     part: str | None = None
     element: str | None = None
+    strain: Literal["small", "large"] = "small"
     move: Place = (0.0, 0.0)
     cuts: dict[Label, CutTable] = Field(default_factory=dict)
     boundaries: dict[Label, BoundaryTable] = Field(default_factory=dict)

@@ -18,18 +18,23 @@ from studies.definition.parameters import parameters_of
 from studies.errors import StudyError
 from studies.scenes.registry import known_names, scene_named
 from studies.storage.dataset import attributes_of
-from studies.views.audited import worst
 from studies.views.columns import unit_text, value_text
-from studies.views.figures import FIGURES, group_of
-from studies.views.left_out import BY_ACCURACY, set_by_accuracy
+from studies.views.figures import FIGURES, group_of, worst
 from studies.views.picking import one_run, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import line_fields, map_fields, sweep_fields, usual_field
 from studies.views.plots.lines import line_figure
 from studies.views.plots.maps import map_figure
-from studies.views.plots.saved import png
+from studies.views.plots.sheets import png
 from studies.views.plots.sweep import sweep_figure
-from studies.views.summary import place_of, placed, values_text
-from studies.views.tables import FOOTNOTE, messages, run_cells
+from studies.views.summary import placed, values_text
+from studies.views.tables import (
+    BY_ACCURACY,
+    FOOTNOTE,
+    messages,
+    place_of,
+    run_cells,
+    set_by_accuracy,
+)
 
 LISTED = 500
 """Largest number of runs in the table."""

@@ -30,7 +30,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import linprog, minimize
 from scipy.stats import t as student
 
-from studies.views.tenths import tenths
+from studies.views.fits import tenths
 
 Array = NDArray[np.float64]
 

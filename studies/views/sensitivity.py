@@ -23,14 +23,12 @@ import xarray as xr
 
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError, one_of
-from studies.views.by_content import by_content
 from studies.views.chaos import DEGREES, Chaos, Numbers, bears, fitted
 from studies.views.columns import aligned, or_none, value_text
-from studies.views.grids import parameters_over, point_axes
-from studies.views.picking import flags, select, sweep_axes
+from studies.views.fits import TENTHS, by_content, check_predicted, share_predicted, tenths
+from studies.views.picking import flags, parameters_over, point_axes, select, sweep_axes
 from studies.views.plots.fields import sweep_fields, wide_fields
 from studies.views.table import one_number
-from studies.views.tenths import TENTHS, check_predicted, share_predicted, tenths
 
 METHODS = ("chaos", "delta", "pawn", "rbd_fast")
 """The fit of this module, and methods of the library SALib."""

@@ -10,8 +10,8 @@ import xarray as xr
 
 from solver.tensors import AXES
 from studies.errors import StudyError
+from studies.views.best import column_over
 from studies.views.columns import unit_text
-from studies.views.numbers import column_over
 from studies.views.plots.captions import DISTANCE
 from studies.views.plots.fields import (
     check_field,

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import xarray as xr
 
+from solver import Solution
 from solver.results.body_fields import BODY_FIELDS
 from solver.tensors import AXES, components
-
-if TYPE_CHECKING:
-    from solver import Solution
 
 
 def to_xarray(solution: Solution) -> xr.Dataset:

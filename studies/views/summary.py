@@ -8,22 +8,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, SupportsIndex
+from typing import Any
 
 from studies.definition.sweep import labels
 from studies.definition.vocabulary import MISSING, OK
-from studies.views.audited import Worst, worst
-from studies.views.columns import aligned, unit_text, value_text
-
-if TYPE_CHECKING:
-    import xarray as xr
+from studies.views.columns import aligned, value_text
+from studies.views.figures import Worst
 
 WIDTH = 28
 """Number of characters of a bar."""
 
 NAMED = 4
-"""Largest number of values of an axis, and of failed runs, that are named."""
+"""Largest number of values of an axis, and of runs of a kind, that are named."""
 
 _LONGEST = 100
 """Largest number of characters of a message."""
@@ -114,50 +110,6 @@ class Summary:
         return rows
 
 
-def summary(study: xr.Dataset | Path | str) -> Summary:
-    """Return a short view of a study that is stored.
-
-    Parameters
-    ----------
-    study : its data set, or what `open_study` opens
-
-    Raises
-    ------
-    StudyError
-        if there is no such study
-    """
-    import numpy as np
-
-    from studies.views.picking import sweep_axes
-    from studies.views.reading import open_study
-
-    if isinstance(study, Path | str):
-        with open_study(study) as opened:
-            return summary(opened)
-    names = sweep_axes(study)
-    status, message = (study[name].to_numpy() for name in ("status", "message"))
-    numbers = {str(n): v.to_numpy() for n, v in study.data_vars.items() if v.dims == (*names,)}
-    first = next(iter(worst(numbers)), None)
-    words, count = np.unique(status.astype(str), return_counts=True)
-    lost = [at for at in np.ndindex(status.shape) if status[at] not in (OK, MISSING)]
-    counts = dict(zip(words.tolist(), count.tolist(), strict=True))
-    return Summary(
-        name=str(study.attrs["title"]),
-        scene=str(study.attrs["scene"]),
-        status="complete" if MISSING not in counts else "not complete",
-        progress=1.0 - counts.get(MISSING, 0) / status.size,
-        counts=counts,
-        axes={n: values_text(study[n].to_numpy().tolist(), _unit(study[n])) for n in names},
-        audit=None
-        if first is None
-        else (first, place_of(study, np.unravel_index(first.at, status.shape))),
-        failed=[
-            Failed(place=place_of(study, at), status=str(status[at]), message=str(message[at]))
-            for at in lost[:NAMED]
-        ],
-    )
-
-
 def summary_of(
     detail: Mapping[str, Any], audit: tuple[Worst, str] | None, failed: Sequence[Failed]
 ) -> Summary:
@@ -179,13 +131,6 @@ def _called(name: str, known: str) -> str:
     return name if name == known else f"{name} ({known[:8]}…)".lstrip()
 
 
-def place_of(dataset: xr.Dataset, at: Sequence[SupportsIndex]) -> str:
-    """Return where the run at a position (n_axes,) of a data set is, on axes of several values."""
-    here = zip(dataset["status"].dims, at, strict=True)
-    several = ((str(n), k) for n, k in here if dataset.sizes[n] > 1)
-    return placed({name: dataset[name].to_numpy()[k] for name, k in several})
-
-
 def placed(place: Mapping[str, Any]) -> str:
     """Return the place of a run in words."""
     return ", ".join(f"{name} = {value_text(value)}" for name, value in place.items())
@@ -204,7 +149,3 @@ def values_text(values: Sequence[Any], unit: str = "", most: int = NAMED) -> str
     else:
         text = ", ".join(map(value_text, values))
     return f"{text} {unit}".rstrip()
-
-
-def _unit(values: xr.DataArray) -> str:
-    return unit_text(values.attrs.get("units"))

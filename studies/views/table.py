@@ -1,6 +1,6 @@
 """The numbers of a study's runs as columns: sorted, filtered, written.
 
-A service makes the table from its catalogue, while the study runs; `studies.views.numbers` makes
+A service makes the table from its catalogue, while the study runs; `studies.views.best` makes
 that of a data set.
 """
 

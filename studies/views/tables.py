@@ -6,20 +6,31 @@ import json
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple, SupportsIndex
 
 import numpy as np
 import xarray as xr
 
+from solver.errors import ModelError
 from solver.results.quantities import QUANTITIES
 from solver.tensors import AXES
-from studies.definition.vocabulary import LABEL_ATTRIBUTES, OK
+from studies.definition.identity import solver_hash
+from studies.definition.parameters import Parameter, completed, parameters_of, plain
+from studies.definition.vocabulary import LABEL_ATTRIBUTES, MISSING, OK
+from studies.errors import StudyError
+from studies.execution.run import StudyOutcome
+from studies.kinds.kind import Kind
+from studies.scenes.registry import scene_of
 from studies.storage.ugrid import owns
-from studies.views.columns import aligned, in_blocks, stacked, unit_text, value_text
-from studies.views.figures import FIGURES
-from studies.views.left_out import BY_ACCURACY, set_by_accuracy
+from studies.views.columns import aligned, in_blocks, or_none, stacked, unit_text, value_text
+from studies.views.figures import FIGURES, worst
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
+from studies.views.reading import open_study
+from studies.views.summary import NAMED, Failed, Summary, placed, values_text
 
+LISTED = 100
+"""Largest number of runs that a report lists; `residua show` prints all."""
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*[A-Za-z_])")
 """A number in a message, not the digits of a name."""
 _AUDIT = "audit_"
@@ -32,8 +43,6 @@ FOOTNOTE = (
 
 _ROUNDED = 1e-9
 """Ratio of a number to the largest of its unit in a table; below it, it is printed as 0."""
-NAMED = 4
-"""Largest number of runs that are named for a message; further ones are counted."""
 
 
 class RunCells(NamedTuple):
@@ -254,3 +263,115 @@ def _unit(variable: xr.DataArray) -> str:
 
 def _bracketed(unit: str) -> str:
     return f"[{unit}]" if unit else ""
+
+
+BY_ACCURACY = "by accuracy"
+"""What sets a parameter that is left out."""
+
+_MOST = 500
+"""Largest number of runs whose parameters are made: those of a scene file take a millisecond."""
+
+
+def set_by_accuracy(dataset: xr.Dataset) -> dict[str, str]:
+    """Return the number of each parameter that is left out as text, or its range over the runs.
+
+    The text is empty where the number is not known: the data set is of another version of the
+    solver, does not tell all parameters of its runs, as that of a search, or has too many runs.
+    """
+    given = json.loads(dataset.attrs.get("parameters", "{}"))
+    names = [name for name, value in given.items() if value is None]
+    if not names or "accuracy" not in {*given, *dataset.coords}:
+        return {}
+    found: dict[str, list[Any]] = {name: [] for name in names}
+    if dataset.attrs.get("solver_source") == solver_hash() and dataset["status"].size <= _MOST:
+        try:
+            scene = scene_of(dataset.attrs)
+            known = parameters_of(scene)
+            if known.keys() <= {*given, *dataset.coords}:
+                for own in _runs(dataset, given, known):
+                    whole = completed(scene, own)
+                    for name in names:
+                        found[name].append(whole[name])
+        except (StudyError, ModelError):  # a scene that is not here, or of another time
+            found = {name: [] for name in names}
+    return {name: _range_text(numbers) for name, numbers in found.items()}
+
+
+def _runs(
+    dataset: xr.Dataset, given: dict[str, Any], known: dict[str, Parameter]
+) -> Iterator[dict[str, Any]]:
+    """Yield the parameters of each run."""
+    swept = {n: axis for n, axis in sweep_coordinates(dataset).items() if n in known}
+    values = {
+        name: [plain(or_none(each), known[name].default) for each in dataset[name].to_numpy()]
+        for name in swept
+    }
+    for at in np.ndindex(dataset["status"].shape):
+        place = dict(zip(sweep_axes(dataset), at, strict=True))
+        yield given | {name: values[name][place[axis]] for name, axis in swept.items()}
+
+
+def _range_text(numbers: list[Any]) -> str:
+    texts = [value_text(each) for each in (min(numbers), max(numbers))] if numbers else []
+    return " to ".join(dict.fromkeys(texts))
+
+
+def summary(study: xr.Dataset | Path | str) -> Summary:
+    """Return a short view of a study that is stored.
+
+    Parameters
+    ----------
+    study : its data set, or what `open_study` opens
+
+    Raises
+    ------
+    StudyError
+        if there is no such study
+    """
+    if isinstance(study, Path | str):
+        with open_study(study) as opened:
+            return summary(opened)
+    names = sweep_axes(study)
+    status, message = (study[name].to_numpy() for name in ("status", "message"))
+    numbers = {str(n): v.to_numpy() for n, v in study.data_vars.items() if v.dims == (*names,)}
+    first = next(iter(worst(numbers)), None)
+    words, count = np.unique(status.astype(str), return_counts=True)
+    lost = [at for at in np.ndindex(status.shape) if status[at] not in (OK, MISSING)]
+    counts = dict(zip(words.tolist(), count.tolist(), strict=True))
+    return Summary(
+        name=str(study.attrs["title"]),
+        scene=str(study.attrs["scene"]),
+        status="complete" if MISSING not in counts else "not complete",
+        progress=1.0 - counts.get(MISSING, 0) / status.size,
+        counts=counts,
+        axes={n: values_text(study[n].to_numpy().tolist(), _unit(study[n])) for n in names},
+        audit=None
+        if first is None
+        else (first, place_of(study, np.unravel_index(first.at, status.shape))),
+        failed=[
+            Failed(place=place_of(study, at), status=str(status[at]), message=str(message[at]))
+            for at in lost[:NAMED]
+        ],
+    )
+
+
+def place_of(dataset: xr.Dataset, at: Sequence[SupportsIndex]) -> str:
+    """Return where the run at a position (n_axes,) of a data set is, on axes of several values."""
+    here = zip(dataset["status"].dims, at, strict=True)
+    several = ((str(n), k) for n, k in here if dataset.sizes[n] > 1)
+    return placed({name: dataset[name].to_numpy()[k] for name, k in several})
+
+
+def report_text(dataset: xr.Dataset, kind: Kind, outcome: StudyOutcome, note: str) -> str:
+    """Return the runs of a study, or what it has found, and their messages; last their numbers."""
+    size = dataset["status"].size
+    if kind.table:
+        table = kind.table(dataset) + "\n"
+    else:
+        table = runs_table(dataset) + "\n" if size <= LISTED else ""
+    counts = ", ".join(f"{number} {status}" for status, number in outcome.counts.items())
+    warned = (dataset["status"] == OK) & (dataset["message"] != "")
+    warning = f"; {int(warned.sum())} with a warning" if warned.any() else ""
+    ended = f"{dataset.attrs['title']}: {size} {kind.rows} ({counts}{warning})"
+    noted = f"\nnote: {note}\n" if note else ""
+    return f"{table}{messages(dataset)}{noted}\n{ended}\n"

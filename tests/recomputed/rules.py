@@ -510,7 +510,8 @@ class Rules:
                     least = LEAST_LENGTH * self.size / size
                     yield f"motion_{axis}", row, value, LIMIT * max(abs(value), least)
             elif body.axle is None:
-                own = own - self.plain(name).applied(state.time)[0]
+                moved = system.displacement(name, state)
+                own = own - self.plain(name).applied(state.time, moved)[0]
                 if body.kinematics == "axisymmetric":
                     own[0] = np.nan  # radial forces balance around the axis
             else:

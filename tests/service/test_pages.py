@@ -55,6 +55,6 @@ def test_the_curl_lines_of_the_pages_work(service: Server, tmp_path: Path) -> No
     (looking, _), *_ = curl_blocks("service/README.md")
     listing, placeholder, drawing = re.split(r"^(RUN=.*\n)", looking, flags=re.M)
     runs = json.loads(typed(listing))["items"]
-    assert placeholder and len(runs) == 2
+    assert placeholder and len(runs) >= 2
     typed(drawing, RUN=runs[0]["id"])
     assert matplotlib.image.imread(tmp_path / "map.png").std() > 0.01

@@ -407,6 +407,9 @@ def test_a_form_computes_a_goal_and_tells_its_mistakes_beside_its_fields(seen: S
     assert {*answer["wrong"]} == {"goal.between", "goal.within", "goal.at"}
     page = seen.client.post("/ui/new", data=fields)
     assert page.status_code == 422 and 'value="[2, 1]"' in page.text
+    del fields["goal.at"], fields["goal.within"]
+    page = seen.client.post("/ui/new", data=fields | {"goal.between": "[1, 2]"})
+    assert page.status_code == 422 and "needs of and one of at," in page.text, "of the whole table"
 
 
 def test_studies_are_found_by_scene_and_text(seen: Seen) -> None:

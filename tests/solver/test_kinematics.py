@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
@@ -15,6 +19,20 @@ from solver.tensors import SQRT2, to_tensor
 
 ELASTIC = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Curved(Deformation):
+    geometric: Callable
+    linear: ClassVar[bool] = False
+
+    def stiffness(self, elements, tangent, stress=None):
+        added = 0.0 if stress is None else self.geometric(stress, elements)
+        return super().stiffness(elements, tangent) + added
+
+    def geometric_energy(self, step, stress):
+        each = step[self.dofs]
+        return np.einsum("ei,eij,ej", each, self.geometric(stress, slice(None)), each)
 
 
 class GreenLagrange:
@@ -39,9 +57,9 @@ class GreenLagrange:
              + np.einsum("iep,aep->epai", F[:, 1], G[:, 0])) / SQRT2,
         ]  # fmt: skip
         B = np.stack(rows, axis=2).reshape(*F.shape[2:], 4, -1)
-        return Deformation(
+        return Curved(
             n=part.n, dofs=part.dofs, strain=strain, B=B, weights=part.weights,
-            geometric=self.geometric, linear=False,
+            geometric=self.geometric,
         )  # fmt: skip
 
     def geometric(self, stress, elements):

@@ -97,6 +97,22 @@ def test_points_of_s1002_give_s1002(tmp_path):
     assert same.curvature(z) == pytest.approx(PROFILE.curvature(z), abs=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("heading", "factor"), [("z y", 1), ("z [mm], y [mm]", 1), ("z[m] y[m]", 1e3)]
+)
+def test_the_heading_of_a_file_of_points_has_their_unit(tmp_path, heading, factor):
+    file = tmp_path / "wheel.csv"
+    file.write_text(f"{heading}\n-1, 0\n0, 0.5\n1, 0.5\n2, 0\n")
+    assert read_points(file).tolist() == [
+        [-factor, 0, factor, 2 * factor], [0, factor / 2, factor / 2, 0],
+    ]  # fmt: skip
+    for other in ("[feet]", "z [m], y [mm]"):
+        file.write_text(file.read_text().replace(heading, other))
+        with pytest.raises(ModelError, match="one unit in its heading, of mm, m, um, in"):
+            read_points(file)
+        file.write_text(file.read_text().replace(other, heading))
+
+
 def test_a_centred_wheelset_touches_rails_canted_by_1_in_40_on_their_crown():
     """S1002 was made for them: running circles 1500 mm apart, gauge 1435 mm 14 mm below the top."""
     for slope, low, high in ((1 / 40, -2.0, 5.0), (1 / 20, 10.0, 12.0)):

@@ -18,9 +18,8 @@ from studies.errors import StudyError
 from studies.scenes.registry import scene_named
 from studies.storage.provenance import provenance
 from studies.views.archive import archive
-from studies.views.left_out import set_by_accuracy
 from studies.views.plots.captions import setting
-from studies.views.tables import run_details
+from studies.views.tables import run_details, set_by_accuracy
 
 pytestmark = pytest.mark.usefixtures("one_worker")
 

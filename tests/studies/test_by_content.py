@@ -11,7 +11,7 @@ import pytest
 from solver.memory import SETTING
 from studies import StudyError, predict
 from studies.views import gaussian, sensitivity
-from studies.views.by_content import by_content
+from studies.views.fits import by_content
 from tests.studies.test_predict import rough, sampled, smooth
 
 

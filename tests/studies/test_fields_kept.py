@@ -18,7 +18,7 @@ from solver.mesh import grid
 from studies import Store, Study, StudyError, run_study
 from studies.scenes.scene import read_scene
 from studies.storage import ugrid
-from studies.views.kept import drawn_from
+from studies.views.plots.picture import drawn_from
 from studies.views.reading import open_netcdf
 
 pytestmark = [pytest.mark.processes, pytest.mark.solves, pytest.mark.usefixtures("one_worker")]

@@ -18,13 +18,13 @@ from solver.errors import ModelError
 from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, estimate, fit, open_study, run_study
 from studies.definition.identity import solver_hash
-from studies.definition.line import Line
+from studies.definition.quantity import Line
 from studies.definition.schema import Context, parsed
 from studies.definition.sweep import standings
 from studies.execution.asking import Asking
 from studies.execution.result import answered
 from studies.execution.task import PathTask, walk
-from studies.kinds.fit.certainty import certainty
+from studies.kinds.fit.answer import certainty
 from studies.kinds.fit.fitting import Fit, Fitted, Fitting
 from studies.kinds.fit.measured import MeasuredLine, pieces
 from studies.views.picking import run_file

@@ -15,8 +15,9 @@ import pytest
 from residua.cli import main
 from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, estimate, open_study, run_study
+from studies.kinds import found_of
+from studies.kinds.kind import Found
 from studies.kinds.minimise.search import Minimising
-from studies.views.found import Found, found_of
 from tests.studies.fakes import Canned, FakeParameters, bare, record
 from tests.studies.killed import runs_before_a_kill
 

@@ -12,7 +12,7 @@ import pytest
 
 from residua.cli import main
 from studies import Store, Study, open_study
-from studies.views.numbers import table_of
+from studies.views.best import table_of
 from studies.views.table import RunTable, column_of
 from studies.views.written import FORMS
 

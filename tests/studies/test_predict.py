@@ -13,9 +13,9 @@ from xarray.backends import BackendArray
 from xarray.core.indexing import LazilyIndexedArray
 
 from studies import Store, Study, StudyError, open_study, predict, sensitivity
-from studies.views.answers import answer
+from studies.views.fits import share_predicted, tenths
 from studies.views.gaussian import Gaussian, in_hull
-from studies.views.tenths import share_predicted, tenths
+from studies.views.predict import answer
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import SWITCHED
 from tests.studies.test_goal import search_here

@@ -230,7 +230,7 @@ def loads_times(kind: type, factor: float) -> Fault:
     external = kind.external  # type: ignore[attr-defined]
 
     def fault(patch: Patch) -> None:
-        patch.setattr(kind, "external", lambda self, time: factor * external(self, time))
+        patch.setattr(kind, "external", lambda self, time, u=None: factor * external(self, time, u))
 
     return fault
 

@@ -85,8 +85,6 @@ class RollingPatch(PatchLoad):
         shape = self.compliance.shape
         if shape[1:] != (m, 3, m, 3) or len(self.compliance) < n:
             raise ModelError("compliance", shape, f"must be ({n} or more, {m}, 3, {m}, 3)")
-        if not self.load.force > 0:
-            raise ModelError("force", self.load.force, "must be positive")
         if not self._lines.rough.any():
             object.__setattr__(self, "load", replace(self.load, drive=None, lateral_force=None))
 

@@ -40,13 +40,6 @@ class PrismParameters(WheelParameters):
         """Return the parameters of each pass; those of equal passes are one object."""
         return [self] * self.passes
 
-    @property
-    def contact_modulus(self) -> float:
-        """E* of the contact of wheel and prism [MPa]."""
-        return 1 / sum(
-            1 / each.plane_strain_modulus for each in (self.elasticity, self.wheel_elasticity)
-        )
-
     def under(self, force: float) -> RollingLoad:
         """Return the load with this vertical force [N], and the motion of the wheel."""
         locked = self.traction == 1.0

@@ -224,12 +224,6 @@ class RollingParameters(WheelParameters):
         return self.load_ratio * self.yield_stress
 
     @property
-    def contact_modulus(self) -> float:
-        """E* of wheel and half-space [MPa]."""
-        own = (1 - self.poisson_ratio**2) / self.youngs_modulus
-        return 1 / (own + 1 / self.wheel_elasticity.plane_strain_modulus)
-
-    @property
     def half_width(self) -> float:
         """Half-width a = 2 R p0 / E* of the elastic Hertz contact [mm]."""
         return 2 * self.radius * self.peak_pressure / self.contact_modulus

@@ -73,6 +73,12 @@ class WheelParameters(ContactParameters):
             poisson_ratio=self.poisson_ratio if nu == "same" else float(nu),
         )
 
+    @property
+    def contact_modulus(self) -> float:
+        """E* of the contact of wheel and body [MPa]."""
+        both = self.elasticity, self.wheel_elasticity
+        return 1 / sum(1 / each.plane_strain_modulus for each in both)
+
 
 def check_given_shear(parameters: Any) -> None:
     """Raise `ModelError` for friction that does not give shear in proportion to pressure."""

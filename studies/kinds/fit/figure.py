@@ -6,12 +6,11 @@ import math
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solver.results.quantities import QUANTITIES
 from studies.views.plots.captions import axis_label, label, words, wrapped
-from studies.views.plots.legends import add_head
+from studies.views.plots.sheets import add_head, plain_axes
 
 _PANEL = (4.6, 4.4)
 """Width and height of a line with its differences [in]."""
@@ -79,7 +78,7 @@ def _draw(panels: np.ndarray, rows: xr.Dataset, line: xr.Dataset) -> None:
         above.set_title(words(at.replace(" = ", " ")), fontsize=8, loc="left", color="0.3")
     above.legend(frameon=False, fontsize=8)
     for axes in (above, below):
-        _plain(axes)
+        plain_axes(axes)
 
 
 def _declared(name: str) -> xr.DataArray:
@@ -93,9 +92,3 @@ def _sure(dataset: xr.Dataset, name: str) -> str:
     value, sigma = dataset[name].item(), dataset[f"{name}_sigma"].item()
     unit = dataset[name].attrs.get("units", "1")
     return f"{value:.4g} ± {sigma:.2g}" + ("" if unit == "1" else f" {unit}")
-
-
-def _plain(axes: Axes) -> None:
-    axes.grid(color="0.92")
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)

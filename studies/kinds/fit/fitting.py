@@ -28,16 +28,14 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from solver.late import Late
 from solver.typing import Array
-from studies.definition.line import Read
+from studies.definition.quantity import Read
 from studies.definition.schema import Context, Number, Whole
 from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import SOLVED
 from studies.errors import Mistakes, StudyError
-from studies.kinds.fit.files import with_files
-from studies.kinds.fit.measured import MeasuredLine
+from studies.kinds.fit.measured import MeasuredLine, with_files
 from studies.kinds.kind import Placed, Reading
-from studies.kinds.ranges import DIGITS, Ranged
-from studies.kinds.replayed import Ends, Evaluation, Lacking, Replayed
+from studies.kinds.ranged import DIGITS, Ends, Evaluation, Lacking, Ranged, Replayed
 
 NO_FIT = "is missing: tell what was measured, and the ranges"
 """What a command of fits says of a study without one."""
@@ -66,16 +64,17 @@ class Fit(Ranged):
     table = Late("studies.kinds.fit.shown:fit_table")
     figure = Late("studies.kinds.fit.figure:compared")
 
-    measured: Annotated[list[MeasuredLine], Field(min_length=1)]
+    measured: Annotated[list[MeasuredLine], Field(min_length=1, max_length=1000)]
     step: Annotated[Number, Interval(ge=1e-4, le=0.5)] = 0.05
     most: Annotated[Whole, Interval(ge=1, le=10_000)] = 100
 
     @model_validator(mode="after")
     def _check(self, info: ValidationInfo) -> Self:
-        every, free, wrong = standings(Context.of(info).axes), len(self.ranges), Mistakes()
-        if (count := len(every) * (1 + free)) > self.most:
+        axes, free, wrong = Context.of(info).axes, len(self.ranges), Mistakes()
+        if (count := math.prod(map(len, axes.values())) * (1 + free)) > self.most:
             allowed = f"must be at least {count}, the runs of the first round"
             raise StudyError("most", self.most, allowed)
+        every = standings(axes)
         for k, line in enumerate(self.measured):
             with wrong.at(f"measured[{k}].at"):
                 if len(there := [each for each in every if each.has(line.at)]) != 1:

@@ -9,8 +9,10 @@ piece is compared with its own.
 from __future__ import annotations
 
 import math
+import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -18,12 +20,13 @@ from pydantic import Field, GetJsonSchemaHandler, PlainValidator, ValidationInfo
 
 from solver.scenes import Scene
 from solver.typing import Array
-from studies.definition.line import Read, picked
 from studies.definition.parameters import in_unit
-from studies.definition.quantity import Variable, known_variable
+from studies.definition.quantity import Read, Variable, known_variable, picked
+from studies.definition.rows import read_table
 from studies.definition.schema import Context, StudyTable, is_finite
-from studies.definition.sweep import standings
+from studies.definition.sweep import linked_values
 from studies.errors import StudyError, Unchecked, one_of
+from studies.toml import CASE
 from studies.units import UnitError, number_in, under
 
 _HEADING = re.compile(r"(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
@@ -125,7 +128,7 @@ class MeasuredLine(StudyTable):
         if self.over and (count != len(self.values) or len({*self.places}) < 2):
             two = f"must be as many as the values, {len(self.values)}, and two different ones"
             raise StudyError("places", f"{count} numbers", f"{two} at least")
-        axes = dict.fromkeys(n for each in standings(Context.of(info).axes) for n in each.at)
+        axes = {**(swept := Context.of(info).axes), **linked_values(swept)}
         for name, value in self.at.items():
             if name not in axes and name not in quantity.dims:
                 raise StudyError(f"at.{name}", value, one_of(name, [*axes, *quantity.dims]))
@@ -238,3 +241,54 @@ def _number(heading: str, text: Any) -> float:
         return float(text)
     except (TypeError, ValueError):
         raise StudyError(heading, text, "must be a number in every row") from None
+
+
+def with_files(content: Any, folder: Path, given: Sequence[Path]) -> Any:
+    """Return a fit with the rows of its measured lines.
+
+    Parameters
+    ----------
+    content : the entry of a study; None if it has none
+    folder : of the study
+    given : tables, in place of those that the fit names; the place of one on other dimensions may
+        be behind its name: ``crater.csv@stage=unloaded,pass=2``
+    """
+    if given and not isinstance(content := {} if content is None else content, dict):
+        raise StudyError("fit", content, "must be a table")
+    if given:
+        return content | {"measured": [_at_place(str(each), "--measured") for each in given]}
+    if not isinstance(content, dict) or "measured" not in content:
+        return content
+    lines = content["measured"] if isinstance(content["measured"], list) else [content["measured"]]
+    every = [_with_rows(each, f"fit.measured[{k}]", folder) for k, each in enumerate(lines)]
+    return content | {"measured": every}
+
+
+def _with_rows(line: Any, field: str, folder: Path) -> Any:
+    """Return a measured line with the rows of its file, if it names one."""
+    given = {"file": line} if isinstance(line, str) else line
+    if not isinstance(given, dict) or not isinstance(given.get("file"), str):
+        return line
+    rest = {key: value for key, value in given.items() if key != "file"}
+    return rest | {"rows": read_table(folder / given["file"], field)}
+
+
+def _at_place(text: str, field: str) -> dict[str, Any]:
+    """Return the rows of a measured line, and its place, which may be behind the file's name."""
+    signs = [k for k in range(len(text) - 1, 0, -1) if text[k] == "@" and "=" in text[k:]]
+    # Path.is_file raises an error for a text that is too long for the name of a file
+    there = (k for k in [len(text), *signs] if os.path.isfile(text[:k]))  # noqa: PTH113
+    end = next(there, signs[0] if signs else len(text))  # names and folders may have these signs
+    name, places = text[:end], text[end + 1 :]
+    if not places:
+        return {"rows": read_table(text, field)}
+    at: dict[str, Any] = {}
+    for each in places.split(","):
+        dim, sign, value = each.partition("=")
+        if not (dim and sign and value):
+            raise StudyError(field, text, "must be FILE, or FILE@NAME=VALUE,NAME=VALUE")
+        try:
+            at[dim] = value if dim == CASE else float(value)
+        except ValueError:
+            at[dim] = value
+    return {"rows": read_table(name, field), "at": at}

@@ -12,9 +12,9 @@ from studies.definition.study import Study
 from studies.errors import StudyError
 from studies.execution.run import run_study
 from studies.kinds.fit.fitting import NO_FIT, Fit
+from studies.kinds.kind import Found
 from studies.storage.store import Store
 from studies.views.columns import aligned, or_none, unit_text, value_text
-from studies.views.found import Found
 from studies.views.reading import open_study
 
 _ENDS = {"value": "", "sigma": "_sigma", "lowest": "_low", "highest": "_high"}

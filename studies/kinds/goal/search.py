@@ -38,7 +38,7 @@ from studies.definition.cases import Case
 from studies.definition.parameters import in_unit
 from studies.definition.place import Chooser
 from studies.definition.quantity import OneNumber, number_of_a_run
-from studies.definition.schema import Context, Ends, Number, Range, is_finite, rounded
+from studies.definition.schema import Context, Limits, Number, Range, is_finite, rounded
 from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import NO_EQUILIBRIUM, SOLVED
 from studies.errors import StudyError, Unchecked, one_of
@@ -102,7 +102,14 @@ def _between(content: Any, info: ValidationInfo) -> list[float]:
         raise Unchecked
     if not isinstance(content, list | tuple):
         raise StudyError("", content, "must be [lowest, highest], the first bracket")
-    ends = Range.read(content, Context.of(info).known[info.data["parameter"]])
+    name = info.data["parameter"]
+    try:
+        ends = Range.read(content, Context.of(info).known[name])
+    except StudyError as error:
+        if name != Context.of(info).scene.branch:
+            raise
+        allowed = f"{error.allowed}, of {name}, which varies unless goal.parameter is another"
+        raise StudyError(error.field, error.value, allowed) from None
     return [ends.start, ends.stop]
 
 
@@ -140,7 +147,7 @@ class Goal(Kind):
     first_above: _Threshold = None
     first_below: _Threshold = None
     within: Annotated[Number, Interval(ge=1e-6, le=0.5)] = 0.01
-    between: Annotated[list[float], PlainValidator(_between, json_schema_input_type=Ends)]
+    between: Annotated[list[float], PlainValidator(_between, json_schema_input_type=Limits)]
     _branch: str = ""
     _goes_on: bool = False
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from studies.kinds.kind import Found, Mark
 from studies.views.columns import or_none, plain, value_text
-from studies.views.found import Found, Mark
 from studies.views.picking import sweep_axes, sweep_coordinates
 from studies.views.tables import run_cells
 

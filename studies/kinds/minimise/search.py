@@ -20,8 +20,7 @@ from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import OK, taken
 from studies.errors import StudyError
 from studies.kinds.kind import Placed, Reading
-from studies.kinds.ranges import Ranged
-from studies.kinds.replayed import Evaluation, Lacking, Replayed
+from studies.kinds.ranged import Evaluation, Lacking, Ranged, Replayed
 
 _RADII = {"initial_tr_radius": 0.2, "final_tr_radius": 0.01}  # of trust: shares of the ranges
 
@@ -48,6 +47,7 @@ class Minimise(Ranged):
     where: Annotated[
         list[OneCondition],
         BeforeValidator(listed, json_schema_input_type=str | list[str]),
+        Field(max_length=100),
     ] = Field(default_factory=list)
     starts: Annotated[Whole, Interval(ge=1, le=100)] = 3
     most: Annotated[Whole, Interval(ge=1, le=10_000)] = 60

@@ -8,9 +8,9 @@ from typing import Any
 import xarray as xr
 
 from studies.errors import StudyError
+from studies.kinds.kind import Found
 from studies.views.best import best_runs
 from studies.views.columns import unit_text, value_text
-from studies.views.found import Found
 
 
 def found(dataset: xr.Dataset, asked: Mapping[str, Any]) -> Found:

@@ -42,10 +42,9 @@ from pydantic import (
 from solver.late import Late
 from solver.parameters import is_number
 from studies.definition.cases import Case
-from studies.definition.line import Read
 from studies.definition.parameters import in_unit
 from studies.definition.place import Chooser
-from studies.definition.quantity import OneOf
+from studies.definition.quantity import OneOf, Read
 from studies.definition.schema import MAXIMUM_RUNS, Context, Whole, is_finite, listed
 from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import OK, taken
@@ -101,7 +100,7 @@ class Refine(Kind):
     of: Annotated[
         list[OneOf],
         BeforeValidator(listed, json_schema_input_type=OneOf | list[OneOf]),
-        Field(min_length=1),
+        Field(min_length=1, max_length=100),
     ]
     until: Annotated[
         float | dict[str, float],

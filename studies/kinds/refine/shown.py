@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from studies.kinds.kind import Found
 from studies.kinds.refine.cells import ERROR
 from studies.views.columns import plain, unit_text, value_text
-from studies.views.found import Found
 
 
 def found(dataset: xr.Dataset, refine: Mapping[str, Any]) -> Found:

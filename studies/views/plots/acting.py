@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, get_args, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 import numpy as np
 from annotated_types import Unit
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.markers import CARETDOWN, CARETLEFT, CARETRIGHT, CARETUP
+from skfem import Mesh
 
+from solver.model.body import Body
 from solver.model.loads import Load
 from solver.model.rigid import Pushed, RigidBody
 from studies.views.plots.captions import short_number, words
-
-if TYPE_CHECKING:
-    from skfem import Mesh
-
-    from solver.model.body import Body
-
-    Array = np.ndarray
+from studies.views.plots.meshed import Array
 
 _FORCE, _MOTION, _FIELD, _HELD = "#c2410c", "#15803d", "#b45309", "0.15"
 _ARROW = 0.38

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from studies.errors import StudyError
 from studies.views.differing import Difference, checked_number
 from studies.views.plots.captions import capitalised, words
-from studies.views.plots.legends import add_head
+from studies.views.plots.sheets import add_head
 
 _BARS = 14
 """Largest number of variables that are drawn."""

@@ -30,7 +30,9 @@ from studies.views.plots.fields import (
     placed,
     too_close,
 )
-from studies.views.plots.legends import (
+from studies.views.plots.mapped import STAGE
+from studies.views.plots.maps import entitle
+from studies.views.plots.sheets import (
     MOST_LINES,
     STYLES,
     add_bar,
@@ -38,9 +40,8 @@ from studies.views.plots.legends import (
     colours_of,
     has_bar,
     is_number,
+    plain_axes,
 )
-from studies.views.plots.mapped import STAGE
-from studies.views.plots.maps import entitle
 
 _EACH = len(STYLES)
 """Largest number of values drawn of a dimension of the field."""
@@ -121,9 +122,7 @@ def line_figure(
                 )
                 _mark_stages(axes, run, line, at)
     axes.axhline(0.0, color="0.35", linewidth=0.8, zorder=0)
-    axes.grid(color="0.92")
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    plain_axes(axes)
     axes.margins(x=0.03 if against else 0.0)
     if along in REPEATED:
         axes.margins(x=0.03)

@@ -5,25 +5,157 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import scipy  # loads ndimage when it is used: maps on meshes do not need it
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.markers import CARETDOWN
+from matplotlib.path import Path
+from matplotlib.transforms import ScaledTranslation
 from matplotlib.tri import Triangulation
 
+from solver.model.friction import PatchStatus
 from solver.results.invariants import PRINCIPAL, principal_of
 from solver.tensors import AXES
 from studies.errors import StudyError
 from studies.views.picking import one_run
 from studies.views.plots.captions import capitalised, label, setting, symbol, wrapped
-from studies.views.plots.fields import Window, component_name, is_half, map_axes, usual_field
-from studies.views.plots.mapped import STAGE, Mapped, is_patch, mapped
+from studies.views.plots.fields import (
+    OUTLINE,
+    Window,
+    component_name,
+    is_half,
+    map_axes,
+    usual_field,
+)
+from studies.views.plots.mapped import STAGE, STATUS, Mapped, is_patch, mapped
 from studies.views.plots.meshed import Box, MappedMesh, mesh_maps, on_mesh
-from studies.views.plots.outlined import clip_of, lines_of, outlines_of, reaching
-from studies.views.plots.over import BELOW, draw_patch, draw_wheel
+
+_SHEAR, _SLIP = "patch_shear", "patch_slip"
+_ARROWS = 16
+"""Number of arrows over the side of a square as large as what is shown."""
+BELOW = -40.0
+"""Place of words below a map, under the name of its axis [pt]."""
+_WHEEL, _UP, _OVER = "wheel_surface", "y", 3.0
+"""The profile of the wheel, its height, and how far above the body it is shown [mm]."""
+
+
+def draw_patch(axes: Axes, run: xr.Dataset, field: str, window: Window) -> None:
+    """Draw the border of the contact, that of stick, and arrows of shear, or of slip over slip."""
+    status = run[STATUS]
+    across, up = map_axes(status)
+    lines = [
+        (status != PatchStatus.OPEN, "k", "edge of contact"),
+        (status == PatchStatus.STICK, "b", "edge of stick"),
+    ]
+    handles = []
+    for inside, colour, name in lines:
+        if inside.any() and not inside.all():
+            axes.contour(
+                status[across], status[up], inside.astype(float), levels=[0.5], colors=colour,
+                linewidths=1.2,
+            )  # fmt: skip
+            handles.append(Line2D([], [], color=colour, linewidth=1.2, label=name))
+    kind = _SLIP if field.startswith(_SLIP) else _SHEAR
+    arrows = [run[f"{kind}_{axis}"].where(status != PatchStatus.OPEN) for axis in (across, up)]
+    longest = float(np.sqrt(sum(each**2 for each in arrows)).max())
+    if longest > 0.0:
+        step = np.sqrt((window[1] - window[0]) * (window[3] - window[2])) / _ARROWS
+        some = {
+            name: slice(None, None, max(1, round(step / float(np.diff(status[name])[0]))))
+            for name in (across, up)
+        }
+        u, v = (each.isel(some) for each in arrows)
+        axes.quiver(
+            u[across], u[up], u, v, units="xy", angles="xy", scale_units="xy",
+            scale=longest / (1.2 * step), width=step / 12, color="0.1",
+        )  # fmt: skip
+        unit = arrows[0].attrs.get("units", "1")
+        name = f"{kind.removeprefix('patch_')} on the surface, at most {longest:.3g}"
+        label = name if unit == "1" else f"{name} {unit}"
+        handles.append(Line2D([], [], color="0.1", marker=r"$\rightarrow$", ls="none", label=label))
+    down = ScaledTranslation(0.0, BELOW / 72.0, axes.figure.dpi_scale_trans)
+    axes.legend(  # not on the map: a contact that is long one way leaves no corner free
+        handles=handles, loc="upper left", bbox_to_anchor=(0.0, 0.0, 1.0, 0.0), frameon=False,
+        bbox_transform=axes.transAxes + down, borderpad=0.0, borderaxespad=0.0, fontsize=8,
+    )  # fmt: skip
+
+
+def draw_wheel(axes: Axes, values: xr.DataArray, run: xr.Dataset) -> None:
+    """Draw the profile of the wheel above a section, if the run has one and the top is shown."""
+    across, up = map_axes(values)
+    if up != _UP or _WHEEL not in run or float(values[up][-1]) < 0.0:
+        return
+    bottom, _ = axes.get_ylim()
+    axes.plot(run[across], run[_WHEEL], color="k", linewidth=1.2, label="wheel before contact")
+    axes.set_ylim(bottom, _OVER)
+    axes.legend(loc="lower right", framealpha=0.9, edgecolor="none", fontsize=8)
+
+
+Array = np.ndarray
+_ON_LINE = 1e-9
+"""Ratio of a position to the size of the bodies; below it a point is on the line of symmetry."""
+
+
+def outlines_of(run: xr.Dataset, across: str, up: str) -> list[Array]:
+    """Return the outlines (2, n) of bodies over two axes, of both halves; none if not stored."""
+    names = [f"{OUTLINE}_{axis}" for axis in (across, up)]
+    if not all(name in run for name in names):
+        return []
+    X = np.stack([run[name].to_numpy().squeeze() for name in names])
+    known = np.isfinite(X[0])
+    begins = np.flatnonzero(known & ~np.append(False, known[:-1]))
+    ends = np.flatnonzero(known & ~np.append(known[1:], False)) + 1
+    curves = [X[:, begin:end] for begin, end in zip(begins, ends, strict=True)]
+    if is_half(run):
+        curves += [curve[:, ::-1] * [[-1.0], [1.0]] for curve in curves]
+    return curves
+
+
+def lines_of(curves: list[Array], run: xr.Dataset) -> list[Array]:
+    """Return the pieces (n, 2) of outlines that are borders: not the line of symmetry."""
+    if not is_half(run):
+        return [curve.T for curve in curves]
+    near = _ON_LINE * max(np.ptp(curve) for curve in curves)
+    found = []
+    for curve in curves:
+        inner = (np.abs(curve[0]) < near).astype(int)
+        cuts = np.flatnonzero(inner[1:] & inner[:-1]) + 1
+        found += [piece.T for piece in np.split(curve, cuts, axis=1) if piece.shape[1] > 1]
+    return found
+
+
+def clip_of(curves: list[Array]) -> Path:
+    """Return what the outlines enclose: a body is on the left of each."""
+    return Path.make_compound_path(*(Path(curve.T, closed=True) for curve in curves))
+
+
+def reaching(values: xr.DataArray, curves: list[Array]) -> xr.DataArray:
+    """Return a map in which places outside of the bodies have the value of the nearest place.
+
+    So it reaches their outlines. What is unknown inside of them stays unknown.
+    """
+    across, up = map_axes(values)
+    whole = values.transpose(up, across)
+    places = np.stack(np.meshgrid(whole[across], whole[up]), axis=-1).reshape(-1, 2)
+    turns = np.zeros(len(places), dtype=int)
+    for curve in curves:
+        way = np.sign(curve[0] @ np.roll(curve[1], -1) - curve[1] @ np.roll(curve[0], -1))
+        turns += int(way) * Path(curve.T).contains_points(places)
+    there = whole.notnull().to_numpy()
+    outside = (turns <= 0).reshape(there.shape) & ~there
+    if not there.any():
+        return values
+    nearest = scipy.ndimage.distance_transform_edt(
+        ~there, return_distances=False, return_indices=True
+    )
+    filled = np.where(outside, whole.to_numpy()[tuple(nearest)], whole.to_numpy())
+    return whole.copy(data=filled)
+
 
 SIGNED = "RdBu_r"
 SEQUENTIAL = "YlOrRd"

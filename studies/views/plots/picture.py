@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 
 import xarray as xr
 from matplotlib.figure import Figure
 
 from studies.errors import StudyError, one_of
+from studies.kinds.kind import Kind
+from studies.storage.ugrid import keeps
 from studies.views.picking import (
+    file_of,
     one_run,
     positions,
     runs_over,
     select,
+    study_of,
     sweep_axes,
     sweep_coordinates,
 )
@@ -31,9 +37,10 @@ from studies.views.plots.fields import (
 from studies.views.plots.lines import line_figure
 from studies.views.plots.mapped import STAGE
 from studies.views.plots.maps import map_figure
-from studies.views.plots.meshed import mesh_maps
-from studies.views.plots.saved import resolved
+from studies.views.plots.meshed import MESH_MAPS, mesh_maps
+from studies.views.plots.sheets import png, resolved
 from studies.views.plots.sweep import sweep_figure
+from studies.views.reading import find_study, open_netcdf
 
 
 def picture(
@@ -200,3 +207,65 @@ def _part(
     return run.isel(
         {name: positions(run[name], selection[name]) for name in own if name in selection}
     )
+
+
+@contextmanager
+def drawn_from(
+    path: Path | str, dataset: xr.Dataset, field: str | None, selection: Mapping[str, str]
+) -> Iterator[tuple[xr.Dataset, Mapping[str, str]]]:
+    """Give the data set from which a field is drawn, and what is still to be selected of it.
+
+    It is that of the study, or the file of the selected run if the study keeps fields and the field
+    is a map: data sets of studies do not have the meshes of their runs.
+    """
+    found = _run_of(path, dataset, field or usual_field(dataset), selection)
+    if found is None:
+        yield dataset, selection
+        return
+    swept = sweep_coordinates(dataset)
+    chosen = {name: value for name, value in selection.items() if name in swept}
+    with open_netcdf(found) as own:
+        left = {name: value for name, value in selection.items() if name not in swept}
+        of = one_run(dataset, chosen)  # what distinguishes the run stands in the caption
+        run = one_run(own)
+        run = run.assign_coords({name: of[name] for name in swept if name not in run.variables})
+        yield (run, left) if keeps(run) else (dataset, selection)
+
+
+def _run_of(
+    path: Path | str, dataset: xr.Dataset, field: str, selection: Mapping[str, str]
+) -> Path | None:
+    if isinstance(path, str) or keeps(dataset) or field not in MESH_MAPS:
+        return None
+    found = find_study(path)
+    if found.name != "dataset.nc" or not found.with_name("study.json").is_file():
+        return None
+    try:
+        study, store = study_of(found)
+    except StudyError:  # of another version of the solver: its runs are not found by their ids
+        return None
+    if not study.keep:
+        return None
+    swept = sweep_coordinates(dataset)
+    chosen = {name: each for name, each in selection.items() if name in swept}
+    return file_of(dataset, study, store, chosen)
+
+
+def report_pictures(dataset: xr.Dataset, kind: Kind, path: Path | None) -> dict[str, bytes]:
+    """Return the picture of a report as PNG by the name of its file; none if none can be drawn.
+
+    Of a study that chose its runs it shows what was found; else the residual stress of the run of
+    `one_run`, or the stress if bodies are not unloaded. With the path of the data set it is drawn
+    on the mesh of the run, which its own file has.
+    """
+    try:
+        if kind.chooses:
+            name = kind.name if kind.figure else kind.value
+            figure = kind.figure(dataset) if kind.figure else sweep_figure(dataset, kind.value)
+        else:
+            name = f"{(field := usual_field(dataset))}_xx"
+            with drawn_from(path or "", dataset, field, {}) as (run, _):
+                figure = map_figure(run, field, "xx")
+    except StudyError:
+        return {}
+    return {f"{name}.png": png(figure)} if figure else {}

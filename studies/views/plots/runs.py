@@ -15,8 +15,7 @@ from matplotlib.transforms import Transform
 from studies.definition.cases import USUAL_AXES
 from studies.definition.vocabulary import OK, OUTSIDE_THEORY, STATUSES
 from studies.errors import StudyError
-from studies.views.grids import parameters_over, point_axes
-from studies.views.picking import flags, sweep_axes, sweep_coordinates
+from studies.views.picking import flags, parameters_over, point_axes, sweep_axes, sweep_coordinates
 from studies.views.plots.captions import words
 from studies.views.plots.maps import SIGNED
 

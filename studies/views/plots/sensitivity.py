@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from studies.views.picking import select
 from studies.views.plots.captions import capitalised, short_label, words
 from studies.views.plots.runs import known_values
+from studies.views.plots.sheets import plain_axes
 from studies.views.sensitivity import main_index, ordered
 
 _ABREAST = 3
@@ -58,7 +59,7 @@ def sensitivity_figure(
             one = found.sel(parameter=name)
             axes.plot(one["place"], one["effect"], color=_EFFECT, linewidth=1.8)
         axes.set_xlabel(capitalised(short_label(dataset[name])))
-        _plain(axes)
+        plain_axes(axes)
     for axes in panels[len(names) :]:
         axes.set_axis_off()
     for axes in panels[::_ABREAST]:
@@ -87,7 +88,7 @@ def _indices(axes: Axes, found: xr.Dataset, names: list[str]) -> None:
     axes.invert_yaxis()
     axes.set_xlabel("Share of the variance" if chaos else capitalised(words(main_index(found))))
     axes.legend(frameon=False, fontsize=8, loc="lower right")
-    _plain(axes)
+    plain_axes(axes)
 
 
 def _tornado(axes: Axes, found: xr.Dataset, values: xr.DataArray, names: list[str]) -> None:
@@ -106,10 +107,4 @@ def _tornado(axes: Axes, found: xr.Dataset, values: xr.DataArray, names: list[st
     axes.margins(x=0.2)
     axes.set_xlabel(f"Mean of {short_label(values)}")
     axes.axvline(float(values.mean()), color="0.2", linewidth=0.8)
-    _plain(axes)
-
-
-def _plain(axes: Axes) -> None:
-    axes.grid(color="0.92")
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    plain_axes(axes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
+from skfem import Mesh
 
+from solver.model.body import Body
+from solver.model.link import Link
+from solver.model.model import Model
 from solver.model.rigid import RigidBody
 from solver.results.named_places import NamedPlaces
 from solver.results.view import View
@@ -26,16 +30,7 @@ from studies.errors import StudyError
 from studies.views.plots.acting import acting, draw_acting, draw_supports, outward
 from studies.views.plots.captions import capitalised, named, short_number, words, wrapped
 from studies.views.plots.fields import Window, empty_window
-
-if TYPE_CHECKING:
-    from skfem import Mesh
-
-    from solver.model.body import Body
-    from solver.model.link import Link
-    from solver.model.model import Model
-
-    Array = np.ndarray
-    Box = tuple[float, float, float, float]
+from studies.views.plots.meshed import Array, Box
 
 _PANEL, _LEGEND = (4.4, 5.4), 3.3
 """Largest width and height of a panel; width of a column of the legend [in]."""

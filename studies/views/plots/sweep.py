@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import cycle
 
 import numpy as np
 import xarray as xr
@@ -14,21 +15,42 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from studies.errors import StudyError
-from studies.views.grids import parameters_over, point_axes, to_grid
-from studies.views.picking import flags, sweep_axes
-from studies.views.plots.captions import capitalised, named, setting, short_label, words, wrapped
-from studies.views.plots.cloud import cloud_figure
-from studies.views.plots.curves import curve_figure
-from studies.views.plots.legends import MOST_LINES, add_head
+from studies.views.columns import counted
+from studies.views.picking import (
+    flags,
+    only_numbers,
+    parameters_over,
+    point_axes,
+    sweep_axes,
+    to_grid,
+)
+from studies.views.plots.captions import (
+    capitalised,
+    named,
+    short_label,
+    value_text,
+    words,
+)
 from studies.views.plots.limits import draw_shakedown_limits
 from studies.views.plots.runs import (
     POINTS,
+    RunMark,
     Style,
     absent,
     known_values,
     plane_of,
     standing,
     style_of,
+)
+from studies.views.plots.sheets import (
+    MOST_LINES,
+    add_legend,
+    colours_of,
+    head_of,
+    is_number,
+    meaning,
+    plain_axes,
+    setting_of,
 )
 
 MOST_PANELS = 6
@@ -47,6 +69,19 @@ _DENSE, _CONTOURS = 6, 12
 """Least number of values of both quantities for contours; number of contours."""
 _LEGEND, _BAR = 3.2, 1.6
 """Width of the legend beside panels, and that of a colour bar: then the legend is below [in]."""
+_MARKS = "osD^vPh*"
+_CURVES = (8.0, 4.6)
+"""Width and height of a figure of curves [in]."""
+_LEFT = 0.9
+"""Width of the labels left of the axes, where the caption of curves begins [in]."""
+_LETTERS = 60
+"""Largest number of letters of horizontal labels."""
+_FOOT = 0.03
+"""Position of the marks of runs without a value, as a share of the height of the axes."""
+_CLOUD, _ABREAST = (3.2, 2.9), 3
+"""Width and height of a panel of a cloud [in]; number of panels beside one another."""
+_NAMES = 1.8
+"""Width of the legend of a cloud [in]."""
 
 
 def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
@@ -120,9 +155,7 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
         axes.set_xlabel(capitalised(short_label(across)))
     for axes in grid[:, 0]:
         axes.set_ylabel(capitalised(short_label(up)))
-    single = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] == 1]
-    below = wrapped(setting(dataset.squeeze(single)), size[0] - 0.4, 8)
-    add_head(sheet, capitalised(dataset[field].attrs.get("long_name", words(field))), below)
+    head_of(sheet, dataset, field)
     return sheet
 
 
@@ -201,3 +234,165 @@ def _contours(
     axes.contourf(x, y, values, levels, cmap=style.colours, norm=style.norm)
     axes.contour(x, y, values, levels, colors="0.25", linewidths=0.4)
     return True
+
+
+def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
+    """Return `field` over the swept number, with a curve for each combination of the other axes.
+
+    If only labels are swept, they are on the horizontal axis. Runs without a value are marked at
+    the bottom by their status.
+
+    Parameters
+    ----------
+    dataset : data set of a study
+    field : one of its variables with one value per run
+
+    Raises
+    ------
+    StudyError
+        if nothing varies, no run has a value, or more than `MOST_LINES` curves would be drawn
+    """
+    numbers, labels = standing(dataset)
+    if not numbers and not labels:
+        allowed = "has one value a run, which is drawn over what is swept, but nothing varies here"
+        raise StudyError("field", field, allowed)
+    across, *others = [*numbers, *labels]
+    curves = math.prod(each.size for each in others)
+    if curves > MOST_LINES:
+        rest = ", ".join(str(each.name) for each in others)
+        raise StudyError(
+            "field",
+            field,
+            f"would take {curves} curves, at most {MOST_LINES} are drawn: select values of {rest}",
+        )
+    style_of(dataset, field)  # raises an error if no run has a value
+    sheet = Figure(figsize=_CURVES, dpi=150, layout="constrained")
+    axes = sheet.add_subplot()
+    numeric = is_number(across)
+    x = across.to_numpy() if numeric else np.arange(across.size)
+    values = known_values(dataset, field)
+    missing: dict[RunMark, list[float]] = {}
+    for at, mark in zip(np.ndindex(*(each.size for each in others)), cycle(_MARKS), strict=False):
+        own = {str(each.dims[0]): i for each, i in zip(others, at, strict=True)}
+        line, status = (each.isel(own).squeeze() for each in (values, dataset["status"]))
+        name = ", ".join(value_text(each[i]) for each, i in zip(others, at, strict=True))
+        order, y = np.argsort(x), line.to_numpy()
+        style = "-" if numeric and not flags(dataset[field]) else "none"
+        axes.plot(
+            x[order], y[order], linestyle=style, marker=mark, markersize=5.0, label=name or None
+        )
+        for kind, there in absent(np.isfinite(y), status.to_numpy()).items():
+            missing.setdefault(kind, []).extend(x[there])
+    for kind, places in missing.items():
+        foot = np.full(len(places), _FOOT)
+        kind.draw(axes, np.array(places), foot, axes.get_xaxis_transform())
+    if not numeric:
+        names = [counted(each) for each in across.to_numpy()]
+        axes.set_xticks(x, names, rotation=90.0 if len("".join(names)) > _LETTERS else 0.0)
+    label_values(axes, dataset[field], values)
+    plain_axes(axes)
+    axes.set_xlabel(capitalised(short_label(across)))
+    if others or missing:
+        add_legend(axes, [words(str(each.name)) for each in others])
+    below = setting_of(dataset, _CURVES[0] - _LEFT)
+    axes.set_title(below, loc="left", fontsize=8, color="0.3")
+    sheet.suptitle(meaning(dataset, field), x=0.01, ha="left", fontsize=11, weight="bold")
+    return sheet
+
+
+def label_values(axes: Axes, field: xr.DataArray, values: xr.DataArray) -> None:
+    """Label the vertical axis: a number with its unit, or the meanings of flags that occur."""
+    meanings: Mapping[int, str] = flags(field)
+    if not meanings:
+        axes.set_ylabel(capitalised(short_label(field)))
+        return
+    there = [code for code in meanings if (values == code).any()]
+    axes.set_yticks(there, [words(meanings[code]) for code in there])
+    axes.margins(y=0.2)
+
+
+def cloud_figure(dataset: xr.Dataset, field: str, points: str) -> Figure:
+    """Return `field` over each parameter of an axis of points, in a panel of its own.
+
+    Each run is a mark in every panel, with a colour for each combination of the other axes. Runs
+    without a value are marked at the bottom by their status.
+
+    Parameters
+    ----------
+    dataset : data set of a study
+    field : one of its variables with one value per run
+    points : the axis of points
+
+    Raises
+    ------
+    StudyError
+        if no run has a value, or there are more than `MOST_LINES` combinations of other axes
+    """
+    style_of(dataset, field)  # raises an error if no run has a value
+    names = parameters_over(dataset, points)
+    others = [a for a in sweep_axes(dataset) if a != points and dataset.sizes[a] > 1]
+    count = math.prod(dataset.sizes[axis] for axis in others)
+    if count > MOST_LINES:
+        rest = ", ".join(others)
+        allowed = f"would take {count} colours, at most {MOST_LINES} are drawn: select {rest}"
+        raise StudyError("field", field, allowed)
+    rows = -(-len(names) // _ABREAST)
+    columns = -(-len(names) // rows)
+    size = _CLOUD[0] * columns + _NAMES, _CLOUD[1] * rows + 0.9
+    sheet = Figure(figsize=size, dpi=130, layout="constrained")
+    panels = list(sheet.subplots(rows, columns, sharey=True, squeeze=False).flat)
+    shown = only_numbers(dataset, field)
+    series = shown.stack({"series": others}) if others else shown.expand_dims("series")
+    colours = colours_of(series["series"]) if others else ["C0"]
+    legend: dict[str, Line2D] = {}
+    for axes, name in zip(panels, names, strict=False):
+        for k, colour in enumerate(colours):
+            one = series.isel(series=k).squeeze()
+            places = [one[axis] for axis in others]
+            label = ", ".join(
+                named(str(each.name), each.item(), each.attrs.get("units", "")) for each in places
+            )  # without a label, matplotlib's begins with "_"
+            for each in _draw_cloud(
+                axes, one, field, name, RunMark(name=label, marker="o", colour=colour)
+            ):
+                legend.setdefault(str(each.get_label()), each)
+        axes.set_xlabel(capitalised(short_label(dataset[name])))
+        plain_axes(axes)
+    for axes in panels[len(names) :]:
+        axes.set_axis_off()
+    for axes in panels[::columns]:
+        label_values(axes, dataset[field], known_values(dataset, field))
+    handles = [each for name, each in legend.items() if not name.startswith("_")]
+    if handles:
+        handles.sort(key=lambda each: each.get_marker() != "o")
+        sheet.legend(handles=handles, loc="outside right upper", frameon=False)
+    head_of(sheet, dataset, field)
+    return sheet
+
+
+def _draw_cloud(axes: Axes, runs: xr.Dataset, field: str, name: str, kind: RunMark) -> list[Line2D]:
+    """Draw the runs of a panel over a parameter; return marks for the legend."""
+    values, across = known_values(runs, field).to_numpy(), runs[name]
+    x = across.to_numpy()
+    if not is_number(across):
+        texts = sorted({str(each) for each in x})
+        x = np.array([texts.index(str(each)) for each in x])
+        axes.set_xticks(range(len(texts)), texts)
+        axes.margins(x=0.3)
+    elif across.dtype.kind in "iu":
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    elif x.min() > 0.0 and _is_even(np.log(x)) and not _is_even(x):
+        axes.set_xscale("log")
+    known = np.isfinite(values)
+    drawn = [kind.draw(axes, x[known], values[known])]
+    drawn[0].set(markersize=4.0, alpha=0.8)
+    for reason, there in absent(known, runs["status"].to_numpy()).items():
+        foot = np.full(int(there.sum()), _FOOT)
+        drawn.append(reason.draw(axes, x[there], foot, axes.get_xaxis_transform()))
+    return drawn
+
+
+def _is_even(x: np.ndarray) -> bool:
+    """Whether values fill their range about evenly: their mean and median are in its middle."""
+    middle = (x.min() + x.max()) / 2.0
+    return bool(max(abs(np.median(x) - middle), abs(x.mean() - middle)) < 0.15 * np.ptp(x))

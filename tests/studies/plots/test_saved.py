@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
-from studies.views.plots.saved import png, save
+from studies.views.plots.sheets import png, save
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -15,22 +16,31 @@ from solver.typing import Array
 
 _FEWEST = 4
 """Least number of points of a curve."""
+_LENGTHS = {"mm": 1.0, "m": 1000.0, "um": 1e-3, "in": 25.4}
+"""Units that a heading may have, in mm."""
 
 
 def read_points(path: str | Path) -> Array:
     """Return the points (2, n) of a text file: z, y in each line, with comma or space between [mm].
 
-    A first line without numbers is a heading. For the points see `checked_points`.
+    A first line without numbers is a heading; ``z [m], y [m]`` has the unit of the numbers. For the
+    points see `checked_points`.
 
     Raises
     ------
     ModelError
-        for ``file``, if it cannot be read or a line does not have two numbers; for ``points``
+        for ``file``, if it cannot be read, its unit is no length or a line does not have two
+        numbers; for ``points``
     """
     try:
-        lines = [line.replace(",", " ").split() for line in read_file(path).decode().splitlines()]
+        text = read_file(path).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise ModelError("file", str(path), f"must be a readable text file: {error}") from None
+    lines = [line.replace(",", " ").split() for line in text.splitlines()]
+    units = {unit.strip() for unit in re.findall(r"\[([^]]*)\]", text.partition("\n")[0])} or {"mm"}
+    if len(units) > 1 or not units <= _LENGTHS.keys():
+        allowed = f"must have one unit in its heading, of {', '.join(_LENGTHS)}"
+        raise ModelError("file", f"{path}: [{'], ['.join(sorted(units))}]", allowed)
     points = []
     for number, line in enumerate(lines, 1):
         try:
@@ -41,7 +51,7 @@ def read_points(path: str | Path) -> Array:
             allowed = f"must have two numbers in each line; line {number} is {' '.join(line)!r}"
             raise ModelError("file", str(path), allowed) from None
         points.append((z, y))
-    return checked_points(np.array(points).reshape(-1, 2).T)
+    return checked_points(_LENGTHS[units.pop()] * np.array(points).reshape(-1, 2).T)
 
 
 def as_points(field: str, value: Any) -> Pairs:

@@ -1,9 +1,11 @@
-"""Colours and styles of lines, and the legend or colour bar that explains them."""
+"""What figures share: colours and styles of lines, legends, heads, axes, and figures as files."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 import xarray as xr
@@ -14,7 +16,9 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from studies.views.plots.captions import capitalised, short_label, wrapped
+from studies.errors import StudyError
+from studies.views.picking import sweep_axes
+from studies.views.plots.captions import capitalised, setting, short_label, words, wrapped
 
 MOST_LINES = 12
 """Largest number of lines in a legend; more values of a number have a colour bar instead."""
@@ -72,6 +76,30 @@ def add_legend(axes: Axes, headings: Sequence[str], *, styles: bool = False) -> 
             line.set_color("0.3")
 
 
+def plain_axes(axes: Axes) -> None:
+    """Draw a grid behind the lines, and no frame above and at the right."""
+    axes.grid(color="0.92")
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def meaning(dataset: xr.Dataset, field: str) -> str:
+    """Return what a variable is, as a title."""
+    return capitalised(dataset[field].attrs.get("long_name", words(field)))
+
+
+def setting_of(dataset: xr.Dataset, width: float) -> str:
+    """Return what the runs of a study have in common, in lines of `width` inches."""
+    single = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] == 1]
+    return wrapped(setting(dataset.squeeze(single)), width, 8)
+
+
+def head_of(sheet: Figure, dataset: xr.Dataset, field: str) -> None:
+    """Write what is drawn of a study at the top of a figure of several panels."""
+    below = setting_of(dataset, sheet.get_size_inches()[0] - 0.4)
+    add_head(sheet, meaning(dataset, field), below)
+
+
 def add_head(sheet: Figure, name: str, below: str) -> None:
     """Write the title at the top left of a figure of several panels, and the setting below it."""
     engine = sheet.get_layout_engine()
@@ -86,3 +114,38 @@ def add_head(sheet: Figure, name: str, below: str) -> None:
     left = 0.1 / width
     sheet.text(left, 1.0 - 0.08 / height, name, va="top", fontsize=11, weight="bold")
     sheet.text(left, 1.0 - title / height, below, va="top", fontsize=8, color="0.3")
+
+
+_COARSEST, _FINEST = 50, 600
+"""Range of the resolution in dots per inch."""
+_SIDE = 2**15
+"""Largest number of dots of a side: matplotlib draws twice as many, in gigabytes of memory."""
+
+
+def resolved(figure: Figure, resolution: float | None) -> Figure:
+    """Return a figure with its resolution [dpi], by default its own, or raise `StudyError`."""
+    if resolution is not None:
+        if not _COARSEST <= resolution <= _FINEST:
+            allowed = f"must be {_COARSEST} to {_FINEST} dots per inch"
+            raise StudyError("resolution", resolution, allowed)
+        figure.set_dpi(resolution)
+    return figure
+
+
+def save(figure: Figure, to: Path | IO[bytes], kind: str = "png") -> None:
+    """Write a figure in its resolution, or the finest that its size allows.
+
+    Parameters
+    ----------
+    to : name of a file, or a file
+    kind : one of the formats of matplotlib, such as ``"svg"``
+    """
+    figure.set_dpi(min(figure.dpi, _SIDE / max(figure.get_size_inches())))
+    figure.savefig(to, format=kind, dpi=figure.dpi)  # matplotlib's default may be another dpi
+
+
+def png(figure: Figure, resolution: float | None = None) -> bytes:
+    """Return a figure as PNG, with a resolution [dpi], by default its own."""
+    content = io.BytesIO()
+    save(resolved(figure, resolution), content)
+    return content.getvalue()

@@ -1,4 +1,4 @@
-"""What follows from arrays alone, such as a fit: made once, kept by the content of the arrays."""
+"""What fits to runs share: they are kept by their content, and tell how well they predict runs."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from hashlib import sha256
 from typing import ParamSpec, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.memory import remembered
 from studies.errors import StudyError
@@ -50,3 +51,30 @@ def _key(given: object) -> object:
     if not isinstance(given, np.ndarray):
         return given
     return given.shape, given.dtype.str, sha256(np.ascontiguousarray(given).data).digest()
+
+
+TENTHS = 10
+_PREDICTED = 0.8
+"""Least share of the variance that the fits must predict."""
+
+
+def tenths(count: int) -> list[NDArray[np.bool_]]:
+    """Return which of the runs are left out, for each tenth: of less than ten runs each alone."""
+    number = np.random.default_rng(0).permutation(count) % TENTHS
+    return [number == k for k in range(min(count, TENTHS))]
+
+
+def share_predicted(values: NDArray[np.float64], misses: NDArray[np.float64]) -> float:
+    """Return Q²: the share of the variance of the runs that the fits without them predict."""
+    squares = float(np.sum((values - values.mean(axis=0)) ** 2))
+    return 1.0 - float(np.sum(misses**2)) / squares if squares > 0.0 else 1.0
+
+
+def check_predicted(of: str, q2: float, runs: int) -> None:
+    """Raise `StudyError` if fits predict too little of a number."""
+    if q2 < _PREDICTED:
+        allowed = (
+            f"is the share of the variance of {of} that a fit to {runs} runs predicts, and at "
+            f"least {_PREDICTED} is needed: double the sample, or make ranges smaller"
+        )
+        raise StudyError("Q2", f"{q2:.2f}", allowed)

@@ -1,0 +1,135 @@
+"""A body of large strain: logarithmic strain, and pressures that follow its boundary.
+
+Its nodes, points, law and contact are those of a body of small strain. No element keeps the
+stiffness of the undeformed body, so that the elastic stiffness is also that at the displacements.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from functools import cached_property
+
+import numpy as np
+
+from solver.fem.deformation import Kinematics, PartResponse
+from solver.fem.discretisation import Discretisation
+from solver.fem.dofs import Dofs, vectors
+from solver.fem.log_strain import LogStrain, gradient_operator
+from solver.fem.surface import edges_of
+from solver.materials import PlasticState, Response
+from solver.mesh.edges import shape_derivatives, shape_functions
+from solver.model.loads import Load
+from solver.typing import Array
+
+_XI, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+_STEP = 1e-5
+"""Step of central differences over the length of an edge."""
+
+
+class _Follower:
+    """The forces of a load that follows a boundary.
+
+    Attributes
+    ----------
+    dofs : (n_edges, m) unknowns of its edges
+    before : (n_edges, m) forces on the undeformed boundary at load factor 1 [N]
+    """
+
+    def __init__(self, part: Discretisation, load: Load, boundary: str) -> None:
+        self._part, self.load = part, load
+        edges = edges_of(part, boundary)
+        self.dofs = Dofs(edges.ravel(), 2).every.reshape(len(edges), -1)
+        count = edges.shape[1]
+        self._N, self._slopes = shape_functions(_XI, count), shape_derivatives(_XI, count)
+        self._X = part.X.T.ravel()[self.dofs]
+        self._element = part.body.mesh.f2t[0, part.body.facets(boundary)]
+        own = part.dofs[self._element]
+        self._at = (own[:, None, :] == self.dofs[:, :, None]).argmax(axis=2)
+        self.before = self._forces(self._X)
+
+    def _forces(self, x: Array) -> Array:
+        """Return the forces (n_edges, m) on edges whose nodes are at x (n_edges, m)."""
+        nodes = x.reshape(len(x), -1, 2)
+        at, along = (
+            np.moveaxis(np.einsum("enk,qn->ekq", nodes, of), 1, 0).reshape(2, -1)
+            for of in (self._N, self._slopes)
+        )
+        push = np.asarray(self.load.push(at, along)) * self._part.measure(at)
+        each = push.reshape(2, len(x), -1) * _WEIGHTS
+        forces = np.einsum("keq,qn->enk", each, self._N)
+        return np.asarray(forces.reshape(len(x), -1))
+
+    def change(self, u: Array, time: float) -> Array:
+        """Return the change of the nodal forces (n,) by the displacements at a time [N]."""
+        each = self.load.factor(time) * (self._forces(self._X + u[self.dofs]) - self.before)
+        return np.asarray(np.bincount(self.dofs.ravel(), each.ravel(), self._part.n))
+
+    def add_stiffness(self, elements: Array, u: Array, time: float) -> None:
+        """Add the symmetric part of its stiffness to the matrices of all elements [N/mm]."""
+        x, factor = self._X + u[self.dofs], self.load.factor(time)
+        m = x.shape[1]
+        step = _STEP * np.ptp(x.reshape(len(x), -1, 2), axis=1).max(axis=1)
+        K = np.zeros((len(x), m, m))
+        for k in range(m):
+            moved = np.zeros_like(x)
+            moved[:, k] = step
+            change = self._forces(x + moved) - self._forces(x - moved)
+            K[:, :, k] = -factor * change / (2 * step[:, None])
+        K = (K + K.swapaxes(1, 2)) / 2
+        np.add.at(elements, (self._element[:, None, None], self._at[:, :, None],
+                             self._at[:, None, :]), K)  # fmt: skip
+
+
+class LargeDiscretisation(Discretisation):
+    """Unknowns, quadrature and operators of a body of large strain."""
+
+    @cached_property
+    def _following(self) -> list[_Follower]:
+        loads = [load for load in self.body.every_load if load.follows]
+        return [_Follower(self, load, b) for load in loads for b in load.boundaries]
+
+    def _measure(self, values: Array, gradients: Array, *, mean: bool) -> Kinematics:
+        g = gradient_operator(values, gradients, self.points[0], self.body.kinematics)
+        return LogStrain(n=self.n, dofs=self.dofs, gradients=g, weights=self.weights, mean=mean)
+
+    def external(self, time: float, u: Array | None = None) -> Array:
+        """Return the external nodal forces (n,) at a time and displacements (n,) [N]."""
+        force = super().external(time)
+        if u is not None:
+            for each in self._following:
+                force = force + each.change(u, time)
+        return force
+
+    def _stressed(self, strain: Array, state: PlasticState, time: float) -> Response:
+        """Return the response of the law; stress is NaN where the material is inverted."""
+        inverted = np.isnan(strain).any(axis=0)
+        if not inverted.any():
+            return super()._stressed(strain, state, time)
+        found = super()._stressed(np.where(inverted, 0.0, strain), state, time)
+        return found._replace(stress=np.where(inverted, np.nan, found.stress))
+
+    def tangent_data(self, response: PartResponse, blend: float = 0.0) -> Array:
+        """Return the values of the consistent tangent on `pattern`.
+
+        The share ``blend`` of the moduli is elastic; the geometric term is whole.
+        """
+        law, deformation, shape = response.law, response.deformation, self.weights.shape
+        D = law.tangent
+        if blend:
+            D = (1 - blend) * D + blend * self.body.law.stiffness(self.components)[:, :, None]
+        D = D.reshape(*D.shape[:2], *shape).transpose(2, 3, 0, 1)
+        K = deformation.stiffness(slice(None), D, law.stress)
+        for each in self._following:
+            each.add_stiffness(K, *response.place)
+        return self._assembly.values(slice(None), K)
+
+    def during(self, time: float, u: Array) -> LargeDiscretisation:
+        """Return the body for an increment from displacements u: its rotation is about its place.
+
+        Unknowns and pins stay the same.
+        """
+        if self.rigid.shape[1] < 2 or not u.any():
+            return self
+        here = copy(self)
+        here.rigid = self._motions(self.X + vectors(u, self.dim))
+        return here

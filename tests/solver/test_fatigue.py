@@ -1,0 +1,182 @@
+"""Fatigue criteria on paths: published numbers, closed forms, invariance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from solver.errors import ModelError
+from solver.fatigue import (
+    CRITERIA,
+    BrownMiller,
+    Criterion,
+    Crossland,
+    DangVan,
+    FatemiSocie,
+    Findley,
+    Matake,
+    Paths,
+    SmithWatsonTopper,
+)
+from solver.fatigue.kernels import balls
+from solver.tensors import _PLACES
+from solver.typing import Array
+
+LIMITS = {"torsion": 352.0, "bending": 540.97}
+G, NU = 200e3 / 2.6, 0.3
+EVERY: tuple[Criterion, ...] = (
+    Crossland(**LIMITS), DangVan(**LIMITS), Findley(**LIMITS), Matake(**LIMITS), FatemiSocie(),
+    SmithWatsonTopper(), BrownMiller(),
+)  # fmt: skip
+
+
+def cycle(*instants: Sequence[float]) -> Array:
+    """Return the path (1, n_instants, 6) of one point."""
+    return np.array([instants], dtype=float)
+
+
+def elastic(stress: Array) -> Paths:
+    """Return paths with the elastic strain of their stress."""
+    strain = stress / (2 * G)
+    strain[..., :3] -= NU / (1 + NU) * stress[..., :3].sum(axis=2, keepdims=True) / (2 * G)
+    return Paths(stress, strain)
+
+
+def rotated(tensor: Array, turns: Array) -> Array:
+    """Return tensors (n, n_instants, 6), each path turned by its matrix (n, 3, 3)."""
+    full = np.empty((*tensor.shape[:2], 3, 3))
+    for k, (i, j) in enumerate(_PLACES):
+        full[..., i, j] = full[..., j, i] = tensor[..., k]
+    full = np.einsum("pik,ptkl,pjl->ptij", turns, full, turns)
+    return np.stack([full[..., i, j] for i, j in _PLACES], axis=-1)
+
+
+BENT_AND_TWISTED = cycle((411, 0, 0, 205, 0, 0), (-411, 0, 0, -205, 0, 0))
+"""Bending and torsion in phase: Code_Aster, szlz107a."""
+PULLED = elastic(cycle((200, 0, 0, 0, 0, 0), (-200, 0, 0, 0, 0, 0)))
+
+
+def test_published_numbers_of_bending_and_torsion() -> None:
+    paths = Paths(BENT_AND_TWISTED)
+    assert paths.deviator_balls[1][0] / 2**0.5 == pytest.approx(313.579, rel=1e-5)
+    assert paths.pressure.max() == pytest.approx(137.0, rel=1e-12)
+    found = Crossland(torsion=352.0, sensitivity=0.22).assess(paths)
+    assert found.value[0] - 352.0 == pytest.approx(-8.281, abs=1e-3)
+    assert Crossland(**LIMITS).factor == pytest.approx(0.22, rel=1e-4)
+    assert DangVan(**LIMITS).assess(paths).utilisation[0] == pytest.approx(1.00056, rel=1e-5)
+    for k, value in {0.1: 312.265, 0.2: 337.116, 0.3: 364.698}.items():
+        found = Findley(torsion=352.0, sensitivity=k).assess(paths)
+        assert found.value[0] == pytest.approx(value, rel=1e-5)
+
+
+def test_published_numbers_of_tension_and_compression() -> None:
+    """Code_Aster, sslv135a, multiplies shear by 1.5; then closed forms of one stress."""
+    for criterion, value in {
+        Matake(torsion=200.0, sensitivity=1.0): 300.0,
+        DangVan(torsion=200.0, sensitivity=1.25): 275.0,
+    }.items():
+        found = criterion.assess(PULLED)
+        assert 1.5 * found.value[0] == pytest.approx(value, rel=1e-5)
+        assert abs(found.plane[0, 0]) == pytest.approx(np.cos(np.pi / 4), rel=1e-5)
+    found = FatemiSocie().assess(PULLED)
+    assert found.value[0] == pytest.approx(1.40088e-3, rel=1e-5)
+    assert np.degrees(np.arccos(abs(found.plane[0, 0]))) == pytest.approx(43.02, abs=5e-3)
+    found = SmithWatsonTopper(endured=0.4).assess(PULLED)
+    assert (found.value[0], found.safety_factor[0]) == pytest.approx((0.2, 2.0), rel=1e-10)
+    value = BrownMiller(sensitivity=0.3).assess(PULLED).value[0]
+    assert value == pytest.approx(1.3e-3 + 0.3 * 2 * 0.35e-3, rel=1e-5)
+
+
+def test_both_limits_are_reached_by_the_cycles_that_they_are_of() -> None:
+    t, f = LIMITS["torsion"], LIMITS["bending"]
+    twisted = Paths(cycle((0, 0, 0, t, 0, 0), (0, 0, 0, -t, 0, 0)))
+    bent = Paths(cycle((f, 0, 0, 0, 0, 0), (-f, 0, 0, 0, 0, 0)))
+    for criterion in EVERY[:4]:
+        for paths in (twisted, bent):
+            assert criterion.assess(paths).utilisation[0] == pytest.approx(1.0, rel=2e-6)
+
+
+@pytest.mark.parametrize("criterion", EVERY, ids=lambda each: type(each).__name__)
+def test_rotation_changes_nothing(criterion: Criterion) -> None:
+    """Out of phase, with mean stress; 1e-8 where the plane is one of equal shear (see `matake`)."""
+    rng = np.random.default_rng(2)
+    t = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
+    bent, twisted, mean = 100 * np.abs(rng.normal(size=(3, 20, 1)))
+    stress = np.zeros((20, 24, 6))
+    stress[..., 0] = mean + bent * np.sin(t)
+    stress[..., 3] = twisted * np.sin(t + rng.uniform(0, np.pi, (20, 1)))
+    turns = Rotation.random(20, random_state=3).as_matrix()
+    before, paths = elastic(stress), elastic(rotated(stress, turns))
+    found, after = criterion.assess(before), criterion.assess(paths)
+    tolerance = 1e-8 if isinstance(criterion, Matake | BrownMiller) else 1e-12
+    np.testing.assert_allclose(after.value, found.value, rtol=tolerance)
+
+
+def test_smallest_ball_is_the_least_of_all() -> None:
+    """Its centre is a mean of the points on it: no other ball is as small."""
+    x = np.random.default_rng(4).normal(size=(50, 5, 40))
+    centres, radii = balls(x)
+    away = np.linalg.norm(x - centres[:, :, None], axis=1)
+    np.testing.assert_allclose(away.max(axis=1), radii, rtol=1e-13)
+    for path, centre, far, radius in zip(x, centres, away, radii, strict=True):
+        on = path[:, far > radius * (1 - 1e-10)]
+        shares = np.linalg.lstsq(np.vstack([on, np.ones(on.shape[1])]), [*centre, 1.0])[0]
+        assert shares.min() > -1e-9
+        np.testing.assert_allclose(on @ shares, centre, atol=1e-9)
+
+
+def line_contact(depth: Array, x: Array) -> Array:
+    """Return the stress (depth, x, 6) below a cylinder, over p0 and a, without friction.
+
+    K.L. Johnson, Contact Mechanics (1985), eqs. 4.49; plane strain.
+    """
+    z, x = depth[:, None], x[None]
+    root = np.sqrt((1 - x**2 + z**2) ** 2 + 4 * x**2 * z**2)
+    m, n = (np.sqrt((root + s * (1 - x**2 + z**2)) / 2) for s in (1, -1))
+    n = n * np.sign(x)
+    ratio = (z**2 + n**2) / (m**2 + n**2)
+    stress = np.zeros((*root.shape, 6))
+    stress[..., 0] = -(m * (1 + ratio) - 2 * z)
+    stress[..., 1] = -m * (1 - ratio)
+    stress[..., 2] = NU * (stress[..., 0] + stress[..., 1])
+    stress[..., 3] = n * (m**2 - z**2) / (m**2 + n**2)
+    return stress
+
+
+def test_an_elastic_rolling_contact_is_worst_where_theory_says() -> None:
+    depth, x = np.linspace(0.02, 1.5, 75), np.linspace(-8, 8, 801)
+    paths = Paths(line_contact(depth, x))
+    amplitude = paths.deviator_balls[1] / 2**0.5
+    assert amplitude.max() == pytest.approx(0.25, rel=0.01)
+    assert depth[amplitude.argmax()] == pytest.approx(0.50, abs=0.02)
+    value = DangVan(torsion=1.0, sensitivity=0.3).assess(paths).value
+    assert value.max() == pytest.approx(0.1706, rel=0.01)
+    assert depth[value.argmax()] == pytest.approx(0.60, abs=0.02)
+
+
+def test_paths_in_the_plane_are_paths_in_space() -> None:
+    stress = BENT_AND_TWISTED[..., :4]
+    for criterion in EVERY[:4]:
+        found, whole = criterion.assess(Paths(stress)), criterion.assess(Paths(BENT_AND_TWISTED))
+        assert found.value == pytest.approx(whole.value, rel=0.0)
+
+
+def test_a_cycle_in_compression_does_no_damage() -> None:
+    pressed = elastic(cycle((-100, 0, 0, 0, 0, 0), (-300, 0, 0, 0, 0, 0)))
+    assert SmithWatsonTopper().assess(pressed).safety_factor[0] == np.inf
+
+
+def test_mistakes_name_their_field() -> None:
+    for field, make in {
+        "bending": lambda: DangVan(torsion=300.0, bending=1000.0),
+        "torsion": lambda: DangVan(torsion=-300.0, sensitivity=0.3),
+        "stress": lambda: Paths(np.zeros((3, 6))),
+        "strain": lambda: SmithWatsonTopper().assess(Paths(BENT_AND_TWISTED)),
+    }.items():
+        with pytest.raises(ModelError) as error:
+            make()
+        assert error.value.field == field
+    assert set(CRITERIA) >= {"dang_van", "crossland", "findley", "matake", "fatemi_socie"}
