@@ -22,8 +22,7 @@ def run(options: argparse.Namespace) -> int:
     from residua.cost import ALONE, Foreseen, dry_run
     from residua.progress import Progress
     from studies.definition.study import Study
-    from studies.execution.cluster import Access
-    from studies.execution.forking import FORK_HERE, variables
+    from studies.execution.access import Access
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, run_study
     from studies.kinds.fit.fitting import NO_FIT, Fit
@@ -67,9 +66,7 @@ def run(options: argparse.Namespace) -> int:
             preparing.start()
         progress(event)
 
-    # Before a worker knows the module path of this process, it would look in the current directory.
-    for_workers = {"PYTHONSAFEPATH": "1", FORK_HERE: "1"}
-    with _interruption() as interrupted, variables(for_workers):
+    with _interruption() as interrupted:
         outcome = run_study(
             study,
             store,

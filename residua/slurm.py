@@ -7,7 +7,8 @@ from pathlib import Path
 from shlex import quote
 
 from studies.errors import StudyError
-from studies.execution.cluster import CONFIGURATION, FROM_THE_START
+from studies.execution.access import CONFIGURATION
+from studies.execution.forks import FROM_THE_START
 
 _TIME = re.compile(r"(\d+-)?\d+(:\d\d){0,2}")
 _MEMORY = re.compile(r"\d+[KMGT]?")

@@ -22,14 +22,12 @@ from service.connections import limited
 from service.datasets import Datasets
 from service.errors import QueueLost
 from service.examiner import Examiner
-from service.headers import SecurityHeaders
 from service.inspector import Inspector
 from service.jobs import Jobs
 from service.keys import Keys, KeysError
-from service.limits import body_limit
 from service.maps import Pictures
-from service.methods import head_is_get
 from service.metrics import Metrics
+from service.middleware import SecurityHeaders, body_limit, head_is_get
 from service.overview import Details
 from service.pages import new
 from service.pages import routes as pages
@@ -40,6 +38,7 @@ from service.recovery import Mender, open_queue
 from service.retention import Keeper
 from service.routes.manual import ASSETS
 from service.runner import Runner
+from service.sandbox import READERS
 from service.settings import Settings, chosen
 from service.table import Tables
 from service.turns import COMBINING, COMPUTING, READING, Turns
@@ -197,6 +196,7 @@ def serve(
     except OSError as error:
         refuse(f"data = {str(settings.data)!r}: must be a directory to write in ({error.strerror})")
     check_port(settings.host, settings.port)
+    READERS.prepare()  # loads while this process begins to listen
     uvicorn.run(
         app,
         host=settings.host,

@@ -15,7 +15,7 @@ from typing import Any
 from service.processes import Outlet, beat, claim_stdout, read_order, watch_stdin
 from studies import GridLost, Store, Study, StudyError, StudyEvent, run_study
 from studies.errors import CatalogueDamaged, StoreBusy, StoreFull, Unusable
-from studies.execution.cluster import Access
+from studies.execution.access import Access
 from studies.execution.limits import Limits
 
 log = logging.getLogger("service.child")

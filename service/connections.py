@@ -13,7 +13,7 @@ import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from service.errors import LATER, problem
-from service.headers import HEADERS
+from service.middleware import HEADERS
 from service.settings import Settings
 
 MACOS_FILES = 10_240

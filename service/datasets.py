@@ -16,21 +16,28 @@ from collections import OrderedDict
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+from service.cache import Cache
 from service.errors import Busy, Conflict, NotFound
 from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.turns import Beyond, Share
-from studies import Store, Study
+from solver.late import Late
+from studies import Store
 from studies.errors import FileDamaged, StoreFull
 from studies.kinds import kind_of
 from studies.scratch import scratch
 from studies.storage.seal import State, state_of
 from studies.storage.tiles import Tiles
 
+COMBINED, FOUND = Late("service.reading:combined"), Late("service.reading:found")
+
 KEPT = 4
 """Number of studies whose data set is kept."""
+FOUND_KEPT = 16
+"""Number of studies of which is kept what they found."""
 
 REST = 10.0
 """Time for which a data set is kept though runs were added, as a multiple of that of making it."""
@@ -81,6 +88,7 @@ class Datasets:
     def __init__(self, jobs: Jobs, store: Store, computes: bool = True) -> None:
         self.jobs, self.store, self.computes = jobs, store, computes
         self.made: OrderedDict[str, _Offered] = OrderedDict()
+        self.answers = Cache[Any](FOUND_KEPT)
         self.folders = ExitStack()
         self.folder: Path | None = None
 
@@ -115,10 +123,19 @@ class Datasets:
                 raise Busy(AGAIN) from None
             return await self._partial(job, await reading.here(self.jobs.study, job.id), combining)
 
+    async def found(self, job: Job, reading: Share) -> Any:
+        """Return what a study that chooses its runs has found; errors as `ended`."""
+        path = await reading.here(self.ended, job)
+        state = state_of(path)
+        if (found := self.answers.get(path, of=state)) is not None:
+            return found
+        entries = await reading.read(FOUND, path)
+        return self.answers.put(path, SimpleNamespace(**entries) if entries else None, of=state)
+
     async def tiles(self, job: Job, reading: Share, combining: Share) -> Tiles:
         """Return the current data set of a study as a Zarr store; errors as `current`."""
         path = await self.current(job, reading, combining)
-        return await reading.read(self._tiles, job.id, path)
+        return await reading.here(self._tiles, job.id, path)
 
     def _tiles(self, study_id: str, path: Path) -> Tiles:
         found = Tiles(path)
@@ -166,7 +183,7 @@ class Datasets:
             target = self.folder / f"{study_id}-{made.number + 1}.nc"
             given = content, self.store.directory.resolve(), self.store.aside, target
             try:
-                await turn.apart(combined, *given, field="data set", name=study_id, seconds=SECONDS)
+                await turn.apart(COMBINED, *given, field="data set", name=study_id, seconds=SECONDS)
             except StoreFull:  # not the data directory
                 raise OSError(errno.ENOSPC, "no room is left for temporary files") from None
             except Beyond:
@@ -209,15 +226,3 @@ def rested(began: float) -> float:
     """Return until when a data set stays that was begun at a time, and has just been made."""
     now = time.monotonic()
     return now + REST * (now - began)
-
-
-def combined(content: dict[str, Any], directory: Path, aside: Path | None, target: Path) -> None:
-    """Write the data set of the runs of a study that are there; called in another process.
-
-    Nothing is moved in a directory whose lists are ``aside``.
-    """
-    from studies.storage.combine import combine
-
-    store = Store(directory, aside=aside)
-    study = Study.known(content, store.scene)
-    combine(study, store, study.cases(), target=target)

@@ -14,10 +14,9 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
-from service.headers import HEADERS
 from service.keys import KeysError
 from service.logs import REQUEST
-from service.methods import offered
+from service.middleware import HEADERS, offered
 from studies import StudyError
 from studies.errors import (
     LONGEST_FIELD,

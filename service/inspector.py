@@ -1,4 +1,4 @@
-"""Check scene files before they are stored, and draw them; nothing in them is executed.
+"""Check scene files before they are stored; nothing in them is executed.
 
 A scene is read in a process without a network, which writes in one folder.
 """
@@ -8,30 +8,21 @@ from __future__ import annotations
 import errno
 import json
 import logging
-from base64 import b64decode, b64encode
+from base64 import b64decode
 from collections.abc import Mapping
 from math import ceil
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from service.alone import CRASHED, FAILED, Answer, alone
 from service.errors import TooMany
-from service.maps import draw_scene
-from service.schemas import KeptScene, SketchQuery
+from service.sandbox import CRASHED, FAILED, Answer
+from service.schemas import KeptScene
 from service.turns import MINUTE, Share, beyond
-from solver.files import LARGEST
-from solver.results.quantities import QUANTITIES
-from studies import Store, Study, StudyError
-from studies.definition.parameters import read_values
+from solver.late import Late
+from studies import StudyError
 from studies.errors import SceneError
-from studies.scenes.file_scene import FileScene
-from studies.scenes.formats import FORMATS, load_readers
-from studies.scenes.registry import scene_named
+from studies.scenes.formats import FORMATS
 from studies.scenes.table import FILE_NAME
 from studies.scratch import scratch
-
-if TYPE_CHECKING:
-    from studies.scenes.description import Description
 
 log = logging.getLogger(__name__)
 
@@ -40,6 +31,7 @@ SLOW = 10.0
 LONGEST = 1_000_000
 """Largest size of a scene file, without its meshes [bytes]."""
 _FILE = "scene.toml"
+CHECKED = Late("service.posted:checked")
 
 
 class Inspector:
@@ -56,7 +48,7 @@ class Inspector:
 
     async def inspect(
         self, text: bytes, meshes: Mapping[str, bytes], share: Share
-    ) -> tuple[KeptScene, Description]:
+    ) -> tuple[KeptScene, Any]:
         """Return the scene of a file and its meshes, and their content.
 
         Raises
@@ -78,10 +70,11 @@ class Inspector:
                 raise StudyError("meshes", name, allowed)
         slow = SLOW * self.seconds
         async with share.turn() as turn:
-            most, files = min(turn.remaining, self.seconds), {**meshes, _FILE: text}
-            answer = await turn.apart(
-                inspected, files, most, field="scene", name=_FILE, seconds=slow
-            )
+            most = min(turn.remaining, self.seconds)
+            with scratch() as folder:
+                for name, data in {**meshes, _FILE: text}.items():
+                    (folder / name).write_bytes(data)
+                answer = await turn.shut_in(CHECKED, folder, folder=folder, cpu=most, seconds=slow)
         if answer.failed == errno.ETIME and most < self.seconds:
             share.turns.remaining(share.caller)
             raise TooMany("too little processor time remained: ask later", ceil(MINUTE))
@@ -107,72 +100,3 @@ class Inspector:
             raise beyond("scene", _FILE, self.seconds)
         found: dict[str, Any] = json.loads(answer.text)
         return found
-
-
-def inspected(files: Mapping[str, bytes], seconds: float) -> Answer:
-    """Return what a copy of this process, which has loaded what a scene needs, finds in files."""
-    import studies.scenes.building
-    import studies.scenes.scene  # noqa: F401
-
-    load_readers()
-    list(QUANTITIES)  # loads all that declare some: the copy cannot compile what it loads
-    with scratch() as folder:
-        for name, data in files.items():
-            (folder / name).write_bytes(data)
-        return alone(_checked, folder, folder=folder, seconds=seconds)
-
-
-def drawn(directory: Path, name: str, query: SketchQuery) -> bytes:
-    """Return the picture of a scene of a store as PNG; called in a process.
-
-    Its meshes may be those of a stranger, and its parameters are the caller's.
-    """
-    scene = Store(directory).scene(name) or scene_named(name)
-    return draw_scene(scene, read_values(scene, query.selection), query)
-
-
-def pictured(directory: Path, content: dict[str, Any]) -> bytes:
-    """Return the scene of the first run of a study as PNG; called in a process."""
-    first = next(iter(Study.known(content, Store(directory).scene).cases()))
-    return draw_scene(first.scene, first.values, SketchQuery())
-
-
-def _checked(folder: Path) -> str:
-    """Return the scene in a folder and its content, or its mistakes, as JSON."""
-    answer: dict[str, Any]
-    try:
-        scene = _read(folder)
-        arrays = _arrays(scene.description)
-        kept = {"id": scene.id, "name": scene.name, "summary": scene.summary}
-        answer = {"scene": kept, "content": scene.description.content, "arrays": arrays}
-    except StudyError as error:
-        answer = {"mistakes": [_fields_of(each) for each in error.each], "count": error.count}
-    return json.dumps(answer).replace(f"{folder}/", "")
-
-
-def _read(folder: Path) -> FileScene:
-    """Return the scene in a folder; every file must be needed and valid."""
-    from studies.scenes.description import Description, file_names  # loads scipy
-    from studies.scenes.scene import read_scene
-
-    needed = file_names(Description.read(folder / _FILE).content)
-    for name in sorted({each.name for each in folder.iterdir()} - {_FILE, *needed}):
-        listed = ", ".join(needed) or "(it names none)"
-        raise StudyError("meshes", name, f"must be a file that the scene names: {listed}")
-    return read_scene(folder / _FILE)
-
-
-def _arrays(description: Description) -> dict[str, str]:
-    """Return the arrays of the meshes as text: nobody else reads the files themselves."""
-    read = {name: mesh.read().arrays for name, mesh in (description.meshes or {}).items()}
-    if sum(map(len, read.values())) > LARGEST:
-        raise StudyError("meshes", ", ".join(read), f"must have at most {LARGEST} bytes of arrays")
-    return {name: b64encode(arrays).decode() for name, arrays in read.items()}
-
-
-def _fields_of(mistake: StudyError) -> tuple[str, object, str]:
-    return mistake.field, _plain(mistake.value), mistake.allowed
-
-
-def _plain(value: object) -> object:
-    return value if isinstance(value, str | int | float | bool | None) else repr(value)

@@ -18,7 +18,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from service import schema
 from service.errors import Busy, Conflict, NotFound, QueueLost
 from service.job import COLUMNS, Job, StudyState, job_of, row_of, wanted
 from studies.storage.database import Database, WrongContent, check
@@ -35,6 +34,45 @@ ALIKE = """SELECT 1 FROM job AS mine JOIN job AS theirs ON theirs.scene = mine.s
 BOTH = (SHARED, ALIKE)
 NOTES = 200
 """Number of notes that are kept of what happened to a job."""
+
+
+FORM = 5
+"""Form of the tables; a queue of another form is set aside, and made again from the studies."""
+
+TABLES = (
+    """CREATE TABLE job (
+    id TEXT PRIMARY KEY,
+    name TEXT NOT NULL,
+    scene TEXT NOT NULL,
+    size INTEGER NOT NULL,
+    state TEXT NOT NULL,
+    message TEXT NOT NULL,
+    progress REAL NOT NULL,
+    since INTEGER NOT NULL,
+    stood TEXT NOT NULL,
+    priority INTEGER NOT NULL,
+    submitted TEXT NOT NULL,
+    started TEXT,
+    finished TEXT,
+    turn INTEGER NOT NULL,
+    bytes REAL NOT NULL,
+    stage TEXT NOT NULL,
+    study TEXT NOT NULL
+)""",
+    "CREATE INDEX job_by_turn ON job (turn)",
+    "CREATE INDEX job_by_state ON job (state, priority, turn)",
+    """CREATE TABLE run (
+    job TEXT NOT NULL, position INTEGER NOT NULL, run TEXT NOT NULL,
+    PRIMARY KEY (job, position)
+) WITHOUT ROWID""",
+    "CREATE INDEX run_by_id ON run (run)",
+    # what happened to studies
+    "CREATE TABLE told (job TEXT NOT NULL, at TEXT NOT NULL, words TEXT NOT NULL)",
+    "CREATE INDEX told_by_job ON told (job)",
+    # the layout of the data set of a study that was shown last, and how many it had before
+    "CREATE TABLE layout (job TEXT PRIMARY KEY, digest TEXT NOT NULL, turn INTEGER NOT NULL)",
+    f"PRAGMA user_version = {FORM}",
+)
 
 
 class Jobs(Database):
@@ -54,7 +92,7 @@ class Jobs(Database):
         self.longest = longest
         new = not path.exists()
         with self.transaction("BEGIN IMMEDIATE", mode="rwc" if new else "rw") as connection:
-            schema.prepare(connection, new)
+            _prepare(connection, new)
             _check(connection)
 
     def check(self) -> None:
@@ -310,6 +348,16 @@ class Jobs(Database):
         if row is None:
             raise unknown(job_id)
         return job_of(row)
+
+
+def _prepare(connection: sqlite3.Connection, new: bool) -> None:
+    """Create the tables of a new file; raise `WrongContent` if a file has not this form."""
+    if new:
+        for statement in TABLES:
+            connection.execute(statement)
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if version != FORM:
+        raise WrongContent(f"it has form {version}, not {FORM}")
 
 
 def _check(connection: sqlite3.Connection) -> None:

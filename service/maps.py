@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,13 +10,9 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 import solver
+from service.cache import Cache
 from service.files import UNCHANGED, tagged, unchanged
-from service.schemas import LineQuery, MapQuery, PlotQuery, SketchQuery
 from service.turns import Share
-from solver.errors import ModelError
-from solver.scenes import Scene
-from studies import StudyError
-from studies.storage.runfile import verify
 from studies.storage.seal import digest
 
 PNG = "image/png"
@@ -36,32 +31,19 @@ class Pictures:
     """
 
     def __init__(self, memory: int) -> None:
-        self.memory, self.size = memory, 0
-        self.kept: OrderedDict[str, bytes] = OrderedDict()
+        self.kept = Cache[bytes](memory, len)
 
     async def get(
         self, tag: str, share: Share, draw: Callable[..., bytes], *given: object, name: object
     ) -> bytes:
         """Return the picture with this tag, drawn in the turn of a caller unless it is kept."""
-        picture = self._kept(tag)
-        if picture is None:
-            async with share.turn() as turn:
-                picture = self._kept(tag)  # it may have been drawn meanwhile
-                if picture is None:
-                    picture = await turn.apart(draw, *given, field="picture", name=name)
-                    self._keep(tag, picture)
-        return picture
-
-    def _kept(self, tag: str) -> bytes | None:
-        if tag in self.kept:
-            self.kept.move_to_end(tag)
-        return self.kept.get(tag)
-
-    def _keep(self, tag: str, picture: bytes) -> None:
-        self.size += len(picture) - len(self.kept.get(tag, b""))
-        self.kept[tag] = picture
-        while self.size > self.memory:
-            self.size -= len(self.kept.popitem(last=False)[1])
+        if (picture := self.kept.get(tag)) is not None:
+            return picture
+        async with share.turn() as turn:
+            if (picture := self.kept.get(tag)) is not None:  # it was drawn meanwhile
+                return picture
+            drawn: bytes = await turn.apart(draw, *given, field="picture", name=name)
+            return self.kept.put(tag, drawn)
 
     async def answer(
         self,
@@ -96,66 +78,3 @@ class Pictures:
         """Return the answer with a picture of the file of a run or a study."""
         what = path.name, await reading.here(digest, path), query
         return await self.answer(request, what, computing, draw, path, query, name=path.stem)
-
-
-def draw_map(path: Path, query: MapQuery) -> bytes:
-    """Return a map of the run in ``path`` as PNG.
-
-    Raises
-    ------
-    StudyError
-        If the run has no such field, or the field no such component or stage.
-    """
-    from studies import open_netcdf
-    from studies.views.plots.maps import map_figure  # matplotlib takes a second to import
-    from studies.views.plots.sheets import png
-
-    verify(path)
-    with open_netcdf(path) as run:
-        return png(map_figure(run, **query.model_dump(exclude={"resolution"})), query.resolution)
-
-
-def draw_lines(path: Path, query: LineQuery) -> bytes:
-    """Return lines of the run in ``path`` as PNG; raise `StudyError` as `picture` does."""
-    from studies import open_netcdf
-    from studies.views.plots.fields import check_field, line_fields
-    from studies.views.plots.picture import picture
-    from studies.views.plots.sheets import png
-
-    verify(path)
-    with open_netcdf(path) as run:
-        check_field(query.field, line_fields(run))
-        asked = query.model_dump(include={"field", "component", "zoom"})
-        return png(picture(run, selection=query.selection, **asked), query.resolution)
-
-
-def draw_study(path: Path, query: PlotQuery) -> bytes:
-    """Return a field of the study in ``path`` as PNG; raise `StudyError` as `picture` does."""
-    from studies import open_netcdf
-    from studies.views.plots.picture import drawn_from, picture
-    from studies.views.plots.sheets import png
-
-    with (
-        open_netcdf(path) as dataset,
-        drawn_from(path, dataset, query.field, query.selection) as (found, left),
-    ):
-        asked = query.model_dump(include={"field", "component", "zoom", "window", "over"})
-        return png(picture(found, selection=left, **asked), query.resolution)
-
-
-def draw_scene(scene: Scene, values: Mapping[str, Any], query: SketchQuery) -> bytes:
-    """Return a scene before loading as PNG, for these values of its parameters.
-
-    Raises
-    ------
-    StudyError
-        If a parameter or the part is refused, or the scene has nothing to draw.
-    """
-    from studies.views.plots.setup import setup_figure
-    from studies.views.plots.sheets import png
-
-    try:
-        figure = setup_figure(scene, values, query.zoom, query.window)
-    except ModelError as error:
-        raise StudyError(error.field, error.value, error.allowed) from None
-    return png(figure, query.resolution)

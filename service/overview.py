@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections import Counter, OrderedDict
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from service.cache import Cache
 from service.job import Job
 from service.jobs import Jobs
 from service.scenes import scene_name
@@ -56,7 +57,7 @@ class Details:
     def __init__(self, jobs: Jobs, store: Store) -> None:
         self.jobs = jobs
         self.store = store
-        self.kept: OrderedDict[tuple[str, int, int], Detail] = OrderedDict()
+        self.kept = Cache[Detail](KEPT)
 
     async def get(self, study_id: str, window: Window, share: Share) -> bytes:
         """Return a study, with those of its runs that are in ``window``, in a caller's turn.
@@ -65,8 +66,7 @@ class Details:
         """
         requested = time.monotonic()
         key = study_id, window.limit, window.offset
-        detail = self.kept.setdefault(key, Detail())
-        self.kept.move_to_end(key)
+        detail = self.kept.get(key) or self.kept.put(key, Detail())
         try:
             while detail.looked < requested:
                 async with detail.one:
@@ -77,11 +77,9 @@ class Details:
                             await turn.here(self._look, study_id, window, detail)
             return detail.content
         finally:
-            if not detail.content:  # unless another caller looks, or has begun anew
-                if self.kept.get(key) is detail and not detail.one.locked():
-                    del self.kept[key]
-            elif len(self.kept) > KEPT:
-                self.kept.popitem(last=False)
+            # unless another caller looks, or has begun anew
+            if not (detail.content or detail.one.locked()) and self.kept.get(key) is detail:
+                self.kept.forget(key)
 
     def _look(self, study_id: str, window: Window, detail: Detail) -> None:
         began = time.monotonic()
@@ -151,6 +149,27 @@ def searched_at(study: Mapping[str, Any], parameters: Mapping[str, Any]) -> dict
     names = [*study["sweep"], *kind.searched(study[kind.name])]
     places = {name: labelled.get(name, parameters.get(name)) for name in names}
     return {name: place for name, place in places.items() if place is not None}
+
+
+def log_of(job: Job, jobs: Jobs, store: Store) -> str:
+    """Return a line for each thing that happened to a study, in the order of time.
+
+    Runs that were there before it was accepted come first. Of a study that an earlier version
+    accepted only the times of its row are known.
+    """
+    lines = jobs.told(job.id)
+    if not lines:
+        begun = [(job.submitted, "accepted"), (job.started, "running")]
+        ended = [(job.finished, f"{job.state}: {job.message}".removesuffix(": "))]
+        lines = [(at, words) for at, words in begun + ended if at]
+    for run_id, row in store.catalogue.each(jobs.runs(job.id)):
+        if row:
+            seconds = "" if row["cpu_seconds"] is None else f", {row['cpu_seconds']:.3g} s of CPU"
+            words = f"run {run_id}: {row['status']}{seconds}"
+            said = f"{words}: {row['message']}" if row["message"] else words
+            lines.append((str(row["created"]), said))
+    told = ((at, " ".join(words.split())) for at, words in sorted(lines, key=lambda each: each[0]))
+    return "".join(f"{at}  {words}\n" for at, words in told)
 
 
 def _columns(job: Job) -> dict[str, Any]:

@@ -16,7 +16,14 @@ from typing import Any
 from service import processes
 from service.processes import Process, Starter
 from service.settings import Settings
+from solver.late import Late
+from studies import Store, Study
 from studies.errors import StoreBusy, StoreFull, StudyError
+from studies.execution.estimate import memory_needed
+from studies.execution.forks import LOADING_SECONDS, SHARED
+
+OWN_WORKERS = Late("studies.execution.workers:own_workers")
+"""What uses dask, which the service itself does not."""
 
 
 class PoolAway(RuntimeError):
@@ -83,7 +90,7 @@ class Pool:
             raise PoolAway(f"the workers cannot be started: {error.strerror}") from error
         said: dict[str, Any] = {}
         with contextlib.suppress(TimeoutError, ValueError):
-            async with asyncio.timeout(processes.START_SECONDS):
+            async with asyncio.timeout(LOADING_SECONDS):
                 said = json.loads(await self._process.stdout.readline())
         if said.get("kind") == "access":
             return said["content"]
@@ -94,16 +101,10 @@ class Pool:
 
 def main() -> None:
     """Lock the store, and run the workers unless there is a scheduler, until the service stops."""
-    from studies import Store, Study
-    from studies.execution.cluster import own_workers, prepare_workers
-    from studies.execution.estimate import memory_needed
-    from studies.execution.forking import FORK_HERE, variables
-
     outlet = processes.claim_stdout()
     order = processes.read_order()
     if order["access"] is None:
-        with variables({FORK_HERE: "1"}):
-            prepare_workers()
+        SHARED.prepare()  # as a fork of this process, which has one thread
     stop = processes.watch_stdin(order["grace"])
     try:
         with contextlib.ExitStack() as held:
@@ -116,7 +117,7 @@ def main() -> None:
                     workers = os.cpu_count() or 1
                     with contextlib.suppress(StudyError):  # it will be refused
                         need = memory_needed(Study.known(order["study"], store.scene))
-                own = own_workers(workers, order["memory"], need)
+                own = OWN_WORKERS(workers, order["memory"], need)
                 access = held.enter_context(own).to_dict()
             outlet.send("access", access)
             stop.wait()

@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ctypes
-import errno
 import json
 import multiprocessing
 import os
@@ -20,15 +19,15 @@ import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, TextIO
 
 from service import logs
 from solver.parts import SETTING, own_files
-from studies.execution.cluster import prepare_workers
+from studies.execution.forks import NEEDED, Fork, Forks
 
 LONGEST_LINE = 10_000_000
 """Largest size of a message of a process [bytes]: of a search the ids of all runs are one."""
@@ -37,10 +36,7 @@ BEAT_SECONDS = 5.0
 """Time between two signs of life [s]; a process counts as frozen only after a longer time."""
 
 LOADED = ("service.child", "service.pool", "studies.storage.combine")
-"""Modules that are loaded before a process is forked, beside those that workers need."""
-
-START_SECONDS = 60.0
-"""Longest time for the start of a process, with what is loaded for it [s]."""
+"""Modules that are loaded before a process is forked, besides those that workers need."""
 
 STDIN, STDOUT = 0, 1
 
@@ -83,18 +79,18 @@ class Process:
 
     Attributes
     ----------
-    process : its end
+    fork : its end
     stdin, stdout : what it reads, and what it writes
     """
 
-    process: BaseProcess
+    fork: Fork
     stdin: asyncio.WriteTransport
     stdout: asyncio.StreamReader
 
     @property
     def returncode(self) -> int | None:
-        """Its exit status; None while it runs. It is 255 if its parent, the fork server, died."""
-        return self.process.exitcode
+        """Its exit status; None while it runs."""
+        return self.fork.returncode
 
     async def wait(self) -> None:
         """Wait until it has ended."""
@@ -103,7 +99,7 @@ class Process:
 
     def kill(self) -> None:
         """Kill it."""
-        self.process.kill()
+        self.fork.kill()
 
 
 @dataclass(slots=True, frozen=True)
@@ -116,12 +112,11 @@ class Starter:
     """
 
     lock: int
-    _one: asyncio.Lock = field(default_factory=asyncio.Lock)
+    forks: Forks = field(default_factory=lambda: Forks((*LOADED, *NEEDED)))
 
-    async def prepare(self) -> str:
-        """Start to load, unless it is done; return the method of `multiprocessing`."""
-        async with self._one:  # meanwhile this process has variables of the other one
-            return await asyncio.to_thread(prepare_workers, LOADED)
+    async def prepare(self) -> None:
+        """Begin to load, unless that has been done."""
+        await asyncio.to_thread(self.forks.prepare)
 
     async def start(self, module: str, order: Mapping[str, Any]) -> Process:
         """Return a process that executes ``main()`` of a module, and has received its order.
@@ -131,46 +126,24 @@ class Starter:
         OSError
             If the system cannot start a process, or not in time.
         """
-        context = multiprocessing.get_context(await self.prepare())
-        theirs, stdin = context.Pipe(duplex=False)
-        stdout, out = context.Pipe(duplex=False)
-        held = Connection(os.dup(self.lock))
-        process: BaseProcess = context.Process(  # type: ignore[attr-defined]
-            target=_begin,
-            args=(module, theirs, out, held, dict(os.environ)),
-            daemon=True,  # if this process must end at once, it shall not wait for the other
-        )
-
-        def begin() -> None:
-            with theirs, out, held:
-                process.start()
-
+        theirs, stdin = multiprocessing.Pipe(duplex=False)
+        stdout, out = multiprocessing.Pipe(duplex=False)
+        pipes = theirs, out, Connection(os.dup(self.lock))
+        begin = partial(self.forks.start, _begin, module, pipes=pipes)
         try:
-            async with asyncio.timeout(START_SECONDS):
-                await asyncio.to_thread(begin)
-        except TimeoutError:
-            raise OSError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT)) from None
-        except EOFError:  # the one to be forked has ended, as where no process can be started
-            raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN)) from None
+            fork = await asyncio.to_thread(begin)
+        finally:
+            for each in pipes:
+                each.close()
         loop, reader = asyncio.get_running_loop(), asyncio.StreamReader(LONGEST_LINE)
         await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), stdout)
         writer, _ = await loop.connect_write_pipe(asyncio.BaseProtocol, stdin)
         writer.write(json.dumps(order).encode() + b"\n")
-        return Process(process, writer, reader)
+        return Process(fork, writer, reader)
 
 
-def _begin(
-    module: str,
-    stdin: Connection,
-    stdout: Connection,
-    lock: Connection,
-    environment: Mapping[str, str],
-) -> None:
+def _begin(stdin: Connection, stdout: Connection, lock: Connection, module: str) -> None:
     """Execute ``main()`` of a module in a process that has just been started."""
-    multiprocessing.current_process().daemon = False  # it may start processes
-    os.setsid()  # the service handles an interrupt from a terminal
-    os.chdir("/")  # it reads no settings of libraries where the service was started
-    os.environ.update(environment)
     os.dup2(stdin.fileno(), STDIN)
     os.dup2(stdout.fileno(), STDOUT)
     stdin.close()

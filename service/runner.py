@@ -31,7 +31,7 @@ SILENCE_SECONDS = 20.0
 SMALL = 100
 """Largest number of runs of a study for which the last place is reserved."""
 
-READY_SECONDS = 5.0
+READY_SECONDS = 0.5
 """Time without a study after which what the next one needs is loaded [s]."""
 
 SILENT = "its process says nothing: it is frozen, or the machine is overloaded"

@@ -12,7 +12,7 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 from solver.files import LARGEST
 from solver.memory import most_kept
 from studies.errors import StudyError
-from studies.execution.cluster import Access
+from studies.execution.access import Access
 from studies.execution.estimate import Bounds
 from studies.execution.limits import Limits
 from studies.scenes.refusals import mistakes_of

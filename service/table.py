@@ -8,12 +8,12 @@ or fits are those that it has asked for: they fill no grid, and have no axes.
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from service.cache import Cache
 from service.job import Job
 from service.jobs import Jobs
 from service.overview import PENDING, searched_at
@@ -42,20 +42,15 @@ class Tables:
 
     def __init__(self, jobs: Jobs, store: Store) -> None:
         self.jobs, self.store = jobs, store
-        self.kept: OrderedDict[str, tuple[object, RunTable]] = OrderedDict()
+        self.kept = Cache[RunTable](KEPT)
 
     async def get(self, study_id: str, share: Share) -> RunTable:
         """Return the table of a study, made in the turn of a caller unless it is kept."""
         async with share.turn() as turn:
             job, state = await turn.here(self._state, study_id)
-            known, table = self.kept.get(study_id, (None, None))
-            if table is None or known != state:
-                table = await turn.here(self._made, job)
-        self.kept[study_id] = state, table
-        self.kept.move_to_end(study_id)
-        while len(self.kept) > KEPT:
-            self.kept.popitem(last=False)
-        return table
+            if (table := self.kept.get(study_id, of=state)) is not None:
+                return table
+            return self.kept.put(study_id, await turn.here(self._made, job), of=state)
 
     def _state(self, study_id: str) -> tuple[Job, object]:
         """Return a study, and all on which its table depends."""

@@ -12,35 +12,26 @@ answers other requests.
 from __future__ import annotations
 
 import asyncio
-import copyreg
-import os
-import pickle
-import resource
-import signal
+import errno
 import time
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
 from dataclasses import dataclass, replace
-from io import BytesIO
 from math import ceil, inf
 from pathlib import Path
-from threading import Lock
 from typing import Any, TypeVar, cast
 from weakref import WeakValueDictionary
 
-from anyio import BrokenWorkerProcess, CapacityLimiter, fail_after, to_process, to_thread
-from threadpoolctl import threadpool_limits
+from anyio import CapacityLimiter, to_thread
 
+from service import sandbox
 from service.errors import Busy, TooMany
-from solver.files import read_file
+from service.sandbox import BYTES, Answer
 from studies import StudyError
 
 READING, COMPUTING, COMBINING = 2, 2, 1
 """Slots of each queue. Combining has its own, so that no other answer waits for it."""
-
-FILES = Lock()
-"""Held while a file is read: the netCDF library ends the process if two threads do it."""
 
 WAITING = 200
 """Number of calls of a caller that may wait."""
@@ -56,32 +47,6 @@ Found = TypeVar("Found")
 
 class Beyond(StudyError):
     """An input that takes more time or memory than is allowed."""
-
-
-def memory(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path("/sys/fs/cgroup")) -> int:
-    """Return the memory that this process and those it starts may have [bytes].
-
-    The smallest limit of its control groups, of version 2 or 1, or all of the machine. In a
-    container the path of a group may be that outside, and its files are at the top.
-    """
-    found = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")]
-    with suppress(OSError):
-        for line in read_file(groups).decode().splitlines():
-            _, kinds, path = line.split(":", 2)
-            if kinds and "memory" not in kinds.split(","):
-                continue
-            top, name = (
-                (mounted / "memory", "memory.limit_in_bytes") if kinds else (mounted, "memory.max")
-            )
-            own = top / path.lstrip("/")
-            for folder in (own, *own.parents):
-                with suppress(OSError, ValueError):  # no such file, or "max"
-                    found.append(int(read_file(folder / name)))
-    return min(found)
-
-
-BYTES = min(max(memory() // 5, 2**30), 8 * 2**30)
-"""Address space of a process [bytes]: the service, three of them and studies share the memory."""
 
 
 class Turns:
@@ -224,27 +189,42 @@ class Turn:
         Busy
             if the process was killed
         """
-        begun = time.monotonic()
-        try:
-            with fail_after(seconds):
-                one = CapacityLimiter(1)
-                answer = await to_process.run_sync(
-                    _limited, function, *given, cancellable=True, limiter=one
-                )
-        except BaseException as error:  # without an answer nobody knows
-            self.spent += time.monotonic() - begun
-            if isinstance(error, BrokenWorkerProcess):
-                raise Busy(f"the process that reads a {field} has ended: ask again") from None
-            if isinstance(error, TimeoutError):
-                raise beyond(field, name, seconds, advice) from None
-            raise
-        found, failed, spent = pickle.loads(answer)
+        with self._refused(field, name, seconds, advice):
+            found, failed, spent = await sandbox.call(function, *given, seconds=seconds)
         self.spent += spent
         if isinstance(failed, MemoryError):
             raise beyond(field, name, seconds, advice)
         if failed is not None:
             raise failed
         return cast("Found", found)
+
+    async def shut_in(
+        self, function: Callable[..., str], *given: object, folder: Path, cpu: float, seconds: float
+    ) -> Answer:
+        """Return what `sandbox.call_shut_in` does; errors as of `apart`, for a scene."""
+        begun = time.monotonic()
+        with self._refused("scene", "scene.toml", seconds):
+            answer = await sandbox.call_shut_in(
+                function, *given, folder=folder, cpu=cpu, seconds=seconds
+            )
+        self.spent += cpu if answer.failed == errno.ETIME else time.monotonic() - begun
+        return answer
+
+    @contextmanager
+    def _refused(
+        self, field: str, name: object, seconds: float, advice: str = ""
+    ) -> Iterator[None]:
+        """Charge a call without an answer its time, and raise what it is told."""
+        begun = time.monotonic()
+        try:
+            yield
+        except BaseException as error:  # without an answer nobody knows
+            self.spent += time.monotonic() - begun
+            if isinstance(error, sandbox.Ended):
+                raise Busy(f"the process that reads a {field} has ended: ask again") from None
+            if isinstance(error, TimeoutError):
+                raise beyond(field, name, seconds, advice) from None
+            raise
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,13 +258,8 @@ class Share:
             yield piece
 
     async def read(self, function: Callable[..., Found], *given: object) -> Found:
-        """Return what a function returns that opens files, called while no other one does."""
-
-        def alone() -> Found:
-            with FILES:
-                return function(*given)
-
-        return await self.here(alone)
+        """Return what a function returns that opens a file, called in a process."""
+        return await self.apart(function, *given, field="file", name=self.caller)
 
     async def apart(self, function: Callable[..., Found], *given: object, **limits: Any) -> Found:
         """Return what `Turn.apart` does, in the caller's turn."""
@@ -296,34 +271,3 @@ def beyond(field: str, name: object, seconds: float, advice: str = "") -> Beyond
     """Return the error for what takes more than this time, or more memory than is allowed."""
     allowed = f"must be read within {seconds:g} s and {BYTES / 2**30:.3g} GiB of memory"
     return Beyond(field, name, allowed + advice)
-
-
-def _limited(function: Callable[..., object], *given: object) -> bytes:
-    """Return a pickle of what a function returns, the error that it raises, and its time [s].
-
-    An error is pickled by its own rule. That of `tblib`, which Dask sets for all errors, adds what
-    the error came from; in the errors of pydantic that has no end.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the service's to handle
-    resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
-    threadpool_limits(1)
-    begun, found, failed = _used(), None, None
-    try:
-        found = function(*given)
-    except Exception as error:
-        failed = error
-    out = BytesIO()
-    pickler = pickle.Pickler(out)
-    pickler.dispatch_table = {
-        kind: rule
-        for kind, rule in copyreg.dispatch_table.items()
-        if not issubclass(kind, BaseException)
-    }
-    pickler.dump((found, failed, _used() - begun))
-    return out.getvalue()
-
-
-def _used() -> float:
-    """Return the processor time of this process and of those that it has waited for [s]."""
-    each = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
-    return sum(used.ru_utime + used.ru_stime for used in each)

@@ -22,11 +22,12 @@ if TYPE_CHECKING:
     from studies.definition.cases import Case, LoadingPath
     from studies.definition.parameters import scene_schema
     from studies.definition.study import Study
-    from studies.execution.cluster import Access, own_workers
+    from studies.execution.access import Access
     from studies.execution.estimate import Bounds, Estimate, estimate
     from studies.execution.function import sweep
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, StudyOutcome, run_study
+    from studies.execution.workers import own_workers
     from studies.kinds.fit.shown import fit
     from studies.storage.store import Store
     from studies.views.differing import Difference, diff
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from studies.views.tables import summary
 
 _HOMES = {
-    "Access": "execution.cluster",
+    "Access": "execution.access",
     "Case": "definition.cases",
     "Client": "client",
     "Limits": "execution.limits",
@@ -55,7 +56,7 @@ _HOMES = {
     "fit": "kinds.fit.shown",
     "open_netcdf": "views.reading",
     "open_study": "views.reading",
-    "own_workers": "execution.cluster",
+    "own_workers": "execution.workers",
     "predict": "views.predict",
     "run_study": "execution.run",
     "scene_schema": "definition.parameters",

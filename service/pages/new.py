@@ -23,12 +23,12 @@ from service.dependencies import (
 )
 from service.errors import NoRoom
 from service.examiner import Examined
-from service.inspector import pictured
 from service.maps import PNG
 from service.pages import form
 from service.pages.rendering import ROOT, PageRoute, page, to_study
 from service.routes.scenes import post_scene
 from service.scenes import known_scene
+from solver.late import Late
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.scenes.registry import known_scenes
@@ -73,7 +73,9 @@ async def draw_scene(
         raise StudyError(field, given.get(f"p.{field}"), allowed)
     try:
         what = store.directory, content
-        picture = await computing.apart(pictured, *what, field="study", name=content["name"])
+        picture = await computing.apart(
+            Late("service.drawing:pictured"), *what, field="study", name=content["name"]
+        )
     except StudyError as error:
         if error.field != "scene":
             raise

@@ -17,8 +17,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from starlette.exceptions import HTTPException
 
 from service.errors import STATUS, answer_to
-from service.headers import CHARTS as POLICY
 from service.keys import Scope
+from service.middleware import CHARTS as POLICY
 from service.pages import assets
 from studies.views import rules
 from studies.views.columns import value_text

@@ -9,9 +9,7 @@ import gzip
 import json
 from collections.abc import Mapping
 from contextlib import suppress
-from functools import lru_cache
 from http import HTTPStatus
-from pathlib import Path
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
@@ -19,7 +17,6 @@ from fastapi import APIRouter, Form, Query, Request, Response
 from fastapi.responses import RedirectResponse
 
 from service import overview
-from service.datasets import Datasets
 from service.dependencies import (
     TheCaller,
     TheDatasets,
@@ -42,16 +39,14 @@ from service.pages.assets import asset
 from service.pages.rendering import COOKIE, ROOT, PageRoute, number_text, page, to_study
 from service.pages.run import MOST, audited, compared, numbers_shown, parameters_shown
 from service.routes.health import health
-from service.routes.numbers import outlined
+from service.routes.numbers import OUTLINED
 from service.scenes import scene_name, scene_of
 from service.schemas import ContentId, Health, StudyFilter, Window
 from solver.scenes import Scene
 from studies import Store, StudyError
 from studies.definition.identity import is_id
-from studies.kinds import found_of, kind_of
-from studies.kinds.kind import Found
+from studies.kinds import kind_of
 from studies.scenes.registry import known_names
-from studies.storage.seal import State, state_of
 from studies.views.table import MESSAGE, RUN, STATUS, RunTable, varied
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
@@ -61,8 +56,6 @@ FOR_GOOD = {"cache-control": "public, max-age=31536000, immutable", "vary": "acc
 LISTED = 25
 """Number of studies on a page."""
 POLLED = ("accepted", "running")
-KEPT = 16
-"""Number of studies of which is kept what they found."""
 
 
 @home.get("/")
@@ -143,24 +136,10 @@ async def study_page(
     found = None
     if kind_of(study).chooses:
         with suppress(Busy, NotFound):  # it is there at the end
-            found = await reading.read(_found, tables.jobs.get(study_id), datasets)
+            job = await reading.here(tables.jobs.get, study_id)
+            found = await datasets.found(job, reading)
     table = await tables.get(study_id, reading)
     return await reading.here(_study, request, study, tables.store, table, found)
-
-
-def _found(job: Job, datasets: Datasets) -> Found | None:
-    """Return what a study that chooses its runs has found."""
-    path = datasets.ended(job)
-    return _found_in(path, state_of(path))
-
-
-@lru_cache(maxsize=KEPT)
-def _found_in(path: Path, state: State | None) -> Found | None:
-    """Return the same of a data set in a state of its file."""
-    from studies import open_netcdf  # xarray takes half a second to import
-
-    with open_netcdf(path) as dataset:
-        return found_of(dataset)
 
 
 def _study(
@@ -168,7 +147,7 @@ def _study(
     study: Mapping[str, Any],
     store: Store,
     table: RunTable,
-    found: Found | None,
+    found: Any,
 ) -> Response:
     scene = scene_of(store, study["scene"])
     query = dict(request.query_params)
@@ -234,7 +213,7 @@ def _cell(column: Any, at: int) -> str:
 @router.get("/runs/{run_id}")
 async def run_page(run: TheRun, request: Request, store: TheStore, reading: TheReading) -> Response:
     """Show a run: its maps and lines, its numbers, its audit."""
-    drawn = await reading.read(outlined, store.run_path(run["id"]))
+    drawn = await reading.read(OUTLINED, store.run_path(run["id"]))
     return await reading.here(_run, request, run, store, drawn)
 
 

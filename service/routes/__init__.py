@@ -1,10 +1,10 @@
 """The resources, one module for each."""
 
-from service.routes import estimate, health, manual, metrics, numbers, runs, scenes, studies
+from service.routes import health, manual, metrics, numbers, runs, scenes, studies
 
 ROUTERS = (
     studies.router,
-    estimate.router,
+    studies.costs,
     runs.router,
     numbers.router,
     scenes.router,

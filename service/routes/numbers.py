@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from http import HTTPStatus
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -20,8 +17,8 @@ from service.files import UNCHANGED, tagged, unchanged
 from service.octets import MEDIA_TYPE, octets
 from service.schemas import AuditFigure, ContentId, NumbersFilter, TableFilter
 from service.table import OUTCOMES
+from solver.late import Late
 from studies import StudyError
-from studies.storage.runfile import verify
 from studies.storage.seal import digest
 from studies.views.figures import Worst, worst
 from studies.views.table import RUN, STATUS, RunTable, varied
@@ -30,6 +27,8 @@ from studies.views.written import FORMS
 router = APIRouter()
 
 MISSING = "table.parquet needs pyarrow on the service: pip install residua-contact[parquet]"
+
+OUTLINED, VALUES = Late("service.reading:outlined"), Late("service.reading:values")
 
 OCTETS: dict[int | str, dict[str, Any]] = {
     200: {"content": {MEDIA_TYPE: {}}, "description": "A line of JSON, then the numbers"},
@@ -147,7 +146,7 @@ async def fields(
     run: TheRun, store: TheStore, reading: TheReading
 ) -> dict[str, list[dict[str, Any]]]:
     """Return the variables of a run that are drawn: `maps` and `lines`, with their labels."""
-    return await reading.read(outlined, store.run_path(run["id"]))
+    return await reading.read(OUTLINED, store.run_path(run["id"]))
 
 
 @router.get(
@@ -180,47 +179,8 @@ async def values(
     headers = tagged((solver.__version__, digests, field, component, stage, table))
     if known := unchanged(request, headers):
         return known
-    found = await reading.read(read, files, field, component, stage, table)
+    found = await reading.read(VALUES, files, field, component, stage, table)
     if not table:
         return Response(found, media_type=MEDIA_TYPE, headers=dict(headers))
     named = {"content-disposition": f'attachment; filename="{field}.csv"'}
     return Response(found, media_type=FORMS["csv"].media_type, headers={**headers, **named})
-
-
-def outlined(path: Path) -> dict[str, list[dict[str, Any]]]:
-    """Return the variables of a run's file that are drawn."""
-    from studies.views.shown import outline
-
-    with opened(path) as dataset:
-        return outline(dataset)
-
-
-def read(
-    files: list[Path], field: str, component: str | None, stage: str | None, table: bool
-) -> bytes:
-    """Return a map or lines of the first run, less the map of the second if there is one.
-
-    They are octets, or a ``table`` as CSV.
-
-    Raises
-    ------
-    StudyError
-        if the run has no such field, component or stage
-    """
-    from studies.views.shown import shown
-
-    with ExitStack() as stack:
-        runs = [stack.enter_context(opened(path)) for path in files]
-        found = shown(runs[0], field, component, stage, *runs[1:])
-        return b"".join(found.as_csv()) if table else octets(found.head, found.arrays, kind="<f4")
-
-
-@contextmanager
-def opened(path: Path) -> Iterator[Any]:
-    """Give the data set of a run, without the dimensions of a sweep."""
-    from studies import open_netcdf  # xarray takes half a second to import
-    from studies.views.picking import sweep_axes
-
-    verify(path)
-    with open_netcdf(path) as dataset:
-        yield dataset.isel(dict.fromkeys(sweep_axes(dataset), 0))

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from http import HTTPStatus
-from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import FileResponse
 from starlette.convertors import StringConvertor, register_url_convertor
 
-from service import maps
 from service.dependencies import (
     TheComputing,
     TheKeeper,
@@ -25,11 +23,12 @@ from service.files import NETCDF, netcdf
 from service.maps import PICTURE
 from service.schemas import LineQuery, MapQuery, Run, RunFilter, RunPage
 from service.search import conditions
-from solver.results.export import vtu_of
-from studies import StudyError
-from studies.storage.ugrid import read
+from solver.late import Late
 
 VTU = "application/xml"
+
+NODAL = Late("service.reading:nodal_fields")
+MAP, LINES = Late("service.drawing:draw_map"), Late("service.drawing:draw_lines")
 
 router = APIRouter(prefix="/runs", tags=["runs"])
 
@@ -69,20 +68,9 @@ async def fetch_mesh(
     The study must say `"keep": "fields"`.
     """
     given = store.run_path(run["id"]), stage
-    content = await computing.apart(nodal_fields, *given, field="stage", name=stage)
+    content = await computing.apart(NODAL, *given, field="stage", name=stage)
     named = {"content-disposition": f'attachment; filename="{run["id"]}.vtu"'}
     return Response(content, media_type=VTU, headers=named)
-
-
-def nodal_fields(path: Path, stage: str | None) -> bytes:
-    """Return the fields at the nodes of a run at a stage, as a VTU file."""
-    from studies import open_netcdf  # xarray takes half a second to import
-
-    with open_netcdf(path) as dataset:
-        fields = read(dataset)
-    if stage is not None and stage not in fields.stages:
-        raise StudyError("stage", stage, f"must be one of {', '.join(fields.stages)}")
-    return vtu_of(fields, stage or list(fields.stages)[-1])
 
 
 @router.get("/{run_id:stem}")
@@ -109,7 +97,7 @@ async def draw_map(
 ) -> Response:
     """Draw a field of a run around the contact."""
     path = store.run_path(run["id"])
-    return await pictures.of_file(request, path, query, reading, computing, maps.draw_map)
+    return await pictures.of_file(request, path, query, reading, computing, MAP)
 
 
 @router.get("/{run_id}/line.png", responses={**PICTURE, **REFUSED})
@@ -127,4 +115,4 @@ async def draw_lines(
     Beside the queries named below, every dimension of the field is one: `?stage=loaded&pass=2`.
     """
     path = store.run_path(run["id"])
-    return await pictures.of_file(request, path, query, reading, computing, maps.draw_lines)
+    return await pictures.of_file(request, path, query, reading, computing, LINES)

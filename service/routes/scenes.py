@@ -18,13 +18,15 @@ from service.dependencies import (
     in_turn,
 )
 from service.errors import REFUSED
-from service.inspector import drawn
 from service.maps import PICTURE
 from service.scenes import known_scene
 from service.schemas import ContentId, KeptScene, SceneSummary, SketchQuery, Window
+from solver.late import Late
 from studies import StudyError, scene_schema
 from studies.scenes.file_scene import FileScene
 from studies.scenes.registry import known_scenes
+
+DRAWN = Late("service.drawing:drawn")
 
 router = APIRouter(prefix="/scenes", tags=["scenes"])
 
@@ -117,7 +119,7 @@ async def draw_scene(
     known = await reading.here(store.scene_id, name)
     await reading.here(known_scene, store, known)
     what, given = (known, query), (store.directory, known, query)
-    return await pictures.answer(request, what, computing, drawn, *given, name=known)
+    return await pictures.answer(request, what, computing, DRAWN, *given, name=known)
 
 
 @router.delete("/{name}", status_code=HTTPStatus.NO_CONTENT)

@@ -7,7 +7,6 @@ import logging
 from collections.abc import AsyncIterator
 from dataclasses import replace
 from http import HTTPStatus
-from pathlib import Path
 from typing import Annotated, Any
 
 from annotated_types import Interval
@@ -16,8 +15,7 @@ from fastapi.responses import FileResponse, PlainTextResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import GetJsonSchemaHandler
 
-from service import maps, overview
-from service.datasets import Datasets
+from service import overview
 from service.dependencies import (
     TheCombining,
     TheComputing,
@@ -36,9 +34,6 @@ from service.dependencies import (
 )
 from service.errors import REFUSED, Busy, Conflict, NotFound, QueueLost
 from service.files import NETCDF, UNCHANGED, netcdf, tagged, unchanged
-from service.history import log_of
-from service.job import Job
-from service.jobs import Jobs
 from service.maps import PICTURE
 from service.octets import MEDIA_TYPE
 from service.schemas import (
@@ -53,7 +48,8 @@ from service.schemas import (
     Window,
 )
 from service.strict import StrictRoute
-from studies import Store, Study, StudyError
+from solver.late import Late
+from studies import Estimate, Study, StudyError
 from studies.definition.schema import StudyTable, Whole, parsed
 from studies.errors import StoreFull
 from studies.storage.seal import digest
@@ -62,6 +58,7 @@ from studies.storage.tiles import METADATA
 log = logging.getLogger(__name__)
 
 router = APIRouter(prefix="/studies", tags=["studies"], route_class=StrictRoute)
+costs = APIRouter(tags=["studies"], route_class=StrictRoute)
 
 EXAMPLE: dict[str, Any] = {
     "name": "two-frictions",
@@ -70,8 +67,8 @@ EXAMPLE: dict[str, Any] = {
     "sweep": {"load_ratio": [0.5714, 0.8571], "friction": [0.0, 0.3]},
 }
 
-MOST_FITTED = 1000
-"""Largest number of runs to which a request may fit polynomials, which takes seconds."""
+PREDICTED, INDICES = Late("service.reading:predicted"), Late("service.reading:indices")
+FITTED, DRAWN = Late("service.reading:fitted"), Late("service.drawing:draw_study")
 
 
 class Priority(StudyTable):
@@ -209,7 +206,7 @@ async def events(
 @in_turn
 def tell_log(job: TheJob, jobs: TheJobs, store: TheStore) -> str:
     """Return a line for each thing that happened: states, what was waited for, ends of runs."""
-    return log_of(job, jobs, store)
+    return overview.log_of(job, jobs, store)
 
 
 @router.get("/{study_id}/predict", responses=REFUSED)
@@ -231,24 +228,7 @@ async def predict(
     path = await reading.here(datasets.ended, job)
     content = await reading.here(jobs.study, job.id)
     given = path, content, store.directory, store.aside, query
-    return await computing.apart(_predicted, *given, field="of", name=query.of)
-
-
-def _predicted(
-    path: Path, content: dict[str, Any], directory: Path, aside: Path | None, query: PredictQuery
-) -> Prediction:
-    """Return what `predict` tells; called in a process."""
-    from studies import open_netcdf  # xarray takes half a second to import
-    from studies.views.predict import answer
-
-    asked, store = query.model_dump(), Store(directory, aside=aside)
-    at = {name: asked.pop(name) for name in query.model_extra or {}}
-    study = Study.known(content, store.scene)
-    with open_netcdf(path) as runs:
-        found = answer(runs, study, store, at=at, **asked)
-    add = None if found.enough else found.run.to_dict()
-    told = {name: getattr(found, name) for name in Prediction.model_fields.keys() - {"add"}}
-    return Prediction(**told, add=add)
+    return await computing.apart(PREDICTED, *given, field="of", name=query.of)
 
 
 @router.get("/{study_id}/sensitivity", responses=REFUSED)
@@ -262,19 +242,7 @@ async def tell_sensitivity(
     with the reason.
     """
     path = await reading.here(datasets.ended, job)
-    return await computing.apart(_indices, path, of, field="of", name=of)
-
-
-def _indices(path: Path, of: str) -> dict[str, Any]:
-    """Return what `tell_sensitivity` tells; called in a process."""
-    from studies import open_netcdf, sensitivity  # xarray takes half a second to import
-    from studies.views.sensitivity import told
-
-    with open_netcdf(path) as runs:
-        if (size := runs["status"].size) > MOST_FITTED:
-            allowed = f"at most {MOST_FITTED} are fitted here: fetch the data set, and fit it there"
-            raise StudyError("runs", size, allowed)
-        return told(sensitivity(runs, of))
+    return await computing.apart(INDICES, path, of, field="of", name=of)
 
 
 @router.get("/{study_id}/plot.png", responses={**PICTURE, **REFUSED})
@@ -293,7 +261,7 @@ async def draw_study(
     `?field=contact_pressure&over=friction&load_ratio=0.5&stage=loaded`.
     """
     found = await reading.here(datasets.ended, job)
-    return await pictures.of_file(request, found, query, reading, computing, maps.draw_study)
+    return await pictures.of_file(request, found, query, reading, computing, DRAWN)
 
 
 @router.get("/{study_id}/fit", responses=REFUSED)
@@ -305,18 +273,9 @@ async def tell_fit(
     `message` warns, such as of parameters that cannot be told apart. The lines over which it was
     fitted are in the data set.
     """
-    return await reading.read(_fitted, job, jobs, datasets)
-
-
-def _fitted(job: Job, jobs: Jobs, datasets: Datasets) -> dict[str, Any]:
-    """Return what `tell_fit` tells."""
-    from studies import open_netcdf  # xarray takes half a second to import
-    from studies.kinds.fit.shown import told
-
-    if not jobs.study(job.id).get("fit"):
+    if not (await reading.here(jobs.study, job.id)).get("fit"):
         raise StudyError("fit", job.name, "is a study without a fit: submit one with an entry fit")
-    with open_netcdf(datasets.ended(job)) as found:
-        return told(found)
+    return await reading.read(FITTED, await reading.here(datasets.ended, job))
 
 
 @router.get("/{study_id}/dataset.nc", responses=NETCDF)
@@ -354,7 +313,7 @@ async def tile(
         if known := unchanged(request, headers):
             return known
         try:
-            content = await reading.read(tiles.content, key)
+            content = await reading.here(tiles.content, key)
         except LookupError as error:
             raise Conflict(str(error)) from None
     except FileNotFoundError:
@@ -364,3 +323,21 @@ async def tile(
         raise NotFound("nothing is stored under this key")
     kind = "application/json" if key.endswith(METADATA) else MEDIA_TYPE
     return Response(content, media_type=kind, headers=dict(headers))
+
+
+@costs.post("/estimate", responses=REFUSED)
+async def estimate(
+    content: Content,
+    examiner: TheExaminer,
+    computing: TheComputing,
+    keeper: TheKeeper,
+) -> Estimate:
+    """Tell what a study asks for beyond the runs that are there; nothing is stored.
+
+    `cpu_seconds` are low, likely and high. A study that asks for more than the service allows is
+    refused as it is when it is submitted.
+    """
+    taken_priority(content)
+    found = await examiner.examine(content, computing)
+    await asyncio.to_thread(keeper.check_room, found)
+    return found.estimate

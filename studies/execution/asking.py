@@ -13,10 +13,11 @@ from copy import copy, deepcopy
 from dataclasses import replace
 from functools import partial
 from itertools import takewhile
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from solver.late import Late
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.place import Limit, Place
 from studies.definition.quantity import Line, Read
@@ -24,8 +25,7 @@ from studies.definition.study import Study
 from studies.storage import runfile
 from studies.storage.store import Store
 
-if TYPE_CHECKING:
-    from studies.definition.neighbours import Neighbours
+NEIGHBOURS = Late("studies.definition.neighbours:Neighbours")  # loads scipy
 
 
 class Asked(NamedTuple):
@@ -84,12 +84,10 @@ class Asking:
         self._paths: dict[str, tuple[int, list[Any]]] = {}
         self._waits: list[set[Any]] = [set() for _ in self.places]
         self._ready: deque[Asked] = deque()
-        self._neighbours: Neighbours | None = None
+        self._neighbours: Any = None
         self._after: dict[int, list[int]] = {}
         if kind.expects:
-            from studies.definition.neighbours import Neighbours  # loads scipy
-
-            self._neighbours = Neighbours([place.fixed for place in self.places])
+            self._neighbours = NEIGHBOURS([place.fixed for place in self.places])
             for number, before in enumerate(self._neighbours.before):
                 for each in before:
                     self._after.setdefault(each, []).append(number)

@@ -8,11 +8,13 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from solver.errors import LimitLoad, NotConverged
+from solver.late import Late
 from studies.errors import StudyError
 
 if TYPE_CHECKING:
     import xarray as xr
 
+_CALLED = Late("studies.execution.workers:called")  # dask takes a second to import
 _DONE, _LIMIT, _FAILED = "ok", "limit_load", "not_converged"
 
 
@@ -50,12 +52,7 @@ def sweep(
     combined = itertools.product(*values.values())
     points = [dict(zip(values, point, strict=True)) for point in combined]
     calls = [partial(_run, function, point) for point in points]
-    if workers > 1:
-        from studies.execution.cluster import called
-
-        found = called(calls, workers)
-    else:
-        found = [call() for call in calls]
+    found = _CALLED(calls, workers) if workers > 1 else [call() for call in calls]
     runs: list[Any] = [
         xr.Dataset(dict(result)).assign(status=status, message=message)
         for result, status, message in found

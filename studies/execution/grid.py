@@ -8,23 +8,25 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Generator, Iterable, Iterator
-from dataclasses import dataclass
 from typing import Any, Self
 
 from dask.task_spec import Task
 from distributed import Client, Future, KilledWorker, get_worker
 
 from studies.errors import GridLost
-from studies.execution.cluster import Access, connect
+from studies.execution.access import Access
+from studies.execution.executor import (
+    Event,
+    Finished,
+    Function,
+    Message,
+    StopCheck,
+    Waiting,
+)  # fmt: skip
 from studies.execution.limits import Limits
 from studies.execution.proof import Unfit
-from studies.execution.watch import Ticket, Waiting, Watch
-
-Report = Callable[[dict[str, Any]], None]
-"""Sends a small message from a task to the caller."""
-StopCheck = Callable[[], bool]
-"""Returns whether a task shall stop."""
-Function = Callable[[Any, Report, StopCheck], Any]
+from studies.execution.watch import Ticket, Watch
+from studies.execution.workers import connect
 
 _POLL = 0.2
 """Seconds between two checks whether to stop."""
@@ -41,7 +43,7 @@ _SPARE = 2
 _HEAD_START = 60.0
 """Seconds by which each submitted task of a study delays its next one, in favour of others."""
 _RESTART = 30.0
-"""Seconds within which the nanny of a worker must have killed it."""
+"""Seconds within which the nanny of a worker, if it has one, must have killed it."""
 _STARTS = 2
 """Number of starts of a task that ended with the death of the worker, before the task is blamed."""
 _ROUNDS = 3
@@ -51,22 +53,6 @@ _WORKER_DIED = (
     "the worker process died each time it computed this loading path; if memory ran out, "
     "use fewer workers or allow each more memory"
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """A report of a running task."""
-
-    content: dict[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class Finished:
-    """End of a task, with its error if it failed, and the loading path at fault if it is known."""
-
-    task: Any
-    error: Exception | None = None
-    path: str = ""
 
 
 class Grid:
@@ -98,10 +84,26 @@ class Grid:
         self,
         function: Function,
         tasks: Iterable[Any],
+        hear: Callable[[Event], None],
+        should_stop: StopCheck,
+        limits: Limits,
+        priority: int,
+    ) -> None:
+        """See `Executor`, and `events`."""
+        with contextlib.closing(
+            self.events(function, tasks, should_stop, limits, priority)
+        ) as events:
+            for event in events:
+                hear(event)
+
+    def events(
+        self,
+        function: Function,
+        tasks: Iterable[Any],
         should_stop: StopCheck,
         limits: Limits | None = None,
         priority: int = 0,
-    ) -> Generator[Message | Waiting | Finished, None, None]:
+    ) -> Generator[Event, None, None]:
         """Run ``function(task, report, should_stop)`` for every task; yield what happens.
 
         Only so many tasks as there are workers, and a few more, are at the scheduler at a time:
@@ -141,9 +143,7 @@ class _HandedOut:
         self._watch = Watch(limits.patience)
         self._replacing: list[threading.Thread] = []
 
-    def carry_out(
-        self, tasks: Iterator[Any], should_stop: StopCheck
-    ) -> Iterator[Message | Waiting | Finished]:
+    def carry_out(self, tasks: Iterator[Any], should_stop: StopCheck) -> Iterator[Event]:
         """Hand out the tasks one after the other, and yield what happens."""
         looked = time.monotonic() - 2 * _LOOK
         while not should_stop():

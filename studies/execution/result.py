@@ -15,8 +15,7 @@ from studies.execution.asking import Asking
 from studies.kinds.kind import Answers
 from studies.storage import runfile, seal
 from studies.storage.dataset import RunContent
-from studies.storage.held import Combined, held
-from studies.storage.made import Made
+from studies.storage.made import Combined, Made, held
 from studies.storage.provenance import provenance
 from studies.storage.room import needs_room
 from studies.storage.store import Store

@@ -8,32 +8,37 @@ import shutil
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from solver.memory import most_kept, release
+from solver.late import Late
+from solver.memory import most_kept
 from solver.scenes import Scene
 from studies.definition.cases import LoadingPath
 from studies.definition.identity import solver_hash
 from studies.definition.study import Study
 from studies.definition.vocabulary import KEEP, OK, SOLVED
 from studies.errors import StoreFull, StudyError, Unusable
+from studies.execution.access import Access
 from studies.execution.asking import Asking
 from studies.execution.bundles import Bundle, bundles
-from studies.execution.cluster import Access, connect, own_workers
 from studies.execution.estimate import memory_needed
+from studies.execution.executor import Event, Executor, Finished, Here, Message, Waiting
+from studies.execution.forks import SHARED
 from studies.execution.limits import Limits
 from studies.execution.proof import Proof, proof_of
 from studies.execution.result import answered, result
+from studies.execution.script import check_script
 from studies.execution.task import PathTask, walk
-from studies.execution.watch import Waiting
 from studies.storage.store import Store
 
-if TYPE_CHECKING:
-    from studies.execution.grid import Grid
+own_workers = Late("studies.execution.workers:own_workers")
+connect = Late("studies.execution.workers:connect")
+grid_of = Late("studies.execution.grid:Grid")
+"""What uses dask, which takes a second to import."""
 
 DEFAULT = Limits()
 """The limits of a study that sets none."""
@@ -117,6 +122,7 @@ def run_study(
     workers: int | None = None,
     alone: float = 0.0,
     scheduler: Access | str | None = None,
+    executor: Executor | None = None,
     resume: bool = False,
     since: int = 0,
     limits: Limits = DEFAULT,
@@ -137,6 +143,7 @@ def run_study(
         computes itself. They begin with the next loading path
     scheduler : a running dask scheduler to use instead; its workers must see the store under the
         same path
+    executor : computes in another way than this process or workers of dask
     resume : compute only runs without a stored status; by default failed runs are computed again
         too
     since : with `resume`, failed runs stored before this time are computed again [ns since 1970]
@@ -198,7 +205,10 @@ def run_study(
         if wanted or (asking and not asking.ended):
             if shutil.disk_usage(store.directory).free < _ROOM:
                 raise StoreFull(str(store.directory))  # before any path is computed in vain
-            if not alone or work.compute_here(stop, alone):
+            here = Here(alone)
+            if executor or alone:
+                work.compute_by(executor or here, stop)
+            if not executor and (not alone or (here.over and work.lacks and not stop())):
                 work.compute(workers, access, stop)
         if asking:
             stopped, anew = work.lacks, bool(work.computed)
@@ -243,39 +253,49 @@ class _Work:
     _walked: int = 0
     _walking: dict[str, tuple[int, float]] = field(default_factory=dict)
 
-    def compute(self, wanted: int | None, access: Access | None, stop: Callable[[], bool]) -> None:
+    def compute_by(self, executor: Executor, stop: Callable[[], bool]) -> None:
         """Run a task for each bundle of paths that lack runs."""
-        from studies.execution.grid import Finished, Grid, Message  # dask takes a second to import
+        self._run(executor, self._tasks(None, lambda: executor.workers), stop)
 
+    def compute(self, wanted: int | None, access: Access | None, stop: Callable[[], bool]) -> None:
+        """Run the tasks on workers of dask, which prove that they see the directory."""
         workers = wanted or os.cpu_count() or 1
-        grid: Grid | None = None
-        unwritable: list[StoreFull | StudyError] = []
+        grid: Any = None
         with ExitStack() as opening:
             proof = opening.enter_context(proof_of(self.store, self.study.id))
             tasks = self._tasks(proof, lambda: grid.workers if grid else workers)
             if access is None:
+                check_script()
+                SHARED.prepare()  # loads while dask is imported
                 first = list(islice(tasks, workers))
                 count = sum(task is not None for task in first)
                 need = 0 if wanted or count < 2 else memory_needed(self.study)
                 own = own_workers(count, self.limits.memory, need)
                 access = opening.enter_context(own)
                 tasks = chain(first, tasks)
-            grid = opening.enter_context(Grid(access, self.limits.patience))
+            grid = opening.enter_context(grid_of(access, self.limits.patience))
+            self._run(grid, self._with_left(tasks), stop)
 
-            def leave() -> bool:
-                return bool(unwritable) or stop()
+    def _run(
+        self, executor: Executor, tasks: Iterator[PathTask | None], stop: Callable[[], bool]
+    ) -> None:
+        unwritable: list[StoreFull | StudyError] = []
 
-            items = grid.run(walk, self._with_left(tasks), leave, self.limits, self.priority)
-            for item in opening.enter_context(closing(items)):
-                match item:
-                    case Waiting(reason):
-                        self._tell("waiting", message=reason)
-                    case Message(content):
-                        self._hear(content)
-                    case Finished(_, StoreFull() | StudyError() as error):
-                        unwritable.append(error)
-                    case Finished(task, error, path):
-                        self._close(task, error, path)
+        def hear(event: Event) -> None:
+            match event:
+                case Waiting(reason):
+                    self._tell("waiting", message=reason)
+                case Message(content):
+                    self._hear(content)
+                case Finished(_, StoreFull() | StudyError() as error):
+                    unwritable.append(error)
+                case Finished(task, error, path):
+                    self._close(task, error, path)
+
+        def leave() -> bool:
+            return bool(unwritable) or stop()
+
+        executor.run(walk, tasks, hear, leave, self.limits, self.priority)
         for error in unwritable:
             raise self._of_directory(error)
 
@@ -283,39 +303,6 @@ class _Work:
     def lacks(self) -> bool:
         """Whether runs are left to compute."""
         return not self.asking.ended if self.asking else bool(self.wanted - self.computed)
-
-    def compute_here(self, stop: Callable[[], bool], seconds: float) -> bool:
-        """Run the tasks in this process, one after the other.
-
-        Return whether some are left after this processor time [s], for workers.
-        """
-        until = time.process_time() + seconds
-        failed: list[Exception] = []  # a task takes an error of its reports for its worker's end
-
-        def hear(content: Mapping[str, Any]) -> None:
-            try:
-                self._hear(content)
-            except Exception as error:
-                failed.append(error)
-                raise
-
-        def leave() -> bool:
-            return bool(failed) or stop()
-
-        for task in self._tasks(None, lambda: 1):
-            if task is None or stop():
-                return False
-            try:
-                walk(task, hear, leave)
-            except (StoreFull, StudyError) as error:
-                raise self._of_directory(error) from None
-            for each in failed:
-                raise each
-            self._close(task, None)
-            if time.process_time() > until and self.lacks and not stop():
-                release(0)
-                return True
-        return False
 
     def _of_directory(self, error: StoreFull | StudyError) -> StoreFull | StudyError:
         """Return an error with the directory as the user gave it, not with the path of a task."""

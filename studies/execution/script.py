@@ -6,14 +6,11 @@ import ast
 import inspect
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import FrameType
 
 from solver.files import read_file
 from studies.definition.identity import only_as_script
 from studies.errors import StudyError
-
-if TYPE_CHECKING:
-    from types import FrameType
 
 GUARD = 'if __name__ == "__main__":'
 

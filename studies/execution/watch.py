@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from studies.errors import GridLost
+from studies.execution.executor import Waiting
 from studies.execution.limits import Limits
 
 _QUIET = 10.0
@@ -18,13 +19,6 @@ _BEGIN = 60.0
 _NO_WORKER = "no worker is connected to the scheduler: start one, or wait while they start again"
 _NOT_TAKEN = "of the workers that are connected ({}) none takes the work: see their logs"
 _SILENT = "the scheduler does not answer"
-
-
-@dataclass(frozen=True, slots=True)
-class Waiting:
-    """No worker accepts tasks, for this `reason`; an empty reason says that work goes on."""
-
-    reason: str
 
 
 @dataclass(slots=True)

@@ -20,7 +20,7 @@ from studies.errors import FileDamaged
 from studies.storage import dataset as layout
 from studies.storage import seal
 from studies.storage.frame import Frame, write_beside
-from studies.storage.held import Combined
+from studies.storage.made import Combined
 from studies.storage.provenance import provenance, together, what_ran
 from studies.storage.room import Reservoir, needs_room
 from studies.storage.runfile import global_attributes, opened

@@ -35,7 +35,7 @@ def test_no_module_imports_against_the_direction(package: str) -> None:
 
 def test_two_modules_of_studies_import_dask() -> None:
     users = {m for m, names in imports("studies").items() if names & {"dask", "distributed"}}
-    assert users == {"studies/execution/cluster.py", "studies/execution/grid.py"}
+    assert users == {"studies/execution/workers.py", "studies/execution/grid.py"}
 
 
 def test_what_draws_is_in_its_folder() -> None:
@@ -52,7 +52,7 @@ def test_a_kind_of_study_is_known_in_its_folder_alone() -> None:
     }
     users = {path for path, text in texts.items() if of_kinds.search(text)}
     assert {path for path in users if not path.startswith("studies/kinds/")} == {
-        "residua/commands.py", "service/routes/studies.py", "studies/__init__.py",
+        "residua/commands.py", "service/reading.py", "studies/__init__.py",
         "studies/views/predict.py",
     }  # fmt: skip
 

@@ -12,7 +12,7 @@ from tests.architecture.sources import PACKAGES, ROOT, modules
 ONE = "solver/files.py"
 
 OTHERS = {
-    "service/alone.py": "devices and folders that are named in the code",
+    "service/sandbox.py": "devices and folders that are named in the code",
     "service/keys.py": "a folder, to lock it",
     "studies/scratch.py": "folders of its own, to lock them",
     "studies/storage/claims.py": "makes a new file",

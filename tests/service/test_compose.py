@@ -176,7 +176,7 @@ def test_who_needs_the_scheduler_waits_for_its_health() -> None:
 
 CONFIGURATION = """
 import json, dask, distributed
-from studies.execution.cluster import CONFIGURATION as own
+from studies.execution.access import CONFIGURATION as own
 names = [name for name in own if name.startswith("distributed.scheduler.")]
 known = dask.config.merge(*dask.config.defaults)
 print(json.dumps({name: [own[name], dask.config.get(name)] for name in names

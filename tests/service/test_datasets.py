@@ -19,7 +19,7 @@ import uvicorn
 import xarray as xr
 from fastapi.testclient import TestClient
 
-from service import datasets
+from service import datasets, reading
 from service.app import create_app
 from service.keys import Keys, Scope
 from service.settings import Settings
@@ -97,8 +97,8 @@ def test_a_data_set_is_made_again_when_runs_were_added_but_not_too_often(
 ) -> None:
     running = Running(tmp_path)
     made: list[object] = []
-    combined = datasets.combined
-    monkeypatch.setattr(datasets, "combined", lambda *given: made.append(given) or combined(*given))
+    combined = reading.combined
+    monkeypatch.setattr(reading, "combined", lambda *given: made.append(given) or combined(*given))
     monkeypatch.setattr(datasets, "REST", 1e6)
 
     def count() -> int:
@@ -121,7 +121,7 @@ def test_one_that_took_long_stays_though_others_were_asked_for_meanwhile(
     running: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(datasets, "KEPT", 1)
-    held, made, first = datasets.Datasets(running.jobs, running.store), datasets.combined, []
+    held, made, first = datasets.Datasets(running.jobs, running.store), reading.combined, []
     later = fake_study("later", sweep=AXES | {"load_ratio": [0.3]})
     running.jobs.accept(later.id, later.to_dict(), later.run_ids())
     ended, turns = threading.Event(), Turns(2)
@@ -142,7 +142,7 @@ def test_one_that_took_long_stays_though_others_were_asked_for_meanwhile(
         ended.set()
         return await tasks[1]
 
-    monkeypatch.setattr(datasets, "combined", combined)
+    monkeypatch.setattr(reading, "combined", combined)
     assert asyncio.run(both()).is_file() and first == [True]
     assert len(list(held.folder.iterdir())) == 1, "the older one is deleted then"
     held.close()
@@ -257,7 +257,7 @@ def test_one_who_read_another_layout_gets_an_error_in_place_of_values(running: R
 def test_a_data_set_that_takes_too_long_to_make_is_told_with_what_to_do(
     running: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tried, whole = list[object](), datasets.combined
+    tried, whole = list[object](), reading.combined
 
     def combined(*given: Any) -> None:
         tried.append(given)
@@ -265,7 +265,7 @@ def test_a_data_set_that_takes_too_long_to_make_is_told_with_what_to_do(
         time.sleep(0.01)
         raise beyond("data set", running.study.id, datasets.SECONDS)
 
-    monkeypatch.setattr(datasets, "combined", combined)
+    monkeypatch.setattr(reading, "combined", combined)
     monkeypatch.setattr(datasets, "REST", 1e4)
     running.app.state.datasets.made.clear()
     for _ in range(2):
@@ -277,7 +277,7 @@ def test_a_data_set_that_takes_too_long_to_make_is_told_with_what_to_do(
     assert not list(held.folder.glob("*.part"))
     held.made.clear()
     with monkeypatch.context() as small:
-        small.setattr(datasets, "combined", whole)
+        small.setattr(reading, "combined", whole)
         before = running.dataset()
     offered = held.made[running.study.id]
     offered.of, offered.until = None, 0.0  # as when runs were added long after

@@ -14,9 +14,9 @@ import h5py
 import pytest
 
 from service.errors import Busy, Conflict, NotFound, QueueLost
-from service.history import log_of
 from service.job import StudyState
 from service.jobs import Jobs, forget
+from service.overview import log_of
 from service.recovery import open_queue
 from studies import Store, StoreBusy, Study
 from studies.storage.lock import lock

@@ -8,9 +8,8 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
-import time
 from asyncio.subprocess import PIPE, Process
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,6 +22,7 @@ from service.pool import Pool
 from service.processes import LOADED, Starter
 from service.runner import SILENT, Runner
 from service.settings import Settings
+from studies.execution.forks import NEEDED, Forks
 from tests.architecture.sources import ROOT
 
 RUN = {"kind": "event", "content": {"kind": "run", "progress": 0.5, "stage": "", "run": "b"}}
@@ -149,8 +149,8 @@ def test_what_the_next_study_needs_is_loaded_while_there_is_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("service.runner.READY_SECONDS", 0.1)
-    asked: list[tuple[str, ...]] = []
-    monkeypatch.setattr("service.processes.prepare_workers", asked.append)
+    asked: list[Sequence[str]] = []
+    monkeypatch.setattr(Forks, "prepare", lambda forks: asked.append(forks.modules))
     jobs = Jobs(tmp_path / "jobs.sqlite")
     settings = Settings(data=tmp_path, poll_seconds=0.02)
     starter = Starter(0)
@@ -162,40 +162,17 @@ def test_what_the_next_study_needs_is_loaded_while_there_is_none(
                 await asyncio.sleep(0.02)
 
     asyncio.run(work())
-    assert set(asked) == {LOADED}
+    assert set(asked) == {(*LOADED, *NEEDED)}
 
 
-def test_one_at_a_time_loads_what_processes_need(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Meanwhile this process has variables of the one that loads."""
-    now, most = 0, 0
-
-    def prepare(more: object) -> str:
-        nonlocal now, most
-        now += 1
-        most = max(most, now)
-        time.sleep(0.02)
-        now -= 1
-        return "forkserver"
-
-    async def work() -> None:
-        starter = Starter(0)
-        await asyncio.gather(*(starter.prepare() for _ in range(5)))
-
-    monkeypatch.setattr("service.processes.prepare_workers", prepare)
-    asyncio.run(work())
-    assert most == 1
-
-
-def test_a_process_that_cannot_be_forked_is_an_error_of_the_system(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    def start(process: object) -> None:
-        raise EOFError("unexpected EOF")
-
-    monkeypatch.setattr("service.processes.prepare_workers", lambda more: "forkserver")
-    monkeypatch.setattr("multiprocessing.context.ForkServerProcess.start", start)
-    with (tmp_path / "lock").open("w") as lock, pytest.raises(OSError, match="unavailable"):
-        asyncio.run(Starter(lock.fileno()).start("service.child", {}))
+def test_a_process_that_cannot_be_forked_is_an_error_of_the_system(tmp_path: Path) -> None:
+    """What cannot be loaded ends the process that is to be forked; the next call starts another."""
+    forks = Forks(("no_such_module",))
+    with (tmp_path / "lock").open("w") as lock:
+        for _ in range(2):
+            with pytest.raises(OSError, match="unavailable"):
+                asyncio.run(Starter(lock.fileno(), forks).start("service.child", {}))
+    forks.close()
 
 
 ECHO = """
@@ -213,43 +190,39 @@ def main():
 PROGRAM = """
 import asyncio, json, os
 from service import processes
+from studies.execution.forks import NEEDED, Forks
+from studies.execution.forks import Forks
 async def work():
-    starter = processes.Starter(os.open(os.devnull, os.O_RDONLY))
-    method = await starter.prepare()
+    starter = processes.Starter(os.open(os.devnull, os.O_RDONLY), Forks(()))
+    await starter.prepare()
     os.environ["FOR_IT"] = "told"
     process = await starter.start("echo_order", {"id": "a"})
     told = (await process.stdout.readline()).decode().split()
     order = json.loads(await process.stdout.readline())
     running = process.returncode
     await processes.end(process, 10.0)
-    pid, code = process.process.pid, process.returncode
+    pid, code = process.fork.pid, process.returncode
     other = await starter.start("echo_order", {"id": "b"})
     other.kill()
     await other.wait()
-    print(json.dumps([method, told, order, running, pid, code, other.returncode]))
+    print(json.dumps([told, order, running, pid, code, other.returncode]))
 if __name__ == "__main__":
     asyncio.run(work())
 """
 
 
-@pytest.mark.parametrize("folder", ["short", "long" * 30])
-def test_a_process_starts_the_same_by_either_method(folder: str, tmp_path: Path) -> None:
-    """The name of the folder for temporary files may be too long for a socket."""
+def test_a_process_starts_with_its_order_and_tells_its_end(tmp_path: Path) -> None:
     (tmp_path / "echo_order.py").write_text(ECHO)
     (tmp_path / "program.py").write_text(PROGRAM)
-    with tempfile.TemporaryDirectory(dir="/tmp") as short:  # `tmp_path` itself may be too long
-        temporary = Path(short, folder)
-        temporary.mkdir()
-        done = subprocess.run(
-            [sys.executable, str(tmp_path / "program.py")],
-            env=os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(temporary)},
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=120,
-        )
-    method, told, order, running, pid, code, killed = json.loads(done.stdout)
-    assert method == ("forkserver" if folder == "short" else "spawn")
+    done = subprocess.run(
+        [sys.executable, str(tmp_path / "program.py")],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    )
+    told, order, running, pid, code, killed = json.loads(done.stdout)
     assert told == [str(pid), "/", "told"], "a session of its own, and no folder of the service"
     assert order == {"id": "a"}
     assert (running, code, killed) == (None, 3, -signal.SIGKILL)

@@ -160,7 +160,7 @@ def test_files_are_as_large_as_those_that_keep_as_much(store: Store) -> None:
 MEASURED = """
 import importlib, re, sys
 from solver import SCENES
-from studies.execution.forking import NEEDED
+from studies.execution.forks import NEEDED
 for name in NEEDED:
     importlib.import_module(name)
 scene = SCENES[sys.argv[1]]

@@ -14,6 +14,7 @@ from residua.cli import main
 from residua.cost import ALONE
 from studies import Store, StudyEvent, open_study, run_study
 from studies.errors import StudyError
+from studies.execution.executor import Here
 from studies.execution.limits import Limits
 from studies.execution.run import _Work
 from tests.studies.conftest import fake_study
@@ -92,7 +93,7 @@ def test_workers_take_what_is_left_after_some_time(
     def compute(work: _Work, *_: object) -> None:
         before = set(work.computed)
         assert work.lacks and before
-        work.compute_here(lambda: False, math.inf)
+        work.compute_by(Here(math.inf), lambda: False)
         by_workers.extend(work.computed - before)
 
     monkeypatch.setattr(_Work, "compute", compute)

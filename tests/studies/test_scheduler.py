@@ -30,7 +30,7 @@ from studies import (
     StudyOutcome,
     run_study,
 )
-from studies.execution.cluster import connect, own_workers
+from studies.execution.workers import connect, own_workers
 from tests.studies.conftest import fake_study
 
 ANSWERS = "distributed.comm.timeouts.connect"
@@ -131,7 +131,7 @@ def test_a_goal_is_searched_by_workers_that_find_the_scheduler_by_a_file(tmp_pat
 def test_a_file_without_a_scheduler_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("studies.execution.cluster._APPEARS", 0.1)
+    monkeypatch.setattr("studies.execution.access._APPEARS", 0.1)
     with pytest.raises(GridLost, match="no scheduler has written the file"):
         Access.of_file(tmp_path / "none.json", None, None, None)
     (tmp_path / "begun.json").touch()
@@ -174,10 +174,8 @@ def test_no_scheduler_at_the_address_is_one_clear_error_and_leaves_nothing(
 def test_that_a_scheduler_is_waited_for_is_reported_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    for seconds in ("_LATE", "_APPEARS"):
-        monkeypatch.setattr(
-            f"studies.execution.cluster.{seconds}", 0.1 if seconds == "_LATE" else 0.6
-        )
+    for name, seconds in (("_LATE", 0.1), ("_APPEARS", 0.6)):
+        monkeypatch.setattr(f"studies.execution.access.{name}", seconds)
     address, file = "tcp://127.0.0.1:1", tmp_path / "none.json"
     with pytest.raises(GridLost), dask.config.set({ANSWERS: "2s"}):
         connect(Access(address))

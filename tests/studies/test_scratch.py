@@ -24,7 +24,7 @@ with scratch() as folder:
 
 STARTER = """
 import time
-from studies.execution.cluster import own_workers
+from studies.execution.workers import own_workers
 with own_workers(0):
     print("started", flush=True)
     time.sleep(60)

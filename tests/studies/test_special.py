@@ -21,7 +21,8 @@ from solver.model.tabulated import Tabulated
 from solver.results import saved
 from solver.rolling.rail.profiles.points import read_points
 from studies import CatalogueDamaged, Store, Study, StudyError, run_study
-from studies.execution.cluster import Access, connect
+from studies.execution.access import Access
+from studies.execution.workers import connect
 from studies.storage.claims import Claims
 from tests.studies.conftest import write_study
 

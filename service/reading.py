@@ -1,0 +1,117 @@
+"""What opens files of results; called in processes apart, see `service.sandbox`.
+
+The service itself reads them as bytes, or parts of data sets by h5py. The netCDF library ends a
+process in which two threads use it, and no answer waits for the file of another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from service.octets import octets
+from service.schemas import Prediction, PredictQuery
+from solver.results.export import vtu_of
+from studies import Store, Study, StudyError, open_netcdf, sensitivity
+from studies.kinds import found_of
+from studies.kinds.fit.shown import told as told_fit
+from studies.storage.combine import combine
+from studies.storage.runfile import verify
+from studies.storage.ugrid import read
+from studies.views.picking import sweep_axes
+from studies.views.predict import answer
+from studies.views.sensitivity import told as told_indices
+from studies.views.shown import outline, shown
+
+MOST_FITTED = 1000
+"""Largest number of runs to which a request may fit polynomials, which takes seconds."""
+
+
+def outlined(path: Path) -> dict[str, list[dict[str, Any]]]:
+    """Return the variables of a run's file that are drawn."""
+    with opened(path) as dataset:
+        return outline(dataset)
+
+
+def values(
+    files: list[Path], field: str, component: str | None, stage: str | None, table: bool
+) -> bytes:
+    """Return a map or lines of the first run, less the map of the second if there is one.
+
+    They are octets, or a ``table`` as CSV.
+
+    Raises
+    ------
+    StudyError
+        if the run has no such field, component or stage
+    """
+    with ExitStack() as stack:
+        runs = [stack.enter_context(opened(path)) for path in files]
+        found = shown(runs[0], field, component, stage, *runs[1:])
+        return b"".join(found.as_csv()) if table else octets(found.head, found.arrays, kind="<f4")
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """Give the data set of a run, without the dimensions of a sweep."""
+    verify(path)
+    with open_netcdf(path) as dataset:
+        yield dataset.isel(dict.fromkeys(sweep_axes(dataset), 0))
+
+
+def nodal_fields(path: Path, stage: str | None) -> bytes:
+    """Return the fields at the nodes of a run at a stage, as a VTU file."""
+    with open_netcdf(path) as dataset:
+        fields = read(dataset)
+    if stage is not None and stage not in fields.stages:
+        raise StudyError("stage", stage, f"must be one of {', '.join(fields.stages)}")
+    return vtu_of(fields, stage or list(fields.stages)[-1])
+
+
+def predicted(
+    path: Path, content: dict[str, Any], directory: Path, aside: Path | None, query: PredictQuery
+) -> Prediction:
+    """Return what `predict` tells; called in a process."""
+    asked, store = query.model_dump(), Store(directory, aside=aside)
+    at = {name: asked.pop(name) for name in query.model_extra or {}}
+    study = Study.known(content, store.scene)
+    with open_netcdf(path) as runs:
+        found = answer(runs, study, store, at=at, **asked)
+    add = None if found.enough else found.run.to_dict()
+    told = {name: getattr(found, name) for name in Prediction.model_fields.keys() - {"add"}}
+    return Prediction(**told, add=add)
+
+
+def indices(path: Path, of: str) -> dict[str, Any]:
+    """Return what `tell_sensitivity` tells; called in a process."""
+    with open_netcdf(path) as runs:
+        if (size := runs["status"].size) > MOST_FITTED:
+            allowed = f"at most {MOST_FITTED} are fitted here: fetch the data set, and fit it there"
+            raise StudyError("runs", size, allowed)
+        return told_indices(sensitivity(runs, of))
+
+
+def fitted(path: Path) -> dict[str, Any]:
+    """Return what a fit has found, of the data set in ``path``."""
+    with open_netcdf(path) as found:
+        return told_fit(found)
+
+
+def found(path: Path) -> dict[str, Any]:
+    """Return the entries of `Found` of a data set of a study that chooses its runs; {} if none."""
+    with open_netcdf(path) as dataset:
+        answers = found_of(dataset)
+        return asdict(answers) if answers else {}
+
+
+def combined(content: dict[str, Any], directory: Path, aside: Path | None, target: Path) -> None:
+    """Write the data set of the runs of a study that are there; called in another process.
+
+    Nothing is moved in a directory whose lists are ``aside``.
+    """
+    store = Store(directory, aside=aside)
+    study = Study.known(content, store.scene)
+    combine(study, store, study.cases(), target=target)
