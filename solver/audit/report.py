@@ -15,7 +15,7 @@ from solver.audit.large_strain import large_strain
 from solver.audit.links import least_energy, links_error, turned
 from solver.audit.pairs import AuditedPair
 from solver.audit.plain import LEAST, PlainBody
-from solver.audit.theory import accumulated_strain, plastic_strain
+from solver.audit.theory import accumulated_strain, elastic_strain, plastic_strain
 from solver.contact.pressure import contact_pressure
 from solver.contact.state import Converged
 from solver.contact.system import System
@@ -136,6 +136,7 @@ def audit(
         violations=_violations(system, figures, loaded, pairs) + _severed([*bodies, *released]),
         warnings=sum((pair.warnings for pair in pairs), warnings(figures)),
         outside=tuple(text + mend for each in neglected for text in each.outside)
+        + elastic_strain(system, every).outside
         + sum((pair.outside for pair in pairs), turned(system, loaded)),
     )
 

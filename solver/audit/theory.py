@@ -9,12 +9,17 @@ import numpy as np
 
 from solver.contact.state import Converged, State
 from solver.contact.system import System
+from solver.fem.large import LargeDiscretisation
 from solver.materials.state import PlasticState
 from solver.model.singular import SingularPoint
+from solver.tensors import principal
 from solver.typing import Array
 
 LARGE = 0.05
 """Largest share of stress or strain that small-strain theory may neglect."""
+
+_ELASTIC = 0.25
+"""Largest elastic strain of bodies of large strain."""
 
 
 class Neglected(NamedTuple):
@@ -89,6 +94,29 @@ def plastic_strain(system: System, states: Iterable[Converged]) -> Strained:
     small = {body.name for body in system.model.bodies if not body.large}
     bodies = ((name, X, equivalent(plastic)) for name, X, plastic in each if name in small)
     return largest_strain(bodies, system.model.singular)
+
+
+def elastic_strain(system: System, states: Iterable[Converged]) -> Neglected:
+    """Return what Hooke's law of logarithmic strain neglects in bodies of large strain.
+
+    It is good to elastic strains of about 0.25: L. Anand, J. Appl. Mech. 46 (1979) 78-82.
+    """
+    most = Strained()
+    for converged in states:
+        bodies = []
+        for number, part in enumerate(system.parts):
+            if isinstance(part, LargeDiscretisation):
+                stress = converged.responses[number].stress
+                law = part.law(converged.state.time)
+                own = np.abs(principal(law.elasticity.strain(stress) / law.stiff)[0]).max(axis=0)
+                bodies.append((part.body.name, part.positions, own))
+        most = max(most, largest_strain(bodies, system.model.singular))
+    return Neglected(
+        LARGE * most.value / _ELASTIC,
+        f"elastic strain reaches {most.value:.0%} in {most.body} at ({most.x:z.4g}, "
+        f"{most.y:z.4g}): the elastic law of large strain holds to about {_ELASTIC:.0%}, reduce "
+        "the load",
+    )
 
 
 def _yielding(system: System, state: State) -> list[tuple[str, Array, PlasticState]]:

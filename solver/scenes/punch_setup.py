@@ -51,6 +51,8 @@ def model(parameters: PunchParameters) -> Model:
         supports={"left": "x", "bottom": "y"},
     )
     contact = p.contact(slave=("punch", "bottom"), master=("half_plane", "top"))
+    if p.strain == "large":
+        contact = replace(contact, sliding="finite")
     return Model(bodies=(punch, half_plane), contacts=(contact,), singular=(p.corner,))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.audit.plain import GHOST, PlainBody
+from solver.audit.stretched import nominal
 from solver.mesh.rounding import ROUNDED
 from solver.tensors import SQRT2
 
@@ -174,12 +175,25 @@ def of_state(plain: PlainBody, u: Array, plastic: Any, time: float) -> Fields:
     stress = plain.shares(time)[0] * hooke(elasticity, elastic)
     if plane_stress:
         stress[2] = 0.0
+    if plain.body.large:
+        stress = _cauchy(plain, stress, u, np.exp((elastic + inelastic)[2] * plane_stress))
     gone = (plain.remaining(time) <= GHOST).reshape(plain.volume.shape)[:, 0]
     return Fields(
         plain, stress, nothing[0] if plastic is None else plastic.accumulated,
         strain=elastic + inelastic, plastic=flow,
         u=u.reshape(-1, 2).T, gone=gone,
     )  # fmt: skip
+
+
+def _cauchy(plain: PlainBody, stress: Array, u: Array, thickness: Array) -> Array:
+    """True stress (4, n): nominal stress times F', over the change of volume."""
+    H, hoop = plain.gradient(u)
+    P, around = nominal(plain.level(stress.reshape(4, *hoop.shape)), H, hoop)
+    F = H + np.eye(2)[:, :, None, None]
+    true = np.einsum("ik...,jk...->ij...", P, F)
+    found = np.array([true[0, 0], true[1, 1], around * (1 + hoop), true[0, 1]])
+    volume = np.linalg.det(np.moveaxis(F, (0, 1), (2, 3))) * (1 + hoop)
+    return (found / volume).reshape(4, -1) / thickness
 
 
 def layered(elasticity: Any, flow: Array) -> Array:

@@ -1,0 +1,183 @@
+"""Bodies of large strain: closed forms, published numbers, and an audit that sees faults."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from solver import (
+    Body,
+    Displacement,
+    Material,
+    Model,
+    PathControl,
+    Pressure,
+    Solution,
+    Temperature,
+    Traction,
+    solve,
+)
+from solver.fem.dofs import vectors
+from solver.fem.large import LargeDiscretisation
+from solver.fem.log_strain import _Stretch
+from solver.mesh import grid
+from solver.results.record import Status
+from studies.scenes.registry import scene_named
+
+pytestmark = pytest.mark.solves
+
+E = 2e5
+ELASTIC = Material(youngs_modulus=E, poisson_ratio=0.3)
+
+
+def block(x: Any, y: Any, cells: tuple[int, int], **fields: Any) -> Body:
+    mesh = grid(*(np.linspace(*at, n + 1) for at, n in zip((x, y), cells, strict=True)))
+    return Body(**{"name": "b", "mesh": mesh, "material": ELASTIC, "element": "quad4",
+                   "strain": "large", **fields})  # fmt: skip
+
+
+def solved(body: Body, step: float) -> Solution:
+    found = solve(Model(bodies=(body,)), load=1.0, control=PathControl(load_step=step))
+    audit = found.audit()
+    assert not audit.violations
+    assert not audit.outside
+    return found
+
+
+@pytest.mark.parametrize("strain", [0.5, -0.5])
+@pytest.mark.parametrize("hardening", ["none", "isotropic", "kinematic"])
+@pytest.mark.parametrize(("kinematics", "element"), [("axisymmetric", "quad4"),
+                                                     ("plane_stress", "quad8")])  # fmt: skip
+def test_a_bar_has_the_cauchy_stress_of_its_logarithmic_strain(
+    kinematics: Any, element: str, hardening: Any, strain: float
+) -> None:
+    """The stress T of the law is tensile; the Cauchy stress is T / J, with J elastic."""
+    ratio = 0.002 if hardening != "none" else 0.0
+    law = Material(youngs_modulus=E, poisson_ratio=0.3, yield_stress=300.0,
+                   hardening=hardening, hardening_ratio=ratio)  # fmt: skip
+    pulled = Displacement(boundary="top", y=2 * np.expm1(strain))
+    bar = block((0.0, 1.0), (0.0, 2.0), (2, 2), material=law, kinematics=kinematics,
+                element=element, supports={"bottom": "y", "left": "x"},
+                loads=(pulled,))  # fmt: skip
+    found = solved(bar, 0.2)
+    T = np.sign(strain) * (300.0 + ratio * E * (abs(strain) - 300.0 / E))
+    stress = T / np.exp(0.4 * T / E)
+    # within an increment the elastic strain changes path: the residual tolerance
+    assert found.stress("b", "loaded")[1] == pytest.approx(stress, rel=1e-8)
+    assert np.abs(found.stress("b", "loaded")[[0, 2, 3]]).max() < 1e-5
+
+
+@pytest.mark.parametrize("gamma", [0.5, 2.0, 4.0])
+def test_simple_shear_has_the_shear_and_normal_stress_of_hencky(gamma: float) -> None:
+    """Sigma = 2 G ln(V), and ln(V) has the components asinh(g / 2) / sqrt(g^2 + 4) (g, -g, 2)."""
+    part = LargeDiscretisation(block((0.0, 1.0), (0.0, 1.0), (2, 2)))
+    u = np.stack([gamma * part.X[1], 0 * part.X[1]]).T.ravel()
+    found = part.respond(u, part.virgin(), 0.0)
+    xx, yy, zz, xy = found.deformation.cauchy(found.law.stress, np.zeros(part.weights.size))
+    unit = E / 1.3 * np.arcsinh(gamma / 2) / np.sqrt(gamma**2 + 4)
+    expected = unit * np.array([[gamma], [-gamma], [0.0], [2.0]])
+    assert np.allclose([xx, yy, zz, xy / 2**0.5], expected, atol=1e-12 * E)
+
+
+def test_a_cylinder_whose_bore_is_doubled_has_the_pressure_of_the_rigid_plastic_one() -> None:
+    """p = 2 / sqrt(3) yield stress ln(b / a) with the present radii; E / yield stress = 1000."""
+    law = Material(youngs_modulus=E, poisson_ratio=0.4999, yield_stress=200.0)
+    widened = Displacement(boundary="left", x=1.0)
+    tube = block((1.0, 2.0), (0.0, 0.1), (16, 1), material=law, kinematics="axisymmetric",
+                 element="quad8", supports={"bottom": "y", "top": "y"},
+                 loads=(widened,))  # fmt: skip
+    found = solved(tube, 0.05)
+    loaded = found.loaded
+    part = found.system.full("b")
+    force = vectors(loaded.forces[0], 2)[0, part.boundary_nodes("left")].sum()
+    a, b = 2.0, np.sqrt(2.0**2 + 2.0**2 - 1.0)
+    pressure = 2 / np.sqrt(3) * 200.0 * np.log(b / a)
+    assert force / (2 * np.pi * a * 0.1) == pytest.approx(pressure, rel=2e-6)
+    outer = part.X[0].max() + found.displacement("b", "loaded")[0, part.X[0].argmax()]
+    assert outer == pytest.approx(b, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("load", "down", "back"), [(1.0, 0.30172, 0.05643), (5.0, 0.71379, 0.38763)]
+)
+def test_a_cantilever_bends_as_the_elastica(load: float, down: float, back: float) -> None:
+    """K. Mattiasson, Int. J. Numer. Meth. Engng 17 (1981) 145-153, for P L^2 / (E I)."""
+    L, h = 100.0, 1.0
+    law = Material(youngs_modulus=E, poisson_ratio=0.0)
+    shear = load * E * h**3 / 12 / L**2 / h
+    beam = block((0.0, L), (0.0, h), (40, 1), material=law, kinematics="plane_stress",
+                 element="quad8", supports={"left": "xy"},
+                 loads=(Traction(boundary="right", y=-shear),))  # fmt: skip
+    found = solved(beam, 0.1)
+    end = found.system.full("b").boundary_nodes("right")
+    x, y = found.displacement("b", "loaded")[:, end].mean(axis=1) / L
+    assert (-y, -x) == pytest.approx((down, back), rel=2e-3)
+
+
+def test_a_pressure_all_around_follows_the_block_that_it_compresses() -> None:
+    """-p J = T: with a dead pressure the strain would be that of -p."""
+    p = 0.1 * E
+    pushed = tuple(Pressure(boundary=b, value=p) for b in ("top", "right"))
+    body = block(
+        (0.0, 1.0), (0.0, 2.0), (2, 2), supports={"bottom": "y", "left": "x"}, loads=pushed
+    )
+    found = solved(body, 0.25)
+    plane = E / (1.3 * 0.4)  # T11 = T22 = E / ((1 + nu) (1 - 2 nu)) e
+    e = brentq(lambda e: plane * e + p * np.exp(2 * e), -0.5, 0.0, xtol=1e-15)
+    assert found.displacement("b", "loaded")[0].max() == pytest.approx(0.0, abs=1e-12)
+    assert found.displacement("b", "loaded")[0].min() == pytest.approx(np.expm1(e), rel=1e-7)
+    assert np.allclose(found.stress("b", "loaded")[:2], -p, rtol=1e-7)
+
+
+def test_free_expansion_by_heat_is_a_stretch_without_stress() -> None:
+    hot = Temperature(rise=1000.0, expansion=1e-4)
+    body = block((0.0, 1.0), (0.0, 1.0), (2, 2), kinematics="plane_stress",
+                 supports={"bottom": "y", "left": "x"}, loads=(hot,))  # fmt: skip
+    found = solve(Model(bodies=(body,)), load=1.0, control=PathControl(load_step=1.0))
+    assert found.displacement("b", "loaded").max() == pytest.approx(np.expm1(0.1), rel=1e-9)
+    assert np.abs(found.stress("b", "loaded")).max() < 1e-6 * E
+
+
+def test_the_audit_sees_forces_that_are_not_those_of_the_stress(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The operator B is wrong by 1 % of its shear: the solver finds its own equilibrium."""
+    right = _Stretch.by_functions
+
+    def wrong(self: _Stretch) -> np.ndarray:
+        P = right(self)
+        P[3] *= 1.01
+        return P
+
+    monkeypatch.setattr(_Stretch, "by_functions", wrong)
+    bent = block((0.0, 4.0), (0.0, 1.0), (8, 2), supports={"left": "xy"},
+                 loads=(Traction(boundary="right", y=-100.0),))  # fmt: skip
+    found = solve(Model(bodies=(bent,)), load=1.0, control=PathControl(load_step=0.5))
+    assert any("audit_residual" in each for each in found.audit().violations)
+
+
+def test_the_largest_elastic_strain_of_a_law_for_metals_is_reported() -> None:
+    pulled = Displacement(boundary="top", y=2.0)
+    body = block((0.0, 1.0), (0.0, 1.0), (1, 1), supports={"bottom": "xy"},
+                 loads=(pulled,))  # fmt: skip
+    found = solve(Model(bodies=(body,)), load=1.0, control=PathControl(load_step=0.25))
+    (text,) = found.audit().outside
+    assert "elastic strain" in text
+
+
+def test_small_strain_names_the_parameter_that_mends_it_and_large_strain_is_ok() -> None:
+    """A flat punch whose corner strains by more than 10 %: the same path in both."""
+    punch = scene_named("punch")
+    found = {}
+    for strain in ("small", "large"):
+        own: dict[str, Any] = {"accuracy": "draft", "element": "quad4", "friction": 0.4}
+        own |= {"load_ratio": 0.8571, "strain": strain}
+        (found[strain],) = punch.path(punch.parameters(**own), [0.8571], lambda fraction: None)
+    assert found["small"].status is Status.OUTSIDE_THEORY
+    assert 'strain = "large"' in found["small"].message
+    assert found["large"].status is Status.OK
+    small, large = (found[key].scalars["max_plastic_strain_half_plane"] for key in found)
+    assert large < 0.7 * small
