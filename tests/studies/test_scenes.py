@@ -58,6 +58,7 @@ def records() -> list[Record]:
         "elastic_punch": ({"smallest_element": 0.1, "growth": 2.5}, 50.0),
         "shaft_hub": ({"accuracy": "draft", "growth": 2.0}, 50.0),
         "ball": ({"accuracy": "draft", "load_ratio": 2.0, "load_step": 0.5}, 1),
+        "cone": ({"element_size": 0.2, "growth": 2.0, "load_step": 0.2, "unload_steps": 1}, 1),
         "rigid_punch": ({"smallest_element": 0.1, "largest_element": 0.1}, 50.0),
         "rolling": (
             {"element_size": 2.0, "advance_step": 2.0, "track": 4.0, "growth": 3.0}

@@ -181,3 +181,13 @@ def test_small_strain_names_the_parameter_that_mends_it_and_large_strain_is_ok()
     assert found["large"].status is Status.OK
     small, large = (found[key].scalars["max_plastic_strain_half_plane"] for key in found)
     assert large < 0.7 * small
+
+
+def test_a_cone_has_the_published_force_of_its_depth() -> None:
+    """C = P / h^2 by M. Dao et al., Acta Mater. 49 (2001) 3899-3918, to the error of the mesh."""
+    cone = scene_named("cone")
+    own = {"accuracy": "draft", "youngs_modulus": 1e4, "yield_stress": 30.0, "unload_steps": 1}
+    (record,) = cone.path(cone.parameters(**own), [1], lambda fraction: None)
+    assert record.status is Status.OK
+    force = np.abs(record.fields["reaction_y"][1]).max()
+    assert force / 0.1**2 == pytest.approx(2731.3, rel=0.02)
