@@ -10,6 +10,7 @@ from solver.errors import ModelError
 from studies.definition.rows import read_table
 from studies.errors import StudyError
 from studies.kinds import KINDS
+from studies.materials import read_material
 from studies.scenes.formats import FORMATS
 from studies.toml import CASE, read_given, read_toml
 
@@ -26,9 +27,9 @@ def read_study(
     ``[points] file = "tests.csv"`` names a table beside the study, and so does an axis of the sweep
     that has this entry: see `read_table`. A value of a parameter that ends in ``.csv`` or ``.txt``
     names the points of a curve, one with the ending of a mesh file (`FORMATS`) the mesh of a
-    section. Entries of kinds of study name files too, see `Kind.with_files`. The study that this
-    one ``extends`` may be a file. What is in the files takes their place, so that the content of a
-    study needs no other file.
+    section, and ``steels.toml#40Cr`` a material. Entries of kinds of study name files too, see
+    `Kind.with_files`. The study that this one ``extends`` may be a file. What is in the files takes
+    their place, so that the content of a study needs no other file.
 
     Parameters
     ----------
@@ -94,8 +95,10 @@ def _with_files(value: Any, field: str, folder: Path) -> Any:
         }
     if isinstance(value, list):
         return [_with_files(each, f"{field}[{k}]", folder) for k, each in enumerate(value)]
-    if not isinstance(value, str) or not value.endswith((*_OF_POINTS, *FORMATS)):
+    if not isinstance(value, str):
         return value
+    if not value.endswith((*_OF_POINTS, *FORMATS)):
+        return read_material(value, folder, field)
     try:
         if value.endswith(_OF_POINTS):
             from solver.rolling.rail.profiles.points import read_points  # loads numpy

@@ -21,7 +21,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from solver.parameters import is_number
 from solver.scenes import Scene
-from studies.errors import StudyError, one_of
+from studies.errors import Mistakes, StudyError, one_of
+from studies.materials import MATERIAL, parameters_in
 from studies.scenes.registry import scene_named
 from studies.units import UnitError, converted, is_quantity, number_in
 
@@ -191,10 +192,38 @@ def read_values(scene: Scene, texts: Mapping[str, str]) -> dict[str, Any]:
         if there is no such parameter, or it cannot have such a value
     """
     known = parameters_of(scene)
+    wrong = Mistakes()
+    found, texts = of_material(texts, known, wrong)
+    wrong.report()
     for name, text in texts.items():
         if name not in known:
             raise StudyError(name, text, one_of(name, known))
-    return {name: known[name].read(text, name) for name, text in texts.items()}
+    return found | {name: known[name].read(text, name) for name, text in texts.items()}
+
+
+def of_material(
+    content: Mapping[str, Any], known: Mapping[str, Parameter], wrong: Mistakes
+) -> tuple[dict[str, Any], Mapping[str, Any]]:
+    """Return the normalised parameters of the `MATERIAL` of settings, and the other settings.
+
+    A scene whose bodies do not yield takes the elastic constants alone. It is wrong if there is
+    none of this name, or the scene lacks one of its parameters.
+    """
+    if MATERIAL not in content or MATERIAL in known:
+        return {}, content
+    found, given = dict[str, Any](), content[MATERIAL]
+    with wrong.at(MATERIAL):
+        values = parameters_in(given)
+        if "yield_stress" not in known:
+            values = {name: value for name, value in values.items() if name in _ELASTIC}
+        for name, value in values.items():
+            if name not in known:
+                raise StudyError("", given, f"has {name}, and the scene has no such parameter")
+            found[name] = known[name].normalise(value, name)
+    return found, {name: value for name, value in content.items() if name != MATERIAL}
+
+
+_ELASTIC = ("youngs_modulus", "poisson_ratio")
 
 
 def completed(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from contextlib import suppress
 from typing import Any, TypeGuard
 
 from solver.parameters import is_number
-from studies.definition.parameters import Parameter
+from studies.definition.parameters import Parameter, of_material
 from studies.definition.sampling import METHOD, Sample
 from studies.definition.schema import Context, filled, is_finite, known_name, parsed
 from studies.errors import Mistakes, StudyError
@@ -105,6 +105,7 @@ def _point(
     if not isinstance(content, Mapping):
         raise StudyError("", content, "must be a table of parameters")
     point, wrong = dict[str, Any](), Mistakes()
+    material, content = of_material(content, known, wrong)
     for key, value in content.items():
         with wrong.at():
             if key not in headings:
@@ -117,7 +118,7 @@ def _point(
             else:
                 point[name] = _value(name, value, known[name], unit)
     wrong.report()
-    return point
+    return material | point
 
 
 def _value(field: str, value: Any, parameter: Parameter, unit: str) -> Any:

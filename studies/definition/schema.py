@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from inspect import getdoc
@@ -29,7 +29,7 @@ from pydantic import (
 from solver.parameters import is_number
 from solver.scenes import Scene
 from studies.definition.identity import canonical
-from studies.definition.parameters import Parameter, parameters_of
+from studies.definition.parameters import Parameter, of_material, parameters_of
 from studies.errors import Mistakes, StudyError, Unchecked, encodable, nearest
 from studies.scenes.refusals import dotted, mistakes_of
 
@@ -109,10 +109,12 @@ class Context:
     ----------
     found : the scene; None if the study names none that is known
     swept : the axes; None if they have mistakes
+    varied : words of the sweep, its points and the kind of study: all parameters that vary
     """
 
     found: Scene | None
     swept: dict[str, Any] | None = None
+    varied: frozenset[str] = frozenset()
 
     @staticmethod
     def of(info: ValidationInfo) -> Context:
@@ -172,12 +174,19 @@ def known_name(name: Any, known: Mapping[str, Any], value: Any) -> None:
         raise StudyError("", value, allowed + nearest(name, known))
 
 
-def checked_settings(content: Any, known: Mapping[str, Parameter]) -> dict[str, Any]:
-    """Return a table of parameters of the scene, normalised."""
+def checked_settings(
+    content: Any, known: Mapping[str, Parameter], varied: Collection[str] = ()
+) -> dict[str, Any]:
+    """Return a table of parameters of the scene, normalised.
+
+    Those of its material are in it, except those that it has itself or that are ``varied``.
+    """
     if not isinstance(content, Mapping):
         raise StudyError("", content, "must be a table of parameters")
-    found, wrong = {}, Mistakes()
-    for name, value in content.items():
+    wrong = Mistakes()
+    material, rest = of_material(content, known, wrong)
+    found = {name: value for name, value in material.items() if name not in varied}
+    for name, value in rest.items():
         with wrong.at(str(name)):
             known_name(name, known, value)
             found[name] = known[name].normalise(value, "")
@@ -201,7 +210,9 @@ def filled(given: Mapping[Any, Any], known: Mapping[str, Parameter]) -> dict[Any
 
 Settings = Annotated[
     dict[str, Any],
-    PlainValidator(lambda given, info: checked_settings(given, Context.of(info).known)),
+    PlainValidator(
+        lambda given, info: checked_settings(given, Context.of(info).known, Context.of(info).varied)
+    ),
     WithJsonSchema({"type": "object"}),
 ]
 """Values of parameters of the scene."""

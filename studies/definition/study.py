@@ -203,6 +203,7 @@ class Study(StudyTable):
             count(runs, context.found, given.get("keep", ""))
         entries = {name: given.pop(name) for name in KINDS if name in given}
         of_points = {entry: given.pop(entry) for entry in ENTRIES if entry in given}
+        context.varied = frozenset(_words([given.get("sweep"), of_points, entries]))
         with wrong.at():
             given["sweep"] = _with_points(given.get("sweep", {}), of_points, context)
         lacks, study = wrong.failed, None
@@ -423,6 +424,19 @@ class Study(StudyTable):
         """Return what `from_dict` reads."""
         whole = self.model_dump(include={"parameters", "sweep"})
         return self.model_dump(exclude_defaults=True) | whole | self.choice
+
+
+def _words(tree: Any) -> Iterator[str]:
+    """Yield the names and words of a part of a study; a name has no unit."""
+    if isinstance(tree, str):
+        yield tree.partition("[")[0].strip()
+    elif isinstance(tree, Mapping):
+        for key, each in tree.items():
+            yield from _words(key)
+            yield from _words(each)
+    elif isinstance(tree, list | tuple):
+        for each in tree:
+            yield from _words(each)
 
 
 _POINT = re.compile(rf"^sweep\.{POINT}(?=$|[.[])")

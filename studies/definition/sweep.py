@@ -36,9 +36,11 @@ from studies.definition.schema import (
     checked_text,
     filled,
     known_name,
+    listed,
     parsed,
 )
 from studies.errors import Mistakes, StudyError
+from studies.materials import MATERIAL, name_in
 from studies.scenes.names import in_use
 from studies.toml import CASE
 
@@ -238,6 +240,8 @@ def _axis(name: Any, content: Any, context: Context) -> list[Any] | LinkedAxis:
             )
             raise StudyError("", dict(content), allowed)
         content = parsed(Steps, content, known[name]).values
+    if name == MATERIAL and name not in known and not isinstance(content, Mapping):
+        content = _materials(listed(content))
     points = name not in known and describes_points(name, content)
     if name not in known:
         if not points and not isinstance(content, Mapping):
@@ -279,6 +283,19 @@ def _labels(content: Mapping[str, Any], known: Mapping[str, Parameter]) -> Linke
             given[label] = checked_settings(settings, known)
     wrong.report()
     return filled(given, known)
+
+
+def _materials(given: Sequence[Any]) -> dict[Any, Any]:
+    """Return the table of labels that a list of materials stands for."""
+    found, wrong = dict[Any, Any](), Mistakes()
+    for position, material in enumerate(given):
+        with wrong.at(f"[{position}]"):
+            label = checked_text(name_in(material))
+            if label in found:
+                raise StudyError("", label, "occurs already: keep one")
+            found[label] = {MATERIAL: material}
+    wrong.report()
+    return found
 
 
 def _check_name(name: Any, content: Any, known: Mapping[str, Parameter]) -> None:

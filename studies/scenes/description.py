@@ -14,13 +14,14 @@ from pydantic import ValidationError
 
 from solver.parts import Declared
 from studies.errors import SceneError, StudyError
+from studies.materials import parameters_in, read_material
 from studies.scenes.arithmetic import ExpressionError, evaluated, is_expression, names
 from studies.scenes.mending import Where, mended
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.quantities import in_own_units, wrong_units
 from studies.scenes.refusals import dotted, mistakes_of
 from studies.scenes.table import FILE_NAME
-from studies.scenes.tables import ACCURACY, OPEN, ParameterTable, SceneFile
+from studies.scenes.tables import ACCURACY, NAMED, OPEN, ParameterTable, SceneFile
 from studies.toml import read_given, toml_of
 
 PLAIN = ("name", "summary", "parameters", "derived", "accuracy", "advice")
@@ -35,7 +36,7 @@ WHEN = "when"
 DESCRIBED = ("parameters", "outputs")
 """Entries of a scene file whose tables have a description."""
 
-_LEAST = {
+_LEAST: Mapping[str, Any] = {
     "name": "scene",
     "materials": {"m": {"youngs_modulus": 1.0, "poisson_ratio": 0.3}},
     "bodies": {"b": {"material": "m"}},
@@ -88,7 +89,7 @@ class Description:
     shipped: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "content", in_own_units(self.content))
+        object.__setattr__(self, "content", in_own_units(_with_materials(self.content)))
 
     @classmethod
     def read(cls, path: Path | str, *, shipped: bool = False) -> Self:
@@ -104,6 +105,9 @@ class Description:
         if "scene" in content and "bodies" not in content:
             allowed = f"is a study file, not a scene: its scene is {content['scene']}"
             raise StudyError("scene", path.name, allowed)
+        for where, table in _named(content):
+            if isinstance(table[NAMED], str):
+                table[NAMED] = read_material(table[NAMED], path.parent, f"{where}.{NAMED}")
         meshes = {}
         for name in file_names(content):
             if (path.parent / name).is_file():  # a missing one is a mistake of the scene file
@@ -274,6 +278,27 @@ class Description:
         if ACCURACY in tree:
             tree[ACCURACY] = self._levels(mistakes)
         return tree, mistakes
+
+
+def _named(content: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the tables of materials that name another one, each with its place."""
+    tables = content.get("materials")
+    for name, table in tables.items() if isinstance(tables, Mapping) else ():
+        if isinstance(table, Mapping) and NAMED in table:
+            yield f"materials.{name}", table
+
+
+def _with_materials(content: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a scene file with the parameters of materials instead of names that are known."""
+    found = dict[str, Any]()
+    for where, table in _named(content):
+        rest = {key: each for key, each in table.items() if key != NAMED}
+        try:
+            rest = parameters_in(table[NAMED]) | rest
+        except StudyError:  # the check of the tables reports it
+            rest = {**_LEAST["materials"]["m"], **table}
+        found[where.partition(".")[2]] = rest
+    return {**content, "materials": {**content["materials"], **found}} if found else content
 
 
 def file_names(content: Mapping[str, Any]) -> list[str]:

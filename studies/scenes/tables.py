@@ -22,7 +22,7 @@ from typing import (
 import numpy as np
 from annotated_types import Interval, Unit
 from numpy.typing import NDArray
-from pydantic import Field, StringConstraints, create_model
+from pydantic import AfterValidator, Field, StringConstraints, create_model
 
 from solver.errors import ModelError
 from solver.loading.control import INCREMENT_ERROR
@@ -40,6 +40,8 @@ from solver.results.requested import (
     of_body,
 )
 from solver.scenes.material_parameters import ContactParameters, MaterialParameters
+from studies.errors import StudyError
+from studies.materials import parameters_in
 from studies.scenes.shape_tables import ArcTable, GradedTable, LineTable, Shape
 from studies.scenes.table import (
     Angle,
@@ -119,11 +121,24 @@ class OpenTable(SceneTable):
         return self.model_dump(exclude={"open"}, exclude_unset=True, exclude_none=True)
 
 
+NAMED = "named"
+"""Entry of a material: the name of another one, for whose parameters it stands."""
+
+
+def _unknown(material: Any) -> Any:
+    """Refuse what names no material: of others the parameters stand in the table."""
+    try:
+        return parameters_in(material)
+    except StudyError as error:
+        raise ValueError(error.allowed) from None
+
+
 def _material() -> type[OpenTable]:
     """Return the table of a material: the parameters of the scenes' materials."""
     known = {name: (hint, field.default) for name, (hint, field) in OPEN["materials"].items()}
     known |= {name: (known[name][0], ...) for name in ("youngs_modulus", "poisson_ratio")}
     known["yield_stress"] = (Stress | None, None)
+    known[NAMED] = (Annotated[Any, AfterValidator(_unknown)], None)
     made: type[OpenTable] = create_model("Material", __base__=OpenTable, **known)  # type: ignore[call-overload]
     made.__doc__ = "A material; one without a yield stress is elastic."
     return made
