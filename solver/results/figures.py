@@ -13,7 +13,7 @@ MAX_PLASTIC_STRAIN = declare(
 )
 DEPTH_OF_MAX_PLASTIC_STRAIN = declare(
     "depth_of_max_plastic_strain",
-    "depth of the largest plastic strain; negative in the upper body", "mm",
+    "depth of the largest plastic strain below the surface; negative in the upper body", "mm",
 )  # fmt: skip
 PEAK_RESIDUAL_TENSION = declare(
     "peak_residual_tension", "largest normal component of the residual stress", "MPa"
@@ -43,11 +43,11 @@ def extremes(run: FinishedRun) -> Values:
     strains = {n: system.state(n, run.unloaded).plastic.accumulated for n in names}
     largest = {name: float(np.nanmax(each)) for name, each in strains.items()}
     most = max(names, key=lambda name: largest[name])
-    where = system.positions(most)[1, np.nanargmax(strains[most])]
+    where = run.view.below(system.positions(most)[:, [np.nanargmax(strains[most])]])[0]
     residual = [run.samples.fields.at_nodes(run.unloaded, name).stress[:3] for name in names]
     return {
         MAX_PLASTIC_STRAIN: largest[most],
-        DEPTH_OF_MAX_PLASTIC_STRAIN: float(-where) if largest[most] > 0 else np.nan,
+        DEPTH_OF_MAX_PLASTIC_STRAIN: float(where) if largest[most] > 0 else np.nan,
         PEAK_RESIDUAL_TENSION: float(max(np.nanmax(r) for r in residual)),
         PEAK_RESIDUAL_COMPRESSION: float(min(np.nanmin(r) for r in residual)),
         PLASTIC_WORK: run.outcome.tally.plastic_work,

@@ -24,8 +24,7 @@ class Samples:
         self.system, self.view = system, view
         self.fields = SystemFields(system)
         X, Y = np.meshgrid(*view.map_grid)
-        S, D = np.meshgrid(view.station, view.depth, indexing="ij")
-        grid, lines = view.axis.place(X.ravel(), -Y.ravel()), view.axis.place(S.ravel(), D.ravel())
+        grid = view.axis.place(X.ravel(), -Y.ravel())
         surface = view.axis.place(view.s, np.zeros_like(view.s))
         self._map = {name: system.sampler(name, grid) for name in view.surfaces}
         if X.size and not any(sampler.inside.any() for sampler in self._map.values()):
@@ -34,7 +33,7 @@ class Samples:
                 "map", _extent(view),
                 f"must meet a body, from {across} to {across} and from {up} to {up} [mm]",
             )  # fmt: skip
-        self._lines = system.sampler(view.profile_body, lines)
+        self._lines = system.sampler(view.profile_body, view.profiles)
         self._surface = {name: system.sampler(name, surface) for name in view.surfaces}
 
     def on_map(self, name: str, at: Solved) -> Array:

@@ -72,6 +72,8 @@ ALONG_X = Axis()
 """The axis of a horizontal surface at y = 0, with the lower body below it."""
 ACROSS_TRACK = Axis((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 """The axis along z of a section at x = 0 across a track along x."""
+_INSIDE = 1e-4
+"""Least depth of profiles below a curved surface, over the largest."""
 NOWHERE = np.zeros(0)
 """Empty positions, of a grid that a view does not have."""
 
@@ -94,6 +96,8 @@ class View:
         the bodies are not released
     following : stages in which ``s`` is zero at the load instead of x = 0
     symmetric : whether the bodies are one half of a model symmetric about s = 0
+    top : (2, n) the surface of a ``profile_body`` that is curved before loading: rising s, and
+        height over the line of ``axis`` [mm]; without points, this line is the surface
     """
 
     x: Array
@@ -110,6 +114,24 @@ class View:
     symmetric: bool = False
     axis: Axis = ALONG_X
     z: Array = field(default_factory=lambda: NOWHERE)
+    top: Array = field(default_factory=lambda: np.zeros((2, 0)))
+
+    def below(self, X: Array) -> Array:
+        """Return the depth (n,) of positions (n_axes, n) below the surface above them [mm]."""
+        depth = np.array(self.axis.down) @ (X - np.array(self.axis.origin)[:, None])
+        return np.asarray(depth + self._height(self.axis.reached(X)))
+
+    @property
+    def profiles(self) -> Array:
+        """Positions (n_axes, n) of the profiles, those of one station after the other [mm]."""
+        S, D = np.meshgrid(self.station, self.depth, indexing="ij")
+        if self.top.size:  # sides of elements follow a curved surface to less than this
+            D = np.maximum(D, _INSIDE * self.depth.max(initial=0.0))
+        return self.axis.place(S.ravel(), (D - self._height(S)).ravel())
+
+    def _height(self, s: Array) -> Array:
+        """Return the height of the surface over the line of the axis [mm]."""
+        return np.interp(s, *self.top) if self.top.size else np.zeros_like(s)
 
     @property
     def map_axes(self) -> tuple[str, str]:

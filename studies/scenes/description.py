@@ -296,7 +296,7 @@ def _with_materials(content: Mapping[str, Any]) -> Mapping[str, Any]:
         try:
             rest = parameters_in(table[NAMED]) | rest
         except StudyError:  # the check of the tables reports it
-            rest = _LEAST["materials"]["m"] | dict(table)
+            rest = {**_LEAST["materials"]["m"], **table}
         found[where.partition(".")[2]] = rest
     return {**content, "materials": {**content["materials"], **found}} if found else content
 

@@ -31,6 +31,7 @@ FIGURES: Mapping[str, str] = {
     "apparent_power": "apparent power",
     "peak_contact_pressure": "peak contact pressure",
     "max_plastic_strain": "largest plastic strain",
+    "most_yielded_depth": "yielded to depth",
     "audit_plastic_strain": "away from singular points",
     "shakedown_state": "shakedown state",
     "increments": "increments",

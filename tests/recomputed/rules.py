@@ -183,6 +183,10 @@ class Rules:
         each = zip(X, *self.view.axis, strict=True)
         return np.asarray(sum((x - x0) * way for x, x0, way in each))
 
+    def _height(self, s: Array) -> Array:
+        """Height (n,) of the surface over the axis of the view [mm]."""
+        return np.interp(s, *self.view.top) if self.view.top.size else np.zeros(len(s))
+
     def sampled(self, bodies: Sequence[str], X: Array, field: str, stage: str) -> Array:
         """A field at places (..., n), of the first body that contains each."""
         found = [(self.located(name, X.tobytes()), self.fields(name, stage)) for name in bodies]
@@ -244,7 +248,9 @@ class Rules:
         ]
         count = len(station) * len(depth)
         at = some(count, *(values.reshape(-1, count) for values in flat))
-        X = self._place(station[at // len(depth)], depth[at % len(depth)])
+        top = self._height(station)[at // len(depth)]
+        inside = np.maximum(depth, 1e-4 * depth.max() if self.view.top.size else 0.0)
+        X = self._place(station[at // len(depth)], inside[at % len(depth)] - top)
         # the state behind a steady pass is interpolated from recovered values
         steady = isinstance(self.system, TrackBody) and field == "plastic_strain"
         own = self.sampled((view.profile_body,), X, "flow" if steady else field, view.unloaded)
@@ -357,10 +363,12 @@ class Rules:
         return Own(np.nanmax(flow), LIMIT * self.scale("flow", flow))
 
     def depth_of_most(self) -> Own:
-        (_, y, *_), flow = self._strained()
+        X, flow = self._strained()
+        each = zip(X, self.view.axis.origin, self.view.axis.down, strict=True)
+        depth = sum((x - x0) * down for x, x0, down in each) + self._height(self._along(X))
         there = flow >= np.nanmax(flow) - LIMIT * self.scale("flow", flow)
         stored = np.array([self.record.scalars["depth_of_max_plastic_strain"]])
-        return Own(closest(-y[None, there], stored)[0], LIMIT * self.size)
+        return Own(closest(depth[None, there], stored)[0], LIMIT * self.size)
 
     def peak_residual(self, of: Callable[[Any], Any]) -> Own:
         each = [self.fields(n, self.view.unloaded).at("stress")[:3].ravel() for n in self.names]

@@ -355,3 +355,23 @@ def test_a_ball_in_a_ring_has_the_relative_radius(ring: float) -> None:
     exact = HertzEllipse.of(relative, p.contact_modulus, peak_pressure=0.5 * p.yield_stress)
     assert (p.ellipse.a, p.ellipse.b) == pytest.approx((exact.a, exact.b), rel=1e-12)
     assert p.groove == pytest.approx(6.188, rel=1e-12)
+
+
+# -- the surface of a groove ---------------------------------------------------------------------
+
+
+def test_depth_counts_from_the_surface_of_a_groove_and_the_map_has_its_flanks() -> None:
+    record = rolled(**BEARING, conformity=0.515, load_by="force", force=6000.0)
+    numbers, at = record.scalars, record.coordinates
+    assert 0.0 < numbers["least_yielded_depth"] < numbers["most_yielded_depth"]
+    assert numbers["least_yielded_depth"] < numbers["depth_of_max_plastic_strain"]
+    # the highest point that has yielded is on a flank, above the lowest line of the groove
+    strain, y = record.fields["plastic_strain"][1], at["y"]
+    assert y[np.nonzero(strain > 1e-5)[0]].max() > 0.0
+    assert np.nanmax(strain[-1]) < 1e-5  # none is above the map
+    # a profile begins at the surface, where the stress is known from its nodes
+    profile = record.fields["residual_profile"][1]
+    surface = record.fields["running_surface_residual"][1]
+    for k, station in enumerate(at["station"]):
+        there = [np.interp(station, at["z"], each) for each in surface]
+        np.testing.assert_allclose(profile[k, :, 0], there, atol=0.02 * np.abs(profile).max())

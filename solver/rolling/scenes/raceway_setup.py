@@ -184,10 +184,16 @@ def view(parameters: RacewayParameters) -> View:
     a, b = parameters.size
     below, wide = parameters.below, _ACROSS * b
     along, across = round(_ALONG * _PIXELS), round(_ACROSS * _PIXELS)
-    down = round(_DOWN * _PIXELS)
+    down, step = round(_DOWN * _PIXELS), below / _PIXELS
+    own, top, rise = geometry(parameters), np.zeros((2, 0)), 0
+    if own.groove:
+        radius, edge = own.groove
+        s = np.linspace(-edge, edge, 2001)
+        top = np.stack([s, s**2 / (radius + np.sqrt(radius**2 - s**2))])
+        rise = math.ceil(radius * (1 - math.cos(own.half_width / radius)) / step)  # of the zone
     return View(
         x=np.linspace(-_ALONG * a, _ALONG * a, 2 * along + 1),
-        y=np.linspace(-_DOWN * below, 0.0, down + 1),
+        y=np.linspace(-down * step, rise * step, down + rise + 1),
         z=np.linspace(-wide, wide, 2 * across + 1),
         depth=np.linspace(0.0, _DOWN * below, down + 1),
         station=b / 2 * np.array([-1.0, 0.0, 1.0]),
@@ -195,6 +201,7 @@ def view(parameters: RacewayParameters) -> View:
         profile_body="raceway",
         surfaces={"raceway": "running"},
         axis=ACROSS_TRACK,
+        top=top,
     )
 
 

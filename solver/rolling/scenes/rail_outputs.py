@@ -65,14 +65,14 @@ LOWEST_LOADED = declare(
 )  # fmt: skip
 HIGHEST_MISES = declare("highest_mises", "largest von Mises stress at x = 0 under the load", "MPa")
 HIGHEST_MISES_DEPTH = declare(
-    "highest_mises_depth", "depth below the top of the largest von Mises stress", "mm"
+    "highest_mises_depth", "depth below the surface of the largest von Mises stress", "mm"
 )
 MOST_STRAINED_Z = declare("most_strained_z", "position z of the largest plastic strain", "mm")
 LEAST_YIELDED_DEPTH = declare(
-    "least_yielded_depth", "depth below the top of the highest point that has yielded", "mm"
+    "least_yielded_depth", "least depth below the surface of a point that has yielded", "mm"
 )
 MOST_YIELDED_DEPTH = declare(
-    "most_yielded_depth", "depth below the top of the deepest point that has yielded", "mm"
+    "most_yielded_depth", "largest depth below the surface of a point that has yielded", "mm"
 )
 PASS_RESIDUAL_MIN = declare(
     "pass_residual_min", "smallest residual stress after a pass, at points of the zone", "MPa",
@@ -155,13 +155,14 @@ def section(run: FinishedRun) -> Values:
     X, mises, _ = run.samples.fields.at_points(run.loaded, name)
     accumulated = run.samples.fields.at_points(run.unloaded, name)[2]
     loaded: Any = run.loaded
-    yielded = -X[1, accumulated > _YIELDED]
+    depth = run.view.below(X)
+    yielded = depth[accumulated > _YIELDED]
     most = int(np.nanargmax(mises))
     return {
         RUNNING_SURFACE_RESIDUAL: np.stack(at_surface),
         LOWEST_LOADED: loaded.lowest,
         HIGHEST_MISES: float(mises[most]),
-        HIGHEST_MISES_DEPTH: float(-X[1, most]),
+        HIGHEST_MISES_DEPTH: float(depth[most]),
         MOST_STRAINED_Z: float(X[2, accumulated.argmax()]) if len(yielded) else np.nan,
         LEAST_YIELDED_DEPTH: float(yielded.min()) if len(yielded) else np.nan,
         MOST_YIELDED_DEPTH: float(yielded.max()) if len(yielded) else np.nan,

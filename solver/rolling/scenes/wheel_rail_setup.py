@@ -19,7 +19,7 @@ from solver.rolling.scenes.rail_outputs import cycles, sketched
 from solver.rolling.scenes.rail_passes import REACHES, RailPasses, RolledPrism
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
 from solver.rolling.scenes.wheel_rail import WheelRailParameters
-from solver.rolling.scenes.wheel_rail_contact import expected_contact, wheel_of
+from solver.rolling.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
 from solver.rolling.scenes.wheel_rail_track import geometry, meshed, stressed_track
 from solver.scenes.scene import Effort, Method
 from solver.scenes.sketch import Sketch
@@ -77,7 +77,8 @@ def view(parameters: WheelRailParameters) -> View:
     contact = expected_contact(parameters)
     beside = round(contact.across) / 2
     across, along = round(2 * _HALF_HEAD / _PIXEL), round(2 * _ALONG / _PIXEL)
-    down = round(2 * _MAPPED / _PIXEL)
+    down, section = round(2 * _MAPPED / _PIXEL), rail_of(parameters)
+    z, y = section.outline.at(np.linspace(*upper(section), 2001))
     return View(
         x=np.linspace(-_ALONG, _ALONG, along + 1),
         y=np.linspace(-_MAPPED, 0.0, down + 1),
@@ -88,6 +89,7 @@ def view(parameters: WheelRailParameters) -> View:
         profile_body="rail",
         surfaces={"rail": "running"},
         axis=ACROSS_TRACK,
+        top=np.stack([z, y])[:, np.argsort(z)],
     )
 
 

@@ -475,8 +475,7 @@ def _draw_results(axes: Axes, view: View, places: NamedPlaces | None) -> dict[st
         handles[f"map: {size}"] = Line2D([], [], color=_RESULTS, linewidth=1.0, linestyle="--")
     if view.station.size and view.depth.size:
         rows = [AXES.index(name) for name in view.map_axes]
-        for at in view.station:
-            profile = view.axis.place(np.full(view.depth.size, at), view.depth)[rows]
+        for profile in np.split(view.profiles[rows], view.station.size, axis=1):
             axes.plot(*profile, color=_RESULTS, linewidth=1.0, linestyle=":")
         text = f"profiles, {short_number(view.depth.max())} mm deep"
         handles[text] = Line2D([], [], color=_RESULTS, linewidth=1.0, linestyle=":")
