@@ -11,7 +11,7 @@ from solver.late import front
 
 _HOMES = {
     "Assessment": "criterion", "Criterion": "criterion", "PlaneCriterion": "criterion",
-    "TwoLimits": "criterion", "CRITERIA": "criterion", "Paths": "paths", "OnPlanes": "planes",
+    "TwoLimits": "criterion", "CRITERIA": "criteria", "Paths": "paths", "OnPlanes": "planes",
     "critical_planes": "planes",
     "Crossland": "crossland", "DangVan": "dang_van", "Findley": "findley", "Matake": "matake",
     "FatemiSocie": "fatemi_socie", "SmithWatsonTopper": "smith_watson_topper",

