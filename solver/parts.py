@@ -127,6 +127,10 @@ class Parts(Generic[T]):
         """Return the names of the parameters of a part."""
         return frozenset(declared(self[word]))
 
+    def declared_by(self, word: str) -> dict[str, bool]:
+        """Return the parameters of a part: name -> whether it must be given."""
+        return {n: f.default is dataclasses.MISSING for n, (_, f) in declared(self[word]).items()}
+
     def needs(self) -> dict[str, dict[str, tuple[str, ...]]]:
         """Return for each parameter what it needs to have an effect: ``kind`` -> words."""
         return {

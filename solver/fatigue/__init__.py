@@ -11,11 +11,15 @@ from solver.late import front
 
 _HOMES = {
     "Assessment": "criterion", "Criterion": "criterion", "PlaneCriterion": "criterion",
-    "TwoLimits": "criterion", "CRITERIA": "criterion", "Paths": "paths", "OnPlanes": "planes",
+    "TwoLimits": "criterion", "CRITERIA": "criteria", "Paths": "paths", "OnPlanes": "planes",
     "critical_planes": "planes",
     "Crossland": "crossland", "DangVan": "dang_van", "Findley": "findley", "Matake": "matake",
     "FatemiSocie": "fatemi_socie", "SmithWatsonTopper": "smith_watson_topper",
     "BrownMiller": "brown_miller",
+    "stress_intensity": "cracks", "opened_range": "cracks", "held_length": "cracks",
+    "archard_depth": "wear", "slip_work": "wear", "ruiz": "wear",
+    "surface_index": "rolling", "subsurface_index": "rolling", "t_gamma": "rolling",
+    "crack_damage": "rolling",
 }  # fmt: skip
 __all__ = sorted(_HOMES)  # noqa: PLE0605
 __getattr__ = front(__name__, _HOMES)

@@ -39,7 +39,8 @@ _OUTPUTS: dict[str, NamedOutput] = {}
 MODULES = tuple(
     f"solver.results.{module}"
     for module in (
-        "contact", "corner", "extremes", "figures", "increments", "indentation", "maps", "places",
+        "contact", "corner", "extremes", "fatigue", "figures", "increments", "indentation", "maps",
+        "places",
     )
 )  # fmt: skip
 """Modules that define outputs of scene files, or quantities of these."""

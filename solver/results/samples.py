@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from solver.errors import ModelError
@@ -38,9 +40,21 @@ class Samples:
 
     def on_map(self, name: str, at: Solved) -> Array:
         """Return a field of `BodyValues` on the map (..., vertical, horizontal)."""
+        return self._mapped({
+            body: interpolated(sampler, self.fields.at_nodes(at, body), name)
+            for body, sampler in self._map.items()
+        })  # fmt: skip
+
+    def nodal_on_map(self, nodal: Mapping[str, Array]) -> Array:
+        """Return nodal values of bodies (n_nodes,) on the map; NaN in other bodies."""
+        return self._mapped({
+            body: sampler(nodal[body]) if body in nodal else np.full(sampler.inside.shape, np.nan)
+            for body, sampler in self._map.items()
+        })  # fmt: skip
+
+    def _mapped(self, of_body: Mapping[str, Array]) -> Array:
         out: Array | None = None
-        for body, sampler in self._map.items():
-            here = interpolated(sampler, self.fields.at_nodes(at, body), name)
+        for here in of_body.values():
             out = here if out is None else np.where(np.isnan(out), here, out)
         assert out is not None
         across, up = self.view.map_grid

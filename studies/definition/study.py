@@ -17,6 +17,7 @@ from pydantic import (
     StringConstraints,
 )
 
+from solver.late import Late
 from solver.scenes import Scene
 from studies.definition.cases import Case, LoadingPath
 from studies.definition.expansion import Expansion
@@ -37,6 +38,8 @@ from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
 
 Kept = Callable[[str], Mapping[str, Any] | None]
 """Returns the content of a study that is known by its name or its id; None if there is none."""
+
+_assessed: Callable[[Scene, Any], Scene] = Late("studies.scenes.fatigue:assessed")
 
 Count = Callable[[int, Scene, Any], None]
 """Accepts a number of runs of a scene, which keep what the entry ``keep`` says, or raises."""
@@ -96,6 +99,7 @@ class Study(StudyTable):
     keep : ``fields`` keeps the fields at all nodes in the file of each run
     allow : ``large_strain`` makes runs outside small-strain theory count as ok (see `taken`); it
         includes what the scene allows
+    fatigue : criterion, limits and cycle, by which every run is assessed (see `assessed`)
     """
 
     name: Text
@@ -110,6 +114,7 @@ class Study(StudyTable):
     allow: Annotated[list[Literal["large_strain"]], Field(max_length=1)] = Field(
         default_factory=list
     )
+    fatigue: dict[str, Any] | None = None
     _problem: Scene = PrivateAttr()
     _kind: Kind = PrivateAttr()
 
@@ -193,6 +198,8 @@ class Study(StudyTable):
         given, wrong, context = {**content}, Mistakes(), Context(None)
         try:
             context.found = scene_named(given.get("scene"), scenes)
+            if "fatigue" in given:
+                context.found = _assessed(context.found, given["fatigue"])
             given["scene"] = name_of(context.found)
         except SceneError:
             raise
@@ -288,6 +295,7 @@ class Study(StudyTable):
         rest = {key: each for key, each in content.items() if key not in (EXTENDS, *adds)}
         fixed = {key: value for key, value in base.parameters.items() if key not in owners(axes)}
         own = {"scene": base.scene, "parameters": fixed, "sweep": axes}
+        own |= {"fatigue": base.fatigue} if base.fatigue else {}
         return {**base.choice, **rest, **own}
 
     def checked(self) -> Self:

@@ -21,6 +21,7 @@ from studies.scenes import tables
 from studies.scenes.arithmetic import is_expression
 from studies.scenes.description import LARGEST
 from studies.scenes.names import RESERVED, in_use
+from studies.scenes.results import fatigue_of
 
 
 def contradictions(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Iterator[StudyError]:
@@ -38,8 +39,20 @@ def contradictions(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Ite
     yield from _results(scene)
     yield from _outputs(scene)
     yield from _names(scene)
+    yield from _fatigue(scene)
     for k, check in enumerate(scene.checks):
         yield from _one_of(f"checks[{k}].parameter", check.parameter, scene.names)
+
+
+def _fatigue(scene: tables.SceneFile) -> Iterator[StudyError]:
+    if scene.fatigue is None:
+        return
+    for body in scene.fatigue.bodies:
+        yield from _one_of("fatigue.bodies", body, scene.bodies)
+    try:
+        fatigue_of(scene.fatigue, scene.stage_names, scene.released)
+    except ModelError as error:
+        yield StudyError(f"fatigue.{error.field}", error.value, error.allowed)
 
 
 def failed_checks(scene: tables.SceneFile, values: Mapping[str, Any]) -> Iterator[StudyError]:

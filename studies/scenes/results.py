@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.errors import ModelError
+from solver.results.fatigue import Fatigue
 from solver.results.named_places import NamedPlaces
 from solver.results.outputs import outputs
 from solver.results.requested import RequestedNumber
@@ -77,6 +80,21 @@ def output_of(scene: tables.SceneFile, word: str) -> Output:
     if not output.parametric:
         return output.make
     return output.make(**getattr(scene.results, word).model_dump())
+
+
+def fatigue_of(table: tables.FatigueTable, stages: Sequence[str], released: str) -> Fatigue:
+    """Return the output of the table ``fatigue``.
+
+    Raises
+    ------
+    ModelError
+        for an entry that is wrong
+    """
+    if other := [stage for stage in table.cycle if stage not in stages]:
+        raise ModelError("cycle", other[0], f"must be one of {', '.join(stages)}")
+    if not table.residual and not released:
+        raise ModelError("residual", False, "needs a last stage that releases the bodies")
+    return Fatigue.of(**table.model_dump())
 
 
 def places(line: tables.LineResultTable, samples: int) -> Array:

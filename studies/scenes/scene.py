@@ -29,7 +29,7 @@ from studies.scenes.description import Description
 from studies.scenes.effort import effort_of, in_one_increment, too_large, too_long
 from studies.scenes.examining import examined
 from studies.scenes.file_scene import FileScene
-from studies.scenes.results import numbers_of, output_of, places_of, view_of
+from studies.scenes.results import fatigue_of, numbers_of, output_of, places_of, view_of
 from studies.scenes.tables import ACCURACY
 
 if TYPE_CHECKING:
@@ -87,6 +87,7 @@ def _scene_of(description: Description, scene: tables.SceneFile) -> FileScene:
             *(partial(_output, description, word) for word in scene.results.words),
             partial(_at_places, description),
             *([_over_cycles] if scene.repeat else []),
+            *([partial(_fatigue, description)] if scene.fatigue else []),
         ),
         costs=(cost,),
         until=partial(_until, description),
@@ -177,6 +178,13 @@ def _at_places(description: Description, run: FinishedRun) -> Values:
     program, cycles = _program(description, run.parameters), len(run.outcome.cycles)
     times = [0.0, *(each.time for each in program.targets if each.cycle <= cycles)]
     return at_named_places(run, _places(description, run.parameters), times)
+
+
+def _fatigue(description: Description, run: FinishedRun) -> Values:
+    table = _tables(description, run.parameters).fatigue
+    assert table is not None
+    made = fatigue_of(table, run.view.stages, run.view.unloaded)
+    return made(run, _places(description, run.parameters).lines)
 
 
 def _over_cycles(run: FinishedRun) -> Values:

@@ -333,6 +333,20 @@ class RepeatTable(SceneTable):
     until: Literal["shaken_down"] | None = None
 
 
+class FatigueTable(SceneTable):
+    """A fatigue criterion with its constants, on the cycle that runs repeat.
+
+    ``cycle`` names its stages, by default all in their order; a pass over a body without ends is a
+    cycle of its own. Without ``residual`` the stress that remains after release is subtracted.
+    """
+
+    criterion: str
+    limits: dict[Label, float] = Field(default_factory=dict)
+    cycle: tuple[Label, ...] = ()
+    residual: bool = True
+    bodies: tuple[Label, ...] = ()
+
+
 class LoadingTable(SceneTable):
     """Loads that grow together to ``factor``, in steps of ``step``, and are then removed.
 
@@ -606,6 +620,7 @@ class SceneFile(SceneTable):
     stages: tuple[StageTable, ...] = ()
     repeat: RepeatTable | None = None
     loading: LoadingTable | None = None
+    fatigue: FatigueTable | None = None
     results: ResultsTable = ResultsTable()
     outputs: dict[Label, OutputTable] = Field(default_factory=dict)
     advice: AdviceTable = AdviceTable()

@@ -127,6 +127,9 @@ _FORMULAS = """
     running_surface_residual lowest_loaded highest_mises highest_mises_depth most_strained_z
     least_yielded_depth most_yielded_depth pass_residual_min mean_plastic_increment
     mean_net_increment hertz_pressure hertz_a hertz_b hertz_approach axle_lateral_creepage
+    map_fatigue_utilisation fatigue_utilisation_profile line_fatigue_utilisation
+    fatigue_utilisation fatigue_safety_factor fatigue_x fatigue_y fatigue_z fatigue_plane_x
+    fatigue_plane_y fatigue_plane_z fatigue_plastic_strain fatigue_applies
     spin_moment wheel_surface pass_load pass_lateral_position pass_traction outline_z
 """
 FORMULAS = _FORMULAS.split()

@@ -14,6 +14,7 @@ from solver import Record
 from solver.results.quantities import IN_SPACE, QUANTITIES
 from studies import Store, Study, open_study, run_study
 from studies.definition.vocabulary import LABEL_ATTRIBUTES
+from studies.scenes.fatigue import assessed
 from studies.scenes.registry import built_in, scene_named
 from studies.scenes.scene import read_scene
 from studies.views.tables import runs_table
@@ -51,6 +52,9 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
     return computed(tmp_path_factory.mktemp("both"), [0.4, 0.7])
 
 
+FATIGUE = {"criterion": "dang_van", "limits": {"torsion": 300.0, "sensitivity": 0.3}}
+
+
 @pytest.fixture(scope="module")
 def records() -> list[Record]:
     coarse = {
@@ -76,8 +80,10 @@ def records() -> list[Record]:
     for label, (parameters, value) in coarse.items():
         name = names[label]
         scene = scene_named(name)
+        if name in ("ball", "raceway"):
+            scene = assessed(scene, FATIGUE)
         found += scene.path(scene.parameters(**parameters), [value], lambda fraction: None)
-    for own in FILES:
+    for own in (FILES[0], *(assessed(own, FATIGUE) for own in FILES[1:])):
         found += own.path(
             own.parameters(), [getattr(own.parameters(), own.branch, None)], lambda share: None
         )

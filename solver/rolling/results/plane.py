@@ -13,11 +13,13 @@ from solver.fem.fields import Sampler, recovery
 from solver.fem.frame import RigidMotion
 from solver.results.acting import Acting
 from solver.results.contact_result import contact_patches
+from solver.results.fatigue import StressCycle
 from solver.rolling.passing import Pass
 from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.track import Track, of_layers, under_load
 from solver.rolling.plane.wheel import RollingContact
 from solver.rolling.results.stage import PassStage, SteadyBody
+from solver.tensors import to_mandel, to_tensor
 from solver.typing import Array, Ints
 
 _LEVEL = 1e-6
@@ -81,6 +83,25 @@ class TrackBody(SteadyBody):
     def left_by(self, found: Pass[Layers]) -> PassStage:
         """Return the state after a pass."""
         return PassStage(self._seen(of_layers(self.track, found.law, found.after)))
+
+    def cycle(self, loaded: PassStage) -> StressCycle:
+        """Return what a pass does: points of equal depth have the path along their row."""
+        state, (x, y) = loaded.state, self.positions(self.names[0])
+        deep = abs(y).max()
+        _, row = np.unique(np.round(y / deep, 9), return_inverse=True)
+        order = np.lexsort((-self.way * x, row))  # material flows against the load
+        plastic = to_tensor(state.plastic.plastic_strain)
+        rows = np.split(order, np.flatnonzero(np.diff(row[order])) + 1)
+        shape = len(rows), max(map(len, rows))
+        every = np.array([np.pad(each, (0, shape[1] - len(each)), mode="edge") for each in rows])
+        stress, strain, flow = (
+            np.moveaxis(each[:, every], 0, 2)
+            for each in (to_tensor(state.stress), to_tensor(state.strain), plastic)
+        )
+        grown = np.ptp(state.plastic.accumulated[every], axis=1)
+        left = to_mandel(np.moveaxis(flow[:, -1] - flow[:, 0], 1, 0))
+        net = np.sqrt(2 / 3 * (left**2).sum(axis=0))
+        return StressCycle(stress[row], strain[row], grown[row], net[row])
 
     def _seen(self, state: BodyState) -> BodyState:
         """Return a state of the track in the fixed frame."""

@@ -21,6 +21,7 @@ from solver.materials.state import PlasticState
 from solver.memory import kept
 from solver.model.body import Body
 from solver.results.acting import Acting
+from solver.results.fatigue import StressCycle
 from solver.results.mesh_fields import MeshFields, counterclockwise
 from solver.rolling.body import LOADED, RELEASED
 from solver.rolling.passing import Pass
@@ -98,10 +99,28 @@ class PrismBody(SteadyBody):
         whole = np.full((track.section.weights.size, 6), np.nan)
         whole[track.modes.points] = strain
         state = self._state(LOADED, u, whole, inside)
-        elastic = before.strain[:, None] + found.strain - found.plastic_strain
-        stress = np.einsum("ab,pcb->apc", self._law.stiffness(6), elastic)
-        lowest = to_tensor(stress.reshape(6, -1)).min(axis=1)
-        return PassStage(state, applied.contact, lowest)
+        lowest = self._along(found)[0].min(axis=(1, 2))
+        return PassStage(state, applied.contact, lowest, found)
+
+    def _along(self, found: Pass[PrismState]) -> tuple[Array, Array]:
+        """Return stress and strain along the rows of a pass (6, n_rows, n_columns)."""
+        strain = found.before.strain[:, None] + found.strain
+        stress = np.einsum("ab,pcb->apc", self._law.stiffness(6), strain - found.plastic_strain)
+        initial = self.track.initial_strain[self.track.modes.points, None]
+        return to_tensor(stress), to_tensor(np.moveaxis(strain - initial, -1, 0))
+
+    def cycle(self, loaded: PassStage) -> StressCycle:
+        """Return what a pass does along the rows of the zone; NaN at other points."""
+        found, points = loaded.found, self.track.modes.points
+        stress, strain = (np.moveaxis(each, 0, 2) for each in self._along(found))
+        added = found.after.plastic_strain - found.before.plastic_strain
+        grown = found.after.accumulated - found.before.accumulated
+        n = self.track.section.weights.size
+        each = stress, strain, grown, np.sqrt(2 / 3 * (added**2).sum(axis=1))
+        whole = [np.full((n, *values.shape[1:]), np.nan) for values in each]
+        for values, own in zip(whole, each, strict=True):
+            values[points] = own
+        return StressCycle(*whole)
 
     def left_by(self, found: Pass[PrismState]) -> PassStage:
         """Return the state after a pass, in the whole section."""

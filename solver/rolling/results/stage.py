@@ -8,6 +8,7 @@ from typing import Any
 
 from solver.contact.state import BodyState
 from solver.materials.state import PlasticState
+from solver.results.fatigue import StressCycle
 from solver.rolling.passing import Pass
 from solver.typing import Array
 
@@ -21,11 +22,13 @@ class PassStage:
     state : the body; its time is `LOADED` or `RELEASED`
     touching : the contact in the frame of the load, or None
     lowest : (n_components,) smallest stress components around the load, None if not known [MPa]
+    found : the pass of a state under the load, if its cycle is not all in the state
     """
 
     state: BodyState
     touching: Any = None
     lowest: Array | None = None
+    found: Any = None
 
 
 class SteadyBody(ABC):
@@ -48,6 +51,10 @@ class SteadyBody(ABC):
     @abstractmethod
     def left_by(self, found: Pass[Any]) -> PassStage:
         """Return the state after a pass."""
+
+    @abstractmethod
+    def cycle(self, loaded: PassStage) -> StressCycle:
+        """Return what a pass does at the points, along their rows."""
 
     def full(self, name: str) -> Any:
         """Return the body."""

@@ -1,0 +1,218 @@
+"""Fatigue of the bodies of a run: a criterion on the cycle that the run repeats.
+
+The cycle at a point is the stress at named stages of the run, in their order, closed from the last
+to the first. In a pass over a body without ends it is the stress along the row of the point, from
+far ahead of the load to far behind it.
+
+A criterion of elastic shakedown says nothing of a cycle that strains plastically, by more than a
+thousandth of the largest range of strain: such points are NaN, the numbers too, and
+`fatigue_applies` says so, with the plastic strain of a cycle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+
+from solver.errors import ModelError
+from solver.fatigue.criteria import CRITERIA
+from solver.fatigue.criterion import Assessment, Criterion
+from solver.fatigue.paths import Paths
+from solver.results.quantities import along_axes, declare, declare_along, placed
+from solver.results.run import FinishedRun, Values
+from solver.results.shakedown import CLOSED, QUIET
+from solver.results.view import Places
+from solver.tensors import AXES, to_tensor
+from solver.typing import Array, Bools
+
+
+class Applies(IntEnum):
+    """Whether the criterion applies to all points, with its stored value."""
+
+    NOT_APPLICABLE = 0
+    APPLICABLE = 1
+
+
+_WHAT = "fatigue utilisation: equivalent of a cycle over its limit"
+MAP_UTILISATION = declare("map_fatigue_utilisation", _WHAT, dims=("y", "x"))
+PROFILE_UTILISATION = declare(
+    "fatigue_utilisation_profile", f"{_WHAT}, along depth", dims=("station", "depth")
+)
+LINE_UTILISATION = declare(
+    "line_fatigue_utilisation", f"{_WHAT}, along the line", dims=("line", "fraction"),
+    beside=placed("line", *AXES, "s"),
+)  # fmt: skip
+UTILISATION = declare("fatigue_utilisation", "largest fatigue utilisation, at integration points")
+SAFETY = declare("fatigue_safety_factor", "smallest safety factor, one over fatigue utilisation")
+PLACE = declare_along("fatigue_{}", "position along {} of the smallest safety factor", "mm")
+PLANE = tuple(
+    declare(f"fatigue_plane_{axis}", f"normal along {axis} of the critical plane there")
+    for axis in AXES
+)
+STRAIN = declare("fatigue_plastic_strain", "largest plastic strain that a cycle accumulates")
+APPLIES = declare("fatigue_applies", "whether the fatigue criterion applies", flags=Applies)
+
+
+_SAME = 1e-9
+"""Values with this relative difference are equal; the place is then that nearest to the middle."""
+
+
+class StressCycle(NamedTuple):
+    """What a cycle does at the n points of a body.
+
+    Attributes
+    ----------
+    stress, strain : (n, n_instants, n_components), tensor components; NaN where not known
+    grown : (n,) plastic strain that the cycle accumulates
+    net : (n,) equivalent of the signed plastic strain that it leaves
+    """
+
+    stress: Array
+    strain: Array
+    grown: Array
+    net: Array
+
+
+@runtime_checkable
+class Passed(Protocol):
+    """A body of which one state under the load is a whole cycle."""
+
+    def cycle(self, loaded: Any) -> StressCycle:
+        """Return the cycle of a pass."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fatigue:
+    """An output: a fatigue criterion on the cycle of a run.
+
+    Attributes
+    ----------
+    criterion : the criterion with its constants
+    cycle : stages of the cycle; empty for all of a run in their order
+    residual : whether stress that remains after release counts; without, it is subtracted
+    bodies : bodies that are assessed; empty for all
+    """
+
+    criterion: Criterion
+    cycle: tuple[str, ...] = ()
+    residual: bool = True
+    bodies: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls, criterion: str, limits: Mapping[str, Any], cycle: tuple[str, ...] = (),
+        residual: bool = True, bodies: tuple[str, ...] = (),
+    ) -> Fatigue:  # fmt: skip
+        """Return the output of a table.
+
+        Raises
+        ------
+        ModelError
+            if there is no such criterion, or it has other constants
+        """
+        part, known = CRITERIA[criterion], CRITERIA.declared_by(criterion)
+        for name in limits:
+            if name not in known:
+                allowed = f"must be one of {', '.join(known)}"
+                raise ModelError(f"limits.{name}", limits[name], allowed)
+        for name in known:
+            if name not in limits and known[name]:
+                raise ModelError(f"limits.{name}", None, f"is needed by {criterion}")
+        try:
+            made = part(**limits)
+        except ModelError as error:
+            raise ModelError(f"limits.{error.field}", error.value, error.allowed) from None
+        return cls(criterion=made, cycle=cycle, residual=residual, bodies=bodies)
+
+    def __call__(self, run: FinishedRun, lines: Mapping[str, Places] | None = None) -> Values:
+        """Return the quantities of a run."""
+        of_body = {name: self._assessed(run, name) for name in self.bodies or run.system.names}
+        nodal = {
+            name: run.samples.fields.recovered(name, each.found.utilisation)
+            for name, each in of_body.items()
+        }
+        values: dict[Any, Any] = {}
+        across, up = run.view.map_axes
+        if all(grid.size for grid in run.view.map_grid):
+            values[MAP_UTILISATION.at(up, across)] = run.samples.nodal_on_map(nodal)
+        if run.view.depth.size and run.view.profile_body in nodal:
+            values[PROFILE_UTILISATION] = run.samples.along_depth(nodal[run.view.profile_body])
+        if lines:
+            values[LINE_UTILISATION] = np.stack([
+                run.system.sampler(line.body, line.X)(nodal[line.body])
+                if line.body in nodal else np.full(line.X.shape[1], np.nan)
+                for line in lines.values()
+            ])  # fmt: skip
+        return {**values, **self._numbers(run, of_body)}
+
+    def _numbers(self, run: FinishedRun, of_body: Mapping[str, _OfBody]) -> Values:
+        most = {name: np.nanmax(each.found.utilisation, initial=-np.inf)
+                for name, each in of_body.items()}  # fmt: skip
+        worst = max(most, key=lambda name: most[name])
+        found, applies = of_body[worst].found, not any(each.void.any() for each in of_body.values())
+        applies = applies and np.isfinite(most[worst])
+        X, hidden = run.system.positions(worst), 1.0 if applies else np.nan
+        same = found.utilisation >= most[worst] - _SAME * abs(most[worst])
+        k = int(np.where(same, np.abs(run.view.axis.reached(X)), np.inf).argmin())
+        return {
+            APPLIES: Applies(int(applies)),
+            STRAIN: max(float(np.nanmax(each.grown, initial=0.0)) for each in of_body.values()),
+            UTILISATION: float(found.utilisation[k]) * hidden,
+            SAFETY: float(found.safety_factor[k]) * hidden,
+            **along_axes(PLACE, (X[:, k] * hidden).tolist()),
+            **dict(zip(PLANE, (found.plane[k] * hidden).tolist(), strict=True)),
+        }
+
+    def _assessed(self, run: FinishedRun, name: str) -> _OfBody:
+        cycle = self._cycle(run, name)
+        known = np.asarray(np.isfinite(cycle.stress).all(axis=(1, 2)))
+        most = np.ptp(cycle.strain[known], axis=1).max(initial=0.0)
+        void = known & (cycle.grown > QUIET * most)
+        if self.criterion.yielding:
+            void &= cycle.net > CLOSED * cycle.grown
+        asked = known & ~void
+        value, used = np.full(len(known), np.nan), np.full(len(known), np.nan)
+        plane = np.full((len(known), 3), np.nan)
+        if asked.any():
+            found = self.criterion.assess(Paths(cycle.stress[asked], cycle.strain[asked]))
+            value[asked], used[asked], plane[asked] = found
+        return _OfBody(Assessment(value, used, plane), void, cycle.grown)
+
+    def _cycle(self, run: FinishedRun, name: str) -> StressCycle:
+        """Return the cycle at the points of a body; without residual stress if that is asked."""
+        system, points = run.system, run.outcome.points
+        stages = self.cycle or run.view.stages
+        if other := [stage for stage in stages if stage not in points]:
+            raise ModelError("cycle", other[0], f"must be one of {', '.join(points)}")
+        if isinstance(system, Passed):
+            cycle = system.cycle(run.loaded)
+        else:
+            each = [system.state(name, points[stage]) for stage in stages]
+            grown = np.ptp([state.plastic.accumulated for state in each], axis=0)
+            left = each[-1].plastic.plastic_strain - each[0].plastic.plastic_strain
+            stress, strain = (
+                np.stack([to_tensor(getattr(state, what)).T for state in each], axis=1)
+                for what in ("stress", "strain")
+            )
+            cycle = StressCycle(stress, strain, grown, np.sqrt(2 / 3 * (left**2).sum(axis=0)))
+        if self.residual:
+            return cycle
+        if not run.view.unloaded:
+            raise ModelError("residual", False, "needs a last stage that releases the bodies")
+        after = system.state(name, run.unloaded)
+        return cycle._replace(
+            stress=cycle.stress - to_tensor(after.stress).T[:, None],
+            strain=cycle.strain - to_tensor(after.strain).T[:, None],
+        )
+
+
+class _OfBody(NamedTuple):
+    """What the criterion finds at points of a body, where it is void, plastic strain a cycle."""
+
+    found: Assessment
+    void: Bools
+    grown: Array

@@ -1,0 +1,172 @@
+"""The table ``[fatigue]``: a criterion on the cycle of every run of a study or a scene file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver.fatigue import DangVan, Findley, Paths
+from solver.results.fatigue import Applies
+from studies import Study, StudyError
+from studies.scenes.fatigue import assessed
+from tests.studies.scenes.conftest import blocks, built
+
+DANG_VAN = {"criterion": "dang_van", "limits": {"torsion": 200.0, "sensitivity": 0.3}}
+HERTZ: dict[str, Any] = {
+    "load": "hertz", "track": "endless", "accuracy": "draft", "friction": 0.0,
+    "yield_stress": 400.0, "hardening": "kinematic",
+}  # fmt: skip
+
+
+def rolled(fatigue: Any, **parameters: Any) -> Study:
+    """Return a study of one run of the rolling scene."""
+    content = {"name": "rolled", "scene": "rolling", "parameters": HERTZ | parameters}
+    return Study.from_dict(content | ({"fatigue": fatigue} if fatigue else {}))
+
+
+def record_of(study: Study) -> Any:
+    """Return the record of the only run of a study."""
+    scene, (case,) = study.problem, study.cases()
+    (path,) = study.paths()
+    (found,) = scene.path(path.parameters, [case.values[scene.branch]], lambda done: None)
+    return found
+
+
+@pytest.mark.solves
+def test_an_elastic_rolling_contact_is_as_in_theory() -> None:
+    """.1706 p0 at .60 a (`tests/solver/test_fatigue.py`); the draft mesh is coarse: 2 %."""
+    record = record_of(rolled(DANG_VAN, load_ratio=0.8))
+    p0, a = 320.0, record.parameters.half_width
+    assert record.scalars["fatigue_applies"] == Applies.APPLICABLE
+    assert record.scalars["fatigue_safety_factor"] == pytest.approx(200 / (0.1706 * p0), rel=0.02)
+    assert -record.scalars["fatigue_y"] == pytest.approx(0.60 * a, rel=0.15)
+    profile = record.fields["fatigue_utilisation_profile"][1]
+    assert profile.max() == pytest.approx(record.scalars["fatigue_utilisation"], rel=0.02)
+
+
+@pytest.mark.solves
+def test_residual_stress_counts_unless_it_is_left_out() -> None:
+    """After shakedown it is compression along x below the surface, and helps."""
+    with_it = record_of(rolled(DANG_VAN, load_ratio=2.0, passes=4))
+    without = record_of(rolled(DANG_VAN | {"residual": False}, load_ratio=2.0, passes=4))
+    both = [each.scalars["fatigue_safety_factor"] for each in (with_it, without)]
+    assert both[0] > 1.03 * both[1]
+
+
+@pytest.mark.solves
+def test_a_cycle_that_strains_plastically_has_no_safety_factor() -> None:
+    record = record_of(rolled(DANG_VAN, load_ratio=2.0, passes=1))
+    assert record.scalars["fatigue_applies"] == Applies.NOT_APPLICABLE
+    assert np.isnan(record.scalars["fatigue_safety_factor"])
+    assert record.scalars["fatigue_plastic_strain"] > 1e-5
+    profile = record.fields["fatigue_utilisation_profile"][1]
+    assert np.isnan(profile).any() and np.isfinite(profile).any()
+
+
+@pytest.mark.solves
+def test_a_block_that_is_pressed_and_released_is_a_closed_form() -> None:
+    """Plane strain under 150 MPa: yy = -150, zz = nu yy; also along a line, and of named stages."""
+    content = blocks()
+    content["stages"] += [{"name": "eased", "increments": 1}, {"name": "free", "release": True}]
+    content["loads"][0]["amplitude"] = {"pressed": 1.0, "eased": 0.5}
+    content["results"] |= {
+        "lines": {"down": {"body": "lower", "start": [2.0, -0.2], "end": [2.0, -1.8]}}
+    }
+    content["parameters"]["mu"]["default"] = 0.0
+    content["bodies"]["lower"]["supports"] = {"bottom": "y", "left": "x"}
+    content["parameters"]["t"] = {"default": 200.0, "unit": "MPa", "range": [1, 999]}
+    content["fatigue"] = {
+        "criterion": "findley", "limits": {"torsion": "$t", "sensitivity": 0.2},
+        "cycle": ["pressed", "eased"], "bodies": ["lower"],
+    }  # fmt: skip
+    scene = built(content)
+    (record,) = scene.path(scene.parameters(), [], lambda done: None)
+    path = [[0.0, -150.0, -45.0, 0.0], [0.0, -75.0, -22.5, 0.0]]
+    value = Findley(torsion=200.0, sensitivity=0.2).assess(Paths(np.array([path])))
+    assert record.status.name == "OK", record.message
+    (line,) = record.fields["line_fatigue_utilisation"][1]
+    np.testing.assert_allclose(line, value.utilisation[0], rtol=1e-6)
+    assert record.scalars["fatigue_safety_factor"] == pytest.approx(value.safety_factor[0])
+
+
+def boussinesq(X: np.ndarray, a: float, p0: float, nu: float = 0.3) -> np.ndarray:
+    """Return stress (n, 6) below a circular Hertz contact, of point forces on a fine grid.
+
+    K.L. Johnson, Contact Mechanics (1985), eqs. 3.19; x along the surface, y up, z across.
+    """
+    r = (np.arange(60) + 0.5) / 60 * a
+    angle = (np.arange(96) + 0.5) / 96 * 2 * np.pi
+    force = p0 * np.sqrt(1 - (r / a) ** 2) * r * (a / 60) * (2 * np.pi / 96)
+    at = np.stack([np.outer(r, f(angle)).ravel() for f in (np.cos, np.sin)])
+    P = np.repeat(force, 96)
+    x, z = (X[:, k, None] - at[j] for k, j in ((0, 0), (2, 1)))
+    d = -X[:, 1, None]
+    s2, R = x**2 + z**2, np.sqrt(x**2 + z**2 + d**2)
+    k = (1 - 2 * nu) / s2
+    near, far = k * (1 - d / R), 3 * d / R**5
+
+    def across(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return near * (u**2 - v**2) / s2 + k * d * v**2 / R**3 - far * u**2
+
+    zx = near * 2 * x * z / s2 - k * d * x * z / R**3 - far * x * z
+    each = (across(x, z), -far * d**2, across(z, x), far * d * x, far * d * z, zx)
+    return np.stack([(own * P).sum(axis=1) / (2 * np.pi) for own in each], axis=1)
+
+
+@pytest.mark.solves
+def test_a_ball_that_rolls_is_as_an_independent_integral() -> None:
+    """The row below the middle of a circular contact; the error is that of the mesh: 2 %."""
+    parameters = {
+        "accuracy": "standard",
+        "load_ratio": 0.5,
+        "friction": 0.0,
+        "hardening": "kinematic",
+    }
+    content = {"name": "ball", "scene": "raceway", "parameters": parameters, "fatigue": DANG_VAN}
+    record = record_of(Study.from_dict(content))
+    s = record.scalars
+    a, b, p0 = s["hertz_a"], s["hertz_b"], s["hertz_pressure"]
+    assert a == pytest.approx(b, rel=1e-6), "the contact is a circle"
+    depth = np.array([0.5, 0.7, 1.0]) * a
+    x = np.linspace(-6, 6, 121) * a
+    X = np.stack([*(each.ravel() for each in np.meshgrid(x, -depth)), np.zeros(363)], axis=1)
+    paths = Paths(boussinesq(X, a, p0).reshape(3, 121, 6))
+    value = DangVan(torsion=200.0, sensitivity=0.3).assess(paths)
+    profiles = record.fields["fatigue_utilisation_profile"][1]
+    profile = profiles[len(profiles) // 2]
+    found = np.interp(depth, record.coordinates["depth"], profile)
+    np.testing.assert_allclose(found, value.utilisation, rtol=0.02)
+
+
+def test_studies_without_the_table_are_as_before() -> None:
+    """Their scene is the same object; with it, run and study have ids of their own."""
+    plain, asked = rolled(None), rolled(DANG_VAN)
+    without = rolled(DANG_VAN | {"residual": False})
+    assert "fatigue" not in plain.to_dict() and not plain.problem.source
+    assert len({*plain.run_ids(), *asked.run_ids(), *without.run_ids()}) == 3
+    again = Study.from_dict(asked.to_dict())
+    assert (again.id, list(again.run_ids())) == (asked.id, list(asked.run_ids()))
+    assert assessed(asked.problem, DANG_VAN) == asked.problem
+
+
+@pytest.mark.parametrize(
+    ("field", "table"),
+    [
+        ("fatigue", 3),
+        ("fatigue.criterion", {"criterion": "dang"}),
+        ("fatigue.limits.sens", {"criterion": "dang_van", "limits": {"torsion": 3.0, "sens": 1.0}}),
+        ("fatigue.limits.torsion", {"criterion": "dang_van"}),
+        ("fatigue.limits.torsion", {"criterion": "dang_van", "limits": {"torsion": -3.0}}),
+        ("fatigue.cycle", DANG_VAN | {"cycle": ["nowhere"]}),
+        ("fatigue.cyclic", DANG_VAN | {"cyclic": True}),
+    ],
+)
+def test_mistakes_name_their_entry(field: str, table: Any) -> None:
+    with pytest.raises(StudyError) as error:
+        rolled(table)
+    assert error.value.field == field
+    if isinstance(table, dict):
+        with pytest.raises(StudyError, match=field):
+            built(blocks() | {"fatigue": table})
