@@ -35,6 +35,7 @@ FIRST = (
             "verification/test_rolling.py",
             "studies/test_fit.py",
             "verification/test_ball.py",
+            "verification/test_large_bodies.py",
             "verification/test_track_ends.py",
             "studies/test_own_parts.py",
             "verification/test_contact_in_time.py",

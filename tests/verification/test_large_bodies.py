@@ -191,3 +191,25 @@ def test_a_cone_has_the_published_force_of_its_depth() -> None:
     assert record.status is Status.OK
     force = np.abs(record.fields["reaction_y"][1]).max()
     assert force / 0.1**2 == pytest.approx(2731.3, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        {"hardening": "chaboche", "back_stresses": ((20000.0, 100.0), (2000.0, 0.0))},
+        {"hardening": "layered", "curve": ((0.0, 410.0), (0.01, 500.0), (0.05, 560.0))},
+        {"yield_condition": "tresca"},
+        {"yielding": "ball", "friction": 0.3},
+    ],
+    ids=["chaboche", "layered", "tresca", "ball"],
+)
+def test_all_laws_in_contact_agree_with_small_strain_where_strain_is_small(law: Any) -> None:
+    """The half-space strains by less than 2 %: approaches differ by less, the audit passes."""
+    ball, found = scene_named("ball"), {}
+    for strain in ("small", "large"):
+        own = {"accuracy": "draft", "load_ratio": 5.0, "load_step": 0.5, "strain": strain} | law
+        (found[strain],) = ball.path(ball.parameters(**own), [1], lambda fraction: None)
+        assert found[strain].status is Status.OK, found[strain].message
+    small, large = (found[key].scalars["approach"] for key in found)
+    assert large == pytest.approx(small, rel=0.01)
+    assert large != small
