@@ -36,7 +36,7 @@ WHEN = "when"
 DESCRIBED = ("parameters", "outputs")
 """Entries of a scene file whose tables have a description."""
 
-_LEAST: Mapping[str, Any] = {
+_LEAST: dict[str, Any] = {
     "name": "scene",
     "materials": {"m": {"youngs_modulus": 1.0, "poisson_ratio": 0.3}},
     "bodies": {"b": {"material": "m"}},

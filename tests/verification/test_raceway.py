@@ -375,3 +375,10 @@ def test_depth_counts_from_the_surface_of_a_groove_and_the_map_has_its_flanks() 
     for k, station in enumerate(at["station"]):
         there = [np.interp(station, at["z"], each) for each in surface]
         np.testing.assert_allclose(profile[k, :, 0], there, atol=0.02 * np.abs(profile).max())
+
+
+def test_an_undecided_state_says_to_raise_passes_where_several_were_asked_for() -> None:
+    few = rolled(passes=3, load="hertz")
+    assert few.scalars["shakedown_state"] == ShakedownState.UNDECIDED
+    assert "undecided after 3 passes: raise passes" in few.message
+    assert not rolled(load="hertz").message

@@ -14,6 +14,7 @@ from solver.model.friction import PatchStatus
 from solver.results.cycles import shakedown
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values
+from solver.results.shakedown import ShakedownState
 from solver.rolling.rail.section import Section
 from solver.rolling.scenes.passes import mean_added, passes, shakedown_of
 from solver.rolling.scenes.rolling_setup import CREEPAGE, LONGITUDINAL_FORCE
@@ -167,6 +168,16 @@ def section(run: FinishedRun) -> Values:
         LEAST_YIELDED_DEPTH: float(yielded.min()) if len(yielded) else np.nan,
         MOST_YIELDED_DEPTH: float(yielded.max()) if len(yielded) else np.nan,
     }
+
+
+def undecided(run: FinishedRun) -> tuple[str, ...]:
+    """Return what to do if the shakedown state is not known after several passes."""
+    traces, cycle = run.outcome.traces, getattr(run.parameters, "cycle", 1)
+    if cycle is None or len(traces) < 2:  # a load that never repeats itself decides no state
+        return ()
+    if shakedown_of(run.parameters, traces, cycle).state is not ShakedownState.UNDECIDED:
+        return ()
+    return (f"the shakedown state is undecided after {len(traces)} passes: raise passes",)
 
 
 def cycles(run: FinishedRun, cycle: int | None = 1) -> Values:

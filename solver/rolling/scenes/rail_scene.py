@@ -91,6 +91,7 @@ def rail_scene(
             *outputs,
         ),
         costs=late("results.figures", "cost"),
+        warnings=late("rolling.scenes.rail_outputs", "undecided")[0],
         effort=effort,
         setup=geometry,
         advice={

@@ -167,7 +167,8 @@ def _check_points(
     if radius < _SMOOTH * size:
         allowed = (
             f"must be smooth: at z = {z[at]:.4g} mm the radius of the curve through them is "
-            f"{radius:.2g} mm, below {_SMOOTH:g} sides of elements; smooth the points"
+            f"{radius:.2g} mm, below {_SMOOTH:g} sides of elements, {size:.3g} mm each; "
+            "smooth the points"
         )
         raise ModelError(name, given_as, allowed)
     if isinstance(points, SectionMesh):  # `MeshedRail.zoned` looks at its edges
