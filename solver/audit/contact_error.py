@@ -6,11 +6,14 @@ forces. Both converge to the true pressure as the mesh is refined, but different
 has the magnitude of the error. It is large if the contact has few edges.
 
 It is evaluated on the slave, or on the master if the slave is rigid and has no stress. The figure
-is the integral of the absolute difference over the area before loading, over the contact force.
+is the integral of the absolute difference over the area before loading, of a body of large strain
+over the present one, divided by the contact force.
 (The integral of the square is unbounded under refinement at a sharp corner.)
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -50,6 +53,9 @@ def contact_error(system: System, converged: Converged) -> float:
         if at_vertices.max() <= _ROUNDING * np.nan_to_num(np.abs(recovered[name])).max():
             continue
         chain = system.chain(name, boundary)
+        if system.full(name).body.large:  # its stress is that on the deformed area
+            at_vertices = at_vertices * system.pairing(converged.state, k).shrunk
+            chain = replace(chain, X=deformed(system, name, converged.state)[0][:, chain.nodes])
         if name == pair.slave[0]:
             ends = np.stack([at_vertices[:-1], at_vertices[1:]], axis=1)
             pressure = ends @ np.stack([1 - _XI, 1 + _XI]) / 2

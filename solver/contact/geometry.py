@@ -67,6 +67,12 @@ class Pairing:
     closing: tuple[Array, Array]
 
     @property
+    def shrunk(self) -> Array:
+        """Reference area over the current one (n,); 1 where the slave faces no master."""
+        none = np.ones_like(self.area)
+        return np.divide(self.area, self.deformed, out=none, where=self.deformed > 0)
+
+    @property
     def parted(self) -> Pairing:
         """The same pairing as if the surfaces faced each other nowhere."""
         none = np.zeros_like(self.area)

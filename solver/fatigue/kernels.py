@@ -166,9 +166,9 @@ def _widen(low: Array, high: Array, j: int, m: int, value: float) -> None:
     high[j, m] = value if value > high[j, m] else high[j, m]
 
 
-@njit((_STEPS, _TABLE, int64), cache=True, fastmath=True)
-def scan(paths: Array, normals: Array, step: int) -> tuple[Array, Array, Array]:
-    """Return what acts on the same planes at every point, from every `step`-th instant.
+@njit((_STEPS, _TABLE), cache=True, fastmath=True)
+def scan(paths: Array, normals: Array) -> tuple[Array, Array, Array]:
+    """Return what acts on the same planes at every point.
 
     Loops over planes are innermost: they are the ones that a processor does several at a time.
 
@@ -205,7 +205,7 @@ def scan(paths: Array, normals: Array, step: int) -> tuple[Array, Array, Array]:
     normal, across = np.empty((n_points, n_planes)), np.empty((n_points, n_planes))
     for point in range(n_points):
         low[:], high[:] = 1e300, -1e300
-        for t in range(0, n, step):
+        for t in range(n):
             xx, yy, zz = paths[point, 0, t], paths[point, 1, t], paths[point, 2, t]
             xy, yz, zx = paths[point, 3, t], paths[point, 4, t], paths[point, 5, t]
             for m in range(n_planes):

@@ -37,8 +37,8 @@ class Paths:
             if given is None:
                 continue
             array = np.asarray(given, dtype=float)
-            if array.ndim != 3 or array.shape[2] not in (4, 6) or not array.shape[1]:
-                allowed = "must have the shape (n_points, n_instants, 6), or 4 in the plane"
+            if array.ndim != 3 or array.shape[2] not in (4, 6) or array.shape[1] < 2:
+                allowed = "must be (n_points, 2 instants or more, 6), or 4 in the plane"
                 raise ModelError(name, array.shape, allowed)
             if not np.isfinite(array).all():
                 raise ModelError(name, "inf or nan", "must be finite: leave out other points")

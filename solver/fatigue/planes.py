@@ -22,8 +22,6 @@ _scan, _resolve = late("fatigue.kernels", "scan", "resolve")
 
 _PLANES = 108
 """Number of planes in a scan; neighbours are 13 degrees apart."""
-_INSTANTS = 32
-"""Least number of instants that a scan looks at, if there are as many."""
 _NEIGHBOURS, _WORSE = 5, 0.12
 """Newton's method starts at planes that are better than so many neighbours, and by at most this
 share worse than the best: the scan may be wrong by as much."""
@@ -105,8 +103,7 @@ def critical_planes(paths: Paths, search: Value, value: Value | None = None) -> 
 
 
 def _critical(paths: list[Array], search: Value, value: Value) -> Critical:
-    step = max(paths[0].shape[2] // _INSTANTS, 1)
-    found = search(OnPlanes(*(each for own in paths for each in _scan(own, _NORMALS, step))))
+    found = search(OnPlanes(*(each for own in paths for each in _scan(own, _NORMALS))))
     least = found.max(axis=1, keepdims=True)
     least = least - _WORSE * np.abs(least)
     tried = (found >= found[:, _AROUND].max(axis=2)) & (found >= least)

@@ -126,9 +126,10 @@ class LargeDiscretisation(Discretisation):
     def during(self, time: float, u: Array) -> LargeDiscretisation:
         """Return the body for an increment from displacements u: its rotation is about its place.
 
-        Unknowns and pins stay the same.
+        Unknowns and pins stay the same. The free motions of a body that is held somewhere are those
+        before loading: supports fix points of it, about which it cannot be said to turn.
         """
-        if self.rigid.shape[1] < 2 or not u.any():
+        if self._held.any() or self.rigid.shape[1] < 2 or not u.any():
             return self
         here = copy(self)
         here.rigid = self._motions(self.X + vectors(u, self.dim))

@@ -74,8 +74,6 @@ def contact_result(system: System, at: Converged, pair: int = 0) -> ContactResul
     X = chain.X[:, chain.vertices]
     pressure, shear = contact_pressure(system, state, pair)
     pairing = system.pairing(state, pair)
-    known = pairing.deformed > 0
-    shrunk = np.divide(pairing.area, pairing.deformed, out=np.ones_like(pressure), where=known)
     gap = np.where(np.isfinite(pairing.gap), pairing.gap, np.nan)
     closed = contact.normal > 0
     return ContactResult(
@@ -83,7 +81,7 @@ def contact_result(system: System, at: Converged, pair: int = 0) -> ContactResul
         X=X,
         pressure=pressure,
         shear=-shear,
-        pressure_deformed=shrunk * pressure,
+        pressure_deformed=pairing.shrunk * pressure,
         gap=gap,
         slip=np.where(np.isfinite(gap), interface.slip(pairing, state.u), np.nan),
         area=chain.hats,

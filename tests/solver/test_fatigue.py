@@ -182,6 +182,36 @@ def test_an_elastic_rolling_contact_is_worst_where_theory_says() -> None:
     assert depth[value.argmax()] == pytest.approx(0.60, abs=0.02)
 
 
+def test_no_plane_of_a_rolling_pass_is_worse_than_the_critical_one() -> None:
+    """Few of the 129 instants are under the load, and the scan must see them."""
+    path = 1000 * line_contact(np.linspace(0.05, 1.5, 20), np.linspace(-40, 40, 129))
+    path[..., 0] += 200.0
+    paths, along = elastic(path), np.linspace(0, np.pi, 13)[:-1]
+    normals = np.random.default_rng(5).normal(size=(600, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    second = np.cross(normals, first)
+    directions = np.cos(along) * first[..., None] + np.sin(along) * second[..., None]
+    full = path[..., [[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
+    traction = np.einsum("ptij,mj->ptmi", full, normals)
+    normal = np.einsum("ptmi,mi->ptm", traction, normals)
+    shear = np.ptp(np.einsum("ptmi,mid->ptmd", traction, directions), axis=1).max(axis=2) / 2
+    assert paths.strain is not None
+    strain = paths.strain[..., [[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
+    half = np.ptp(np.einsum("ptij,mi,mj->ptm", strain, normals, normals), axis=1) / 2
+    for criterion, dense in (
+        (Findley(torsion=352.0, sensitivity=0.3), shear + 0.3 * normal.max(axis=1)),
+        (SmithWatsonTopper(), normal.max(axis=1) * half),
+    ):
+        assert (criterion.assess(paths).value > dense.max(axis=1) * (1 - 1e-3)).all()
+
+
+def test_a_path_has_two_instants_or_more() -> None:
+    with pytest.raises(ModelError, match="2 instants or more"):
+        Paths(cycle((300, 0, 0, 0, 0, 0)))
+
+
 def test_paths_in_the_plane_are_paths_in_space() -> None:
     stress = BENT_AND_TWISTED[..., :4]
     for criterion in EVERY[:4]:
