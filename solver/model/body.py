@@ -122,8 +122,6 @@ class Body:
         refused = {"axle": self.axle is not None, "travelling": self.travelling is not None}
         refused |= {load.name: True for load in self.every_load if load.removes}
         refused |= {load.name: True for load in self.every_load if isinstance(load, Centrifugal)}
-        if self.kinematics == "plane_stress":  # the thickness on which it would act changes
-            refused |= {load.name: True for load in self.every_load if load.follows}
         for name in (name for name, given in refused.items() if given):
             allowed = f'must be left out of body {self.name!r}, or its strain must be "small"'
             raise ModelError(name, "given with large strain", allowed)

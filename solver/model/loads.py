@@ -141,6 +141,7 @@ class Pressure(BoundaryLoad):
     """A pressure on a boundary, positive when it pushes: ``value`` [MPa].
 
     With large strain it follows the boundary, and a value that varies is that at the deformed one.
+    In plane stress it acts on the thickness before loading.
     """
 
     value: StressValue

@@ -381,7 +381,7 @@ def test_the_example_in_the_description_is_a_study(app: FastAPI) -> None:
     post = json.loads(ask(app, "/openapi.json").text)["paths"]["/studies"]["post"]
     schema = post["requestBody"]["content"]["application/json"]["schema"]
     own = {"name", "scene", "parameters", "sweep", "points", "sample", "goal", "note", "tags"}
-    own |= {"refine", "fit", "minimise", "extends", "keep", "priority", "allow"}
+    own |= {"refine", "fit", "minimise", "extends", "keep", "priority", "allow", "fatigue"}
     assert set(schema["properties"]) == own
     (example,) = schema["examples"]
     assert Study.from_dict(example).size == 4
