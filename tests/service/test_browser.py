@@ -347,7 +347,7 @@ def test_a_caller_signs_in_and_out(browser: Any, locked: tuple[Server, dict[Scop
         (cookie,) = page.context.cookies()
         assert cookie["httpOnly"] and cookie["sameSite"] == "Strict"
         assert page.evaluate("document.cookie") == ""
-        page.click("text=Stop")
+        page.click("button >> text=Stop")
         page.wait_for_selector("[data-live=status] .dismissed")
         page.click("text=Sign out")
         page.wait_for_selector("[name=key]")
@@ -370,7 +370,7 @@ def test_a_wrong_key_and_a_weak_one_are_refused(
     page.fill("[name=key]", keys[Scope.READ])
     page.click("text=Sign in >> nth=-1")
     page.goto(f"/ui/studies/{study_id}")
-    assert page.locator("text=Stop").count() == 0
+    assert page.locator("button >> text=Stop").count() == 0
     refused = page.evaluate(
         "id => fetch(`/ui/studies/${id}/stop`, {method: 'POST', headers:"
         " {'content-type': 'application/x-www-form-urlencoded'}}).then((each) => each.status)",

@@ -162,13 +162,14 @@ def test_studies_that_choose_outlive_a_service_that_is_killed_and_a_caller_who_s
     assert (refined["status"], refined["stage"]) == ("successful", "ended")
     wait_until(lambda: lively.study(study_id)["stage"].startswith("2 of 6"))
     assert 0.0 < lively.study(study_id)["progress"] < 100.0
+    before = stored(lively) - others  # a run that is stopped before it is stored is computed again
     assert lively.client.delete(f"/studies/{study_id}").json()["status"] == "dismissed"
     assert lively.client.post(f"/studies/{study_id}/retry").status_code == 202
     found = lively.finished(study_id)
     assert (found["status"], found["stage"]) == ("successful", "6 of 6 searches ended")
     chosen = {run["id"] for each in (refined, found) for run in each["runs"]}
     assert {path.stem for path in stored(lively) - others} == chosen
-    assert repeated(lively, stored(lively) - others) == []
+    assert len(before) >= 2 and repeated(lively, before) == []
 
 
 def test_the_death_of_a_study_leaves_the_service_alive_and_is_made_good(lively: Server) -> None:
