@@ -124,7 +124,7 @@ def audit(
     figures["audit_error_contact"] = contact_error(system, loaded)
     neglected = [plastic_strain(system, every).neglected]
     neglected += [large_strain(system, plain, every)] if plane else []
-    fixed = any(body.axle or body.travelling or body.dim == 3 for body in system.model.bodies)
+    fixed = any(body.of_small_strain or body.dim == 3 for body in system.model.bodies)
     mend = "" if fixed else ' or set strain = "large"'
     figures["audit_plastic_strain"] = accumulated_strain(system, states[1])
     figures["audit_large_strain"] = _largest(*(each.share for each in neglected))

@@ -117,12 +117,17 @@ class Body:
         """Whether its strain is large."""
         return self.strain == "large"
 
+    @property
+    def of_small_strain(self) -> list[str]:
+        """Names of what it has and bodies of large strain do not have yet."""
+        moved = {"axle": self.axle, "travelling": self.travelling}
+        named = [name for name, given in moved.items() if given is not None]
+        loads = (load for load in self.every_load if load.removes or isinstance(load, Centrifugal))
+        return [*named, *(load.name for load in loads)]
+
     def _check_large(self) -> None:
         """Refuse what bodies of large strain do not have yet."""
-        refused = {"axle": self.axle is not None, "travelling": self.travelling is not None}
-        refused |= {load.name: True for load in self.every_load if load.removes}
-        refused |= {load.name: True for load in self.every_load if isinstance(load, Centrifugal)}
-        for name in (name for name, given in refused.items() if given):
+        for name in self.of_small_strain:
             allowed = f'must be left out of body {self.name!r}, or its strain must be "small"'
             raise ModelError(name, "given with large strain", allowed)
 

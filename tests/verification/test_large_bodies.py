@@ -24,6 +24,7 @@ from solver.fem.dofs import vectors
 from solver.fem.large import LargeDiscretisation
 from solver.fem.log_strain import _Stretch
 from solver.mesh import grid
+from solver.model.loads import Centrifugal
 from solver.results.record import Status
 from studies.scenes.registry import scene_named
 
@@ -181,6 +182,16 @@ def test_small_strain_names_the_parameter_that_mends_it_and_large_strain_is_ok()
     assert found["large"].status is Status.OK
     small, large = (found[key].scalars["max_plastic_strain_half_plane"] for key in found)
     assert large < 0.7 * small
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_large_strain_is_named_where_bodies_can_have_it(turns: bool) -> None:
+    stretched = Displacement(boundary="top", y=0.4)
+    turning = Centrifugal(density=1e-9, speed=0.0, axis="z")
+    body = block((0.0, 1.0), (0.0, 2.0), (2, 4), strain="small", supports={"bottom": "xy"},
+                 loads=(stretched, turning) if turns else (stretched,))  # fmt: skip
+    audit = solve(Model(bodies=(body,)), load=1.0, control=PathControl(load_step=1.0)).audit()
+    assert audit.outside and turns != any('strain = "large"' in text for text in audit.outside)
 
 
 def test_a_cone_has_the_published_force_of_its_depth() -> None:
