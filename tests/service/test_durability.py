@@ -197,7 +197,7 @@ def test_runs_that_kill_their_worker_fail_and_the_next_study_succeeds(lively: Se
 def test_a_temporary_folder_that_a_kill_leaves_is_removed_at_the_next_start(
     mortal: Server, tmp_path: Path
 ) -> None:
-    """The name of the folder is too long for a socket: workers start without the fork server."""
+    """The name of the folder is too long for a socket; workers start all the same."""
     (temporary := tmp_path / ("temporary" * 12)).mkdir()
     mortal.settings["TMPDIR"] = str(temporary)
     study = mortal.start().post(fake_study("left", seconds=0.5))
