@@ -18,6 +18,8 @@ from solver.linear.threads import one_thread
 from solver.rolling.load import RollingLoad
 from solver.rolling.passing import passing
 from solver.rolling.rail.patch_contact import PatchContact
+from solver.rolling.rail.patch_grid import PatchGrid
+from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from solver.rolling.rail.track import PrismTrack
 from tests.verification import stepped_prism
 from tests.verification.hertz_ellipse import wheel_on
@@ -198,6 +200,23 @@ def test_a_wheel_beside_its_place_is_that_wheel() -> None:
     flat = np.zeros((track().grid.stations, len(track().grid.z), 3))
     same = moved.changed(wheel=softer).solve(flat).traction
     assert same == pytest.approx(other.solve(flat).traction, abs=1e-9)
+
+
+def test_another_load_of_the_same_wheel_does_not_compute_its_motion_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    flat = np.zeros((track().grid.stations, len(track().grid.z), 3))
+    one = wheel(creepage=0.002)
+    before = one.solve(flat).traction
+    half = one.changed(load=one.load.scaled(0.5))
+
+    def computed_again(self: ProfiledWheel, grid: PatchGrid) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(ProfiledWheel, "rolling", computed_again)
+    assert half.solve(flat).traction[..., 1].sum() == pytest.approx(before[..., 1].sum() / 2)
+    with pytest.raises(AssertionError):
+        one.changed(wheel=crowned(1.0)).solve(flat)
 
 
 def test_a_load_that_yields_nothing_leaves_nothing() -> None:

@@ -89,11 +89,16 @@ class RollingPatch(PatchLoad):
             object.__setattr__(self, "load", replace(self.load, drive=None, lateral_force=None))
 
     def changed(self, **changes: Any) -> Self:
-        """See `PassingLoad`; influences of tractions are shared with a wheel of this elasticity."""
+        """See `PassingLoad`; influences of tractions are shared with a wheel of this elasticity.
+
+        The motions of a wheel are shared with the same wheel.
+        """
         other = replace(self, **changes)
         same = other.grid is self.grid and other.compliance is self.compliance
         if same and other.wheel.elasticity == self.wheel.elasticity:
             vars(other)["_influence"] = self._influence
+            if other.wheel is self.wheel:
+                vars(other)["_rolling"] = self._rolling
         return other
 
     @cached_property
