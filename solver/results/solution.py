@@ -35,7 +35,7 @@ from solver.results.contact_result import ContactResult, contact_result
 from solver.results.cycles import decided, shakedown_of
 from solver.results.export import write_vtu
 from solver.results.fields import SystemFields
-from solver.results.history import Observed, observe
+from solver.results.increments import Observed, observe
 from solver.results.mesh_fields import MeshFields
 from solver.results.shakedown import Shakedown
 from solver.results.view import Places

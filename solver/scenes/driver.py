@@ -19,11 +19,12 @@ from solver.loading.program import Program, walked
 from solver.loading.walker import Walker
 from solver.results.acting import acting_on
 from solver.results.cycles import decided
-from solver.results.outlines import outlines, singular_points
+from solver.results.outlines import outlines
 from solver.results.quantities import Quantity
 from solver.results.record import Record, Status
 from solver.results.run import FinishedRun, Output, Values
 from solver.results.samples import Samples
+from solver.results.singularity import singular_points
 from solver.scenes.scene import Monitor, Scene
 
 

@@ -200,7 +200,7 @@ def _until(description: Description, parameters: Any) -> bool:
 def _watch(
     description: Description, parameters: Any, samples: Samples, converged: Converged
 ) -> Any:
-    from solver.results.history import observe  # loads scipy
+    from solver.results.increments import observe  # loads scipy
 
     system: Any = samples.system
     watched = {

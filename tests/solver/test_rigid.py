@@ -12,7 +12,7 @@ from solver import Amplitude, Body, ContactPair, Coulomb, Material, Model, Model
 from solver.loading.control import PathControl
 from solver.mesh import graded, grid
 from solver.model.rigid import Moved, Pushed, RigidBody, RigidSurface, arc, line
-from solver.results.history import curve
+from solver.results.increments import curve
 
 pytestmark = pytest.mark.solves
 

@@ -27,7 +27,6 @@ import solver.results.acting
 import solver.results.contact_result
 import solver.results.extremes
 import solver.results.fields
-import solver.results.history
 import solver.results.increments
 import solver.results.places
 import solver.results.samples
@@ -597,7 +596,7 @@ MUTATIONS: dict[str, Mutation] = {
     "forces told an increment later": _file(
         instead(solver.results.increments, "_in_order", later), STORED
     ),
-    "reactions as actions": _file(instead(solver.results.history, "observe", other_way), STORED),
+    "reactions as actions": _file(instead(solver.results.increments, "observe", other_way), STORED),
     # numbers
     "integral times 1e-3": _file(
         instead(RequestedNumber, "_found", number_times("integral", 1e-3)), STORED
