@@ -17,16 +17,26 @@ from tests.studies.conftest import compute_here
 
 CONFIGURATION = Path(__file__).with_name("schemathesis.toml")
 
+IN_THE_SUITE = "# -- from here on for the suite alone"
+"""The line of the configuration above what holds for the suite alone."""
 PHASES = ("Examples", "Coverage", "Fuzzing", "Stateful")
 
 SHORT = ["--max-examples", "2"]
 """How far it may go in the suite: numbers of cases, and no time, which it would spend in full."""
 
 
-def explore(server: Server, extent: list[str], seed: int = 1) -> subprocess.CompletedProcess[str]:
-    """Let schemathesis go through its phases: examples, coverage, fuzzing, stateful."""
+def explore(
+    server: Server, extent: list[str], seed: int = 1, *, whole: bool = False
+) -> subprocess.CompletedProcess[str]:
+    """Let schemathesis go through its phases: examples, coverage, fuzzing, stateful.
+
+    Only a ``whole`` exploration posts a study in each of its thousand forms of coverage.
+    """
+    configuration = server.home / CONFIGURATION.name
+    always, _ = CONFIGURATION.read_text().split(IN_THE_SUITE)
+    configuration.write_text(always if whole else CONFIGURATION.read_text())
     command = [
-        *(sys.executable, "-m", "schemathesis.cli", "--config-file", str(CONFIGURATION)),
+        *(sys.executable, "-m", "schemathesis.cli", "--config-file", str(configuration)),
         *("run", f"http://127.0.0.1:{server.port}/openapi.json", "--continue-on-failure"),
         *("--seed", str(seed), "--no-color", *extent),
     ]

@@ -46,7 +46,7 @@ def half_open(server: Server) -> list[Figure]:
 def description(server: Server) -> list[Figure]:
     """Requests that schemathesis makes from the description of the service."""
     server.finished(server.post(fake_study("computed")))
-    found = explore(server, ["--max-examples", "5"], seed=7)
+    found = explore(server, ["--max-examples", "5"], seed=7, whole=True)
     if found.returncode:
         print(found.stdout[-3000:])
     phases = sum(f"✅ {each}" in found.stdout for each in PHASES)
