@@ -30,7 +30,7 @@ def _check_plane(part: Nodes) -> None:
     """Refuse a body in space: it has values at its points alone."""
     if part.basis.mesh.dim() == 3:
         allowed = "has no fields at nodes and places yet, and so no maps and files: take those at "
-        raise ModelError("element", part.body.element, allowed + "points, System.response")
+        raise ModelError("element", part.body.element, allowed + "points, System.state")
 
 
 def recovery(part: Nodes) -> sparse.csr_array:

@@ -10,7 +10,7 @@ members from the wrapped law.
 """
 
 from solver.materials.back_stress import ArmstrongFrederick, BackStress
-from solver.materials.curves import Curve, Table, Voce
+from solver.materials.curves import Curve, Power, Table, Voce
 from solver.materials.elastic_plastic import (
     Chaboche,
     ElasticPlastic,
@@ -43,6 +43,7 @@ __all__ = [
     "Material",
     "PlaneStress",
     "PlasticState",
+    "Power",
     "Profile",
     "Response",
     "SmoothMaterial",

@@ -15,6 +15,7 @@ from solver.typing import Array
 
 Saturation = Annotated[float, Interval(ge=0.0, le=1e7), Unit("MPa")]
 Rate = Annotated[float, Interval(gt=0.0, le=1e6), Unit("1")]
+Exponent = Annotated[float, Interval(ge=0.0, le=1.0), Unit("1")]
 
 
 class Curve(Protocol):
@@ -65,6 +66,42 @@ class Voce(Checked):
     def limit(self) -> float:
         """See `Curve`."""
         return math.inf if self.modulus else self.yield_stress + self.saturation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Power(Checked):
+    """A power of the strain that begins at first yield: Re (1 + p / e0)^n, with e0 = Re / E.
+
+    Attributes
+    ----------
+    yield_stress : Re, tensile stress at first yield [MPa]
+    youngs_modulus : E; the curve begins with the slope n E [MPa]
+    exponent : n
+
+    References
+    ----------
+    H.W. Swift, J. Mech. Phys. Solids 1 (1952) 1-18; M. Dao, N. Chollacoop, K.J. Van Vliet, T.A.
+    Venkatesh, S. Suresh, Acta Materialia 49 (2001) 3899-3918, eq. (3).
+    """
+
+    yield_stress: Modulus
+    youngs_modulus: Modulus
+    exponent: Exponent
+
+    def flow_stress(self, accumulated: Array) -> Array:
+        """See `Curve`."""
+        grown = 1 + accumulated * (self.youngs_modulus / self.yield_stress)
+        return np.asarray(self.yield_stress * grown**self.exponent)
+
+    def slope(self, accumulated: Array) -> Array:
+        """See `Curve`."""
+        grown = 1 + accumulated * (self.youngs_modulus / self.yield_stress)
+        return np.asarray(self.exponent * self.youngs_modulus * grown ** (self.exponent - 1))
+
+    @property
+    def limit(self) -> float:
+        """See `Curve`."""
+        return math.inf if self.exponent else self.yield_stress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.materials.back_stress import ArmstrongFrederick, BackStress
-from solver.materials.curves import Curve, Rate, Saturation, Table, Voce
+from solver.materials.curves import Curve, Exponent, Power, Rate, Saturation, Table, Voce
 from solver.materials.elastic_plastic import Chaboche
 from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
@@ -164,6 +164,23 @@ class VoceHardening(_Saturating, GrowingRule):
         if not self.saturation:
             raise ModelError("saturation", self.saturation, "must be given with voce hardening")
         return self.voce(yield_stress)
+
+
+@HARDENING.word("power")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PowerHardening(GrowingRule):
+    """The yield surface grows with a power of the strain."""
+
+    hardening_exponent: Exponent = described(
+        0.1, "exponent n of power hardening: stress Re (1 + E p / Re)^n at the plastic strain p"
+    )
+
+    def flow_curve(self, elasticity: Elasticity, yield_stress: float) -> Curve:
+        """Return the power law that begins at the yield stress."""
+        return Power(
+            yield_stress=yield_stress, youngs_modulus=elasticity.youngs_modulus,
+            exponent=self.hardening_exponent,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,6 +17,7 @@ from solver.materials import (
     Material,
     PlaneStress,
     PlasticState,
+    Power,
     Response,
     SmoothMaterial,
     SmoothSurface,
@@ -37,6 +38,7 @@ CURVES = {
     "none": SOFT,
     "linear": Voce(yield_stress=350.0, modulus=4918.0),
     "voce": Voce(yield_stress=350.0, saturation=120.0, rate=300.0),
+    "power": Power(yield_stress=350.0, youngs_modulus=2e5, exponent=0.1),
     "table": Table(plastic_strain=(0.0, 0.002, 0.02), stress=(350.0, 420.0, 480.0)),
 }
 BACK_STRESSES = {

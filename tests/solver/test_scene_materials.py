@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from solver import SCENES, ModelError, Status
@@ -14,6 +15,7 @@ from solver.materials import (
     Chaboche,
     Layered,
     PlaneStress,
+    Power,
     Table,
     TrescaMaterial,
     Voce,
@@ -26,6 +28,7 @@ CURVE = ((0.0, 350.0), (0.002, 420.0), (0.02, 480.0))
 BACK = ((60_000.0, 600.0), (4000.0, 20.0))
 LAWS: dict[str, dict[str, Any]] = {
     "voce": {"hardening": "voce", "saturation": 100.0, "saturation_rate": 50.0},
+    "power": {"hardening": "power", "hardening_exponent": 0.2, "youngs_modulus": 70e3},
     "table": {"hardening": "table", "curve": CURVE},
     "chaboche": {"hardening": "chaboche", "back_stresses": BACK},
     "layered": {"hardening": "layered", "curve": CURVE},
@@ -43,7 +46,8 @@ def test_each_word_stands_for_its_law() -> None:
     laws = {name: PunchParameters(**own).material() for name, own in LAWS.items()}
     kinds = {name: type(law) for name, law in laws.items()}
     assert kinds == {
-        "voce": Chaboche, "table": Chaboche, "chaboche": Chaboche, "layered": Layered,
+        "voce": Chaboche, "power": Chaboche, "table": Chaboche, "chaboche": Chaboche,
+        "layered": Layered,
         "tresca": TrescaMaterial, "tresca, isotropic": TrescaMaterial,
         "tresca, table": TrescaMaterial,
     }  # fmt: skip
@@ -54,6 +58,10 @@ def test_each_word_stands_for_its_law() -> None:
     assert table.curve == Table(plastic_strain=(0.0, 0.002, 0.02), stress=(350.0, 420.0, 480.0))
     assert chaboche.back_stresses == tuple(ArmstrongFrederick(*each) for each in BACK)
     assert not (voce.back_stresses or table.back_stresses)
+    power = laws["power"]
+    assert isinstance(power, Chaboche)
+    assert power.curve == Power(yield_stress=350.0, youngs_modulus=70e3, exponent=0.2)
+    assert power.curve.flow_stress(np.array([0.0, 0.005])) == pytest.approx([350.0, 350 * 2**0.2])
     hard = laws["tresca, isotropic"]
     assert isinstance(hard, TrescaMaterial)
     linear = PunchParameters(hardening="isotropic").material()
@@ -101,7 +109,7 @@ def test_a_curve_that_another_rule_of_the_sweep_needs_is_no_mistake() -> None:
         ({"hardening": "chaboche", "back_stresses": (("a", "b"),)}, "back_stresses[0][0]",
          "a number"),
         ({"yield_condition": "tresca", "hardening": "kinematic"}, "hardening",
-         "none, isotropic, voce, table"),
+         "none, isotropic, voce, power, table"),
     ],
 )  # fmt: skip
 def test_what_does_not_go_together_is_refused(

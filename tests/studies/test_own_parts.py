@@ -67,7 +67,7 @@ HELD = (
 EXPONENTS = (2.0, 8.0, 20.0)
 SWIFT = 0.002 * ((420.0 / 350.0) ** (1 / 0.3) - 1)
 """Plastic strain at which 350 MPa (1 + p / 0.002)^0.3 is 420 MPa."""
-WORDS = "none, isotropic, kinematic, mixed, voce, table, chaboche, layered"
+WORDS = "none, isotropic, kinematic, mixed, voce, power, table, chaboche, layered"
 RUN_ID = """
 from studies import Study
 study = Study.from_dict({"name": "a", "scene": "ball", "sweep": {"load_ratio": [1.0]}})
@@ -191,7 +191,7 @@ def test_a_yield_surface_of_ones_own_is_known_to_scenes_and_rolls(called: Called
     ]
     assert word == "yield_condition = 'round': must be one of mises, tresca, hosford"
     assert exponent == "hosford_exponent = 1.0: must be at least 2 and at most 100"
-    rules = "none, isotropic, voce, table where yield_condition is hosford"
+    rules = "none, isotropic, voce, power, table where yield_condition is hosford"
     assert rule == f"hardening = 'kinematic': must be one of {rules}"
     assert idle.endswith(
         "changes nothing in any run of this study: needs yield_condition = hosford"

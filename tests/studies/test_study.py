@@ -116,7 +116,7 @@ def test_bad_input_names_field_value_and_what_is_allowed(
             "punch",
             {"sweep": {"hardening": ["none", "soft"]}},
             "sweep.hardening[1] = 'soft': must be one of none, isotropic, kinematic, mixed, voce, "
-            "table, chaboche, layered",
+            "power, table, chaboche, layered",
         ),
         (
             "rolling",
