@@ -1,4 +1,4 @@
-"""Indentation by a ball: force, approach, and residual crater."""
+"""Indentation by a ball: force, approach, crater; by a sharp rigid body: force and work."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from solver.mesh.rounding import ROUNDED
 from solver.parameters import Checked, Length, described
 from solver.results.contact_result import contact_patches
 from solver.results.fields import Bodies, Solved
+from solver.results.increments import curve
 from solver.results.outputs import output
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values
@@ -105,3 +106,33 @@ class Indentation(Checked):
         y = X[1, axis]
         centre = self.radius if y.max() > 0 else -self.radius
         return float(-np.sign(centre) * np.interp(centre, y, moved))
+
+
+LOADING_CURVATURE = declare(
+    "loading_curvature", "force over the square of the depth at the largest depth", "MPa"
+)
+IRREVERSIBLE_WORK = declare(
+    "irreversible_work", "share of the work of pressing in that withdrawal does not give back"
+)
+
+
+@output("sharp_indentation", "release")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SharpIndentation(Checked):
+    """Force and work of a rigid cone or wedge that moves into a body along y, and back.
+
+    Work is integrated by the trapezoidal rule over increments.
+    """
+
+    rigid: str = described(MISSING, "name of the rigid body")
+
+    def __call__(self, run: FinishedRun) -> Values:
+        """Return the quantities of a run."""
+        _, _, y, _, _, force, _ = np.abs(curve(run.outcome.history, self.rigid))
+        deepest = int(y.argmax())
+        into = np.trapezoid(force[: deepest + 1], y[: deepest + 1])
+        back = -np.trapezoid(force[deepest:], y[deepest:])
+        return {
+            LOADING_CURVATURE: float(force[deepest] / y[deepest] ** 2),
+            IRREVERSIBLE_WORK: float(1 - back / into),
+        }

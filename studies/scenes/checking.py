@@ -266,9 +266,10 @@ def _results(scene: tables.SceneFile) -> Iterator[StudyError]:
     for side in taken.surfaces:
         yield from _one_of("results.surfaces", side.partition(".")[0], scene.bodies)
     for word in taken.words:
-        body = getattr(getattr(taken, word, None), "body", None)
-        if body is not None:
-            yield from _one_of(f"results.{word}.body", body, scene.bodies)
+        for entry, parts in (("body", scene.bodies), ("rigid", scene.rigid)):
+            part = getattr(getattr(taken, word, None), entry, None)
+            if part is not None:
+                yield from _one_of(f"results.{word}.{entry}", part, parts)
     if not math.isclose(math.hypot(*taken.axis.along), 1.0, rel_tol=1e-9):
         yield StudyError("results.axis.along", list(taken.axis.along), "must have the length 1")
     for name, line in scene.results.lines.items():

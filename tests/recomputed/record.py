@@ -110,7 +110,8 @@ _FORMULAS = """
     singular_power singular_power_error singular_intensity apparent_power fraction
     peak_contact_pressure_s increment increment_time force approach mean_contact_pressure
     crater_depth pile_up pile_up_radius surface_displacement increment_force increment_approach
-    increment_radius pressure_error stick_half_width stick_fraction plastic_work increments
+    increment_radius loading_curvature irreversible_work
+    pressure_error stick_half_width stick_fraction plastic_work increments
     cut_increments iterations median_iterations inner_fallbacks blended_tangents cpu_seconds
     degrees_of_freedom hoop_stress outline outline_x outline_y singular singular_x singular_y
     singular_s singular_radius residual_x_half_plane residual_x_punch cycle
