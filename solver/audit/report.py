@@ -134,7 +134,8 @@ def audit(
     return Audit(
         figures,
         violations=_violations(system, figures, loaded, pairs) + _severed([*bodies, *released]),
-        warnings=sum((pair.warnings for pair in pairs), warnings(figures)),
+        warnings=sum((pair.warnings for pair in pairs), warnings(figures))
+        + system.distorted(loaded.state),
         outside=tuple(text + mend for each in neglected for text in each.outside)
         + elastic_strain(system, every).outside
         + sum((pair.outside for pair in pairs), turned(system, loaded)),

@@ -351,6 +351,12 @@ class System:
         """Return a surface of a whole body, meshed or rigid."""
         return self._chains[name].chain(boundary)
 
+    def distorted(self, state: State) -> tuple[str, ...]:
+        """Return messages on distorted elements in bodies of large strain."""
+        each = zip(self.parts, state.u, strict=True)
+        found = (part.distorted(u) for part, u in each if isinstance(part, LargeDiscretisation))
+        return tuple(filter(None, found))
+
     def displacement(self, name: str, state: State) -> Array:
         """Return the displacements (n,) of a whole body [mm]."""
         number = self.part(name)

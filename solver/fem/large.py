@@ -26,6 +26,18 @@ _STEP = 1e-5
 """Step of central differences over the length of an edge."""
 
 
+_DISTORTED = 0.2
+"""Share of its shape that a distorted element keeps, at most."""
+
+
+def _shapes(x: Array) -> Array:
+    """Return least corner triangle over longest side squared, of polygons (2, k, n)."""
+    ahead, back = np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x
+    area = ahead[0] * back[1] - ahead[1] * back[0]
+    turn = np.sign(area.sum(axis=0))
+    return np.asarray((turn * area).min(axis=0) / (ahead**2).sum(axis=0).max(axis=0))
+
+
 class _Follower:
     """The forces of a load that follows a boundary.
 
@@ -122,6 +134,25 @@ class LargeDiscretisation(Discretisation):
         for each in self._following:
             each.add_stiffness(K, *response.place)
         return self._assembly.values(slice(None), K)
+
+    def distorted(self, u: Array) -> str:
+        """Return a message on the element that displacements u (n,) distort most, or nothing.
+
+        Its shape is the smallest triangle at a corner over the square of the longest side, as a
+        share of that before loading.
+        """
+        corners = self.body.mesh.t
+        each = [_shapes(x[:, corners]) for x in (self.X, self.X + vectors(u, self.dim))]
+        share = each[1] / each[0]
+        worst = int(share.argmin())
+        if share[worst] > _DISTORTED:
+            return ""
+        (x, y), name = self.X[:, corners[:, worst]].mean(axis=1), self.body.name
+        left = f"keeps {share[worst]:.0%} of its shape" if share[worst] > 0 else "is folded"
+        return (
+            f"the element of {name} that was at ({x:z.4g}, {y:z.4g}) {left}: make the elements "
+            "there larger, or reduce the load"
+        )
 
     def during(self, time: float, u: Array) -> LargeDiscretisation:
         """Return the body for an increment from displacements u: its rotation is about its place.

@@ -373,7 +373,9 @@ class Stepper:
         growing = any(part.grows(reached, attempted) for part in self.system.parts)
         if why.limit and growing:
             return LimitLoad(f"no equilibrium {way}: {why}", reached, attempted)
-        hint = spent(self.system, point.now.state)
+        hint = "; ".join([
+            spent(self.system, point.now.state), *self.system.distorted(point.now.state)
+        ])  # fmt: skip
         return NotConverged(f"the increment {way} failed: {failure}{hint}", reached, attempted)
 
     def _timed(self, tally: Tally) -> Tally:

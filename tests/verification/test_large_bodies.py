@@ -190,6 +190,17 @@ def test_small_strain_names_the_parameter_that_mends_it_and_large_strain_is_ok()
     assert large < 0.7 * small
 
 
+@pytest.mark.parametrize(("down", "messages"), [(-0.3, 0), (-0.7, 1)])
+def test_a_squeezed_element_is_reported_with_its_place(down: float, messages: int) -> None:
+    hardens = Material(youngs_modulus=E, poisson_ratio=0.3, yield_stress=400.0,
+                       hardening_ratio=0.02)  # fmt: skip
+    squeezed = block((0.0, 1.0), (0.0, 1.0), (1, 1), supports={"left": "x", "bottom": "y"},
+                     material=hardens, loads=(Displacement(boundary="top", y=down),))  # fmt: skip
+    warnings = solved(squeezed, 0.05).audit().warnings
+    assert len(warnings) == messages
+    assert all("(0.5, 0.5) keeps 9% of its shape: make" in text for text in warnings)
+
+
 def test_a_pressed_block_that_plates_turn_keeps_its_stress() -> None:
     """Objectivity through the solver: both plates turn by 1 rad about one centre, in contact."""
     press, turn = Amplitude([0, 1, 2], [0, 1, 1]), Amplitude([1, 2], [0, 1])
