@@ -74,12 +74,16 @@ class Bar:
 
     def plastic_strain(self) -> float:
         """Return the plastic strain under load, from the curve of tension."""
-        stress = self.load * YIELD
+        return self.plastic_strain_at(self.load * YIELD)
+
+    def plastic_strain_at(self, stress: float) -> float:
+        """Return the plastic strain at a stress [MPa], from the curve of tension."""
         if stress <= YIELD:
             return 0.0
-        return float(brentq(lambda p: self._curve(p) - stress, 0.0, 10.0, xtol=1e-14))
+        return float(brentq(lambda p: self.curve(p) - stress, 0.0, 10.0, xtol=1e-14))
 
-    def _curve(self, p: float) -> float:
+    def curve(self, p: float) -> float:
+        """Return the stress of the curve of tension at a plastic strain [MPa]."""
         law = self.law
         if isinstance(law, Layered):
             points = zip(law.yields, law.weights, strict=True)
