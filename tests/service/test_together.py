@@ -81,7 +81,8 @@ def test_a_lost_queue_is_made_anew_from_the_studies(lively: Server) -> None:
     wait_until(lambda: seen.append(lively.client.get("/health")) or seen[-1].status_code == 200)
     if seen[0].status_code != 200:
         assert seen[0].json()["queue_readable"] is False
-    for study_id, end in ends.items():
+    for study_id, end in ends.items():  # the first that needs the queue may find it lost
+        wait_until(lambda s=study_id: lively.client.get(f"/studies/{s}").status_code != 503)
         found = lively.study(study_id)
         for part in ("status", "message", "counts", "runs", "sweep"):
             assert found[part] == end[part]
