@@ -5,9 +5,9 @@ With the field of a mode of intensity one, marked *, and q that falls from one a
 I = int (s_ij u*_i,1 + s*_ij u_i,1 - s*:e d_1j) q_,j - e0:(s* q),1 dA - int t_i u*_i,1 q ds
   - int b_i u*_i,1 q dA,  K = E' I / 2
 
-where e is the elastic strain, e0 the strain of heat and initial stress, b the force per volume and t
-the traction on the faces. The term of e0 is integrated by parts: e0 need not be smooth. A constant
-e0 adds nothing; its value at the tip is subtracted, so that the integrand stays integrable.
+where e is the elastic strain, e0 the strain of heat and initial stress, b the force per volume and
+t the traction on the faces. The term of e0 is integrated by parts: e0 need not be smooth. A
+constant e0 adds nothing; its value at the tip is subtracted: the integrand stays integrable.
 
 References
 ----------
@@ -35,7 +35,7 @@ Forces = Callable[[Array, Array, Ints], Array]
 along which the body is on the left (2, n_edges, n_points), and of the edges (n_edges, 3)."""
 
 
-class Field(NamedTuple):
+class AtPoints(NamedTuple):
     """What a body has at its points, components xx, yy, zz, xy first (4, n_elements, n_points).
 
     Attributes
@@ -54,7 +54,7 @@ class Field(NamedTuple):
 
 
 def by_integral(
-    tip: Tip, field: Field, elastic: PlaneElasticity, q: Array, forces: tuple[Forces, Forces]
+    tip: Tip, field: AtPoints, elastic: PlaneElasticity, q: Array, forces: tuple[Forces, Forces]
 ) -> Array:
     """Return K_I and K_II (2,) [MPa sqrt(mm)] of a domain q (n_nodes,); see the module.
 
@@ -74,8 +74,7 @@ def by_integral(
     stress, strain, given = (_turned(each[:, own], R) for each in field[1:4])
     force = np.tensordot(R, field.body_force[:, own], 1)
     r, angle = tip.polar(part.points[:, own])
-    nearest = np.unravel_index(r.argmin(), r.shape)
-    given = given - given[:, *nearest][:, None, None]
+    given = given - given.reshape(4, -1)[:, r.argmin()].reshape(4, 1, 1)
     found = []
     for mode in (0, 1):
         near = near_tip(r, angle, mode, elastic)

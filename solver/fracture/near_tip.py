@@ -71,11 +71,11 @@ def near_tip(r: Array, angle: Array, mode: int, elastic: PlaneElasticity) -> Nea
     f1, f2 = -f / (2 * z), 3 * f / (4 * z**2)
     psi, psi1 = sign * f - f - z * f1, sign * f1 - 2 * f1 - z * f2
     moved = (kappa * f - f.conj() - z * f1.conj() - psi.conj()) / (2 * shear)
-    each = [
+    stress, stress_x = (
         _components(4 * s.real, 2 * d, across)
         for s, d in ((f, z.conj() * f1 + psi), (f1, f1 + z.conj() * f2 + psi1))
-    ]
-    return NearTip(*each, np.stack([moved.real, moved.imag]))
+    )
+    return NearTip(stress, stress_x, np.stack([moved.real, moved.imag]))
 
 
 def _components(total: Array, apart: Array, across: float) -> Array:

@@ -89,7 +89,9 @@ def tips_of(part: Nodes) -> list[Tip]:
         for node in nodes:
             # the body is on the left of an edge: the upper face ends at the tip
             at_end = bool((left[:, 1] == node).any())
-            upper, lower = (_from_tip(e, node) for e in ((left, right) if at_end else (right, left)))
+            upper, lower = (
+                _from_tip(e, node) for e in ((left, right) if at_end else (right, left))
+            )
             along = part.X[:, node] - part.X[:, upper[0, 0]]
             end = (".end" if at_end else ".start") if len(nodes) > 1 else ""
             found.append(Tip(

@@ -76,9 +76,7 @@ def opened(mesh: Mesh, name: str, start: Point, end: Point) -> Mesh:
     return replace(made, _subdomains=mesh.subdomains)
 
 
-def _on_line(
-    mesh: Mesh, name: str, corners: Array, start: Array, end: Array
-) -> tuple[Bools, Ints]:
+def _on_line(mesh: Mesh, name: str, corners: Array, start: Array, end: Array) -> tuple[Bools, Ints]:
     """Return which corners lie on a line (n_corners,), and the facets along it, which cover it."""
     length = float(np.hypot(*(end - start)))
     e = (end - start) / (length or 1.0)

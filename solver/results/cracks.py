@@ -12,7 +12,7 @@ from annotated_types import Interval
 
 from solver.contact.state import BodyState
 from solver.fem.surface import edges_of
-from solver.fracture.intensity import Field, Forces, by_displacements, by_integral, tensor
+from solver.fracture.intensity import AtPoints, by_displacements, by_integral, tensor
 from solver.fracture.near_tip import PlaneElasticity
 from solver.fracture.tip import Tip, tips_of
 from solver.mesh.edges import shape_functions
@@ -98,7 +98,7 @@ def _at(system: Any, converged: Any, state: Any, tip: Tip, rings: int) -> Stress
         force = load.body_force(part.positions)
         if force is not None:
             pushed += load.factor(time) * force.reshape(pushed.shape)
-    field = Field(
+    field = AtPoints(
         u, tensor(state.stress, shape), tensor(strain, shape), tensor(given, shape), pushed
     )
     upper, lower = (
@@ -193,7 +193,7 @@ def _on_face(
     return total
 
 
-@output("cracks")
+@output("cracks", "crack")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cracks(Checked):
     """Stress intensities K_I and K_II at the tips of all cracks."""
