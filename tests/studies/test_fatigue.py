@@ -44,6 +44,13 @@ def test_an_elastic_rolling_contact_is_as_in_theory() -> None:
     assert -record.scalars["fatigue_y"] == pytest.approx(0.60 * a, rel=0.15)
     profile = record.fields["fatigue_utilisation_profile"][1]
     assert profile.max() == pytest.approx(record.scalars["fatigue_utilisation"], rel=0.02)
+    p, shear, limit = (
+        record.fields[f"fatigue_path_{name}"][1] for name in ("hydrostatic", "shear", "limit")
+    )
+    factor = record.scalars["fatigue_safety_factor"]
+    assert (shear < limit).all()
+    used = (shear + DANG_VAN["limits"]["sensitivity"] * p).max() / DANG_VAN["limits"]["torsion"]
+    assert 1 / used == pytest.approx(factor)
 
 
 @pytest.mark.solves
