@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -17,9 +16,6 @@ _DEVIATOR = np.array(
     [[1, -1, 0, 0, 0, 0], [-1 / 3**0.5, -1 / 3**0.5, 2 / 3**0.5, 0, 0, 0], *2 * np.eye(6)[3:]]
 ) / np.sqrt(2.0)  # fmt: skip
 """The five coordinates of a deviator, whose square sum is that of its components."""
-
-_PLACES = {"11": 0, "22": 1, "33": 2, "12": 3, "13": 5, "23": 4}
-"""Components in the order of pyLife, and here."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,24 +75,6 @@ class Paths:
         moved = self.stress - centres[:, None]
         moved[..., :3] -= moved[..., :3].mean(axis=2, keepdims=True)
         return np.asarray(_largest_shear(np.ascontiguousarray(moved.swapaxes(1, 2))))
-
-    def to_dataframe(self) -> Any:
-        """Return the paths as pyLife reads them: rows by ``load_step`` and ``node_id``, a point.
-
-        Columns are ``S11``, ``S22``, ``S33``, ``S12``, ``S13``, ``S23`` of stress [MPa], and
-        ``E11`` to ``E23`` of strain, if it is known.
-        """
-        import pandas as pd  # takes half a second
-
-        steps, points = range(self.stress.shape[1]), range(len(self))
-        index = pd.MultiIndex.from_product([steps, points], names=["load_step", "node_id"])
-        columns = {
-            f"{letter}{place}": tensor[..., k].T.ravel()
-            for letter, tensor in (("S", self.stress), ("E", self.strain))
-            if tensor is not None
-            for place, k in _PLACES.items()
-        }
-        return pd.DataFrame(columns, index=index)
 
     @property
     def turned(self) -> Array:

@@ -223,14 +223,6 @@ def test_planes_of_paths_out_of_phase_are_almost_always_the_very_worst() -> None
     assert missed.max() < 5e-3 and np.mean(missed < 1e-12) >= 0.97
 
 
-def test_paths_are_tables_with_the_names_of_pylife() -> None:
-    paths = elastic(np.arange(36.0).reshape(2, 3, 6))
-    table = paths.to_dataframe()
-    assert table.index.names == ["load_step", "node_id"] and table.shape == (6, 12)
-    assert list(table.columns[:6]) == ["S11", "S22", "S33", "S12", "S13", "S23"]
-    assert table.loc[(2, 1)].tolist()[:6] == paths.stress[1, 2, [0, 1, 2, 3, 5, 4]].tolist()
-
-
 def test_a_path_has_two_instants_or_more() -> None:
     with pytest.raises(ModelError, match="2 instants or more"):
         Paths(cycle((300, 0, 0, 0, 0, 0)))
