@@ -52,9 +52,8 @@ class Tip(NamedTuple):
         reached the outline, another crack or another tip, and of none if there is no room.
         """
         mesh, basis = self.part.body.mesh, self.part.basis
-        own = np.concatenate([self.part.body.facets(face) for face in self._faces])
         barred = np.zeros(mesh.nvertices, dtype=bool)
-        barred[mesh.facets[:, np.setdiff1d(mesh.boundary_facets(), own)]] = True
+        barred[mesh.facets[:, np.setdiff1d(mesh.boundary_facets(), self.facets)]] = True
         inside, done = np.arange(mesh.nvertices) == self.vertex, 0
         for _ in range(rings):
             wider = _grown(mesh.t, inside)
@@ -67,8 +66,14 @@ class Tip(NamedTuple):
         return values, done
 
     @property
-    def _faces(self) -> tuple[str, str]:
-        return faces_of(self.name.split(".")[1])
+    def sides(self) -> set[tuple[str, str]]:
+        """Its faces, by body and boundary."""
+        return {(self.part.body.name, face) for face in faces_of(self.name.split(".")[1])}
+
+    @property
+    def facets(self) -> Ints:
+        """The facets of both faces."""
+        return np.concatenate([self.part.body.facets(face) for _, face in self.sides])
 
 
 def _grown(t: Ints, inside: Bools) -> Bools:

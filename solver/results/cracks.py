@@ -16,7 +16,6 @@ from solver.fracture.intensity import AtPoints, by_displacements, by_integral, t
 from solver.fracture.near_tip import PlaneElasticity
 from solver.fracture.tip import Tip, tips_of
 from solver.mesh.edges import shape_functions
-from solver.mesh.opening import faces_of
 from solver.parameters import Checked, described
 from solver.results.outputs import output
 from solver.results.quantities import along_axes, declare, declare_along
@@ -60,9 +59,7 @@ class StressIntensity(NamedTuple):
     why: str
 
 
-def stress_intensities(
-    system: Any, converged: Any, rings: int = _RINGS, bodies: tuple[str, ...] = ()
-) -> list[StressIntensity]:
+def stress_intensities(system: Any, converged: Any, rings: int = _RINGS) -> list[StressIntensity]:
     """Return the stress intensities at all tips in a state.
 
     The domain of the integral is so many rings of elements around the tip and the next one, fewer
@@ -70,7 +67,7 @@ def stress_intensities(
     plastic strain nearer to the tip is allowed, K is then that of the elastic field around it.
     """
     found = []
-    for name in bodies or system.names:
+    for name in system.names:
         body = system.full(name)
         tips = tips_of(body) if body.body.cracks else []
         state = system.state(name, converged) if tips else None
@@ -121,20 +118,11 @@ def _void(system: Any, part: Any, state: BodyState, tip: Tip, q: Array) -> str:
         return "stiffness differs in the domain"
     for interface in system.interfaces:
         pair = interface.declared
-        sides = [side for side in (pair.slave, pair.master) if side[0] == part.body.name]
-        touched = [side for side in sides if _shared(part, side[1], tip)]
-        if touched and {pair.slave, pair.master} != {(part.body.name, f) for f in _faces(tip)}:
+        sides = {pair.slave, pair.master}
+        own = [part.body.facets(boundary) for name, boundary in sides if name == part.body.name]
+        if sides != tip.sides and any(np.isin(each, tip.facets).any() for each in own):
             return "a face touches another boundary than the whole other face"
     return ""
-
-
-def _faces(tip: Tip) -> tuple[str, str]:
-    return faces_of(tip.name.split(".")[1])
-
-
-def _shared(part: Any, boundary: str, tip: Tip) -> bool:
-    own = np.concatenate([part.body.facets(face) for face in _faces(tip)])
-    return bool(np.isin(part.body.facets(boundary), own).any())
 
 
 _Contact = Callable[[Array, Ints], Array] | None
@@ -145,10 +133,9 @@ def _acting(system: Any, converged: Any, tip: Tip, face: int) -> _Contact:
 
     It is the field of the contact problem: values at the vertices of the slave, linear in between.
     """
-    body = tip.part.body.name
     for k, interface in enumerate(system.interfaces):
         pair = interface.declared
-        if {pair.slave, pair.master} != {(body, each) for each in _faces(tip)}:
+        if {pair.slave, pair.master} != tip.sides:
             continue
         contact = converged.state.contacts[k]
         area = system.pairing(converged.state, k).area
