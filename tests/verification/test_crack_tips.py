@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from solver import (
     Pressure,
     Solution,
     Temperature,
+    Traction,
     solve,
 )
 from solver.fatigue import stress_intensity
@@ -69,6 +71,27 @@ def test_edge_crack_under_constant_and_linear_stress(cells: str) -> None:
             assert abs(tip.K[1]) < 5e-3 * tip.K[0]
         assert tip.of_faces[0] == pytest.approx(tip.K[0], rel=0.08)
     assert tip.tip == "plate.root" and tip.at.tolist() == [LENGTH, 0.0]
+
+
+@pytest.mark.parametrize("outwards", [False, True])
+def test_shear_on_the_faces_of_a_crack_that_is_turned(outwards: bool) -> None:
+    """1.1215 tau sqrt(pi a), positive where the upper face, seen from the tip, moves ahead."""
+    turn = np.array([[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]])
+    plain, tip = grid(*lines()), (LENGTH * np.cos(0.5), LENGTH * np.sin(0.5))
+    ends = (tip, (0.0, 0.0)) if outwards else ((0.0, 0.0), tip)
+    shear = {"left": 50 * turn[:, 0], "right": -50 * turn[:, 0]}
+    body = Body(
+        name="plate", mesh=opened(replace(plain, doflocs=turn @ plain.p), "root", *ends),
+        material=Material(**STEEL), cracks=("root",), supports={"right": "xy"},
+        loads=tuple(
+            Traction(boundary=f"root_{side}", x=float(x), y=float(y))
+            for side, (x, y) in shear.items()
+        ),
+    )  # fmt: skip
+    (found,) = solve(Model(bodies=(body,)), control=ONCE).stress_intensities()
+    sign = -1 if outwards else 1
+    assert found.K == pytest.approx(np.array([0.0, sign * 50 * 1.1215 * UNIT]), rel=2e-3, abs=1e-6)
+    assert np.sign(found.of_faces[1]) == sign and found.at == pytest.approx(np.array(tip))
 
 
 @pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress"])
