@@ -63,6 +63,7 @@ _HOMES = {
     "sensitivity": "views.sensitivity",
     "summary": "views.tables",
     "sweep": "execution.function",
+    "to_dataframe": "views.solution",
     "to_grid": "views.picking",
     "to_xarray": "views.solution",
 }
@@ -98,6 +99,7 @@ __all__ = [
     "sensitivity",
     "summary",
     "sweep",
+    "to_dataframe",
     "to_grid",
     "to_xarray",
 ]

@@ -33,6 +33,8 @@ _CORNER = float(np.radians(40.0))
 """Angle between the normals of two edges: they form a corner at a larger angle."""
 _OPPOSED = 0.25
 """Cosine of the angle between surfaces that face each other, at least."""
+_NO_TANGENT = 1e-9
+"""Tangent over the length of an edge: a shorter one is rounding."""
 _STRAIGHT = 1e-6
 """Change of the normals along a straight surface [rad], at most."""
 _SHARE = 0.05
@@ -325,11 +327,18 @@ def _normals(x: Array, surface: Surface, edges: Ints, xi: Array) -> Array:
 
 
 def _at_ends(x: Array, surface: Surface) -> tuple[Array, Array]:
-    """Return the normals (2, n_edges) of each edge at its start and at its end."""
-    count = surface.edges.shape[1]
-    tangents = [x[:, surface.edges] @ shape_derivatives(np.array(xi), count) for xi in (-1.0, 1.0)]
-    first, last = (np.stack([t[1], -t[0]]) / np.linalg.norm(t, axis=0) for t in tangents)
-    return first, last
+    """Return the normals (2, n_edges) of each edge at its start and at its end.
+
+    At the tip of a crack the tangent of the undeformed edge is zero: that between its ends counts.
+    """
+    each = []
+    for xi in (-1.0, 1.0):
+        slope = shape_derivatives(np.array(xi), surface.edges.shape[1])
+        at_rest = np.linalg.norm(surface.X[:, surface.edges] @ slope, axis=0)
+        chord = x[:, surface.edges[:, 1]] - x[:, surface.edges[:, 0]]
+        t = np.where(at_rest > _NO_TANGENT * surface.lengths, x[:, surface.edges] @ slope, chord)
+        each.append(np.stack([t[1], -t[0]]) / np.linalg.norm(t, axis=0))
+    return each[0], each[1]
 
 
 class _Partner:

@@ -10,16 +10,23 @@ from solver.typing import Array
 
 _CORNER = float(np.cos(np.radians(40.0)))
 """Cosine of the angle between the normals of two edges: they form a corner at a larger angle."""
+_ZERO = 1e-9
+"""Length of a tangent over that of its edge: a shorter one is zero."""
 _STRAIGHT = 1e-6
 """Change of the normal along a straight surface by rounding [rad], at most; the sagitta of an
 element is then 1e-7 of its length."""
 
 
 def _edge_normal(x: Array, surface: Surface, xi: float) -> Array:
-    """Return outward unit normals (2, n_edges) at ``xi`` on every edge."""
-    count = surface.edges.shape[1]
-    d = shape_derivatives(np.array(xi), count)
+    """Return outward unit normals (2, n_edges) at ``xi`` on every edge.
+
+    Where the middle node of an edge is a quarter of it from an end, the tangent there is zero
+    before loading: then it is the direction between the ends.
+    """
+    d = shape_derivatives(np.array(xi), surface.edges.shape[1])
     t = x[:, surface.edges] @ d
+    gone = np.hypot(*(surface.X[:, surface.edges] @ d)) <= _ZERO * surface.lengths
+    t[:, gone] = np.diff(x[:, surface.edges[gone, :2]])[..., 0]
     n = np.stack([t[1], -t[0]])
     return np.asarray(n / np.linalg.norm(n, axis=0))
 

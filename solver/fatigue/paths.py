@@ -77,7 +77,7 @@ class Paths:
         return np.asarray(_largest_shear(np.ascontiguousarray(moved.swapaxes(1, 2))))
 
     @property
-    def turned(self) -> list[Array]:
-        """The paths (n, 6, n_instants) of stress and, if known, of strain, as kernels read them."""
-        known = (self.stress, self.strain)
-        return [np.ascontiguousarray(own.swapaxes(1, 2)) for own in known if own is not None]
+    def turned(self) -> Array:
+        """The paths (n, n_kinds, 6, n_instants) of stress and, if known, of strain, for kernels."""
+        known = [own for own in (self.stress, self.strain) if own is not None]
+        return np.ascontiguousarray(np.stack(known, axis=1).swapaxes(2, 3))

@@ -14,6 +14,8 @@ from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.typing import Array, Ints
 
 _CORNER = float(np.cos(np.radians(30.0)))
+_NO_TANGENT = 1e-9
+"""Tangent over the length of an edge: a shorter one is rounding."""
 
 
 @dataclass(frozen=True)  # without slots: cached properties need a __dict__
@@ -193,7 +195,13 @@ def _goes_on(part: Nodes, edge: Ints, at: int) -> bool:
 
 
 def _leaving(X: Array, end: int, other: int, middle: int | None) -> Array:
-    """Return the tangent (2,) of an edge at its ``end``, pointing away from it."""
+    """Return the tangent (2,) of an edge at its ``end``, pointing away from it.
+
+    It is zero where the middle is a quarter of the edge away, at the tip of a crack: then it is the
+    direction of the other end.
+    """
+    chord = np.asarray(X[:, other] - X[:, end])
     if middle is None:
-        return np.asarray(X[:, other] - X[:, end])
-    return np.asarray(4 * X[:, middle] - 3 * X[:, end] - X[:, other])
+        return chord
+    along = np.asarray(4 * X[:, middle] - 3 * X[:, end] - X[:, other])
+    return along if np.hypot(*along) > _NO_TANGENT * np.hypot(*chord) else chord

@@ -15,6 +15,7 @@ _HOMES = {
     "mapped": "grids",
     "marked": "grids",
     "merged": "grids",
+    "opened": "opening",
     "pad": "shapes",
     "rectangle": "shapes",
     "refined": "lines",

@@ -8,6 +8,7 @@ not matter. A mesh in space is not checked for overlaps, cracks and hinges.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NoReturn
 
 import numpy as np
@@ -32,19 +33,21 @@ _ROUNDING = 8 * np.finfo(float).eps
 """Relative rounding error of coordinates after a few operations."""
 
 
-def check_mesh(mesh: Mesh, name: str, kind: ElementType) -> None:
+def check_mesh(mesh: Mesh, name: str, kind: ElementType, faces: Sequence[Ints] = ()) -> None:
     """Raise `ModelError` if the mesh of body ``name`` is folded, overlaps, or is not one piece.
 
-    Errors give the numbers of elements and nodes in the mesh.
+    Errors give the numbers of elements and nodes in the mesh. ``faces`` are the facets of each face
+    of cracks: their nodes may lie on one another, and at a tip the Jacobian may be zero.
     """
     where = f'of body "{name}"'
     _check_nodes(mesh, where, kind)
-    sense = _check_elements(mesh, where, kind)
+    on_face = np.unique(mesh.facets[:, np.concatenate([*faces, np.zeros(0, dtype=int)])])
+    sense = _check_elements(mesh, where, kind, on_face)
     if kind.dim == 3:
         _check_connected(mesh, where)
         return
     _check_neighbours(mesh, where, sense)
-    _check_cracks(mesh, where)
+    _check_cracks(mesh, where, on_face)
     _check_connected(mesh, where)
     _check_hinges(mesh, where)
 
@@ -88,9 +91,11 @@ def _jacobians(mesh: Mesh, kind: ElementType) -> Array:
     return np.asarray(J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0])
 
 
-def _check_elements(mesh: Mesh, where: str, kind: ElementType) -> Array:
+def _check_elements(mesh: Mesh, where: str, kind: ElementType, on_face: Ints) -> Array:
     """Return the orientation of every element: 1 counterclockwise, -1 clockwise."""
     jacobian = _jacobians(mesh, kind)
+    rows, columns = np.nonzero(np.isin(mesh.t, on_face))
+    jacobian[columns, rows] = jacobian.mean(axis=1)[columns]  # its corners come first
     low, high = jacobian.min(axis=1), jacobian.max(axis=1)
     sense = np.where(high >= -low, 1.0, -1.0)
     greatest = np.maximum(high, -low)
@@ -129,14 +134,17 @@ def _check_neighbours(mesh: Mesh, where: str, sense: Array) -> None:
         _refuse("elements " + " and ".join(map(str, elements)), where, allowed)
 
 
-def _check_cracks(mesh: Mesh, where: str) -> None:
-    """Refuse boundary nodes that lie on another node, or on an edge between its ends."""
+def _check_cracks(mesh: Mesh, where: str, on_face: Ints) -> None:
+    """Refuse boundary nodes that lie on another node, or on an edge between its ends.
+
+    The faces of a declared crack may: ``on_face`` are their nodes.
+    """
     start, end = mesh.p[:, mesh.facets[0]], mesh.p[:, mesh.facets[1]]
     length = np.hypot(*(end - start))
     shortest = np.full(mesh.p.shape[1], length.max())
     for ends in mesh.facets:  # one by one: when it broadcasts, numpy 2.4 gives a false warning
         np.minimum.at(shortest, ends, length)
-    nodes = np.unique(mesh.facets[:, mesh.boundary_facets()])
+    nodes = np.setdiff1d(mesh.facets[:, mesh.boundary_facets()], on_face)
     apart = "; surfaces meant to touch need two bodies and a contact pair"
     X = mesh.p[:, nodes]
     one, other = nodes[np.stack(_within(X, X, _close(mesh, nodes, shortest[nodes])))]

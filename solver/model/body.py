@@ -14,6 +14,7 @@ from solver.errors import ModelError
 from solver.materials import Law, PlaneStress
 from solver.mesh.check import check_mesh
 from solver.mesh.elements import element_type
+from solver.mesh.opening import faces_of
 from solver.mesh.rounding import with_zeros
 from solver.model.amplitude import Amplitude
 from solver.model.loads import Centrifugal, Displacement, Kinematics, Load, Pressure
@@ -23,6 +24,12 @@ from solver.tensors import AXES
 
 Held = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
 """Components that a support may hold; those with z in space alone."""
+_CRACKED = {
+    "element": ("quad8", "tri6"), "kinematics": ("plane_strain", "plane_stress"),
+    "strain": ("small",),
+}  # fmt: skip
+"""What a body with cracks may have: elements whose strain grows towards the tip as 1/sqrt(r), and
+what stress intensities are computed for."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,6 +58,7 @@ class Body:
     axle : makes an elastic body a wheel, which its supports connect to the hub
     travelling : a pressure that moves along a boundary
     strain : ``small``, or ``large``: logarithmic strain and equilibrium in the deformed body
+    cracks : names of the cracks of the mesh (`solver.mesh.opened`), whose faces lie on one another
     """
 
     name: str
@@ -68,6 +76,7 @@ class Body:
     axle: Axle | None = None
     travelling: TravellingPressure | None = None
     strain: Literal["small", "large"] = "small"
+    cracks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check(self)
@@ -79,7 +88,10 @@ class Body:
                 "element", self.element, f"needs cells with {needed}; the mesh of body "
                 f"{self.name!r} has {has}; a mesh file with triangles gives no others",
             )  # fmt: skip
-        check_mesh(self.mesh, self.name, element)
+        faces = [self.facets(face, "cracks") for crack in self.cracks for face in faces_of(crack)]
+        check_mesh(self.mesh, self.name, element, faces)
+        if self.cracks:
+            self._check_cracked()
         if self.dim == 3:
             self._check_solid()
         if self.kinematics == "axisymmetric" and self.mesh.p[0].min() < 0:
@@ -130,6 +142,13 @@ class Body:
         for name in self.of_small_strain:
             allowed = f'must be left out of body {self.name!r}, or its strain must be "small"'
             raise ModelError(name, "given with large strain", allowed)
+
+    def _check_cracked(self) -> None:
+        """Refuse what bodies with cracks do not have."""
+        for name, allowed in _CRACKED.items():
+            if (given := getattr(self, name)) not in allowed:
+                words = f"must be {' or '.join(allowed)} in body {self.name!r}, which has a crack"
+                raise ModelError(name, given, words)
 
     @property
     def dim(self) -> int:

@@ -21,6 +21,7 @@ import numpy as np
 from solver.errors import ModelError
 from solver.fatigue.criteria import CRITERIA
 from solver.fatigue.criterion import Assessment, Criterion
+from solver.fatigue.dang_van import DangVan
 from solver.fatigue.paths import Paths
 from solver.results.quantities import along_axes, declare, declare_along, placed
 from solver.results.run import FinishedRun, Values
@@ -54,6 +55,16 @@ PLANE = tuple(
     for axis in AXES
 )
 STRAIN = declare("fatigue_plastic_strain", "largest plastic strain that a cycle accumulates")
+INSTANT = declare("instant", "instant of a cycle", dims=("instant",), count=True)
+PATH = tuple(
+    declare(f"fatigue_path_{name}", f"{meaning} at the worst point", "MPa", dims=("instant",))
+    for name, meaning in {
+        "hydrostatic": "hydrostatic stress",
+        "shear": "mesoscopic shear stress",
+        "limit": "allowed shear stress at the hydrostatic stress",
+    }.items()
+)  # fmt: skip
+"""Dang Van's diagram: a path and its limit."""
 APPLIES = declare("fatigue_applies", "whether the fatigue criterion applies", flags=Applies)
 
 
@@ -158,7 +169,16 @@ class Fatigue:
         X, hidden = run.system.positions(worst), 1.0 if applies else np.nan
         same = found.utilisation >= most[worst] - _SAME * abs(most[worst])
         k = int(np.where(same, np.abs(run.view.axis.reached(X)), np.inf).argmin())
+        path: dict[Any, Any] = {}
+        if isinstance(self.criterion, DangVan):
+            p, shear = (
+                own[0] * hidden
+                for own in self.criterion.path(Paths(of_body[worst].stress[k : k + 1]))
+            )
+            allowed = self.criterion.limit - self.criterion.factor * p
+            path = {INSTANT: np.arange(len(p)), **dict(zip(PATH, (p, shear, allowed), strict=True))}
         return {
+            **path,
             APPLIES: Applies(int(applies)),
             STRAIN: max(float(np.nanmax(each.grown, initial=0.0)) for each in of_body.values()),
             UTILISATION: float(found.utilisation[k]) * hidden,
@@ -180,7 +200,7 @@ class Fatigue:
         if asked.any():
             found = self.criterion.assess(Paths(cycle.stress[asked], cycle.strain[asked]))
             value[asked], used[asked], plane[asked] = found
-        return _OfBody(Assessment(value, used, plane), void, cycle.grown)
+        return _OfBody(Assessment(value, used, plane), void, cycle.grown, cycle.stress)
 
     def _cycle(self, run: FinishedRun, name: str) -> StressCycle:
         """Return the cycle at the points of a body; without residual stress if that is asked."""
@@ -211,8 +231,9 @@ class Fatigue:
 
 
 class _OfBody(NamedTuple):
-    """What the criterion finds at points of a body, where it is void, plastic strain a cycle."""
+    """What the criterion finds at points of a body, where it is void, plastic strain and stress."""
 
     found: Assessment
     void: Bools
     grown: Array
+    stress: Array

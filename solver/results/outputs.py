@@ -17,9 +17,9 @@ from typing import Any, Literal, NamedTuple, TypeVar
 from solver.errors import ModelError
 from solver.parts import load_own_parts, run_again
 
-Need = Literal["map", "profile", "s", "surfaces", "contact", "release"]
+Need = Literal["map", "profile", "s", "surfaces", "contact", "release", "crack"]
 """Requirements of an output: a map grid, depth profiles, positions s along a surface, a contact
-surface of every body, a contact pair, a last stage that releases the bodies."""
+surface of every body, a contact pair, a last stage that releases the bodies, a body with cracks."""
 T = TypeVar("T", bound=Callable[..., Any])
 
 
@@ -39,8 +39,8 @@ _OUTPUTS: dict[str, NamedOutput] = {}
 MODULES = tuple(
     f"solver.results.{module}"
     for module in (
-        "contact", "corner", "extremes", "fatigue", "figures", "increments", "indentation", "maps",
-        "places",
+        "contact", "corner", "cracks", "extremes", "fatigue", "figures", "increments",
+        "indentation", "maps", "places",
     )
 )  # fmt: skip
 """Modules that define outputs of scene files, or quantities of these."""

@@ -32,6 +32,7 @@ from solver.parameters import Positive, require
 from solver.results import saved
 from solver.results.body_fields import BodyValues
 from solver.results.contact_result import ContactResult, contact_result
+from solver.results.cracks import StressIntensity, stress_intensities
 from solver.results.cycles import decided, shakedown_of
 from solver.results.export import write_vtu
 from solver.results.fields import SystemFields
@@ -166,6 +167,13 @@ class Solution:
             allowed = f"must be from 0 to {count - 1}" if count else "the model has no contacts"
             raise ModelError("pair", pair, allowed)
         return contact_result(self.system, self._at(stage), pair)
+
+    def stress_intensities(self, stage: str = "loaded", rings: int = 4) -> list[StressIntensity]:
+        """Return K_I and K_II at the tips of all cracks; see `solver.results.cracks`.
+
+        ``rings`` is the number of rings of elements around a tip in the domain of the integral.
+        """
+        return stress_intensities(self.system, self._at(stage), rings)
 
     def motion(self, body: str, stage: str = "loaded") -> RigidMotion:
         """Return the motion of a rigid body: x, y [mm] and rotation [rad]."""

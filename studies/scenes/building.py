@@ -13,6 +13,7 @@ import numpy as np
 from solver.errors import ModelError
 from solver.loading.program import Lap, Program, Stage, load_and_release, load_cycles
 from solver.mesh.grids import marked, within, without
+from solver.mesh.opening import opened
 from solver.model.amplitude import Amplitude
 from solver.model.friction import FRICTION
 from solver.model.loads import LOADS
@@ -154,6 +155,7 @@ class Builder:
                 kinematics=self.scene.kinematics,
                 element=table.element or default_element(mesh, table.strain),
                 strain=table.strain,
+                cracks=tuple(table.cracks),
                 thickness=self.scene.thickness,
                 supports=supports,
                 loads=(*filter(None, loads), *self._removals(name)),
@@ -453,7 +455,7 @@ def default_element(mesh: Mesh, strain: str) -> str:
 
 
 def mesh_of_body(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) -> Mesh:
-    """Return the mesh of a body at its position, with cuts and boundaries."""
+    """Return the mesh of a body at its position, with cuts, cracks and boundaries."""
     return _placed_mesh(_given_mesh(table, meshes), table)
 
 
@@ -470,7 +472,7 @@ def _given_mesh(table: tables.BodyTable, meshes: Mapping[str, MeshFile] | None) 
 
 
 def _placed_mesh(mesh: Mesh, table: tables.BodyTable) -> Mesh:
-    """Return the mesh moved to the position of its body, with cuts and boundaries."""
+    """Return the mesh moved to the position of its body, with cuts, cracks and boundaries."""
     if any(table.move):
         mesh = mesh.translated(table.move)
     for name, cut in table.cuts.items():
@@ -478,6 +480,8 @@ def _placed_mesh(mesh: Mesh, table: tables.BodyTable) -> Mesh:
             mesh = without(mesh, name, cut.x, cut.y)
         except ModelError as error:
             raise ModelError(f"cuts.{error.field}", error.value, error.allowed) from None
+    for name, crack in table.cracks.items():
+        mesh = opened(mesh, name, crack.start, crack.end)
     own = {
         new: within(mesh, new, each.of, each.x, each.y).boundaries[new]
         for new, each in table.boundaries.items()

@@ -293,6 +293,7 @@ def unmet_needs(scene: tables.SceneFile) -> Iterator[StudyError]:
         "s": (taken.s is not None, "results.s"),
         "surfaces": (bool(taken.surfaces), "results.surfaces"),
         "contact": (bool(scene.contacts), "contacts"),
+        "crack": (any(body.cracks for body in scene.bodies.values()), "a body with cracks"),
         "release": (bool(scene.released), "a last stage that releases the bodies"),
     }
     for word in taken.words:

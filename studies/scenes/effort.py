@@ -156,7 +156,7 @@ def _size_of(description: Description, name: str, body: tables.BodyTable) -> _Bo
     All grids of as many lines, without cuts and boxes, have the size of one of them.
     """
     known, leave = _SIZES.setdefault(description, {}), {"supports", "material"}
-    boxed = body.cuts or any(each.x or each.y for each in body.boundaries.values())
+    boxed = body.cuts or body.cracks or any(each.x or each.y for each in body.boundaries.values())
     try:
         lines = ""
         if isinstance(body.shape, GridTable | RoundTable) and not boxed:
@@ -169,7 +169,7 @@ def _size_of(description: Description, name: str, body: tables.BodyTable) -> _Bo
                 few(mesh.nelements)
             known[key] = _size_of_mesh(mesh, body.element or default_element(mesh, body.strain))
     except ModelError as error:
-        beside = body.shape is None or error.field.startswith(("boundaries.", "cuts."))
+        beside = body.shape is None or error.field.startswith(("boundaries.", "cuts.", "cracks."))
         where = f"bodies.{name}" if beside else f"bodies.{name}.shape"
         raise StudyError(f"{where}.{error.field}", error.value, error.allowed) from None
     while len(known) > _MOST:

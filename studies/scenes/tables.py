@@ -86,6 +86,16 @@ class CutTable(SceneTable):
     y: Span
 
 
+class CrackTable(SceneTable):
+    """A crack along lines of the mesh; an end inside the body is a tip. See `solver.mesh.opened`.
+
+    The crack NAME has the boundaries ``NAME_left`` and ``NAME_right``, seen from start to end.
+    """
+
+    start: Place
+    end: Place
+
+
 class BodyTable(SceneTable):
     """A body: a shape, or a part of a mesh file."""
 
@@ -97,6 +107,7 @@ class BodyTable(SceneTable):
     strain: Literal["small", "large"] = "small"
     move: Place = (0.0, 0.0)
     cuts: dict[Label, CutTable] = Field(default_factory=dict)
+    cracks: dict[Label, CrackTable] = Field(default_factory=dict)
     boundaries: dict[Label, BoundaryTable] = Field(default_factory=dict)
     regions: dict[Label, RegionTable] = Field(default_factory=dict)
     supports: dict[str, Literal["x", "y", "xy"]] = Field(default_factory=dict)

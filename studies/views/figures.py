@@ -30,6 +30,8 @@ FIGURES: Mapping[str, str] = {
     "singular_intensity": "singular intensity",
     "apparent_power": "apparent power",
     "peak_contact_pressure": "peak contact pressure",
+    "K_I": "K I {tip} {stage}",
+    "K_II": "K II {tip} {stage}",
     "max_plastic_strain": "largest plastic strain",
     "most_yielded_depth": "yielded to depth",
     "audit_plastic_strain": "away from singular points",
@@ -39,7 +41,8 @@ FIGURES: Mapping[str, str] = {
     "cpu_seconds": "cpu",
 }
 """Variables in a table of runs, if the scene has them, and their headings. A variable over bodies
-and components has a column for the first component of each body."""
+and components has a column for the first component of each body, one over tips of cracks and stages
+a column for each."""
 
 EFFORT = (
     "increments", "cut_increments", "iterations", "median_iterations", "inner_fallbacks",

@@ -33,6 +33,8 @@ LISTED = 100
 """Largest number of runs that a report lists; `residua show` prints all."""
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*[A-Za-z_])")
 """A number in a message, not the digits of a name."""
+_COLUMNS = ("body", "tip", "stage")
+"""Dimensions of which each place of a figure has a column."""
 _AUDIT = "audit_"
 _AWAY = "audit_plastic_strain"
 _MARK = "*"
@@ -135,10 +137,11 @@ def _figures(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray, xr.DataAr
         if name == "cut_increments" and not (dataset[name] > 0).any():
             continue
         values, spoiled = _in_words(dataset[name]), _spoiled(dataset, name)
-        for k in range(values.sizes.get("body", 1)):
-            one = {"body": k, "component": 0}
+        over = [dim for dim in _COLUMNS if dim in values.dims]
+        for at in np.ndindex(*(values.sizes[dim] for dim in over)):
+            one = {"component": 0, **dict(zip(over, at, strict=True))}
             each = values.isel(one, missing_dims="ignore")
-            words = {c: str(each[c].item()) for c in ("body", "component") if c in each.coords}
+            words = {c: str(each[c].item()) for c in ("component", *over) if c in each.coords}
             text = heading.format(**words).replace("_", " ")
             yield text, each, spoiled.isel(one, missing_dims="ignore")
 

@@ -16,7 +16,8 @@ LAYERS = {
     # from the ground up; a module may import from its own layer and from those before it
     "solver": (
         "version", "late", "typing", "errors", "files", "parameters", "parts", "memory",
-        "tensors", "fatigue", "linear", "mesh", "materials", "model", "fem", "contact", "loading",
+        "tensors", "fatigue", "linear", "mesh", "materials", "model", "fem", "contact",
+        "fracture", "loading",
         "results.quantities", "audit", "results", "scenes", "rolling", "shipped",
     ),
     "studies": (

@@ -31,7 +31,8 @@ from solver.fatigue import (
     surface_index,
     t_gamma,
 )
-from solver.fatigue.kernels import balls
+from solver.fatigue.kernels import balls, resolve
+from solver.fatigue.planes import OnPlanes, _hemisphere
 from solver.tensors import _PLACES
 from solver.typing import Array
 
@@ -134,8 +135,8 @@ def test_rotation_changes_little_out_of_phase(criterion: Criterion) -> None:
     """Paths of many instants have maxima close together: a few planes are not the very best."""
     before, after = (criterion.assess(paths).value for paths in loaded_and_turned(phase=1.0))
     change = np.abs(after / before - 1)
-    assert change.max() < 0.02
-    assert np.mean(change < 1e-8) >= 0.9
+    assert change.max() < 1e-3
+    assert np.mean(change < 1e-8) >= 0.97
     if isinstance(criterion, Crossland | DangVan):
         assert change.max() < 1e-12, "no search"
 
@@ -205,6 +206,21 @@ def test_no_plane_of_a_rolling_pass_is_worse_than_the_critical_one() -> None:
         (SmithWatsonTopper(), normal.max(axis=1) * half),
     ):
         assert (criterion.assess(paths).value > dense.max(axis=1) * (1 - 1e-3)).all()
+
+
+def test_planes_of_paths_out_of_phase_are_almost_always_the_very_worst() -> None:
+    """Against 1500 planes: a plane near each maximum of the scan is found (`planes`)."""
+    rng, t = np.random.default_rng(5), np.linspace(0, 2 * np.pi, 100, endpoint=False)[:, None]
+    phase = rng.uniform(0, 2 * np.pi, (2, 60, 1, 6))
+    size = 100 * rng.normal(size=(3, 60, 1, 6))
+    stress = size[0] + size[1] * np.sin(t + phase[0]) + size[2] / 2 * np.sin(2 * t + phase[1])
+    paths, criterion = elastic(stress), FatemiSocie()
+    points, dense = np.arange(60), np.zeros(60)
+    for plane in _hemisphere(1500):
+        on = OnPlanes(*resolve(paths.turned, points, np.tile(plane, (60, 1))))
+        dense = np.maximum(dense, criterion.on_plane(on))
+    missed = dense / criterion.assess(paths).value - 1
+    assert missed.max() < 5e-3 and np.mean(missed < 1e-12) >= 0.97
 
 
 def test_a_path_has_two_instants_or_more() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from solver.fatigue import DangVan, Findley, Paths
 from solver.results.fatigue import Applies
-from studies import Study, StudyError
+from studies import Study, StudyError, to_dataframe
 from studies.scenes.fatigue import assessed
 from tests.studies.scenes.conftest import blocks, built
 
@@ -44,6 +44,13 @@ def test_an_elastic_rolling_contact_is_as_in_theory() -> None:
     assert -record.scalars["fatigue_y"] == pytest.approx(0.60 * a, rel=0.15)
     profile = record.fields["fatigue_utilisation_profile"][1]
     assert profile.max() == pytest.approx(record.scalars["fatigue_utilisation"], rel=0.02)
+    p, shear, limit = (
+        record.fields[f"fatigue_path_{name}"][1] for name in ("hydrostatic", "shear", "limit")
+    )
+    factor = record.scalars["fatigue_safety_factor"]
+    assert (shear < limit).all()
+    used = (shear + DANG_VAN["limits"]["sensitivity"] * p).max() / DANG_VAN["limits"]["torsion"]
+    assert 1 / used == pytest.approx(factor)
 
 
 @pytest.mark.solves
@@ -170,3 +177,12 @@ def test_mistakes_name_their_entry(field: str, table: Any) -> None:
     if isinstance(table, dict):
         with pytest.raises(StudyError, match=field):
             built(blocks() | {"fatigue": table})
+
+
+def test_paths_are_tables_with_the_names_of_pylife() -> None:
+    stress = np.arange(36.0).reshape(2, 3, 6)
+    paths = Paths(stress, 1e-5 * stress)
+    table = to_dataframe(paths)
+    assert table.index.names == ["load_step", "node_id"] and table.shape == (6, 12)
+    assert list(table.columns[:6]) == ["S11", "S22", "S33", "S12", "S13", "S23"]
+    assert table.loc[(2, 1)].tolist()[:6] == paths.stress[1, 2, [0, 1, 2, 3, 5, 4]].tolist()

@@ -27,6 +27,7 @@ FILES = [
     read_scene(ROOT / file)
     for file in (
         "data/scenes/pin.toml",
+        "data/scenes/crack.toml",
         "data/scenes/bree.toml",
         "tests/studies/scenes/everything.toml",
     )

@@ -20,7 +20,7 @@ Window = Sequence[float]
 """Part of a map: horizontal range, vertical range [mm]."""
 
 _RESIDUAL, _STRESS = "residual_stress", "map_stress"
-ALONG = ("s", "depth", "increment", "fraction")
+ALONG = ("s", "depth", "increment", "fraction", "instant")
 """Dimensions along which lines are drawn."""
 REPEATED = ("cycle", "pass")
 """Dimensions of numbers that are lines over them where one run is drawn."""

@@ -49,6 +49,10 @@ _SIZE = (8.0, 4.6)
 _LENGTHS = ("s", "depth", *AXES)
 INCREMENT, TIME, AGAINST = "increment", "increment_time", "against"
 """Dimension of courses, the variable of their time, and the coordinate of what they lie over."""
+INSTANT, DIAGRAM = "instant", {"fatigue_path_shear": "fatigue_path_hydrostatic"}
+"""Dimension of instants of a cycle; fields that are usually drawn over another one."""
+_LIMIT = "fatigue_path_limit"
+"""The field that limits those."""
 PART, CONTACT = "part", "contact"
 """Dimensions of motions and reactions, and of contact pairs."""
 _RELEASED = ("residual_stress", "plastic_strain", "residual_profile", "surface_residual")
@@ -93,6 +97,7 @@ def line_figure(
     StudyError
         if there is no such field or component, no value, or too many lines
     """
+    against = DIAGRAM.get(field) if against is None and over is None else against
     values, run, at, sizes = _drawn(run, field, component, zoom, over, window, against)
     along = line_axis(values)
     others = [name for name in values.dims if name != along]
@@ -122,6 +127,8 @@ def line_figure(
                 )
                 _mark_stages(axes, run, line, at)
     axes.axhline(0.0, color="0.35", linewidth=0.8, zorder=0)
+    if against is not None and against == DIAGRAM.get(field):
+        _draw_limit(axes, run, against)
     plain_axes(axes)
     axes.margins(x=0.03 if against else 0.0)
     if along in REPEATED:
@@ -135,6 +142,21 @@ def line_figure(
     if named:
         add_legend(axes, [_heading(each, sizes) for each in named], styles=barred)
     return sheet
+
+
+def _draw_limit(axes: Axes, run: xr.Dataset, against: str) -> None:
+    """Draw the line that a path must stay below, a little beyond the path."""
+    p, limit = (run[name].to_numpy() for name in (against, _LIMIT))
+    known = np.isfinite(p)
+    slope, height = (
+        np.polyfit(p[known], limit[known], 1) if np.ptp(p[known]) else (0.0, limit[known][0])
+    )
+    ends = p[known].min() - 0.1 * np.ptp(p[known]), p[known].max() + 0.1 * np.ptp(p[known])
+    axes.plot(ends, [slope * end + height for end in ends], "--", color="0.15", linewidth=1.2)
+    axes.annotate(
+        "limit", (ends[1], slope * ends[1] + height), xytext=(0, 8), textcoords="offset points",
+        ha="right", fontsize=8, color="0.15",
+    )  # fmt: skip
 
 
 def _show_part(axes: Axes, window: Window) -> None:
@@ -199,13 +221,14 @@ def _drawn(
 
 def _other(run: xr.Dataset, values: xr.DataArray, name: str) -> xr.DataArray:
     """Return the variable that is horizontal, over dimensions that the field has."""
+    over = next((each for each in (INCREMENT, INSTANT) if each in values.dims), None)
     known = [
         str(each)
         for each, other in run.data_vars.items()
-        if INCREMENT in other.dims and other.dtype.kind == "f"
+        if over in other.dims and other.dtype.kind == "f"
     ]
-    if INCREMENT not in values.dims:
-        allowed = f"must be left out: {values.name} does not lie over increments"
+    if over is None:
+        allowed = f"must be left out: {values.name} does not lie over increments or a cycle"
         raise StudyError("against", name, allowed)
     if name not in known:
         raise StudyError("against", name, one_of(name, known))
