@@ -119,7 +119,7 @@ def slurm(options: argparse.Namespace) -> int:
     store = Store(options.out)
     study = Study.from_toml(options.study, (), store.definition, store.scene)
     text = script(
-        study.name, options.study, options.out, options.script,
+        study.name, options.study, store.blobs.address, options.script,
         tasks=options.tasks, time=options.time, memory=options.memory,
         scheduler=options.with_scheduler,
     )  # fmt: skip

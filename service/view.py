@@ -33,6 +33,7 @@ from service.settings import Settings
 from solver.files import NoFile, opened
 from studies import Store, Study, StudyError
 from studies.scratch import scratch
+from studies.storage.blobs import blobs_at
 from studies.storage.seal import state_of
 
 log = logging.getLogger(__name__)
@@ -133,7 +134,7 @@ def application(path: Path) -> Iterator[tuple[FastAPI, str]]:
     """
     with scratch() as folder:
         settings = Settings(data=folder, host=HOST, root_path="", require_keys=False)
-        if (path / "studies").is_dir():
+        if (path / "studies").is_dir() or blobs_at(path).names("studies/*/study.json"):
             shown = ViewedFolder(path, folder)
             shown.look()
             _tell_others(path, shown)

@@ -11,7 +11,6 @@ which combines the runs.
 from __future__ import annotations
 
 import itertools
-import os
 import time
 from collections.abc import Callable, Container, Iterator
 from contextlib import ExitStack, contextmanager
@@ -27,7 +26,7 @@ from studies.execution.run import StudyEvent
 from studies.execution.task import PathTask, walk
 from studies.scratch import scratch
 from studies.storage.catalogue import Catalogue
-from studies.storage.claims import Claim, Claims
+from studies.storage.claims import Claim, Claiming
 from studies.storage.store import Store
 
 _MOST_DEATHS = 2
@@ -118,7 +117,7 @@ class _PartWork:
 
     def done(self, begin: float) -> PartOutcome:
         """Go through all units, from a place between 0 and 1 on, until none can be claimed."""
-        claims = Claims(self.store.directory / "claims")
+        claims = self.store.blobs.claims()
         asking = Asking(self.study, self.store, resume=True) if self.study.kind.chooses else None
         units = self._units(asking)
         first = round(begin * len(units))
@@ -161,8 +160,7 @@ class _PartWork:
     def _complete(self, unit: _Unit) -> bool:
         """Whether the runs of a unit were there when the files were listed last."""
         if time.monotonic() - self._looked > _LOOK:
-            with os.scandir(self.store.directory / "runs") as files:
-                self._there = {each.name.removesuffix(".nc") for each in files}
+            self._there = self.store.stored_runs()
             self._looked = time.monotonic()
         return unit.complete(self._there)
 
@@ -186,10 +184,8 @@ class _PartWork:
 
     def task(self, path: LoadingPath, **more: Any) -> PathTask:
         """Return the task of a loading path."""
-        directory = self.store.directory.resolve()
-        return PathTask(
-            self.study.problem, (path,), directory, solver_hash(), self.study.keep, **more
-        )
+        where = self.store.address
+        return PathTask(self.study.problem, (path,), where, solver_hash(), self.study.keep, **more)
 
     def _tell(self, kind: str, **content: Any) -> None:
         self.emit(StudyEvent(kind=kind, progress=self._share, **content))
@@ -212,7 +208,7 @@ class _Unit:
         return complete
 
     @contextmanager
-    def held(self, claims: Claims) -> Iterator[Claim | None]:
+    def held(self, claims: Claiming) -> Iterator[Claim | None]:
         """Claim it; None if another process may be at it.
 
         A search is claimed as a whole too: a process that begins later, and takes the runs that are
@@ -229,7 +225,8 @@ class _Unit:
 
     def compute(self, part: _PartWork, hopeless: bool) -> None:
         """Compute its runs that are not there; or store that those who tried have died."""
-        cases = tuple(case for case in self.path.cases if not part.store.run_path(case.id).exists())
+        there = part.store.modified(case.id for case in self.path.cases)
+        cases = tuple(case for case in self.path.cases if case.id not in there)
         path = replace(self.path, cases=cases)
         if self.asking and self.asked:
             self._ask(part, path, hopeless, self.asking, self.asked)

@@ -6,7 +6,6 @@ from collections import Counter
 from dataclasses import replace
 from typing import Any
 
-from solver.files import appearing
 from studies.definition.identity import canonical
 from studies.definition.points import POINT
 from studies.definition.study import Study
@@ -79,7 +78,7 @@ def answered(study: Study, store: Store, asking: Asking, anew: bool) -> Combined
     written = made.kept(_NAME, found.of) is None
     if written:
         packed = runfile.packed(RunContent(found.content(), _attributes(study) | entry))
-        with needs_room(store.directory), appearing(path) as part:
+        with needs_room(store.directory), store.appearing(study.id) as part:
             part.write_bytes(seal.sealed(f"dataset {study.id}", packed))
         made.note(_NAME, found.of, [path.name])
     counts = dict(Counter(status for _, status, _ in found.outcomes))
