@@ -26,7 +26,7 @@ from studies.execution.run import StudyEvent
 from studies.execution.task import PathTask, walk
 from studies.scratch import scratch
 from studies.storage.catalogue import Catalogue
-from studies.storage.claims import Claim, Claiming
+from studies.storage.claims import Claim, Claims
 from studies.storage.store import Store
 
 _MOST_DEATHS = 2
@@ -208,7 +208,7 @@ class _Unit:
         return complete
 
     @contextmanager
-    def held(self, claims: Claiming) -> Iterator[Claim | None]:
+    def held(self, claims: Claims) -> Iterator[Claim | None]:
         """Claim it; None if another process may be at it.
 
         A search is claimed as a whole too: a process that begins later, and takes the runs that are

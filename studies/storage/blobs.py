@@ -25,7 +25,7 @@ from typing import Any, Protocol
 
 from solver.files import NoFile, appearing, read_file
 from studies.errors import StoreBusy, Unusable
-from studies.storage.claims import Claiming, Claims, Leases
+from studies.storage.claims import Claims, Leases
 from studies.storage.lock import lock
 
 ORIGIN = "origin.json"
@@ -74,7 +74,7 @@ class Blobs(Protocol):
     def lock(self, busy: str, shared: bool) -> AbstractContextManager[None]:
         """Lock the store; raise `StoreBusy`, with what another process does, if it has the lock."""
 
-    def claims(self) -> Claiming:
+    def claims(self) -> Claims:
         """Return the claims of processes that share the store."""
 
     def follow(self) -> None:
@@ -132,7 +132,7 @@ class Folder:
         finally:
             os.close(held)
 
-    def claims(self) -> Claiming:
+    def claims(self) -> Claims:
         """See `Blobs`."""
         return Claims(self.directory / "claims")
 
@@ -216,7 +216,7 @@ class Bucket(Folder):
                 raise StoreBusy(f"{self.address}: a process on another machine {busy}")
             yield
 
-    def claims(self) -> Claiming:
+    def claims(self) -> Claims:
         """See `Blobs`."""
         return Leases(self._ask, self._at("claims"))
 

@@ -20,7 +20,6 @@ import os
 import threading
 import time
 import uuid
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
@@ -55,8 +54,18 @@ class Claim:
     done: bool = False
 
 
-class Claiming(ABC):
-    """Claims of names, by marks ``<name>.<number>`` of which one process can make each."""
+class Claims:
+    """The claims in a directory: marks ``<name>.<number>`` of which one process can make each.
+
+    Parameters
+    ----------
+    directory : the directory; made if it is missing
+    stale : age of a claim of another machine at which it is dead [s]
+    """
+
+    def __init__(self, directory: Path, stale: float = STALE) -> None:
+        self._directory, self._stale = directory, stale
+        directory.mkdir(parents=True, exist_ok=True)
 
     @contextmanager
     def held(self, name: str) -> Iterator[Claim | None]:
@@ -84,51 +93,8 @@ class Claiming(ABC):
                         with suppress(FileNotFoundError, IsADirectoryError):
                             self._remove(each)
 
-    @abstractmethod
-    def _own(self) -> AbstractContextManager[Any]:
-        """Give what the owner of a claim needs while it has it."""
-
-    @abstractmethod
-    def _there(self, claim: str) -> bool: ...
-
-    @abstractmethod
-    def _made(self, own: Any, claim: str) -> bool:
-        """Make a claim, with its content and at once; return False if there is one."""
-
-    @abstractmethod
-    def _dead(self, own: Any, claim: str) -> bool:
-        """Whether the owner of a claim has died; a claim that is gone is none that died."""
-
-    @abstractmethod
-    def _done(self, claim: str) -> bool:
-        """Whether the owner of a claim has ended with nothing left to do."""
-
-    @abstractmethod
-    def _renew(self, own: Any, claim: str) -> None: ...
-
-    @abstractmethod
-    def _end(self, own: Any, claim: str) -> None:
-        """Write that nothing is left to do."""
-
-    @abstractmethod
-    def _remove(self, claim: str) -> None: ...
-
-
-class Claims(Claiming):
-    """The claims in a directory.
-
-    Parameters
-    ----------
-    directory : the directory; made if it is missing
-    stale : age of a claim of another machine at which it is dead [s]
-    """
-
-    def __init__(self, directory: Path, stale: float = STALE) -> None:
-        self._directory, self._stale = directory, stale
-        directory.mkdir(parents=True, exist_ok=True)
-
     @contextmanager
-    def _own(self) -> Iterator[tuple[Path, int]]:
+    def _own(self) -> Iterator[Any]:
         """Make the file that will be the claim, and lock it; give it with its descriptor."""
         path = self._directory / f"{uuid.uuid4().hex}.own"
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
@@ -144,14 +110,16 @@ class Claims(Claiming):
     def _there(self, claim: str) -> bool:
         return (self._directory / claim).exists()
 
-    def _made(self, own: tuple[Path, int], claim: str) -> bool:
+    def _made(self, own: Any, claim: str) -> bool:
+        """Make a claim, with its content and at once; return False if there is one."""
         try:
             os.link(own[0], self._directory / claim)
         except FileExistsError:
             return False
         return True
 
-    def _dead(self, own: tuple[Path, int], claim: str) -> bool:
+    def _dead(self, own: Any, claim: str) -> bool:
+        """Whether the owner of a claim has died; a claim that is gone is none that died."""
         try:
             with opened(self._directory / claim) as file:
                 if json.loads(file.readline(_LONGEST))["machine"] == _machine():
@@ -165,6 +133,7 @@ class Claims(Claiming):
             return True
 
     def _done(self, claim: str) -> bool:
+        """Whether the owner of a claim has ended with nothing left to do."""
         try:
             return read_file(self._directory / claim, _LONGEST).endswith(_DONE)
         except NoFile:
@@ -172,17 +141,17 @@ class Claims(Claiming):
         except FileNotFoundError:
             return True
 
-    def _renew(self, own: tuple[Path, int], claim: str) -> None:
+    def _renew(self, own: Any, claim: str) -> None:
         os.utime(own[0])
 
-    def _end(self, own: tuple[Path, int], claim: str) -> None:
+    def _end(self, own: Any, claim: str) -> None:
         os.write(own[1], _DONE)
 
     def _remove(self, claim: str) -> None:
         (self._directory / claim).unlink()
 
 
-class Leases(Claiming):
+class Leases(Claims):
     """The claims in a folder of an object store.
 
     Parameters
@@ -196,20 +165,20 @@ class Leases(Claiming):
         self._ask, self._folder, self._owner = ask, folder, owner
 
     @contextmanager
-    def _own(self) -> Iterator[None]:
+    def _own(self) -> Iterator[Any]:
         yield
 
     def _there(self, claim: str) -> bool:
         return bool(self._ask("exists", f"{self._folder}/{claim}"))
 
-    def _made(self, own: None, claim: str) -> bool:
+    def _made(self, own: Any, claim: str) -> bool:
         try:
             self._write(claim, mode="create")
         except FileExistsError:
             return False
         return True
 
-    def _dead(self, own: None, claim: str) -> bool:
+    def _dead(self, own: Any, claim: str) -> bool:
         known = self._read(claim)
         mine = bool(self._owner) and known["owner"] == self._owner
         return mine or abs(time.time() - known["at"]) > STALE
@@ -217,10 +186,10 @@ class Leases(Claiming):
     def _done(self, claim: str) -> bool:
         return bool(self._read(claim)["done"])
 
-    def _renew(self, own: None, claim: str) -> None:
+    def _renew(self, own: Any, claim: str) -> None:
         self._write(claim)
 
-    def _end(self, own: None, claim: str) -> None:
+    def _end(self, own: Any, claim: str) -> None:
         self._write(claim, done=True)
 
     def _remove(self, claim: str) -> None:
