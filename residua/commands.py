@@ -252,6 +252,7 @@ def diff(options: argparse.Namespace) -> int:
 def predict(options: argparse.Namespace) -> int:
     """Tell a number between the runs of a study, with its error."""
     from studies.execution.task import compute_here
+    from studies.numbers import number_text
     from studies.views.picking import study_of
     from studies.views.predict import ERROR_IS, answer
     from studies.views.reading import find_study, open_netcdf
@@ -265,8 +266,8 @@ def predict(options: argparse.Namespace) -> int:
             compute_here(found.run, store)
             found = answer(dataset, study, store, **asked)
     unit = f" {found.unit}" if found.unit not in {"", "1"} else ""
-    what = ERROR_IS.get(found.by, "error")
-    print(f"{found.of} = {found.value:.6g}{unit}, {what} {found.error:.2g}{unit} (by {found.by})")
+    what, error = ERROR_IS.get(found.by, "error"), number_text(found.error, 2)
+    print(f"{found.of} = {number_text(found.value, 6)}{unit}, {what} {error}{unit} (by {found.by})")
     if found.enough:
         return OK
     place = ", ".join(f"{name} = {value}" for name, value in found.at.items())

@@ -35,6 +35,11 @@ class Examined:
     runs: list[str]
     estimate: Estimate
 
+    @property
+    def costs(self) -> dict[str, str]:
+        """The cost as text by name."""
+        return self.estimate.costs(self.study.kind.chooses)
+
 
 class Examiner:
     """Checks studies.

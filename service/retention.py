@@ -25,6 +25,7 @@ from service.examiner import Examined
 from service.job import Job, StudyState
 from service.jobs import Jobs, forget, put
 from studies import FileDamaged, Store
+from studies.numbers import size_text
 
 if TYPE_CHECKING:
     from studies.scenes.description import Description
@@ -117,7 +118,7 @@ class Keeper:
         size, promised = found.estimate.bytes, self.jobs.promised(but=found.study.id)
         free = shutil.disk_usage(self.store.directory).free
         if size and size + promised > free:
-            takes, has, others = (f"{each / 1e9:.3g} GB" for each in (size, free, promised))
+            takes, has, others = map(size_text, (size, free, promised))
             told = f"the study takes about {takes}, and {has} are free on the disk of the data"
             before = f", of which studies before it take {others}" if promised else ""
             raise NoRoom(f"{told} directory{before}: use fewer runs, or make room")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Mapping
 from http import HTTPStatus
 from typing import Annotated, Any
@@ -135,7 +134,7 @@ async def make(
         job, _ = await run_in_threadpool(keeper.accept, found, 0)
         return to_study(request, job.id)
     if "application/json" in request.headers.get("accept", ""):
-        costs = None if found is None else dataclasses.asdict(found.estimate)
+        costs = found.costs if found else None
         return JSONResponse({"wrong": wrong, "estimate": costs, **_copies(request, content, scene)})
     return await reading.here(_form, request, store, scene_name, given, wrong, found)
 
@@ -184,7 +183,7 @@ def _form(
         tables=tables,
         wrong=mistakes,
         general=[text for key, text in mistakes.items() if key not in own],
-        estimate=found.estimate if found else None,
+        estimate=found.costs if found else {},
         refused=refused,
         **_copies(request, content, scene),
     )
