@@ -319,7 +319,7 @@ def _written_nodes(run: Any, folder: Path) -> Path:
     """Write the fields at the nodes of a run (a data set), and return the file that lists them."""
     from solver.errors import ModelError
     from solver.results.export import write_vtu
-    from studies.storage.ugrid import read
+    from studies.views.solution import read
 
     try:
         return write_vtu(read(run), folder)

@@ -18,12 +18,12 @@ from service.jobs import Jobs
 from service.scenes import scene_name
 from service.schemas import StudyDetail, StudyRun, StudySummary, Window
 from service.turns import Share
-from studies import Store
 from studies.definition.sweep import labels, positions
 from studies.definition.vocabulary import taken
 from studies.kinds import KINDS, kind_of
 from studies.numbers import number_text
 from studies.storage.seal import state_of
+from studies.storage.store import Store
 
 KEPT = 100
 """Largest number of answers that are kept."""

@@ -11,10 +11,11 @@ from pathlib import Path
 from service.errors import NotFound, QueueLost
 from service.job import StudyState, verdict
 from service.jobs import Jobs
-from studies import FileDamaged, Store
 from studies.definition.vocabulary import MISSING
+from studies.errors import FileDamaged
 from studies.storage.database import Database
 from studies.storage.seal import State, state_of
+from studies.storage.store import Store
 
 log = logging.getLogger(__name__)
 

@@ -18,17 +18,15 @@ from collections.abc import AsyncIterator, Callable, Collection, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
-from typing import TYPE_CHECKING
+from typing import Any
 
 from service.errors import Busy, Conflict, NoRoom, NotFound
 from service.examiner import Examined
 from service.job import Job, StudyState
 from service.jobs import Jobs, forget, put
-from studies import FileDamaged, Store
+from studies.errors import FileDamaged
 from studies.numbers import size_text
-
-if TYPE_CHECKING:
-    from studies.scenes.description import Description
+from studies.storage.store import Store
 
 log = logging.getLogger(__name__)
 
@@ -123,7 +121,7 @@ class Keeper:
             before = f", of which studies before it take {others}" if promised else ""
             raise NoRoom(f"{told} directory{before}: use fewer runs, or make room")
 
-    def keep_scene(self, scene_id: str, description: Description, owner: str) -> bool:
+    def keep_scene(self, scene_id: str, description: Any, owner: str) -> bool:
         """Store a posted scene for a key; return whether it is new.
 
         Raise `Conflict` if all posted scenes, or those of the key, would take more than is allowed.

@@ -9,7 +9,7 @@ from typing import Any
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
 
-from studies import StudyError
+from studies.errors import StudyError
 from studies.toml import check_depth
 
 

@@ -31,10 +31,12 @@ from service.processes import share_arenas
 from service.recovery import add
 from service.settings import Settings
 from solver.files import NoFile, opened
-from studies import Store, Study, StudyError
+from studies.definition.study import Study
+from studies.errors import StudyError
 from studies.scratch import scratch
 from studies.storage.blobs import blobs_at
 from studies.storage.seal import state_of
+from studies.storage.store import Store
 
 log = logging.getLogger(__name__)
 

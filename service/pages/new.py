@@ -29,8 +29,9 @@ from service.routes.scenes import post_scene
 from service.scenes import known_scene
 from solver.late import Late
 from solver.scenes import Scene
-from studies import Store, StudyError
+from studies.errors import StudyError
 from studies.scenes.registry import known_scenes
+from studies.storage.store import Store
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
 

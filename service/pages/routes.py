@@ -43,10 +43,11 @@ from service.routes.numbers import OUTLINED
 from service.scenes import scene_name, scene_of
 from service.schemas import ContentId, Health, StudyFilter, Window
 from solver.scenes import Scene
-from studies import Store, StudyError
 from studies.definition.identity import is_id
+from studies.errors import StudyError
 from studies.kinds import kind_of
 from studies.scenes.registry import known_names
+from studies.storage.store import Store
 from studies.views.html import number
 from studies.views.table import MESSAGE, RUN, STATUS, RunTable, varied
 

@@ -49,9 +49,10 @@ from service.schemas import (
 )
 from service.strict import StrictRoute
 from solver.late import Late
-from studies import Estimate, Study, StudyError
 from studies.definition.schema import StudyTable, Whole, parsed
-from studies.errors import StoreFull
+from studies.definition.study import Study
+from studies.errors import StoreFull, StudyError
+from studies.execution.estimate import Estimate
 from studies.storage.seal import digest
 from studies.storage.tiles import METADATA
 

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
@@ -23,10 +23,6 @@ from studies.scenes.file_scene import FileScene
 from studies.storage.blobs import Blobs
 from studies.storage.database import Database
 from studies.storage.seal import State, bytes_of, check, content_of, sealed, sealed_json, state_of
-
-if TYPE_CHECKING:
-    from studies.scenes.description import Description
-    from studies.scenes.meshfile import MeshFile
 
 _FILE, _ARRAYS = "scene.json", ".arrays"
 _COLUMNS = "id, name, summary, branch, size, owner, added, parameters, state"
@@ -60,7 +56,7 @@ class Kept(NamedTuple):
     added: int
 
 
-def keep(blobs: Blobs, scene_id: str, description: Description, owner: str) -> None:
+def keep(blobs: Blobs, scene_id: str, description: Any, owner: str) -> None:
     """Store a scene of this content id."""
     seal, written = f"scene {scene_id}", {}
     for name, mesh in (description.meshes or {}).items():
@@ -122,7 +118,7 @@ def _made(folder: Path, whole: bool) -> FileScene | None:
         raise FileDamaged(folder, name, reason, state) from None
 
 
-def _mesh(path: Path, name: str) -> MeshFile:
+def _mesh(path: Path, name: str) -> Any:
     """Return a mesh of a scene, with its arrays if it was posted."""
     from studies.scenes.meshfile import MeshFile  # loads scipy
 

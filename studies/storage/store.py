@@ -29,7 +29,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from solver.files import appearing
 from solver.results.record import Record
@@ -46,9 +46,6 @@ from studies.storage.blobs import blobs_at
 from studies.storage.catalogue import BATCH, Catalogue, Row
 from studies.storage.readback import verified
 from studies.storage.room import needs_room
-
-if TYPE_CHECKING:
-    from studies.scenes.description import Description
 
 _STUDY, _DATASET = "study.json", "dataset.nc"
 _UNFINISHED = 600.0
@@ -190,7 +187,7 @@ class Store:
         if isinstance(scene, FileScene) and scene.posted:
             self.keep_scene(scene.id, scene.description)
 
-    def keep_scene(self, scene_id: str, description: Description, owner: str = "") -> bool:
+    def keep_scene(self, scene_id: str, description: Any, owner: str = "") -> bool:
         """Store a scene of this content id for an owner; return whether it is new."""
         new = self.scene(scene_id) is None  # a damaged one is set aside, and so written again
         if new:

@@ -20,7 +20,8 @@ LAYERS = {
         "results.quantities", "audit", "results", "scenes", "rolling", "shipped",
     ),
     "studies": (
-        "units", "numbers", "errors", "toml", "materials", "scratch", "scenes", "definition", "kinds",
+        "units", "numbers", "errors", "toml", "materials", "scratch", "scenes", "definition",
+        "kinds",
         "definition.study", "storage", "kinds.*.answer", "execution", "views", "kinds.*.shown",
         "client",
     ),

@@ -18,6 +18,7 @@ from solver.mesh import grid
 from studies import Store, Study, StudyError, run_study
 from studies.scenes.scene import read_scene
 from studies.storage import ugrid
+from studies.views import solution
 from studies.views.plots.picture import drawn_from
 from studies.views.reading import open_netcdf
 
@@ -110,7 +111,7 @@ def test_plastic_strain_keeps_the_volume_and_makes_the_equivalent_one(pressed: S
 def test_the_fields_are_those_of_the_solution(pressed: Solution) -> None:
     fields = pressed.mesh_fields()
     made = xr.Dataset(ugrid.variables(fields), attrs={"keep": "fields", "id": "x"})
-    again = ugrid.read(made)
+    again = solution.read(made)
     assert list(again.stages) == ["loaded", "unloaded"]
     np.testing.assert_array_equal(again.X, fields.X)
     for name, (element, cells) in fields.bodies.items():
