@@ -19,8 +19,7 @@ from studies.errors import StudyError
 
 def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
-    from residua.cost import ALONE, Foreseen, dry_run
-    from residua.progress import Progress
+    from residua.progress import ALONE, Foreseen, Progress, dry_run
     from studies.definition.study import Study
     from studies.execution.access import Access
     from studies.execution.limits import Limits

@@ -38,7 +38,7 @@ from service.pages import study as chosen
 from service.pages.assets import asset
 from service.pages.rendering import COOKIE, ROOT, PageRoute, page, to_study
 from service.pages.run import MOST, audited, compared, numbers_shown, parameters_shown
-from service.routes.health import health
+from service.routes.itself import health
 from service.routes.numbers import OUTLINED
 from service.scenes import scene_name, scene_of
 from service.schemas import ContentId, Health, StudyFilter, Window

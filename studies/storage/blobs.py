@@ -25,8 +25,7 @@ from typing import Any, Protocol
 
 from solver.files import NoFile, appearing, read_file
 from studies.errors import StoreBusy, Unusable
-from studies.storage.claims import Claims, Leases
-from studies.storage.lock import lock
+from studies.storage.claims import Claims, Leases, lock
 
 ORIGIN = "origin.json"
 """File of a folder that has the blobs of an address: this address, and an id of the folder."""

@@ -1,4 +1,4 @@
-"""Claims of processes that compute in one directory, on whichever machines, without talking.
+"""Claims and the lock of processes that compute in one directory, on any machines, without talking.
 
 A claim is a file ``claims/<name>.<number>``. It appears at once, with its content, by a hard link,
 which fails if there is one; so one process has it. Its owner holds a lock on it, and changes its
@@ -27,8 +27,8 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from solver.files import NoFile, opened, read_file
-from studies.errors import Unusable
+from solver.files import NoFile, descriptor_of, opened, read_file
+from studies.errors import StoreBusy, Unusable
 
 BEAT = 20.0
 """Seconds after which an owner changes the time of its claim."""
@@ -242,3 +242,39 @@ def _machine() -> str:
     with suppress(OSError):
         return read_file("/proc/sys/kernel/random/boot_id").decode("ascii").strip()
     return f"{os.uname().nodename}-{os.getpid()}"  # its locks are not trusted
+
+
+def lock(path: Path, busy: str, patience: float = 0.0, shared: bool = False) -> int:
+    """Return the descriptor of a lock, valid until its last copy is closed.
+
+    Parameters
+    ----------
+    path : the lock file, which contains the id of the process
+    busy : what another one does in the directory, and what helps, for the error
+    patience : how long to wait for another owner of the lock [s]
+    shared : whether others may have it at the same time, if they share it too
+
+    Raises
+    ------
+    StoreBusy
+        if the lock is not released; with the id of the process
+    NoFile
+        if it is no regular file
+    """
+    descriptor = descriptor_of(path, os.O_RDWR | os.O_CREAT)
+    deadline = time.monotonic() + patience
+    while True:
+        try:
+            fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() < deadline:
+                time.sleep(0.1)
+                continue
+            number = os.read(descriptor, 20).decode(errors="replace").strip()
+            os.close(descriptor)
+            who = f"another process (id {number})" if number.isdecimal() else "another process"
+            raise StoreBusy(f"{path.parent}: {who} {busy}") from None
+        with suppress(OSError):  # a full disk is reported when results are written
+            os.ftruncate(descriptor, 0)
+            os.write(descriptor, f"{os.getpid()}\n".encode())
+        return descriptor

@@ -26,7 +26,7 @@ LAYERS = {
         "client",
     ),
     "residua": (
-        "neighbours", "status", "cost", "progress", "keys", "slurm", "commands",
+        "neighbours", "status", "progress", "keys", "slurm", "commands",
         "arguments", "cli", "__main__",
     ),
 }  # fmt: skip
