@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from solver.files import NoFile, appearing, read_file
-from studies.errors import StoreBusy, Unusable
+from studies.errors import StoreBusy, StudyError, Unusable
 from studies.storage.claims import Claims, Leases, lock
 
 ORIGIN = "origin.json"
@@ -268,6 +268,10 @@ def directory_of(place: Path | str) -> Path:
     The latter is in ``RESIDUA_CACHE``, by default ``~/.cache/residua``.
     """
     if not is_address(place):
+        if re.match(r"\w\w+:/(?!/)", str(place)):
+            raise StudyError(
+                "directory", str(place), "is an address: give it as a text, not a Path"
+            )
         return Path(place)
     address = str(place).rstrip("/")
     cache = os.environ.get("RESIDUA_CACHE") or Path.home() / ".cache" / "residua"

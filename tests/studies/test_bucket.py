@@ -74,6 +74,20 @@ def test_what_others_store_is_seen(address: str, monkeypatch: pytest.MonkeyPatch
     assert other.study_ids() != [study.id] and study.id not in other.study_ids()
 
 
+def test_many_blobs_are_listed_as_each_is_asked_for(address: str) -> None:
+    blobs, root = Store(address).blobs, address.removeprefix("memory:/")
+    names = [f"runs/{number:032x}.nc" for number in range(30)]
+    for name in [*names, "runs/x/y.nc", "studies/z/study.json"]:
+        FILES.pipe_file(f"{root}/{name}", name.encode())
+    assert sorted(blobs.names("runs/*.nc")) == names
+    assert blobs.stamps([*names, "runs/none.nc"]) == {n: blobs.stamps([n])[n] for n in names}
+    assert blobs.names("studies/*/study.json") == ["studies/z/study.json"]
+    path = blobs.path(names[0])
+    state = path.stat()
+    assert (state.st_size, state.st_mtime_ns) == blobs.stamps([names[0]])[names[0]]
+    assert not blobs.path("runs/none.nc").exists() and blobs.stamps([]) == {}
+
+
 def test_a_damaged_blob_is_set_aside_and_a_damaged_copy_brought_again(
     address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -133,6 +147,8 @@ def test_an_address_that_cannot_be_used_is_named(
 ) -> None:
     with pytest.raises(StudyError, match=r"directory = 'nowhere://x': cannot be used: Protocol"):
         Store("nowhere://x/")
+    with pytest.raises(StudyError, match=r"directory = 's3:/x': is an address: give it as a text"):
+        Store(Path("s3://x"))
     store = Store(address)
 
     def lost(*given: object, **named: object) -> None:
