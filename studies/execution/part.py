@@ -6,6 +6,10 @@ runs each process carries out all programs: they ask for the same runs, whoever 
 ends when nothing is left that it can claim, and no run of others can make a program ask for more.
 What one that was killed has left is claimed by another one, or computed by `run_study` at the end,
 which combines the runs.
+
+A part is no `Executor`: one is given tasks by a study that has the store alone, and reports how
+each ended. A part has nobody to report to. It decides by what is in the store, which others change,
+which path is open, and what a program asks for next.
 """
 
 from __future__ import annotations
