@@ -21,7 +21,6 @@ from studies.definition.identity import sources
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK
 from studies.errors import FileDamaged
-from studies.storage.room import needs_room
 from studies.storage.seal import content_of, digest, digest_of, sealed_json
 from studies.storage.store import Store
 
@@ -86,7 +85,7 @@ class Made:
         path, store = self._path(name), self._store
         if kind := special(path, links=False):
             store.put_aside(path, f"it is {kind}", "a file takes its place")
-        with needs_room(store.directory), store.appearing(self._study.id, name) as part:
+        with store.appearing(self._study.id, name) as part:
             part.write_bytes(content)
 
     def _made_of(self, of: str) -> str:

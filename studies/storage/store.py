@@ -26,7 +26,7 @@ import time
 import uuid
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any, TypeVar
@@ -95,10 +95,6 @@ class Store:
         """Return the ids of the runs that have a file."""
         return {Path(name).stem for name in self.blobs.names("runs/*.nc")}
 
-    def study_directory(self, study_id: str) -> Path:
-        """Return the directory of a study."""
-        return self.directory / _study(study_id)
-
     def study_ids(self) -> list[str]:
         """Return the ids of the studies whose definition is here, in order."""
         there = (name.split("/")[1] for name in self.blobs.names(f"studies/*/{_STUDY}"))
@@ -108,13 +104,15 @@ class Store:
         """Return the path of the combined data set of a study."""
         return self.study_path(study_id, _DATASET)
 
-    def study_path(self, study_id: str, name: str) -> Path:
-        """Return the path of a file in the directory of a study."""
+    def study_path(self, study_id: str, name: str = "") -> Path:
+        """Return the path of a file in the directory of a study, or without a name of all."""
         return self.blobs.path(_study(study_id, name))
 
-    def appearing(self, study_id: str, name: str = _DATASET) -> AbstractContextManager[Path]:
+    @contextmanager
+    def appearing(self, study_id: str, name: str = _DATASET) -> Iterator[Path]:
         """Give a path to write to, which becomes a file of a study, by default its data set."""
-        return self.blobs.appearing(_study(study_id, name))
+        with needs_room(self.directory), self.blobs.appearing(_study(study_id, name)) as part:
+            yield part
 
     def scene(self, scene_id: str, whole: bool = True) -> Scene | None:
         """Return the scene from a file that is stored here under this id, or None.
