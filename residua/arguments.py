@@ -12,6 +12,7 @@ from residua import commands, keys
 from residua.status import BAD_INPUT, complain
 from solver.version import __version__
 from studies.execution.limits import Limits
+from studies.storage.blobs import directory_of
 
 
 def parser() -> argparse.ArgumentParser:
@@ -97,7 +98,8 @@ def _study(one: argparse.ArgumentParser) -> None:
 def _results(one: argparse.ArgumentParser) -> None:
     one.add_argument(
         "--out", type=_path, default=Path("out"), metavar="DIR",
-        help="folder of all results, which studies share (default: %(default)s)",
+        help="folder of all results, which studies share, or an address such as s3://bucket/x "
+        "(default: %(default)s)",
     )  # fmt: skip
 
 
@@ -299,7 +301,7 @@ def _add_remote(add: Callable[..., argparse.ArgumentParser]) -> None:
 def _path(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError(f"{text!r}: must be the name of a file or a folder")
-    return Path(text)
+    return directory_of(text)
 
 
 def _place(text: str) -> Path | str:

@@ -19,8 +19,7 @@ from studies.errors import StudyError
 
 def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
-    from residua.cost import ALONE, Foreseen, dry_run
-    from residua.progress import Progress
+    from residua.progress import ALONE, Foreseen, Progress, dry_run
     from studies.definition.study import Study
     from studies.execution.access import Access
     from studies.execution.limits import Limits
@@ -119,7 +118,7 @@ def slurm(options: argparse.Namespace) -> int:
     store = Store(options.out)
     study = Study.from_toml(options.study, (), store.definition, store.scene)
     text = script(
-        study.name, options.study, options.out, options.script,
+        study.name, options.study, store.blobs.address, options.script,
         tasks=options.tasks, time=options.time, memory=options.memory,
         scheduler=options.with_scheduler,
     )  # fmt: skip
@@ -252,6 +251,7 @@ def diff(options: argparse.Namespace) -> int:
 def predict(options: argparse.Namespace) -> int:
     """Tell a number between the runs of a study, with its error."""
     from studies.execution.task import compute_here
+    from studies.numbers import number_text
     from studies.views.picking import study_of
     from studies.views.predict import ERROR_IS, answer
     from studies.views.reading import find_study, open_netcdf
@@ -265,8 +265,8 @@ def predict(options: argparse.Namespace) -> int:
             compute_here(found.run, store)
             found = answer(dataset, study, store, **asked)
     unit = f" {found.unit}" if found.unit not in {"", "1"} else ""
-    what = ERROR_IS.get(found.by, "error")
-    print(f"{found.of} = {found.value:.6g}{unit}, {what} {found.error:.2g}{unit} (by {found.by})")
+    what, error = ERROR_IS.get(found.by, "error"), number_text(found.error, 2)
+    print(f"{found.of} = {number_text(found.value, 6)}{unit}, {what} {error}{unit} (by {found.by})")
     if found.enough:
         return OK
     place = ", ".join(f"{name} = {value}" for name, value in found.at.items())
@@ -318,7 +318,7 @@ def _written_nodes(run: Any, folder: Path) -> Path:
     """Write the fields at the nodes of a run (a data set), and return the file that lists them."""
     from solver.errors import ModelError
     from solver.results.export import write_vtu
-    from studies.storage.ugrid import read
+    from studies.views.solution import read
 
     try:
         return write_vtu(read(run), folder)

@@ -18,11 +18,12 @@ def keys(options: argparse.Namespace) -> int:
     """Make, list or remove the API keys of a service."""
     from service.keys import Keys, KeysError
     from service.settings import Settings
+    from studies.storage.blobs import directory_of
 
     # The other settings do not matter here, and may name files that do not exist yet.
     data = options.data or os.environ.get("RESIDUA_DATA") or Settings.model_fields["data"].default
     try:
-        options.act(Keys(Path(data)), options)
+        options.act(Keys(directory_of(data)), options)
     except KeysError as error:
         raise OSError(str(error)) from None
     return OK

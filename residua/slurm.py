@@ -64,7 +64,7 @@ exit $status
 def script(
     name: str,
     study: Path,
-    out: Path,
+    out: Path | str,
     file: Path,
     *,
     tasks: int,
@@ -77,7 +77,7 @@ def script(
     Parameters
     ----------
     name : of the job
-    study, out, file : the study file, the output directory, and the script itself
+    study, out, file : the study file, the output directory or its address, and the script itself
     tasks : number of tasks, of one core each
     time, memory : limits of a task, as sbatch takes them: ``04:00:00``, ``2G``
     scheduler : whether the tasks are workers of a scheduler, in place of parts
@@ -93,6 +93,8 @@ def script(
     ):
         if not form.fullmatch(text):
             raise StudyError(option, text, allowed)
+    if scheduler and isinstance(out, str):
+        raise StudyError("--out", out, "must be a directory, in which the scheduler is found")
     many = f"ntasks={tasks}" if scheduler else f"array=1-{tasks}"
     head = _HEAD.format(name=name, many=many, memory=memory, time=time)
     settings: dict[str, object] = {**FROM_THE_START, "PYTHONSAFEPATH": 1}

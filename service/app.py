@@ -36,16 +36,16 @@ from service.probe import Probe
 from service.processes import Starter, find_modules_at_home, share_arenas
 from service.recovery import Mender, open_queue
 from service.retention import Keeper
-from service.routes.manual import ASSETS
+from service.routes.itself import ASSETS
 from service.runner import Runner
 from service.sandbox import READERS
 from service.settings import Settings, chosen
 from service.table import Tables
 from service.turns import COMBINING, COMPUTING, READING, Turns
-from studies import Store, StoreBusy, StudyError
-from studies.errors import CatalogueDamaged, StoreFull
+from studies.errors import CatalogueDamaged, StoreBusy, StoreFull, StudyError
 from studies.scratch import remove_left
-from studies.storage.lock import lock
+from studies.storage.claims import lock
+from studies.storage.store import Store
 
 BEARER = HTTPBearer(auto_error=False, description="An API key, made by `residua keys add`.")
 """How the description of the service announces that keys are required; `Gate` requires them."""

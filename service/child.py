@@ -13,10 +13,12 @@ from dataclasses import asdict
 from typing import Any
 
 from service.processes import Outlet, beat, claim_stdout, read_order, watch_stdin
-from studies import GridLost, Store, Study, StudyError, StudyEvent, run_study
-from studies.errors import CatalogueDamaged, StoreBusy, StoreFull, Unusable
+from studies.definition.study import Study
+from studies.errors import CatalogueDamaged, GridLost, StoreBusy, StoreFull, StudyError, Unusable
 from studies.execution.access import Access
 from studies.execution.limits import Limits
+from studies.execution.run import StudyEvent, run_study
+from studies.storage.store import Store
 
 log = logging.getLogger("service.child")
 

@@ -25,11 +25,11 @@ from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.turns import Beyond, Share
 from solver.late import Late
-from studies import Store
 from studies.errors import FileDamaged, StoreFull
 from studies.kinds import kind_of
 from studies.scratch import scratch
 from studies.storage.seal import State, state_of
+from studies.storage.store import Store
 from studies.storage.tiles import Tiles
 
 COMBINED, FOUND = Late("service.reading:combined"), Late("service.reading:found")

@@ -26,7 +26,7 @@ from service.schemas import ContentId
 from service.settings import Settings
 from service.table import Tables
 from service.turns import Share
-from studies import Store
+from studies.storage.store import Store
 
 Found = TypeVar("Found")
 

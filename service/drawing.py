@@ -9,15 +9,18 @@ from typing import Any
 from service.schemas import LineQuery, MapQuery, PlotQuery, SketchQuery
 from solver.errors import ModelError
 from solver.scenes import Scene
-from studies import Store, Study, StudyError, open_netcdf
 from studies.definition.parameters import read_values
+from studies.definition.study import Study
+from studies.errors import StudyError
 from studies.scenes.registry import scene_named
 from studies.storage.runfile import verify
+from studies.storage.store import Store
 from studies.views.plots.fields import check_field, line_fields
 from studies.views.plots.maps import map_figure
 from studies.views.plots.picture import drawn_from, picture
 from studies.views.plots.setup import setup_figure
 from studies.views.plots.sheets import png
+from studies.views.reading import open_netcdf
 
 
 def draw_map(path: Path, query: MapQuery) -> bytes:

@@ -17,7 +17,6 @@ from starlette.exceptions import HTTPException
 from service.keys import KeysError
 from service.logs import REQUEST
 from service.middleware import HEADERS, offered
-from studies import StudyError
 from studies.errors import (
     LONGEST_FIELD,
     LONGEST_TEXT,
@@ -26,6 +25,7 @@ from studies.errors import (
     FileDamaged,
     StoreBusy,
     StoreFull,
+    StudyError,
     Unusable,
     cut,
     worded,

@@ -14,7 +14,9 @@ from typing import Any
 from service.settings import Settings
 from service.turns import Share
 from solver.scenes import Scene
-from studies import Bounds, Estimate, Store, Study, estimate
+from studies.definition.study import Study
+from studies.execution.estimate import Bounds, Estimate, estimate
+from studies.storage.store import Store
 
 SECONDS = 120
 """Longest time of the check of a study [s]."""
@@ -34,6 +36,11 @@ class Examined:
     study: Study
     runs: list[str]
     estimate: Estimate
+
+    @property
+    def costs(self) -> dict[str, str]:
+        """The cost as text by name."""
+        return self.estimate.costs(self.study.kind.chooses)
 
 
 class Examiner:

@@ -18,8 +18,7 @@ from service.sandbox import CRASHED, FAILED, Answer
 from service.schemas import KeptScene
 from service.turns import MINUTE, Share, beyond
 from solver.late import Late
-from studies import StudyError
-from studies.errors import SceneError
+from studies.errors import SceneError, StudyError
 from studies.scenes.formats import FORMATS
 from studies.scenes.table import FILE_NAME
 from studies.scratch import scratch

@@ -23,8 +23,9 @@ from anyio.to_thread import run_sync
 from pydantic import BaseModel, TypeAdapter
 
 from solver.files import appearing
-from studies import FileDamaged, Store, StudyError
+from studies.errors import FileDamaged, StudyError
 from studies.storage.seal import State, content_of, sealed_json, state_of
+from studies.storage.store import Store
 
 
 class Scope(StrEnum):

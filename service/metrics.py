@@ -17,8 +17,8 @@ from service.job import StudyState
 from service.jobs import Jobs
 from service.runner import Runner
 from service.search import OUTCOMES
-from studies import Store
 from studies.errors import CatalogueDamaged, StoreBusy, StoreFull
+from studies.storage.store import Store
 
 OTHER = "other"
 """Label of methods and paths without a route, so that clients cannot create labels without end."""

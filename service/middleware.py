@@ -1,4 +1,4 @@
-"""What stands around all answers: security headers, the largest body, HEAD and OPTIONS.
+"""What stands around all answers: security headers, the largest body, strict JSON, HEAD, OPTIONS.
 
 FastAPI's own ``max_body_size`` answers in plain text when the length is declared; `body_limit`
 raises where the body is read, so that the answer is a problem document.
@@ -6,15 +6,20 @@ raises where the body is read, so that the answer is a problem document.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Callable, Coroutine, Mapping
 from http import HTTPStatus
+from typing import Any
 
-from fastapi import Request
-from fastapi.routing import iter_route_contexts
+from fastapi import Request, Response
+from fastapi.routing import APIRoute, iter_route_contexts
 from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from studies.errors import StudyError
+from studies.toml import check_depth
 
 OURS_ALONE = "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 HEADERS = {
@@ -122,3 +127,41 @@ def offered(request: Request, known: str) -> str:
     if "GET" in methods:
         methods.add("HEAD")
     return ", ".join(sorted(methods))
+
+
+class StrictRequest(Request):
+    """A request that refuses such JSON."""
+
+    async def json(self) -> Any:
+        """Return the body, read as JSON."""
+        body = await self.body()
+        text = body.decode(json.detect_encoding(body), "surrogatepass")
+        try:
+            check_depth(text)
+        except ValueError as error:
+            raise StudyError(
+                "body", f"{text[:50]}…", f"must not be nested so deep: {error}"
+            ) from None
+        return json.loads(text, object_pairs_hook=_distinct)
+
+
+class StrictRoute(APIRoute):
+    """A route whose handler gets a `StrictRequest`."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return the handler."""
+        handle = super().get_route_handler()
+
+        async def strict(request: Request) -> Response:
+            return await handle(StrictRequest(request.scope, request.receive))
+
+        return strict
+
+
+def _distinct(members: list[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name, value in members:
+        if name in found:
+            raise StudyError(name, value, "occurs twice in one JSON object: keep one")
+        found[name] = value
+    return found

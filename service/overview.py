@@ -18,11 +18,12 @@ from service.jobs import Jobs
 from service.scenes import scene_name
 from service.schemas import StudyDetail, StudyRun, StudySummary, Window
 from service.turns import Share
-from studies import Store
 from studies.definition.sweep import labels, positions
 from studies.definition.vocabulary import taken
 from studies.kinds import KINDS, kind_of
+from studies.numbers import number_text
 from studies.storage.seal import state_of
+from studies.storage.store import Store
 
 KEPT = 100
 """Largest number of answers that are kept."""
@@ -164,7 +165,11 @@ def log_of(job: Job, jobs: Jobs, store: Store) -> str:
         lines = [(at, words) for at, words in begun + ended if at]
     for run_id, row in store.catalogue.each(jobs.runs(job.id)):
         if row:
-            seconds = "" if row["cpu_seconds"] is None else f", {row['cpu_seconds']:.3g} s of CPU"
+            seconds = (
+                ""
+                if row["cpu_seconds"] is None
+                else f", {number_text(row['cpu_seconds'])} s of CPU"
+            )
             words = f"run {run_id}: {row['status']}{seconds}"
             said = f"{words}: {row['message']}" if row["message"] else words
             lines.append((str(row["created"]), said))

@@ -17,10 +17,11 @@ from service import processes
 from service.processes import Process, Starter
 from service.settings import Settings
 from solver.late import Late
-from studies import Store, Study
+from studies.definition.study import Study
 from studies.errors import StoreBusy, StoreFull, StudyError
 from studies.execution.estimate import memory_needed
 from studies.execution.forks import LOADING_SECONDS, SHARED
+from studies.storage.store import Store
 
 OWN_WORKERS = Late("studies.execution.workers:own_workers")
 """What uses dask, which the service itself does not."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from solver.files import LARGEST
 from solver.results.quantities import QUANTITIES
-from studies import StudyError
+from studies.errors import StudyError
 from studies.scenes import building  # noqa: F401  (needed for a model, and loaded with this)
 from studies.scenes.description import Description, file_names
 from studies.scenes.file_scene import FileScene

@@ -12,8 +12,8 @@ from anyio.to_thread import run_sync
 
 from service.errors import QueueLost
 from service.jobs import Jobs
-from studies import Store
 from studies.errors import CatalogueDamaged, StoreBusy, StoreFull
+from studies.storage.store import Store
 
 SECONDS = 5.0
 """Time within which the check must end [s]."""

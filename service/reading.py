@@ -15,16 +15,20 @@ from typing import Any
 from service.octets import octets
 from service.schemas import Prediction, PredictQuery
 from solver.results.export import vtu_of
-from studies import Store, Study, StudyError, open_netcdf, sensitivity
+from studies.definition.study import Study
+from studies.errors import StudyError
 from studies.kinds import found_of
 from studies.kinds.fit.shown import told as told_fit
 from studies.storage.combine import combine
 from studies.storage.runfile import verify
-from studies.storage.ugrid import read
+from studies.storage.store import Store
 from studies.views.picking import sweep_axes
 from studies.views.predict import answer
+from studies.views.reading import open_netcdf
+from studies.views.sensitivity import sensitivity
 from studies.views.sensitivity import told as told_indices
 from studies.views.shown import outline, shown
+from studies.views.solution import read
 
 MOST_FITTED = 1000
 """Largest number of runs to which a request may fit polynomials, which takes seconds."""

@@ -11,10 +11,11 @@ from pathlib import Path
 from service.errors import NotFound, QueueLost
 from service.job import StudyState, verdict
 from service.jobs import Jobs
-from studies import FileDamaged, Store
 from studies.definition.vocabulary import MISSING
+from studies.errors import FileDamaged
 from studies.storage.database import Database
 from studies.storage.seal import State, state_of
+from studies.storage.store import Store
 
 log = logging.getLogger(__name__)
 
@@ -56,7 +57,7 @@ def _adopt(jobs: Jobs, store: Store) -> None:
         try:
             jobs.get(study_id)
         except NotFound:
-            if store.dataset_path(study_id).exists():
+            if store.blobs.names(f"studies/{study_id}/dataset.nc"):
                 add(study_id, jobs, store, begun=False)
 
 
@@ -79,13 +80,13 @@ def add(study_id: str, jobs: Jobs, store: Store, begun: bool = True) -> None:
         return
     if study.kind.chooses:
         asked = store.asked(study)
-        ended = asked is not None and all(store.run_path(run).is_file() for run in asked)
+        ended = asked is not None and len(store.modified(asked)) == len(asked)
         stage = study.stage(study.expansion.size if ended else 0)
         jobs.accept(study.id, study.to_dict(), sorted(asked or ()), most=study.size, stage=stage)
     else:
         jobs.accept(study.id, study.to_dict(), study.run_ids())
-        there = (store.run_path(run).is_file() for run in study.run_ids())
-        ended = not begun or sum(there) >= counts.total() - counts[MISSING]
+        there = len(store.modified(study.run_ids()))
+        ended = not begun or there >= counts.total() - counts[MISSING]
     if counts and (ended or not begun):
         jobs.finish(study.id, *verdict(counts, study.kind.counted), standing=StudyState.ACCEPTED)
 

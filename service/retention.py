@@ -18,17 +18,15 @@ from collections.abc import AsyncIterator, Callable, Collection, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from service.errors import Busy, Conflict, NoRoom, NotFound
 from service.examiner import Examined
 from service.job import Job, StudyState
 from service.jobs import Jobs, forget, put
-from studies import FileDamaged, Store
-
-if TYPE_CHECKING:
-    from studies.scenes.description import Description
+from studies.errors import FileDamaged
+from studies.numbers import size_text
+from studies.storage.store import Store
 
 log = logging.getLogger(__name__)
 
@@ -99,10 +97,9 @@ class Keeper:
         If it does not fit on the disk, or too many wait (`NoRoom`, `Busy`), nothing of it stays.
         """
         study, size = found.study, found.estimate.bytes
-        directory = self.store.study_directory(study.id)
         with self._one:
             self.check_room(found)
-            there = directory.exists()
+            there = self.store.definition(study.id) is not None
             self.store.save_study(study)
             content, most = study.to_dict(), study.size
             try:
@@ -111,7 +108,7 @@ class Keeper:
                 )
             except Busy:  # or a queue that is made again from the studies would have it
                 if not there:
-                    shutil.rmtree(directory)
+                    self.store.discard_study(study.id)
                 raise
 
     def check_room(self, found: Examined) -> None:
@@ -119,12 +116,12 @@ class Keeper:
         size, promised = found.estimate.bytes, self.jobs.promised(but=found.study.id)
         free = shutil.disk_usage(self.store.directory).free
         if size and size + promised > free:
-            takes, has, others = (f"{each / 1e9:.3g} GB" for each in (size, free, promised))
+            takes, has, others = map(size_text, (size, free, promised))
             told = f"the study takes about {takes}, and {has} are free on the disk of the data"
             before = f", of which studies before it take {others}" if promised else ""
             raise NoRoom(f"{told} directory{before}: use fewer runs, or make room")
 
-    def keep_scene(self, scene_id: str, description: Description, owner: str) -> bool:
+    def keep_scene(self, scene_id: str, description: Any, owner: str) -> bool:
         """Store a posted scene for a key; return whether it is new.
 
         Raise `Conflict` if all posted scenes, or those of the key, would take more than is allowed.
@@ -147,7 +144,7 @@ class Keeper:
 
         Raise `Conflict` if a study, of the queue or of the command line, names it.
         """
-        if not (self.store.directory / "scenes" / scene_id).is_dir():
+        if not self.store.size(f"scenes/{scene_id}/*"):
             raise NotFound(f"no posted scene has the id {scene_id}")
         with self._one:
             if user := self._users().get(scene_id):
@@ -170,7 +167,6 @@ class Keeper:
             job = self.jobs.read(queue, study_id)
             put(queue, job, state=StudyState.DISMISSED, message=DELETED)
         elsewhere = self._needed_elsewhere()
-        directory = self.store.study_directory(study_id)
         with self._ended(study_id) as queue:
             own = queue.execute(
                 "SELECT run FROM run AS mine WHERE job = ? AND NOT EXISTS"
@@ -179,10 +175,11 @@ class Keeper:
             )
             unneeded = {row["run"] for row in own} - elsewhere
             unneeded -= self._searched(unneeded)
-            freed = size(directory) + sum(size(self.store.run_path(run)) for run in unneeded)
+            freed = self.store.size(
+                f"studies/{study_id}/*", *(f"runs/{run}.nc" for run in unneeded)
+            )
             self.store.discard(unneeded)
-            with suppress(FileNotFoundError):
-                shutil.rmtree(directory)
+            self.store.discard_study(study_id)
             forget(queue, study_id)
         return freed
 
@@ -197,7 +194,7 @@ class Keeper:
         oldest = datetime.now(UTC) - timedelta(days=self.days) if self.days else None
         excess = 0
         if self.size is not None:
-            used = sum(size(self.store.directory / name) for name in ("runs", "studies"))
+            used = self.store.size("runs/*", "studies/*/*")
             excess = used + sum(scene.size for scene in self.store.scene_files()) - self.size
         if excess > 0:
             excess -= self._sweep_scenes(excess)
@@ -268,12 +265,3 @@ class Keeper:
             with suppress(FileDamaged, ValueError):
                 needed.update(self.store.runs_of(self.store.study(study_id)))
         return needed
-
-
-def size(path: Path) -> int:
-    """Return the bytes of a file, or of all files below a directory; 0 if there is none."""
-    total = 0
-    for each in (path, *path.rglob("*")):
-        with suppress(FileNotFoundError):
-            total += each.stat().st_size if each.is_file() else 0
-    return total

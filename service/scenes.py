@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from service.errors import NotFound
 from solver.scenes import Scene
-from studies import Store
 from studies.definition.identity import is_id
 from studies.scenes.registry import known_names, scene_named
+from studies.storage.store import Store
 
 
 def scene_of(store: Store, name: str) -> Scene | None:

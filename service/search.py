@@ -7,11 +7,11 @@ from itertools import chain
 from typing import Any
 
 from service.schemas import RunFilter, Window
-from studies import Store, StudyError
 from studies.definition.parameters import Parameter, parameters_of, plain
 from studies.definition.vocabulary import MISSING, STATUSES
-from studies.errors import one_of
+from studies.errors import StudyError, one_of
 from studies.scenes.registry import built_in, known_names, scene_named
+from studies.storage.store import Store
 
 OUTCOMES = tuple(status for status in STATUSES if status != MISSING)
 """Statuses that a run in the catalogue may have."""

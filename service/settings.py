@@ -16,11 +16,17 @@ from studies.execution.access import Access
 from studies.execution.estimate import Bounds
 from studies.execution.limits import Limits
 from studies.scenes.refusals import mistakes_of
+from studies.storage.blobs import directory_of, is_address
 
 
 def _words(given: Any) -> Any:
     """Return the parts of a text that are separated by commas."""
     return [word.strip() for word in given.split(",")] if isinstance(given, str) else given
+
+
+def _folder(given: Any) -> Any:
+    """Return the folder of what is at an address; anything else as it is."""
+    return directory_of(given) if is_address(given) else given
 
 
 class Settings(BaseSettings):
@@ -30,7 +36,10 @@ class Settings(BaseSettings):
         env_prefix="RESIDUA_", env_ignore_empty=True, frozen=True, extra="forbid"
     )
 
-    data: Path = Field(default=Path("out"), description="directory of runs, studies and the queue")
+    data: Annotated[Path, BeforeValidator(_folder)] = Field(
+        default=Path("out"),
+        description="directory of runs, studies and the queue; or an address, such as s3://bucket/x",
+    )
     host: str = Field(default="127.0.0.1", description="where to listen")
     port: int = Field(default=8000, ge=0, le=65535, description="where to listen")
     require_keys: bool = Field(

@@ -20,13 +20,13 @@ from service.overview import PENDING, searched_at
 from service.scenes import scene_of
 from service.turns import Share
 from solver.scenes import Scene
-from studies import Store
 from studies.definition.parameters import parameters_of
 from studies.definition.sweep import labels, linked_values
 from studies.definition.vocabulary import STATUSES, taken
 from studies.kinds import kind_of
 from studies.storage.dataset import axis_attributes
 from studies.storage.seal import state_of
+from studies.storage.store import Store
 from studies.views.figures import group_of
 from studies.views.table import MESSAGE, RUN, STATUS, Column, RunTable, column_of
 

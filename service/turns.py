@@ -28,7 +28,7 @@ from anyio import CapacityLimiter, to_thread
 from service import sandbox
 from service.errors import Busy, TooMany
 from service.sandbox import BYTES, Answer
-from studies import StudyError
+from studies.errors import StudyError
 
 READING, COMPUTING, COMBINING = 2, 2, 1
 """Slots of each queue. Combining has its own, so that no other answer waits for it."""

@@ -31,9 +31,12 @@ from service.processes import share_arenas
 from service.recovery import add
 from service.settings import Settings
 from solver.files import NoFile, opened
-from studies import Store, Study, StudyError
+from studies.definition.study import Study
+from studies.errors import StudyError
 from studies.scratch import scratch
+from studies.storage.blobs import blobs_at
 from studies.storage.seal import state_of
+from studies.storage.store import Store
 
 log = logging.getLogger(__name__)
 
@@ -133,7 +136,7 @@ def application(path: Path) -> Iterator[tuple[FastAPI, str]]:
     """
     with scratch() as folder:
         settings = Settings(data=folder, host=HOST, root_path="", require_keys=False)
-        if (path / "studies").is_dir():
+        if (path / "studies").is_dir() or blobs_at(path).names("studies/*/study.json"):
             shown = ViewedFolder(path, folder)
             shown.look()
             _tell_others(path, shown)

@@ -5,55 +5,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from solver.late import front
-from studies.errors import (
-    CatalogueDamaged,
-    FileDamaged,
-    GridLost,
-    StoreBusy,
-    StoreFull,
-    StudyError,
-)
-
-if TYPE_CHECKING:
-    from studies.client import Client
-    from studies.definition.cases import Case, LoadingPath
-    from studies.definition.parameters import scene_schema
-    from studies.definition.study import Study
-    from studies.execution.access import Access
-    from studies.execution.estimate import Bounds, Estimate, estimate
-    from studies.execution.function import sweep
-    from studies.execution.limits import Limits
-    from studies.execution.run import StudyEvent, StudyOutcome, run_study
-    from studies.execution.workers import own_workers
-    from studies.kinds.fit.shown import fit
-    from studies.storage.store import Store
-    from studies.views.differing import Difference, diff
-    from studies.views.picking import to_grid
-    from studies.views.predict import predict
-    from studies.views.reading import open_netcdf, open_study
-    from studies.views.sensitivity import sensitivity
-    from studies.views.solution import to_xarray
-    from studies.views.tables import summary
 
 _HOMES = {
     "Access": "execution.access",
-    "Case": "definition.cases",
-    "Client": "client",
-    "Limits": "execution.limits",
     "Bounds": "execution.estimate",
+    "Case": "definition.cases",
+    "CatalogueDamaged": "errors",
+    "Client": "client",
+    "diff": "views.differing",
     "Difference": "views.differing",
     "Estimate": "execution.estimate",
-    "LoadingPath": "definition.cases",
-    "Store": "storage.store",
-    "Study": "definition.study",
-    "StudyEvent": "execution.run",
-    "StudyOutcome": "execution.run",
-    "diff": "views.differing",
     "estimate": "execution.estimate",
+    "FileDamaged": "errors",
     "fit": "kinds.fit.shown",
+    "GridLost": "errors",
+    "Limits": "execution.limits",
+    "LoadingPath": "definition.cases",
     "open_netcdf": "views.reading",
     "open_study": "views.reading",
     "own_workers": "execution.workers",
@@ -61,6 +29,13 @@ _HOMES = {
     "run_study": "execution.run",
     "scene_schema": "definition.parameters",
     "sensitivity": "views.sensitivity",
+    "Store": "storage.store",
+    "StoreBusy": "errors",
+    "StoreFull": "errors",
+    "Study": "definition.study",
+    "StudyError": "errors",
+    "StudyEvent": "execution.run",
+    "StudyOutcome": "execution.run",
     "summary": "views.tables",
     "sweep": "execution.function",
     "to_dataframe": "views.solution",
@@ -68,41 +43,7 @@ _HOMES = {
     "to_xarray": "views.solution",
 }
 
-__all__ = [
-    "Access",
-    "Bounds",
-    "Case",
-    "CatalogueDamaged",
-    "Client",
-    "Difference",
-    "Estimate",
-    "FileDamaged",
-    "GridLost",
-    "Limits",
-    "LoadingPath",
-    "Store",
-    "StoreBusy",
-    "StoreFull",
-    "Study",
-    "StudyError",
-    "StudyEvent",
-    "StudyOutcome",
-    "diff",
-    "estimate",
-    "fit",
-    "open_netcdf",
-    "open_study",
-    "own_workers",
-    "predict",
-    "run_study",
-    "scene_schema",
-    "sensitivity",
-    "summary",
-    "sweep",
-    "to_dataframe",
-    "to_grid",
-    "to_xarray",
-]
+__all__ = list(_HOMES)
 
 # A public name is imported when it is first used.
 __getattr__ = front(__name__, _HOMES)

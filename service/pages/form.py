@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from solver.scenes import Scene
-from studies import Study, StudyError
 from studies.definition.cases import USUAL_AXES
 from studies.definition.parameters import Parameter, parameters_of
 from studies.definition.points import ENTRIES
+from studies.definition.study import Study
+from studies.errors import StudyError
 from studies.kinds import KINDS
 from studies.toml import toml_of, toml_text
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Mapping
 from http import HTTPStatus
 from typing import Annotated, Any
@@ -30,8 +29,9 @@ from service.routes.scenes import post_scene
 from service.scenes import known_scene
 from solver.late import Late
 from solver.scenes import Scene
-from studies import Store, StudyError
+from studies.errors import StudyError
 from studies.scenes.registry import known_scenes
+from studies.storage.store import Store
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
 
@@ -135,7 +135,7 @@ async def make(
         job, _ = await run_in_threadpool(keeper.accept, found, 0)
         return to_study(request, job.id)
     if "application/json" in request.headers.get("accept", ""):
-        costs = None if found is None else dataclasses.asdict(found.estimate)
+        costs = found.costs if found else None
         return JSONResponse({"wrong": wrong, "estimate": costs, **_copies(request, content, scene)})
     return await reading.here(_form, request, store, scene_name, given, wrong, found)
 
@@ -184,7 +184,7 @@ def _form(
         tables=tables,
         wrong=mistakes,
         general=[text for key, text in mistakes.items() if key not in own],
-        estimate=found.estimate if found else None,
+        estimate=found.costs if found else {},
         refused=refused,
         **_copies(request, content, scene),
     )

@@ -1,19 +1,16 @@
-"""Templates to answers: links, addresses of static files, numbers as text, errors as pages."""
+"""Templates to answers: links, addresses of static files, errors as pages."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Coroutine
-from functools import cache
 from http import HTTPStatus
 from typing import Any
 
-import numpy as np
 from fastapi import Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, RedirectResponse
 from fastapi.routing import APIRoute
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from starlette.exceptions import HTTPException
 
 from service.errors import STATUS, answer_to
@@ -21,45 +18,10 @@ from service.keys import Scope
 from service.middleware import CHARTS as POLICY
 from service.pages import assets
 from studies.views import rules
-from studies.views.columns import value_text
+from studies.views.html import templates
 
 ROOT = "/ui"
 """Path of the pages."""
-
-
-@cache
-def templates() -> Environment:
-    """Return the templates of this package."""
-    found = Environment(
-        loader=PackageLoader("service.pages"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
-    found.filters |= {
-        "words": lambda name: str(name).replace("_", " "),
-        "number": number_text,
-        "moment": lambda text: (text or "").replace("T", " ").removesuffix("+00:00"),
-        "data": _data,
-    }
-    return found
-
-
-def number_text(value: Any) -> str:
-    """Return a value as the pages show it: numbers with four digits and a minus, "–" for none."""
-    real = isinstance(value, float | np.floating)
-    if real and 1e4 <= abs(float(value)) < 1e6:
-        return f"{float(value):.0f}".replace("-", "−")
-    text = value_text(value)
-    if text == "-":
-        return "–"
-    return text.replace("-", "−") if real or isinstance(value, int) else text
-
-
-def _data(content: Any) -> str:
-    """Return JSON that may stand in an element of a page."""
-    return json.dumps(content).replace("<", "\\u003c").replace("&", "\\u0026")
 
 
 def page(
@@ -72,7 +34,7 @@ def page(
 
     caller: Scope | None = getattr(request.state, "caller", None)
     text = (
-        templates()
+        templates("service.pages")
         .get_template(f"{template}.html")
         .render(
             link=link,

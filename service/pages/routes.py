@@ -36,17 +36,19 @@ from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.pages import study as chosen
 from service.pages.assets import asset
-from service.pages.rendering import COOKIE, ROOT, PageRoute, number_text, page, to_study
+from service.pages.rendering import COOKIE, ROOT, PageRoute, page, to_study
 from service.pages.run import MOST, audited, compared, numbers_shown, parameters_shown
-from service.routes.health import health
+from service.routes.itself import health
 from service.routes.numbers import OUTLINED
 from service.scenes import scene_name, scene_of
 from service.schemas import ContentId, Health, StudyFilter, Window
 from solver.scenes import Scene
-from studies import Store, StudyError
 from studies.definition.identity import is_id
+from studies.errors import StudyError
 from studies.kinds import kind_of
 from studies.scenes.registry import known_names
+from studies.storage.store import Store
+from studies.views.html import number
 from studies.views.table import MESSAGE, RUN, STATUS, RunTable, varied
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
@@ -207,7 +209,7 @@ def _cell(column: Any, at: int) -> str:
     value = column.values[at]
     if column.flags and value == value:
         return str(column.flags.get(int(value), value)).replace("_", " ")
-    return number_text(value)
+    return number(value)
 
 
 @router.get("/runs/{run_id}")

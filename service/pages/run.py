@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,7 @@ from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.storage.dataset import attributes_of
 from studies.views.columns import unit_text
-from studies.views.figures import group_of
+from studies.views.figures import group_of, meter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,10 +35,8 @@ class Figure:
 
     @property
     def share(self) -> float:
-        """Return the place of the value between limit / 1e6 and limit, on a logarithmic scale."""
-        if not self.limit or not self.value or self.value <= 0.0:
-            return 0.0
-        return min(max(1.0 + math.log10(self.value / self.limit) / 6.0, 0.02), 1.0)
+        """Return the length of its `meter`."""
+        return meter(self.value or 0.0, self.limit or 0.0)
 
     @property
     def kept(self) -> bool:

@@ -1,6 +1,6 @@
 """The resources, one module for each."""
 
-from service.routes import health, manual, metrics, numbers, runs, scenes, studies
+from service.routes import itself, numbers, runs, scenes, studies
 
 ROUTERS = (
     studies.router,
@@ -8,7 +8,6 @@ ROUTERS = (
     runs.router,
     numbers.router,
     scenes.router,
-    health.router,
-    metrics.router,
-    manual.router,
+    itself.router,
+    itself.others,
 )

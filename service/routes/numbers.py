@@ -18,7 +18,7 @@ from service.octets import MEDIA_TYPE, octets
 from service.schemas import AuditFigure, ContentId, NumbersFilter, TableFilter
 from service.table import OUTCOMES
 from solver.late import Late
-from studies import StudyError
+from studies.errors import StudyError
 from studies.storage.seal import digest
 from studies.views.figures import Worst, worst
 from studies.views.table import RUN, STATUS, RunTable, varied

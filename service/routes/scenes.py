@@ -22,7 +22,8 @@ from service.maps import PICTURE
 from service.scenes import known_scene
 from service.schemas import ContentId, KeptScene, SceneSummary, SketchQuery, Window
 from solver.late import Late
-from studies import StudyError, scene_schema
+from studies.definition.parameters import scene_schema
+from studies.errors import StudyError
 from studies.scenes.file_scene import FileScene
 from studies.scenes.registry import known_scenes
 

@@ -35,6 +35,7 @@ from service.dependencies import (
 from service.errors import REFUSED, Busy, Conflict, NotFound, QueueLost
 from service.files import NETCDF, UNCHANGED, netcdf, tagged, unchanged
 from service.maps import PICTURE
+from service.middleware import StrictRoute
 from service.octets import MEDIA_TYPE
 from service.schemas import (
     ContentId,
@@ -47,11 +48,11 @@ from service.schemas import (
     StudySummary,
     Window,
 )
-from service.strict import StrictRoute
 from solver.late import Late
-from studies import Estimate, Study, StudyError
 from studies.definition.schema import StudyTable, Whole, parsed
-from studies.errors import StoreFull
+from studies.definition.study import Study
+from studies.errors import StoreFull, StudyError
+from studies.execution.estimate import Estimate
 from studies.storage.seal import digest
 from studies.storage.tiles import METADATA
 

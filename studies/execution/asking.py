@@ -22,6 +22,7 @@ from studies.definition.cases import Case, LoadingPath
 from studies.definition.place import Limit, Place
 from studies.definition.quantity import Line, Read
 from studies.definition.study import Study
+from studies.numbers import number_text
 from studies.storage import runfile
 from studies.storage.store import Store
 
@@ -257,4 +258,4 @@ def _read(store: Store, names: Collection[str], row: Mapping[str, Any]) -> Read:
 
 
 def _short(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return number_text(value, 6) if isinstance(value, float) else str(value)

@@ -27,6 +27,7 @@ from studies.definition.vocabulary import OK, SOLVED
 from studies.errors import StudyError
 from studies.execution.bundles import most_together, setup_of
 from studies.execution.limits import LOADED
+from studies.numbers import size_text, time_text
 from studies.storage.store import Store
 
 _PER_RUN, _PER_SETUP = 0.5, 1.0
@@ -75,6 +76,27 @@ class Estimate:
     bytes: int
     memory: int | None
     basis: str
+
+    @property
+    def time(self) -> str:
+        """The processor time and its range as text; empty if it is not known."""
+        low, likely, high = self.cpu_seconds or (0.0, 0.0, 0.0)
+        return time_text(likely, low, high) if self.cpu_seconds else ""
+
+    def costs(self, chooses: bool) -> dict[str, str]:
+        """Return all as text by name, of a study that chooses its runs or of another one."""
+        unknown, most = "not known", f"at most {self.runs}, of which some may be there"
+        times = f"{self.increments} in all, at most {self.longest} on a path"
+        return {
+            "runs": most if chooses else f"{self.runs} in all, {self.to_compute} to compute",
+            "loading paths": f"{self.paths} to walk",
+            "unknowns": unknown if self.unknowns is None else f"at most {self.unknowns} a run",
+            "increments": unknown if self.increments is None else times,
+            "processor time": self.time or unknown,
+            "memory": f"about {size_text(self.memory)} a worker" if self.memory else unknown,
+            "disk": f"about {size_text(self.bytes)}",
+            "estimated from": self.basis,
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,14 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray as xr
 
 from solver.errors import LimitLoad, NotConverged
 from solver.late import Late
 from studies.errors import StudyError
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _CALLED = Late("studies.execution.workers:called")  # dask takes a second to import
 _DONE, _LIMIT, _FAILED = "ok", "limit_load", "not_converged"
@@ -41,8 +40,6 @@ def sweep(
     StudyError
         if there is no axis, or an axis has no values or one twice
     """
-    import xarray as xr
-
     values = {name: list(given) for name, given in axes.items()}
     for name, own in values.items():
         if not own or len(set(own)) < len(own):

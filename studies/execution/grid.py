@@ -7,7 +7,7 @@ import queue
 import threading
 import time
 import uuid
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Self
 
 from dask.task_spec import Task
@@ -89,22 +89,7 @@ class Grid:
         limits: Limits,
         priority: int,
     ) -> None:
-        """See `Executor`, and `events`."""
-        with contextlib.closing(
-            self.events(function, tasks, should_stop, limits, priority)
-        ) as events:
-            for event in events:
-                hear(event)
-
-    def events(
-        self,
-        function: Function,
-        tasks: Iterable[Any],
-        should_stop: StopCheck,
-        limits: Limits | None = None,
-        priority: int = 0,
-    ) -> Generator[Event, None, None]:
-        """Run ``function(task, report, should_stop)`` for every task; yield what happens.
+        """See `Executor`.
 
         Only so many tasks as there are workers, and a few more, are at the scheduler at a time:
         others who use it get their turn, and `tasks` may be a long generator. If it yields None
@@ -113,8 +98,7 @@ class Grid:
         for each path, and anew after a report with ``follows``. A `function` that raises `Unfit` is
         called again later, on whichever worker is free.
 
-        When `should_stop` turns true, waiting tasks are dropped and running ones stopped;
-        the iteration ends when these have, or soon.
+        When `should_stop` turns true, it ends when the running tasks have, or soon.
 
         Raises
         ------
@@ -122,9 +106,10 @@ class Grid:
             when the scheduler is gone or has forgotten the tasks, or when no worker took the work
             for as long as `limits` allow
         """
-        handed_out = _HandedOut(self._client, function, limits or Limits(), priority)
+        handed_out = _HandedOut(self._client, function, limits, priority)
         try:
-            yield from handed_out.carry_out(iter(tasks), should_stop)
+            for event in handed_out.carry_out(iter(tasks), should_stop):
+                hear(event)
         finally:
             handed_out.close()
 

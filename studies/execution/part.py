@@ -6,12 +6,15 @@ runs each process carries out all programs: they ask for the same runs, whoever 
 ends when nothing is left that it can claim, and no run of others can make a program ask for more.
 What one that was killed has left is claimed by another one, or computed by `run_study` at the end,
 which combines the runs.
+
+A part is no `Executor`: one is given tasks by a study that has the store alone, and reports how
+each ended. A part has nobody to report to. It decides by what is in the store, which others change,
+which path is open, and what a program asks for next.
 """
 
 from __future__ import annotations
 
 import itertools
-import os
 import time
 from collections.abc import Callable, Container, Iterator
 from contextlib import ExitStack, contextmanager
@@ -118,7 +121,7 @@ class _PartWork:
 
     def done(self, begin: float) -> PartOutcome:
         """Go through all units, from a place between 0 and 1 on, until none can be claimed."""
-        claims = Claims(self.store.directory / "claims")
+        claims = self.store.blobs.claims()
         asking = Asking(self.study, self.store, resume=True) if self.study.kind.chooses else None
         units = self._units(asking)
         first = round(begin * len(units))
@@ -161,8 +164,7 @@ class _PartWork:
     def _complete(self, unit: _Unit) -> bool:
         """Whether the runs of a unit were there when the files were listed last."""
         if time.monotonic() - self._looked > _LOOK:
-            with os.scandir(self.store.directory / "runs") as files:
-                self._there = {each.name.removesuffix(".nc") for each in files}
+            self._there = self.store.stored_runs()
             self._looked = time.monotonic()
         return unit.complete(self._there)
 
@@ -186,10 +188,8 @@ class _PartWork:
 
     def task(self, path: LoadingPath, **more: Any) -> PathTask:
         """Return the task of a loading path."""
-        directory = self.store.directory.resolve()
-        return PathTask(
-            self.study.problem, (path,), directory, solver_hash(), self.study.keep, **more
-        )
+        where = self.store.address
+        return PathTask(self.study.problem, (path,), where, solver_hash(), self.study.keep, **more)
 
     def _tell(self, kind: str, **content: Any) -> None:
         self.emit(StudyEvent(kind=kind, progress=self._share, **content))
@@ -229,7 +229,8 @@ class _Unit:
 
     def compute(self, part: _PartWork, hopeless: bool) -> None:
         """Compute its runs that are not there; or store that those who tried have died."""
-        cases = tuple(case for case in self.path.cases if not part.store.run_path(case.id).exists())
+        there = part.store.modified(case.id for case in self.path.cases)
+        cases = tuple(case for case in self.path.cases if case.id not in there)
         path = replace(self.path, cases=cases)
         if self.asking and self.asked:
             self._ask(part, path, hopeless, self.asking, self.asked)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from solver.files import appearing, read_file
+from studies.errors import Unusable
 from studies.storage.store import Store
 
 _PATIENCE = 2.0
@@ -28,12 +28,14 @@ class Proof:
 
     Attributes
     ----------
-    path : file of the token
-    token : its content, new each time the study is computed
+    store : the directory of the store, or its address
+    study : id of the study
+    token : name of the file of the token, new each time the study is computed
     directory : directory of the store, as the user gave it
     """
 
-    path: Path
+    store: Path | str
+    study: str
     token: str
     directory: str
 
@@ -56,19 +58,18 @@ class Proof:
 
     def _seen(self) -> bool:
         try:
-            return read_file(self.path).decode() == self.token
-        except (OSError, ValueError):
+            return Store(self.store).study_path(self.study, self.token).is_file()
+        except (OSError, Unusable):
             return False
 
 
 @contextmanager
 def proof_of(store: Store, study_id: str) -> Iterator[Proof]:
     """Keep a token in the directory of a study while its paths are computed."""
-    path = store.study_directory(study_id).resolve() / "token"
-    proof = Proof(path, uuid.uuid4().hex, str(store.directory))
-    with appearing(path) as part:
-        part.write_text(proof.token, encoding="ascii")
+    token = f"token-{uuid.uuid4().hex}"
+    with store.appearing(study_id, token) as part:
+        part.touch()
     try:
-        yield proof
+        yield Proof(store.address, study_id, token, str(store.blobs.address))
     finally:
-        path.unlink(missing_ok=True)
+        store.discard_study(study_id, "token-*")  # with those of processes that were killed

@@ -6,7 +6,6 @@ from collections import Counter
 from dataclasses import replace
 from typing import Any
 
-from solver.files import appearing
 from studies.definition.identity import canonical
 from studies.definition.points import POINT
 from studies.definition.study import Study
@@ -17,7 +16,6 @@ from studies.storage import runfile, seal
 from studies.storage.dataset import RunContent
 from studies.storage.made import Combined, Made, held
 from studies.storage.provenance import provenance
-from studies.storage.room import needs_room
 from studies.storage.store import Store
 
 _NAME = "data set"
@@ -79,7 +77,7 @@ def answered(study: Study, store: Store, asking: Asking, anew: bool) -> Combined
     written = made.kept(_NAME, found.of) is None
     if written:
         packed = runfile.packed(RunContent(found.content(), _attributes(study) | entry))
-        with needs_room(store.directory), appearing(path) as part:
+        with store.appearing(study.id) as part:
             part.write_bytes(seal.sealed(f"dataset {study.id}", packed))
         made.note(_NAME, found.of, [path.name])
     counts = dict(Counter(status for _, status, _ in found.outcomes))

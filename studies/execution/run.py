@@ -204,7 +204,7 @@ def run_study(
         work = _Work(study, store, wanted, limits, priority, emit, asking)
         if wanted or (asking and not asking.ended):
             if shutil.disk_usage(store.directory).free < _ROOM:
-                raise StoreFull(str(store.directory))  # before any path is computed in vain
+                raise StoreFull(str(store.blobs.address))  # before any path is computed in vain
             here = Here(alone)
             if executor or alone:
                 work.compute_by(executor or here, stop)
@@ -306,7 +306,7 @@ class _Work:
 
     def _of_directory(self, error: StoreFull | StudyError) -> StoreFull | StudyError:
         """Return an error with the directory as the user gave it, not with the path of a task."""
-        directory = str(self.store.directory)
+        directory = str(self.store.blobs.address)
         if isinstance(error, StoreFull):
             return StoreFull(directory)
         return Unusable("directory", directory, error.allowed)
@@ -323,7 +323,7 @@ class _Work:
             )
 
     def _task(self, proof: Proof | None, paths: Bundle) -> PathTask:
-        scene, directory = self.study.problem, self.store.directory.resolve()
+        scene, directory = self.study.problem, self.store.address
         self._walking.update({path.id: (len(path.cases), 0.0) for path in paths})
         task = PathTask(scene, paths, directory, solver_hash(), self.study.keep, proof)
         return replace(task, stale=self.store.modified(case.id for case in task.cases))

@@ -39,7 +39,7 @@ class PathTask:
     Attributes
     ----------
     scene, paths : the scene and its loading paths, or the rest of them
-    directory : directory of the store
+    directory : directory of the store, or its address
     source : `solver_hash` of the process that started the study; a worker with another one refuses
         the task, and the study waits for another worker
     keep : what is kept in addition to the results of the scene
@@ -54,7 +54,7 @@ class PathTask:
 
     scene: Scene
     paths: tuple[LoadingPath, ...]
-    directory: Path
+    directory: Path | str
     source: str
     keep: str = ""
     proof: Proof | None = None
@@ -140,9 +140,8 @@ def compute_here(study: Study, store: Store) -> None:
         when another process computes into the same store
     """
     with store.writing():
-        directory = store.directory.resolve()
         for path in study.paths():
-            task = PathTask(study.problem, (path,), directory, solver_hash(), study.keep)
+            task = PathTask(study.problem, (path,), store.address, solver_hash(), study.keep)
             walk(task, lambda _: None, lambda: False)
         store.sound(study.run_ids())
 
@@ -235,7 +234,7 @@ def _follow(
     def lacking() -> Case | None:
         while wanted := program.wants:
             (case,) = place.runs(wanted[:1]).cases()
-            row = store.found(case.id) if store.run_path(case.id).exists() else None
+            row = store.found(case.id)
             if row is not None and place.stands(row):
                 known(row)
             elif refusal := place.refusal(wanted[0]):

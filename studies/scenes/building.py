@@ -6,37 +6,32 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
+from skfem import Mesh
 
 from solver.errors import ModelError
 from solver.loading.program import Lap, Program, Stage, load_and_release, load_cycles
+from solver.materials.law import Law
 from solver.mesh.grids import marked, within, without
 from solver.mesh.opening import opened
 from solver.model.amplitude import Amplitude
-from solver.model.friction import FRICTION
-from solver.model.loads import LOADS
+from solver.model.body import Body
+from solver.model.contact_pair import ContactPair
+from solver.model.friction import FRICTION, FrictionLaw
+from solver.model.link import Link
+from solver.model.loads import LOADS, Load
+from solver.model.model import Model
+from solver.model.rigid import RigidBody
+from solver.model.tabulated import Tabulated
 from solver.scenes.material_parameters import MaterialParameters
 from studies.errors import StudyError, nearest
 from studies.scenes import tables
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.shape_tables import ArcTable, mesh_of
 from studies.scenes.table import TabulatedTable
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from skfem import Mesh
-
-    from solver.materials.law import Law
-    from solver.model.body import Body
-    from solver.model.contact_pair import ContactPair
-    from solver.model.friction import FrictionLaw
-    from solver.model.link import Link
-    from solver.model.loads import Load
-    from solver.model.model import Model
-    from solver.model.rigid import RigidBody
-    from solver.model.tabulated import Tabulated
 
 T = TypeVar("T")
 _MOTIONS = ("x", "y", "rotation")

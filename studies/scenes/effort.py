@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from skfem import Mesh
 from skfem.assembly import Dofs
 
 from solver.errors import ModelError
@@ -22,12 +23,8 @@ from studies.scenes.building import (
     load_of,
     mesh_of_body,
 )
+from studies.scenes.description import Description
 from studies.scenes.shape_tables import GridTable, RoundTable, lines_of
-
-if TYPE_CHECKING:
-    from skfem import Mesh
-
-    from studies.scenes.description import Description
 
 _MOST_INCREMENTS = 200_000
 """Largest number of increments of a loading history."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING
 
+from solver.contact.system import System
 from studies.errors import SceneError, StudyError
 from studies.scenes import tables
 from studies.scenes.building import Builder, program_of
@@ -22,9 +22,6 @@ from studies.scenes.mending import Where
 from studies.scenes.refusals import dotted
 from studies.scenes.results import places_of, view_of
 from studies.scenes.shipped import is_built_in
-
-if TYPE_CHECKING:
-    from solver.contact.system import System
 
 _NEAR = 0.1
 """Ratio of the gap to the shortest edge of a surface; up to it a body that contact alone holds

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from solver.late import Late
 from solver.scenes.scene import Scene
-
-if TYPE_CHECKING:
-    from studies.scenes.description import Description
 
 _file_scene = Late("studies.scenes.scene:file_scene")
 
@@ -20,10 +17,10 @@ class FileScene(Scene):
 
     Attributes
     ----------
-    description : the content of the file and its meshes
+    description : the content of the file and its meshes, a `Description`, whose module loads scipy
     """
 
-    description: Description
+    description: Any
 
     @property
     def posted(self) -> bool:

@@ -12,7 +12,7 @@ import io
 import re
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,6 @@ from solver.errors import ModelError
 from studies.scenes.abaqus import read_deck
 from studies.scenes.meshdata import MeshData
 from studies.scratch import scratch
-
-if TYPE_CHECKING:
-    import meshio
 
 _NUMBERS = ("gmsh:physical", "medit:ref", "nastran:ref")
 """Cell data of meshio that hold the number of the set of each cell."""
@@ -74,7 +71,7 @@ def _abaqus(data: bytes) -> MeshData:
     return read_deck(data.decode("utf-8-sig", errors="replace"))
 
 
-def _by_meshio(kind: str, data: bytes) -> meshio.Mesh:
+def _by_meshio(kind: str, data: bytes) -> Any:
     """Return what a reader of meshio makes of a file; it can only read from a path."""
     with scratch() as folder:
         path = folder / "mesh"
@@ -178,7 +175,7 @@ def _nastran(data: bytes) -> MeshData:
     return _plain("nastran", f"{begin}\n{text}\n{end}\n".encode())
 
 
-def _arrays(found: meshio.Mesh) -> MeshData:
+def _arrays(found: Any) -> MeshData:
     """Return the arrays of a mesh; a set of cells has its number for a name."""
     sets: dict[str, dict[int, NDArray[np.int64]]] = {}
     for key in set(_NUMBERS) & found.cell_data.keys():

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
+from skfem import Mesh
 
 from solver.errors import ModelError
 from solver.memory import kept
@@ -19,17 +22,9 @@ from solver.rolling.rail.profiles.meshed_rail import (
     triangles_of,
 )
 from solver.rolling.rail.profiles.points import FOOT, RUNNING, SectionMesh
+from solver.typing import Array, Ints
 from studies.scenes.formats import read_mesh
 from studies.scenes.meshdata import MeshData
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from numpy.typing import NDArray
-    from skfem import Mesh
-
-    Array = NDArray[np.float64]
-    Numbers = NDArray[np.int64]
 
 OUTLINE = "outline"
 """Boundary of every mesh: all edges with an element on one side only."""
@@ -49,7 +44,7 @@ _TRIANGLE = {"quad": "triangle", "quad8": "triangle6", "quad9": "triangle6"}
 """Quadrilaterals -> the triangles into which they are divided."""
 _LINES = ("line", "line3")
 _POINTS = {"quad": 4, "quad8": 8, "quad9": 9, "triangle": 3, "triangle6": 6, "line": 2, "line3": 3}
-"""Numbers of the points of these cells and lines."""
+"""Ints of the points of these cells and lines."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -202,12 +197,12 @@ class _BodyCells(NamedTuple):
     """
 
     kind: str
-    cells: Numbers
-    numbers: Numbers
-    place: Numbers
+    cells: Ints
+    numbers: Ints
+    place: Ints
 
     @classmethod
-    def of(cls, kind: str, cells: Numbers, numbers: Numbers) -> Self:
+    def of(cls, kind: str, cells: Ints, numbers: Ints) -> Self:
         """Return cells in their order, each once."""
         _, first, same = np.unique(cells, axis=0, return_index=True, return_inverse=True)
         order = np.sort(first)
@@ -223,7 +218,7 @@ class _BodyCells(NamedTuple):
 
 
 def _of_one_kind(
-    name: str, points: Array, taken: Iterable[tuple[str, Numbers, Numbers]]
+    name: str, points: Array, taken: Iterable[tuple[str, Ints, Ints]]
 ) -> tuple[Array, _BodyCells]:
     """Return the cells of a body, of one kind, and the points with those that are new.
 

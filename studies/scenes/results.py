@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,15 +12,10 @@ from solver.results.fatigue import Fatigue
 from solver.results.named_places import NamedPlaces
 from solver.results.outputs import outputs
 from solver.results.requested import RequestedNumber
+from solver.results.run import Output
 from solver.results.view import Axis, Places, View
+from solver.typing import Array
 from studies.scenes import tables
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from solver.results.run import Output
-
-    Array = NDArray[np.float64]
 
 _NOWHERE = np.zeros(0)
 

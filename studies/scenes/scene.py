@@ -6,12 +6,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, make_dataclass, replace
 from functools import cache, lru_cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from annotated_types import Interval, Unit
 
+from solver.contact.state import Converged
 from solver.errors import ModelError
 from solver.loading.program import Program, walked
+from solver.model.model import Model
 from solver.parameters import Accuracy, by_accuracy, check, described
 from solver.results.cycles import LEAST, over_cycles
 from solver.results.figures import cost
@@ -19,6 +21,8 @@ from solver.results.named_places import NamedPlaces, at_named_places
 from solver.results.outputs import outputs
 from solver.results.record import Status
 from solver.results.run import FinishedRun, Output, Values
+from solver.results.samples import Samples
+from solver.results.view import View
 from solver.scenes.material_parameters import ContactParameters
 from solver.scenes.scene import Effort
 from studies.errors import SceneError, StudyError
@@ -31,12 +35,6 @@ from studies.scenes.examining import examined
 from studies.scenes.file_scene import FileScene
 from studies.scenes.results import fatigue_of, numbers_of, output_of, places_of, view_of
 from studies.scenes.tables import ACCURACY
-
-if TYPE_CHECKING:
-    from solver.contact.state import Converged
-    from solver.model.model import Model
-    from solver.results.samples import Samples
-    from solver.results.view import View
 
 
 def file_scene(description: Description, *, built: bool = False) -> FileScene:

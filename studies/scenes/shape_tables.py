@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
+from skfem import Mesh
 
 from solver.errors import ModelError
 from solver.mesh.grids import grid
@@ -28,13 +29,8 @@ from solver.mesh.shapes import (
     ring,
 )
 from solver.parameters import Coordinate, Length
+from solver.typing import Array
 from studies.scenes.table import Angles, Count, Place, SceneTable, Span
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from skfem import Mesh
-
-    Array = NDArray[np.float64]
 
 
 class NearTable(SceneTable):

@@ -51,7 +51,7 @@ def combine(
     damaged: set[str] = set()
     while True:
         left = {key: at for key, at in places.items() if key not in damaged}
-        found = {key: at for key, at in left.items() if store.run_path(key).exists()}
+        found = {key: left[key] for key in store.modified(left)}
         try:
             missing = [key for key in places if key not in found]
             return _combined(study, store, found, missing, beside, target)
@@ -69,7 +69,6 @@ def _combined(
     elsewhere: Path | None,
 ) -> Combined:
     scene = study.problem
-    target = elsewhere or store.dataset_path(study.id)
     usual = layout.usual_dimensions(scene)
     frame = Frame(scene=scene, axes=_axes(study, scene), usual=usual, linked=study.linked)
     ran: set[tuple[str, str]] = set()
@@ -92,7 +91,8 @@ def _combined(
     if elsewhere is None:
         with suppress(FileDamaged):
             store.dataset(study.id)  # a damaged or foreign one is set aside, not lost
-    with needs_room(target.parent), appearing(target) as part:
+    placed = appearing(elsewhere) if elsewhere else store.appearing(study.id)
+    with needs_room(elsewhere.parent if elsewhere else store.directory), placed as part:
         with Reservoir(part) as disk:
             with h5netcdf.File(disk, "w") as file:
                 file.attrs.update(attrs | {"id": study.id, SYMMETRIC: int(halves == {1})})
@@ -113,7 +113,7 @@ def _combined(
         seal.seal(part, f"dataset {study.id}")
     counts = Counter([status for status, _ in outcomes.values()] + [MISSING] * len(missing))
     return Combined(
-        path=target,
+        path=elsewhere or store.dataset_path(study.id),
         counts=dict(counts),
         failed=[(run_id, *each) for run_id, each in outcomes.items() if each[0] != OK],
         missing=missing,

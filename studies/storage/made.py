@@ -16,15 +16,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from solver.files import appearing, read_file, special
+from solver.files import read_file, special
 from studies.definition.identity import sources
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK
 from studies.errors import FileDamaged
-from studies.storage.room import needs_room
 from studies.storage.seal import content_of, digest, digest_of, sealed_json
 from studies.storage.store import Store
 
+_FILE = "made.json"
 _LIBRARIES = ("h5netcdf", "matplotlib", "xarray")
 
 
@@ -38,14 +38,13 @@ class Made:
 
     def __init__(self, study: Study, store: Store) -> None:
         self._study, self._store = study, store
-        self._directory = store.study_directory(study.id)
-        self._file, self._name = self._directory / "made.json", f"made {study.id}"
+        self._name = f"made {study.id}"
 
     def kept(self, result: str, of: str) -> list[Path] | None:
         """Return the files of a result if it was made of the inputs ``of``, else None."""
         try:
             entry = self._entries()[result]
-            files = {self._directory / name: noted for name, noted in entry["files"].items()}
+            files = {self._path(name): noted for name, noted in entry["files"].items()}
             same = entry["of"] == self._made_of(of)
         except (AttributeError, KeyError, TypeError):
             return None
@@ -55,7 +54,7 @@ class Made:
 
     def digest(self, name: str) -> str:
         """Return the digest of a file, as an input of other results; empty if it is missing."""
-        return digest(self._directory / name)
+        return digest(self._path(name))
 
     def note(self, result: str, of: str, names: Iterable[str]) -> None:
         """Record the inputs of files, while no other process writes them."""
@@ -64,25 +63,29 @@ class Made:
     def write(self, result: str, of: str, contents: Mapping[str, bytes]) -> list[Path]:
         """Write files with these contents, record their inputs, and return their paths."""
         for name, content in contents.items():
-            self._write(self._directory / name, content)
+            self._write(name, content)
         self._note(result, of, {name: digest_of(content) for name, content in contents.items()})
-        return [self._directory / name for name in contents]
+        return [self._path(name) for name in contents]
 
     def _note(self, result: str, of: str, files: Mapping[str, str]) -> None:
         entries = self._entries() | {result: {"of": self._made_of(of), "files": files}}
-        self._write(self._file, sealed_json(self._name, entries))
+        self._write(_FILE, sealed_json(self._name, entries))
 
     def _entries(self) -> dict[str, Any]:
         try:
-            return content_of(self._file, self._name)
+            return content_of(self._path(_FILE), self._name)
         except FileDamaged as error:
             self._store.set_aside(error, "what it tells of is made again")
             return {}
 
-    def _write(self, path: Path, content: bytes) -> None:
+    def _path(self, name: str) -> Path:
+        return self._store.study_path(self._study.id, name)
+
+    def _write(self, name: str, content: bytes) -> None:
+        path, store = self._path(name), self._store
         if kind := special(path, links=False):
-            self._store.put_aside(path, f"it is {kind}", "a file takes its place")
-        with needs_room(self._store.directory), appearing(path) as part:
+            store.put_aside(path, f"it is {kind}", "a file takes its place")
+        with store.appearing(self._study.id, name) as part:
             part.write_bytes(content)
 
     def _made_of(self, of: str) -> str:

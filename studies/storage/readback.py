@@ -12,7 +12,7 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,9 +27,6 @@ from studies.definition.vocabulary import ERROR, KEEP, LABEL_ATTRIBUTES, SYMMETR
 from studies.errors import FileDiffers
 from studies.storage import dataset as layout
 from studies.storage import runfile
-
-if TYPE_CHECKING:
-    import h5py
 
 _DECODED = ("scale_factor", "add_offset", "missing_value", "valid_min", "valid_max", "valid_range",
             "_Unsigned", "calendar", "dtype")  # fmt: skip
@@ -215,7 +212,7 @@ def _of_the_whole(
 
 
 def _compared(
-    name: str, variable: h5py.Dataset, expected: _Required, scales: Mapping[Any, str]
+    name: str, variable: Any, expected: _Required, scales: Mapping[Any, str]
 ) -> tuple[np.ndarray, list[str]]:
     """Return the stored values of a variable, and its differences.
 
@@ -249,7 +246,7 @@ def _compared(
     return stored, found
 
 
-def _dimensions(variable: h5py.Dataset, scales: Mapping[Any, str]) -> tuple[str, ...]:
+def _dimensions(variable: Any, scales: Mapping[Any, str]) -> tuple[str, ...]:
     """Return the names of the dimensions of a variable, each by its only scale."""
     from h5py import h5ds
 
@@ -265,7 +262,7 @@ def _same(seen: np.ndarray, expected: np.ndarray, text: bool) -> bool:
     return seen.dtype.kind != "O" and np.array_equal(seen, expected, equal_nan=True)
 
 
-def _is_bare(variable: h5py.Dataset, scales: Mapping[Any, str]) -> bool:
+def _is_bare(variable: Any, scales: Mapping[Any, str]) -> bool:
     """Whether a variable is only a dimension."""
     return variable.id in scales and variable.attrs.get("NAME", b"").startswith(_BARE)
 

@@ -7,16 +7,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from studies.storage import dataset as layout
 from studies.storage import seal, ugrid
-
-if TYPE_CHECKING:
-    import h5py
-    import netCDF4
 
 _FIRST_BYTES = 1 << 16
 """Initial size of a file in memory, which grows."""
@@ -60,7 +56,7 @@ def packed(run: layout.RunContent) -> bytes:
         return bytes(content)
 
 
-def _write(file: netCDF4.Dataset, name: str, variable: layout.Variable) -> None:
+def _write(file: Any, name: str, variable: layout.Variable) -> None:
     """Write a variable, and the dimensions that the file does not have yet."""
     values = np.asarray(variable.values)
     for dimension, length in zip(variable.dims, values.shape, strict=True):
@@ -88,7 +84,7 @@ def verify(path: Path) -> None:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[h5py.File]:
+def opened(path: Path) -> Iterator[Any]:
     """Give the file of a run, verified and open."""
     import h5py
 
@@ -97,18 +93,18 @@ def opened(path: Path) -> Iterator[h5py.File]:
         yield run
 
 
-def global_attributes(run: h5py.File) -> dict[str, Any]:
+def global_attributes(run: Any) -> dict[str, Any]:
     """Return the global attributes; h5py returns ASCII texts as bytes."""
     return {name: _text(value) for name, value in run.attrs.items()}
 
 
-def variables(run: h5py.File) -> list[str]:
+def variables(run: Any) -> list[str]:
     """Return the names of the variables in their original order, without those of the mesh."""
     return _text(run.attrs[_ORDER]).split() if _ORDER in run.attrs else list(run)
 
 
 def lines(
-    run: h5py.File, names: Iterable[str]
+    run: Any, names: Iterable[str]
 ) -> dict[str, tuple[tuple[str, ...], np.ndarray[Any, Any]]]:
     """Return variables without the sweep: dimensions and values; and the values of dimensions.
 

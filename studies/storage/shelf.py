@@ -14,19 +14,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
-from solver.files import appearing
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.errors import CatalogueDamaged, FileDamaged, StoreBusy
 from studies.scenes.file_scene import FileScene
+from studies.storage.blobs import Blobs
 from studies.storage.database import Database
 from studies.storage.seal import State, bytes_of, check, content_of, sealed, sealed_json, state_of
-
-if TYPE_CHECKING:
-    from studies.scenes.description import Description
-    from studies.scenes.meshfile import MeshFile
 
 _FILE, _ARRAYS = "scene.json", ".arrays"
 _COLUMNS = "id, name, summary, branch, size, owner, added, parameters, state"
@@ -60,10 +56,8 @@ class Kept(NamedTuple):
     added: int
 
 
-def keep(directory: Path, scene_id: str, description: Description, owner: str) -> None:
+def keep(blobs: Blobs, scene_id: str, description: Any, owner: str) -> None:
     """Store a scene of this content id."""
-    folder = directory / "scenes" / scene_id
-    folder.mkdir(parents=True, exist_ok=True)
     seal, written = f"scene {scene_id}", {}
     for name, mesh in (description.meshes or {}).items():
         written[name] = mesh.data
@@ -72,11 +66,11 @@ def keep(directory: Path, scene_id: str, description: Description, owner: str) -
     content = {"file": description.file, "content": description.content, "owner": owner}
     written |= {_FILE: sealed_json(seal, content)}  # last: then all is there
     for name, data in written.items():
-        with appearing(folder / name) as part:
+        with blobs.appearing(f"scenes/{scene_id}/{name}") as part:
             part.write_bytes(data)
 
 
-def stored(directory: Path, scene_id: str, whole: bool) -> Scene | None:
+def stored(blobs: Blobs, scene_id: str, whole: bool) -> Scene | None:
     """Return the scene of this id, None if it is not stored.
 
     One that is not ``whole`` has parameters, but no meshes: no model can be built of it.
@@ -88,8 +82,10 @@ def stored(directory: Path, scene_id: str, whole: bool) -> Scene | None:
     ValueError
         if it is not, and this version does not allow the scene
     """
-    folder = directory / "scenes" / scene_id
+    folder = blobs.path(f"scenes/{scene_id}/{_FILE}").parent
     if whole:
+        for name in blobs.names(f"scenes/{scene_id}/*"):
+            blobs.path(name)
         return _made(folder, whole=True)
     return _described(folder, state_of(folder / _FILE), state_of(folder))
 
@@ -122,7 +118,7 @@ def _made(folder: Path, whole: bool) -> FileScene | None:
         raise FileDamaged(folder, name, reason, state) from None
 
 
-def _mesh(path: Path, name: str) -> MeshFile:
+def _mesh(path: Path, name: str) -> Any:
     """Return a mesh of a scene, with its arrays if it was posted."""
     from studies.scenes.meshfile import MeshFile  # loads scipy
 
@@ -136,9 +132,9 @@ def _mesh(path: Path, name: str) -> MeshFile:
 class Index(Database):
     """The index of the scenes of a directory; its file may be in another one."""
 
-    def __init__(self, directory: Path, lists: Path) -> None:
+    def __init__(self, blobs: Blobs, lists: Path) -> None:
         super().__init__(lists / "scenes.sqlite", CatalogueDamaged, StoreBusy)
-        self.scenes = directory / "scenes"
+        self.blobs = blobs
 
     def follow(self, read: Callable[[str], Scene | None], refused: Collection[str]) -> None:
         """Bring the index to the files.
@@ -148,7 +144,8 @@ class Index(Database):
         read : gives a new scene; None for one that is not there or not allowed
         refused : scenes that are known not to be allowed: another version may have refused others
         """
-        paths = {path.parent.name: state_of(path) for path in self.scenes.glob(f"*/{_FILE}")}
+        files = map(self.blobs.path, self.blobs.names(f"scenes/*/{_FILE}"))
+        paths = {path.parent.name: state_of(path) for path in files}
         there = {name: (repr(state), state[2]) for name, state in paths.items() if state}
         mode = "rwc" if self.path.exists() or there else "memory"
         with self.connection("BEGIN", mode) as connection:
@@ -180,9 +177,9 @@ class Index(Database):
 
     def _kept(self, scene_id: str) -> tuple[int, str]:
         """Return the size of the files of a scene, and its owner."""
-        folder = self.scenes / scene_id
-        size = sum(path.stat().st_size for path in folder.iterdir())
-        return size, str(content_of(folder / _FILE, f"scene {scene_id}").get("owner", ""))
+        stamps = self.blobs.stamps(self.blobs.names(f"scenes/{scene_id}/*"))
+        content = content_of(self.blobs.path(f"scenes/{scene_id}/{_FILE}"), f"scene {scene_id}")
+        return sum(size for size, _ in stamps.values()), str(content.get("owner", ""))
 
     def page(self, limit: int, offset: int = 0, name: str | None = None) -> list[Entry]:
         """Return a page of the scenes, or of those of a name, the latest first."""

@@ -1,4 +1,4 @@
-"""The directory that holds runs, studies and the catalogue.
+"""What holds runs, studies and the catalogue: a directory, or an address of an object store.
 
 ```
 runs/<run id>.nc              one file a run, shared by all studies
@@ -14,22 +14,22 @@ unreadable/                   what was damaged or in a wrong place
 A file gets its name only when it is complete; that of a run, only after it has been read back and
 compared with the results. Each has a seal (`studies.storage.seal`), which is checked whenever it is
 read. What fails is moved to ``unreadable/``, told in one line, and made again where it can be.
+`studies.storage.blobs` says where the files are; the catalogue is always on this machine.
 """
 
 from __future__ import annotations
 
 import logging
 import os
-import shutil
 import tempfile
 import time
 import uuid
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from solver.files import appearing
 from solver.results.record import Record
@@ -42,15 +42,12 @@ from studies.scenes.file_scene import FileScene
 from studies.scenes.registry import known_names
 from studies.storage import dataset as layout
 from studies.storage import runfile, seal, shelf
+from studies.storage.blobs import blobs_at
 from studies.storage.catalogue import BATCH, Catalogue, Row
-from studies.storage.lock import lock
 from studies.storage.readback import verified
 from studies.storage.room import needs_room
 
-if TYPE_CHECKING:
-    from studies.scenes.description import Description
-
-_STUDY = "study.json"
+_STUDY, _DATASET = "study.json", "dataset.nc"
 _UNFINISHED = 600.0
 """Seconds after which an unfinished file beside a data set counts as abandoned."""
 _LOG = logging.getLogger("studies")
@@ -68,7 +65,7 @@ class Store:
 
     Parameters
     ----------
-    directory : the directory; the first write creates it
+    directory : the directory; the first write creates it. Or an address, ``s3://bucket/results``
     held : whether the caller already has the writer's lock, as the service has for its children
     aside : folder of the catalogue and the index of scenes, for a directory that is only read:
         nothing is written or moved in it
@@ -77,7 +74,8 @@ class Store:
     def __init__(
         self, directory: Path | str, held: bool = False, aside: Path | None = None
     ) -> None:
-        self.directory = Path(directory)
+        self.blobs = blobs_at(directory)
+        self.directory = self.blobs.directory
         self.held, self.aside = held, aside
         self._refused: set[str] = set()
         self._lists = aside or self.directory
@@ -85,20 +83,36 @@ class Store:
 
     def run_path(self, run_id: str) -> Path:
         """Return the path of the file of a run."""
-        return self.directory / "runs" / f"{_checked(run_id)}.nc"
+        return self.blobs.path(_run(run_id))
 
-    def study_directory(self, study_id: str) -> Path:
-        """Return the directory of a study."""
-        return self.directory / "studies" / _checked(study_id)
+    @property
+    def address(self) -> Path | str:
+        """What opens the store in another process: the whole path of its directory, or a URL."""
+        address = self.blobs.address
+        return address if isinstance(address, str) else address.resolve()
+
+    def stored_runs(self) -> set[str]:
+        """Return the ids of the runs that have a file."""
+        return {Path(name).stem for name in self.blobs.names("runs/*.nc")}
 
     def study_ids(self) -> list[str]:
         """Return the ids of the studies whose definition is here, in order."""
-        there = (path.parent.name for path in self.directory.glob(f"studies/*/{_STUDY}"))
+        there = (name.split("/")[1] for name in self.blobs.names(f"studies/*/{_STUDY}"))
         return sorted(filter(is_id, there))
 
     def dataset_path(self, study_id: str) -> Path:
         """Return the path of the combined data set of a study."""
-        return self.study_directory(study_id) / "dataset.nc"
+        return self.study_path(study_id, _DATASET)
+
+    def study_path(self, study_id: str, name: str = "") -> Path:
+        """Return the path of a file in the directory of a study, or without a name of all."""
+        return self.blobs.path(_study(study_id, name))
+
+    @contextmanager
+    def appearing(self, study_id: str, name: str = _DATASET) -> Iterator[Path]:
+        """Give a path to write to, which becomes a file of a study, by default its data set."""
+        with needs_room(self.directory), self.blobs.appearing(_study(study_id, name)) as part:
+            yield part
 
     def scene(self, scene_id: str, whole: bool = True) -> Scene | None:
         """Return the scene from a file that is stored here under this id, or None.
@@ -108,7 +122,7 @@ class Store:
         One that is not ``whole`` has no meshes, so that it takes little time and memory.
         """
         try:
-            return shelf.stored(self.directory, scene_id, whole) if is_id(scene_id) else None
+            return shelf.stored(self.blobs, scene_id, whole) if is_id(scene_id) else None
         except FileDamaged as error:
             self.set_aside(error, "post the scene again")
             return None
@@ -151,7 +165,7 @@ class Store:
 
         Raise `CatalogueDamaged` if it is damaged again after it was made again.
         """
-        index = shelf.Index(self.directory, self._lists)
+        index = shelf.Index(self.blobs, self._lists)
 
         def asked() -> Found:
             with suppress(StoreFull):  # then the latest ones are missing
@@ -171,18 +185,27 @@ class Store:
         if isinstance(scene, FileScene) and scene.posted:
             self.keep_scene(scene.id, scene.description)
 
-    def keep_scene(self, scene_id: str, description: Description, owner: str = "") -> bool:
+    def keep_scene(self, scene_id: str, description: Any, owner: str = "") -> bool:
         """Store a scene of this content id for an owner; return whether it is new."""
         new = self.scene(scene_id) is None  # a damaged one is set aside, and so written again
         if new:
             with self._writable():
-                shelf.keep(self.directory, scene_id, description, owner)
+                shelf.keep(self.blobs, scene_id, description, owner)
         return new
 
     def discard_scene(self, scene_id: str) -> None:
         """Delete a scene."""
-        with suppress(FileNotFoundError):
-            shutil.rmtree(self.directory / "scenes" / _checked(scene_id))
+        self.blobs.remove(f"scenes/{_checked(scene_id)}")
+
+    def discard_study(self, study_id: str, files: str = "") -> None:
+        """Delete the definition of a study and what was made of its runs, or ``files`` of these."""
+        for name in self.blobs.names(_study(study_id, files)) if files else [_study(study_id)]:
+            self.blobs.remove(name)
+
+    def size(self, *patterns: str) -> int:
+        """Return the bytes of the files whose names match."""
+        names = (name for pattern in patterns for name in self.blobs.names(pattern))
+        return sum(size for size, _ in self.blobs.stamps(names).values())
 
     def dataset(self, study_id: str) -> Path:
         """Return the path of the data set of a study, checked.
@@ -245,7 +268,7 @@ class Store:
         StudyError
             if another version of the solver computed it, or the scene has changed
         """
-        path = self.study_directory(study_id) / _STUDY
+        path = self.study_path(study_id, _STUDY)
         try:
             study = Study.known(seal.content_of(path, f"study {study_id}"), self.scene)
         except FileDamaged as error:
@@ -266,7 +289,7 @@ class Store:
         """
         found: dict[str, Mapping[str, Any]] = {}
         for study_id in [name] if is_id(name) else self.study_ids():
-            path = self.study_directory(study_id) / _STUDY
+            path = self.study_path(study_id, _STUDY)
             with suppress(FileDamaged):
                 content = seal.content_of(path, f"study {study_id}")
                 if name in (study_id, content.get("name")):
@@ -285,8 +308,7 @@ class Store:
 
     def save_definition(self, study_id: str, content: Mapping[str, Any]) -> Path:
         """Store the content of a study, unless it is stored, and return its directory."""
-        directory = self.study_directory(study_id)
-        path, name = directory / _STUDY, f"study {study_id}"
+        path, name = self.study_path(study_id, _STUDY), f"study {study_id}"
         text = seal.sealed_json(name, content)
         try:
             seal.check(path, name)
@@ -295,11 +317,9 @@ class Store:
                 if seal.sealed_json(name, seal.content_of(path, name)) == text:
                     error.state = None
             self.set_aside(error, "it is written again")
-            with self._writable():
-                directory.mkdir(parents=True, exist_ok=True)
-                with appearing(path) as part:
-                    part.write_bytes(text)
-        return directory
+            with self._writable(), self.blobs.appearing(_study(study_id, _STUDY)) as part:
+                part.write_bytes(text)
+        return path.parent
 
     def write_run(self, case: Case, outcome: Record | str, keep: str = "") -> Row:
         """Write the file of one run, read it back, and return its row for the catalogue.
@@ -316,14 +336,12 @@ class Store:
         """
         if not isinstance(outcome, str):
             outcome = outcome.with_one_mesh()
-        path = self.run_path(case.id)
         content = runfile.sealed(layout.run_content(case.scene, case, outcome, keep))
         with self._writable():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with appearing(path) as part:
+            with self.blobs.appearing(_run(case.id)) as part:
                 part.write_bytes(content)
                 row = verified(part, case, outcome, keep)
-            return row | runfile.stamp(path)
+            return row | runfile.stamp(self.run_path(case.id))
 
     def found(self, run_id: str, known: Row | None = None) -> Row | None:
         """Return the row of a run from its file; None if it has none, or one that is set aside.
@@ -362,7 +380,8 @@ class Store:
 
     def _sound(self, wanted: Sequence[str]) -> dict[str, Row]:
         known = self.catalogue.rows(wanted)
-        there = [each for each in wanted if each in known or self.run_path(each).exists()]
+        stored = self.modified(each for each in wanted if each not in known)
+        there = [each for each in wanted if each in known or each in stored]
         found = {run_id: self.found(run_id, known.get(run_id)) for run_id in there}
         rows = {run_id: row for run_id, row in found.items() if row}
         if gone := known.keys() - rows.keys():
@@ -387,29 +406,26 @@ class Store:
             _LOG.warning("%s cannot be read: %s", path.name, reason)
             return
         here = path.relative_to(self.directory)
-        target = self.directory / "unreadable" / ".".join(here.parts[1:] or here.parts)
+        target = Path("unreadable") / ".".join(here.parts[1:] or here.parts)
         try:
-            target.parent.mkdir(exist_ok=True)
-            if target.exists():
+            (self.directory / target).parent.mkdir(exist_ok=True)
+            if (self.directory / target).exists():
                 target = target.with_name(f"{target.name}.{uuid.uuid4().hex}")
-            path.rename(target)
-            now = f"is now {target.relative_to(self.directory)}"
+            self.blobs.move(str(here), str(target))
+            now = f"is now {target}"
         except OSError as failed:
             now = f"stays, because it cannot be moved ({failed.strerror})"
         _LOG.warning("%s cannot be read and %s: %s; %s", here, now, reason, then)
 
     def modified(self, run_ids: Iterable[str]) -> dict[str, int]:
         """Return, by id, the time of change [ns] of the files of runs that exist."""
-        times = {}
-        for run_id in run_ids:
-            with suppress(FileNotFoundError):
-                times[run_id] = self.run_path(run_id).stat().st_mtime_ns
-        return times
+        names = {_run(run_id): run_id for run_id in run_ids}
+        return {names[name]: time for name, (_, time) in self.blobs.stamps(names).items()}
 
     def discard(self, run_ids: Collection[str]) -> None:
         """Delete runs: their files, then their rows."""
         for run_id in run_ids:
-            self.run_path(run_id).unlink(missing_ok=True)
+            self.blobs.remove(_run(run_id))
         self.catalogue.remove(run_ids)
 
     def reconcile(self) -> None:
@@ -418,6 +434,7 @@ class Store:
         One that is missing or damaged is made again, and appears when it is complete.
         """
         path = self.catalogue.path
+        self.blobs.follow()
         try:
             known = self.catalogue.stamps()
         except CatalogueDamaged as error:
@@ -434,11 +451,9 @@ class Store:
 
     def _follow(self, known: Mapping[str, tuple[int | None, int | None]]) -> None:
         """Update the catalogue, in which these runs have these stamps, to the files."""
-        there = {
-            path.stem: tuple(runfile.stamp(path).values())
-            for path in (self.directory / "runs").glob("*.nc")
-            if is_id(path.stem)
-        }
+        stamps = self.blobs.stamps(self.blobs.names("runs/*.nc"))
+        there = {Path(name).stem: stamp for name, stamp in stamps.items()}
+        there = {run_id: stamp for run_id, stamp in there.items() if is_id(run_id)}
         self.catalogue.remove(known.keys() - there.keys())
         changed = iter([run_id for run_id, state in there.items() if known.get(run_id) != state])
         while batch := list(islice(changed, BATCH)):
@@ -456,16 +471,13 @@ class Store:
         if self.held:
             yield
             return
-        held = self._locked()
-        try:
-            shutil.rmtree(self.directory / "claims", ignore_errors=True)  # of those that shared it
+        with self._locked():
+            self.blobs.remove("claims")  # of those that shared it
             patterns = ("*/**/*.part", "catalogue*.part") if tidy else ()  # not those of keys
             for part in filter(_left, chain.from_iterable(map(self.directory.glob, patterns))):
                 part.unlink(missing_ok=True)
             self.reconcile()
             yield
-        finally:
-            os.close(held)
 
     @contextmanager
     def sharing(self) -> Iterator[None]:
@@ -473,20 +485,20 @@ class Store:
 
         Raise `StoreBusy` if a process that does not share has the lock.
         """
-        held = self._locked(shared=True)
-        try:
+        with self._locked(shared=True):
             yield
-        finally:
-            os.close(held)
 
-    def _locked(self, shared: bool = False) -> int:
-        with self._writable():
-            for name in ("runs", "studies"):
-                (self.directory / name).mkdir(parents=True, exist_ok=True)
-                with tempfile.TemporaryFile(dir=self.directory / name):
-                    pass  # a directory may exist and still not be writable
-            busy = "computes here; wait until it has ended, or name another directory"
-            return lock(self.directory / ".lock", busy, shared=shared)
+    @contextmanager
+    def _locked(self, shared: bool = False) -> Iterator[None]:
+        with ExitStack() as held:
+            with self._writable():
+                for name in ("runs", "studies"):
+                    (self.directory / name).mkdir(parents=True, exist_ok=True)
+                    with tempfile.TemporaryFile(dir=self.directory / name):
+                        pass  # a directory may exist and still not be writable
+                busy = "computes here; wait until it has ended, or name another directory"
+                held.enter_context(self.blobs.lock(busy, shared))
+            yield
 
     @contextmanager
     def _writable(self) -> Iterator[None]:
@@ -505,6 +517,14 @@ def _left(part: Path) -> bool:
         return part.parent.name == "runs" or time.time() - part.stat().st_mtime > _UNFINISHED
     except FileNotFoundError:
         return False
+
+
+def _run(run_id: str) -> str:
+    return f"runs/{_checked(run_id)}.nc"
+
+
+def _study(study_id: str, file: str = "") -> str:
+    return f"studies/{_checked(study_id)}/{file}".rstrip("/")
 
 
 def _checked(content_id: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
@@ -12,14 +11,15 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from studies.definition.parameters import parameters_of
 from studies.errors import StudyError
+from studies.numbers import number_text
 from studies.scenes.registry import known_names, scene_named
 from studies.storage.dataset import attributes_of
 from studies.views.columns import unit_text, value_text
-from studies.views.figures import FIGURES, group_of, worst
+from studies.views.figures import FIGURES, group_of, meter, worst
+from studies.views.html import templates
 from studies.views.picking import one_run, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import line_fields, map_fields, sweep_fields, usual_field
 from studies.views.plots.lines import line_figure
@@ -54,9 +54,6 @@ LINES = ("residual_profile", "line_stress", "contact_pressure")
 ESTIMATED = "audit_error_residual"
 """The estimated error of residual stress."""
 
-DECADES = 6
-"""Length of a meter: it begins at the limit over ten to this power."""
-
 _DPI = 130
 
 
@@ -75,39 +72,35 @@ def archive(dataset: xr.Dataset, path: Path | str = "dataset.nc") -> str:
     rest = range(table.words, len(table.headings))
     words, count = np.unique(dataset["status"].to_numpy().astype(str), return_counts=True)
     attrs = dataset.attrs
-    return _template().render(
-        name=attrs["title"],
-        scene=attrs["scene"],
-        created=str(attrs.get("created", "")).replace("T", " ").removesuffix("+00:00") + " UTC",
-        tags=str(attrs.get("tags", "")).split(),
-        note=attrs.get("note", ""),
-        counts=dict(zip(words.tolist(), count.tolist(), strict=True)),
-        summary=_summary(str(attrs["scene"]), dataset["status"].size),
-        axes=[_axis(dataset, name) for name in _varied(dataset)],
-        parameters=_fixed(dataset),
-        figures=[*_figures(dataset, axes)],
-        table=table._replace(rows=table.rows[:LISTED]),
-        left=max(len(table.rows) - LISTED, 0),
-        blocks=[
-            [*keys, *rest[first : first + COLUMNS]]
-            for first in range(0, max(len(rest), 1), COLUMNS)
-        ],
-        footnote=FOOTNOTE.strip(),
-        messages=messages(dataset).strip(),
-        audit=[*_audit(dataset)],
-        error=_error(dataset),
-        made=_made(attrs),
-        id=attrs.get("id", ""),
-        path=path.as_posix() if isinstance(path, Path) else path,
+    return (
+        templates("studies.views")
+        .get_template("archive.html")
+        .render(
+            name=attrs["title"],
+            scene=attrs["scene"],
+            created=str(attrs.get("created", "")).replace("T", " ").removesuffix("+00:00") + " UTC",
+            tags=str(attrs.get("tags", "")).split(),
+            note=attrs.get("note", ""),
+            counts=dict(zip(words.tolist(), count.tolist(), strict=True)),
+            summary=_summary(str(attrs["scene"]), dataset["status"].size),
+            axes=[_axis(dataset, name) for name in _varied(dataset)],
+            parameters=_fixed(dataset),
+            figures=[*_figures(dataset, axes)],
+            table=table._replace(rows=table.rows[:LISTED]),
+            left=max(len(table.rows) - LISTED, 0),
+            blocks=[
+                [*keys, *rest[first : first + COLUMNS]]
+                for first in range(0, max(len(rest), 1), COLUMNS)
+            ],
+            footnote=FOOTNOTE.strip(),
+            messages=messages(dataset).strip(),
+            audit=[*_audit(dataset)],
+            error=_error(dataset),
+            made=_made(attrs),
+            id=attrs.get("id", ""),
+            path=path.as_posix() if isinstance(path, Path) else path,
+        )
     )
-
-
-def _template() -> Any:
-    found = Environment(
-        loader=PackageLoader("studies.views"), autoescape=True, undefined=StrictUndefined
-    )
-    found.filters["words"] = lambda name: str(name).replace("_", " ")
-    return found.get_template("archive.html")
 
 
 def _summary(scene: str, size: int) -> str:
@@ -162,7 +155,7 @@ def _exact(value: Any) -> str:
     """Return a value as it was given; of a table what it is."""
     if value in (None, [], ""):
         return "none"
-    return f"{value:.10g}" if isinstance(value, float) else value_text(value)
+    return number_text(value, 10) if isinstance(value, float) else value_text(value)
 
 
 def _figures(dataset: xr.Dataset, axes: list[str]) -> Iterator[dict[str, Any]]:
@@ -211,13 +204,12 @@ def _audit(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
     status = dataset["status"]
     numbers = {str(n): v.to_numpy() for n, v in dataset.data_vars.items() if v.dims == status.dims}
     for each in worst(numbers):
-        decades = DECADES + (math.log10(each.share) if each.share > 0.0 else -DECADES)
         yield {
             "name": each.name,
             "words": str(attributes_of(each.name).get("long_name", each.name)),
             "value": value_text(each.value),
             "limit": value_text(each.limit),
-            "percent": round(100.0 * min(max(decades / DECADES, 0.0), 1.0), 1),
+            "percent": round(100.0 * meter(each.value, each.limit), 1),
             "place": place_of(dataset, np.unravel_index(each.at, status.shape)),
         }
 
@@ -234,7 +226,7 @@ def _error(dataset: xr.Dataset) -> dict[str, str]:
     at = np.unravel_index(np.nanargmax(values), values.shape)
     return {
         "name": ESTIMATED,
-        "percent": f"{100.0 * values[at]:.3g}",
+        "percent": number_text(100.0 * values[at], 3),
         "place": place_of(dataset, at),
     }
 

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from studies.numbers import number_text
+
 _HEADING = 9
 """Largest width of a heading in characters; longer ones continue in the next line."""
 _WIDTH = 120
@@ -22,7 +24,7 @@ def value_text(value: Any) -> str:
     if isinstance(value, bool):
         return json.dumps(value)
     if isinstance(value, float | np.floating):
-        return "-" if np.isnan(value) else f"{value:z.4g}"
+        return number_text(float(value))
     return "-" if value is None else counted(value)
 
 

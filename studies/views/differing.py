@@ -15,6 +15,7 @@ import xarray as xr
 from studies.definition.identity import canonical
 from studies.definition.vocabulary import MISSING, SOLVED
 from studies.errors import StudyError, one_of
+from studies.numbers import number_text
 from studies.toml import CASE
 from studies.views.columns import aligned, value_text
 from studies.views.picking import flags, own_grid, sweep_axes, sweep_coordinates
@@ -188,9 +189,9 @@ def difference_table(found: Difference) -> str:
     head = ["variable", "relative", "absolute", "", "from", "to", "runs", "where"]
     rows = [
         [
-            each.variable, f"{each.relative:.2g}", f"{each.absolute:.4g}",
-            each.unit if each.unit not in {"", "1"} else "", f"{each.before:.6g}",
-            f"{each.after:.6g}", str(each.runs), _at({**each.run, **each.place}),
+            each.variable, number_text(each.relative, 2), number_text(each.absolute),
+            each.unit if each.unit not in {"", "1"} else "", number_text(each.before, 6),
+            number_text(each.after, 6), str(each.runs), _at({**each.run, **each.place}),
         ]
         for each in found.changes
     ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -77,6 +78,13 @@ class Worst:
     def share(self) -> float:
         """Value over limit."""
         return self.value / self.limit
+
+
+def meter(value: float, limit: float) -> float:
+    """Return the length of a meter, 0 to 1: the place between limit / 1e6 and limit in decades."""
+    if not limit or value <= 0.0:
+        return 0.0
+    return min(max(1.0 + math.log10(value / limit) / 6.0, 0.02), 1.0)
 
 
 def worst(numbers: Mapping[str, np.ndarray]) -> list[Worst]:

@@ -18,6 +18,7 @@ from studies.definition.identity import is_id
 from studies.definition.study import Study
 from studies.errors import FileDamaged, StudyError
 from studies.storage import seal
+from studies.storage.blobs import blobs_at, directory_of, is_address
 from studies.storage.frame import FRACTION
 from studies.storage.store import Store
 
@@ -44,7 +45,8 @@ def open_study(path: Path | str, name: str | None = None, *, unchecked: bool = F
     ----------
     path : a ``dataset.nc``, the directory of a study, an output directory, a study in it
         (``out/punch``, see `find_datasets`), or the URL of a study of a service that requires no
-        key, such as ``http://localhost:8000/studies/<id>``
+        key, such as ``http://localhost:8000/studies/<id>``, or the address of a store, such as
+        ``s3://bucket/results``
     name : name of the study, if the directory has several; of those with this name the one
         computed last is opened, and the logger ``studies`` says which there are
     unchecked : whether to open a file that has no seal or was changed, such as one that another
@@ -60,6 +62,8 @@ def open_study(path: Path | str, name: str | None = None, *, unchecked: bool = F
         if name is not None:
             raise StudyError("name", name, "must be left out: the URL is that of one study")
         return _fetched(path, unchecked)
+    if is_address(path):
+        path, name = directory_of(path) / (name or ""), None
     return open_netcdf(find_study(path, name), unchecked=unchecked)
 
 
@@ -239,13 +243,22 @@ def present_datasets(path: Path | str) -> list[Path]:
     own = path / "dataset.nc"
     if own.is_file():
         return [own]
-    if path.is_dir():
-        return sorted(path.glob("studies/*/dataset.nc"))
-    found = sorted(path.parent.glob("studies/*/dataset.nc"))
-    if path.name == LATEST:
-        return [max(found, key=_written)] if found else []
-    named = [each for each in found if _name(each) == path.name]
-    return named or [each for each in found if each.parent.name.startswith(path.name)]
+    return _datasets(path, "") if path.is_dir() else _datasets(path.parent, path.name)
+
+
+def _datasets(directory: Path, name: str) -> list[Path]:
+    """Return the data sets in a directory, or those of the studies that a name stands for."""
+    blobs = blobs_at(directory)
+    blobs.follow()
+    found = dict(sorted(blobs.stamps(blobs.names("studies/*/dataset.nc")).items()))
+    names = {each: _name(blobs.path(each.replace("dataset.nc", "study.json"))) for each in found}
+    if name == LATEST:
+        found = dict(sorted(found.items(), key=lambda each: each[1][1])[-1:])
+    elif name:
+        named = [each for each in found if names[each] == name]
+        begun = [each for each in found if each.split("/")[1].startswith(name)]
+        return [blobs.path(each) for each in named or begun]
+    return [blobs.path(each) for each in found]
 
 
 def begun_studies(path: Path | str) -> list[str]:
@@ -254,8 +267,11 @@ def begun_studies(path: Path | str) -> list[str]:
     The data set of a study is written when its computation ends, also after Ctrl-C.
     """
     path = Path(path).resolve()
-    files = [*path.glob("study.json"), *sorted(path.glob("studies/*/study.json"))]
-    begun = [file for file in files if not file.with_name("dataset.nc").is_file()]
+    blobs = blobs_at(path)
+    there = {Path(name).parent.name for name in blobs.names("studies/*/dataset.nc")}
+    files = map(blobs.path, ["study.json", *sorted(blobs.names("studies/*/study.json"))])
+    begun = [file for file in files if file.is_file() and file.parent.name not in there]
+    begun = [file for file in begun if not file.with_name("dataset.nc").is_file()]
     return [f"{_progress(file)}; no data set yet ({file.parent})" for file in begun]
 
 
@@ -274,5 +290,5 @@ def _progress(file: Path) -> str:
         return f"{name}: begun with another version of the solver"
     if study.kind.chooses:
         return f"{study.name}: the {study.kind.work} has not ended"
-    finished = sum(store.run_path(run_id).is_file() for run_id in study.run_ids())
+    finished = len(store.modified(study.run_ids()))
     return f"{study.name}: {finished} of {study.size} runs finished"

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from typing import Any
 
 from studies.definition.sweep import labels
@@ -23,13 +22,6 @@ NAMED = 4
 
 _LONGEST = 100
 """Largest number of characters of a message."""
-_HTML = """<div style="font-size: 90%; max-width: 46em">
-<div><b>{name}</b> · scene {scene} · {standing}</div>
-<div style="background: #8884; margin: 4px 0">\
-<div style="width: {percent:.1f}%; height: 6px; background: {colour}"></div></div>
-<table style="text-align: left"><tbody>
-{rows}
-</tbody></table></div>"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,36 +59,31 @@ class Summary:
 
     def __str__(self) -> str:
         """Return the view as text."""
-        first = f"{self.name}: scene {self.scene}, {self._standing}"
-        rows = aligned(self._rows) if self._rows else ""
+        first = f"{self.name}: scene {self.scene}, {self.standing}"
+        rows = aligned(self.rows) if self.rows else ""
         return f"{first}\n{bar(self.progress)}\n{rows}".rstrip()
 
     def _repr_html_(self) -> str:
         """Return the view as a notebook shows it."""
-        cell = '<td style="text-align: left; padding: 1px 8px">{}</td>'
-        rows = ("".join(cell.format(escape(text)) for text in row) for row in self._rows)
-        return _HTML.format(
-            name=escape(self.name),
-            scene=escape(self.scene),
-            standing=escape(self._standing),
-            percent=100.0 * self.progress,
-            colour="#b3401f" if self._lost else "#2f6f9f",
-            rows="\n".join(f"<tr>{each}</tr>" for each in rows),
-        )
+        from studies.views.html import templates  # loads jinja
+
+        return templates("studies.views").get_template("summary.html").render(of=self)
 
     @property
-    def _standing(self) -> str:
+    def standing(self) -> str:
+        """The status, with the number of runs by status."""
         counted = ", ".join(f"{count} {status}" for status, count in self.counts.items())
         return f"{self.status} ({counted})" if counted else self.status
 
     @property
-    def _lost(self) -> int:
+    def lost(self) -> int:
         """Number of failed runs."""
         waits = (OK, MISSING, "pending")
         return sum(count for status, count in self.counts.items() if status not in waits)
 
     @property
-    def _rows(self) -> list[tuple[str, str]]:
+    def rows(self) -> list[tuple[str, str]]:
+        """Names and texts: the axes, the worst figure of the audit, failed runs."""
         rows = list(self.axes.items())
         if self.audit:
             figure, place = self.audit
@@ -105,7 +92,7 @@ class Summary:
             rows.append(("worst of the audit", f"{figure.name} = {value}, limit {limit}{where}"))
         for each in self.failed:
             rows.append((each.status, f"{each.place}: {each.message}"[:_LONGEST]))
-        if (more := self._lost - len(self.failed)) > 0:
+        if (more := self.lost - len(self.failed)) > 0:
             rows.append(("", f"and {more} more failed runs"))
         return rows
 

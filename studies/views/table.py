@@ -22,7 +22,8 @@ from studies.errors import StudyError, nearest, one_of
 from studies.storage.dataset import attributes_of
 from studies.views.columns import unit_text
 
-_COMPARED: Mapping[str, Callable[[Any, Any], Any]] = {
+Compare = Callable[[Any, Any], Any]
+_COMPARED: Mapping[str, Compare] = {
     "<=": operator.le, ">=": operator.ge, "!=": operator.ne, "<": operator.lt, ">": operator.gt,
     "=": operator.eq,
 }  # fmt: skip
@@ -64,6 +65,17 @@ class Column:
     def number(self) -> bool:
         """Whether it has numbers."""
         return self.values.dtype.kind == "f"
+
+    @property
+    def said(self) -> list[Any]:
+        """Its values in words."""
+        words = {float(code): word for code, word in self.flags.items()}
+        return [words.get(each, each) for each in self.values.tolist()]
+
+    def parts(self, condition: str) -> list[str]:
+        """Return the values that a condition names: one, also with a comma in it, or several."""
+        several = "," in condition and condition not in self.said
+        return [each.strip() for each in (condition.split(",") if several else [condition])]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,7 +126,7 @@ class RunTable:
         """
         keep = np.ones(self.size, dtype=bool)
         for name, condition in (where or {}).items():
-            keep &= _meets(self.column(name, name), condition)
+            keep &= _meets(self.column(name, name), "=", condition)
         found = np.flatnonzero(keep)
         if not sort:
             return found
@@ -141,27 +153,17 @@ class RunTable:
         if match["name"] not in self.columns:
             allowed = one_number(match["name"], self.columns, self.wide)
             raise StudyError("where", condition, allowed)
-        column, compared = self.columns[match["name"]], _COMPARED[match["sign"]]
-        codes = {name: code for code, name in column.flags.items()}
-        if match["value"] in codes:
-            return np.asarray(compared(column.values, codes[match["value"]]))
-        if not column.number:
-            if match["sign"] not in {"=", "!="}:
-                allowed = f"{match['name']} has words: compare them by = or !="
-                raise StudyError("where", condition, allowed)
-            said = column.values.astype(str)
-            words = dict.fromkeys([*said.tolist(), *(STATUSES if column.name == STATUS else ())])
-            if match["value"] not in words:
-                allowed = f"{match['value']!r} {one_of(match['value'], words)}"
-                raise StudyError("where", condition, allowed)
-            return np.asarray(compared(said, match["value"]))
+        column, sign, value = self.columns[match["name"]], match["sign"], match["value"]
+        if not (column.number or sign in {"=", "!="}):
+            allowed = f"{column.name} has words: compare them by = or !="
+            raise StudyError("where", condition, allowed)
+        known = dict.fromkeys([*column.said, *(STATUSES if column.name == STATUS else ())])
+        if not column.number and (missing := [e for e in column.parts(value) if e not in known]):
+            raise StudyError("where", condition, f"{missing[0]!r} {one_of(missing[0], known)}")
         try:
-            value = float(match["value"])
-        except ValueError:
-            allowed = one_of(match["value"], codes) if codes else "must be a number"
-            raise StudyError("where", condition, f"{match['value']!r} {allowed}") from None
-        same = np.isclose(column.values, value, rtol=SAME, atol=0.0)
-        return np.asarray(compared(np.where(same, value, column.values), value))
+            return _meets(column, sign, value)
+        except StudyError as error:
+            raise StudyError("where", condition, f"{value!r} {error.allowed}") from None
 
 
 def one_number(name: str, known: Iterable[str], wide: Mapping[str, Sequence[str]]) -> str:
@@ -209,32 +211,37 @@ def column_of(
     )
 
 
-def _meets(column: Column, condition: str) -> np.ndarray:
-    """Return which runs meet a condition."""
-    if not column.number or column.flags:
-        wanted = {each.strip() for each in condition.split(",")}
-        said = column.values.tolist()
-        if column.flags:
-            said = [column.flags.get(each) for each in said]
-        return np.array([each in wanted for each in said], dtype=bool)
-    values = column.values
+def _meets(column: Column, sign: str, condition: str) -> np.ndarray:
+    """Return which runs meet a condition: one of several values, or the range ``low..high``."""
+    codes = {word: code for code, word in column.flags.items()}
+    compared, parts = _COMPARED[sign], column.parts(condition)
+    if not column.number or (codes and sign in {"=", "!="} and not codes.keys().isdisjoint(parts)):
+        met = np.array([each in parts for each in column.said], dtype=bool)
+        return met if sign == "=" else ~met
+    if sign not in {"=", "!="}:
+        return _against(column, compared, condition, condition)
     if match := RANGE.fullmatch(condition):
-        low, high = (match[end].strip() for end in ("low", "high"))
-        least, most = (_number(column, end, condition) if end else None for end in (low, high))
-        above = least is None or values >= least - SAME * abs(least)
-        below = most is None or values <= most + SAME * abs(most)
-        return ~np.isnan(values) & above & below
-    named = condition.split(",")
-    if len(named) > MOST_VALUES:
+        met = ~np.isnan(column.values)
+        for end, ends in (("low", operator.ge), ("high", operator.le)):
+            if match[end].strip():
+                met &= _against(column, ends, match[end], condition)
+    elif len(parts) > MOST_VALUES:
         allowed = f"must be at most {MOST_VALUES} numbers, or a range such as 0.1..0.4"
-        raise StudyError(column.name, f"{len(named)} numbers", allowed)
-    numbers = [_number(column, each, condition) for each in named]
-    return np.any([np.isclose(values, each, rtol=SAME, atol=0.0) for each in numbers], axis=0)
+        raise StudyError(column.name, f"{len(parts)} numbers", allowed)
+    else:
+        every = [_against(column, operator.eq, each, condition) for each in parts]
+        met = np.any(every, axis=0)
+    return met if sign == "=" else ~met
 
 
-def _number(column: Column, text: str, condition: str) -> float:
+def _against(column: Column, compared: Compare, text: str, condition: str) -> np.ndarray:
+    """Return which numbers of a column compare so with that of a text, up to `SAME`."""
+    codes = {word: float(code) for code, word in column.flags.items()}
     try:
-        return float(text)
+        value = codes[text] if text in codes else float(text)
     except ValueError:
-        allowed = "must be a number, several with commas between, or a range such as 0.1..0.4"
+        numbers = "must be a number, several with commas between, or a range such as 0.1..0.4"
+        allowed = one_of(text, codes) if codes else numbers
         raise StudyError(column.name, condition, allowed) from None
+    same = np.isclose(column.values, value, rtol=SAME, atol=0.0)
+    return np.asarray(compared(np.where(same, value, column.values), value))

@@ -21,12 +21,13 @@ LAYERS = {
         "results.quantities", "audit", "results", "scenes", "rolling", "shipped",
     ),
     "studies": (
-        "units", "errors", "toml", "materials", "scratch", "scenes", "definition", "kinds",
+        "units", "numbers", "errors", "toml", "materials", "scratch", "scenes", "definition",
+        "kinds",
         "definition.study", "storage", "kinds.*.answer", "execution", "views", "kinds.*.shown",
         "client",
     ),
     "residua": (
-        "neighbours", "status", "cost", "progress", "keys", "slurm", "commands",
+        "neighbours", "status", "progress", "keys", "slurm", "commands",
         "arguments", "cli", "__main__",
     ),
 }  # fmt: skip

@@ -107,7 +107,7 @@ def test_show_tells_how_far_a_study_without_a_data_set_is(
     store.dataset_path(study.id).unlink()
     store.discard([next(study.cases()).id])
     store.save_study(later)
-    for path in (store.directory, store.study_directory(study.id)):
+    for path in (store.directory, store.study_path(study.id)):
         assert main(["show", str(path)]) == 0
         told = capsys.readouterr().out
         assert "first: 3 of 4 runs finished; no data set yet" in told
@@ -126,7 +126,7 @@ def test_a_broken_study_hides_no_other(
 ) -> None:
     study = fake_study("first")
     store.save_study(study)
-    (store.study_directory(study.id) / "study.json").write_text(content)
+    (store.study_path(study.id, "study.json")).write_text(content)
     store.save_study(fake_study("second"))
     assert main(["show", str(store.directory)]) == 0
     told = capsys.readouterr().out
@@ -140,7 +140,7 @@ def test_a_study_of_another_solver_is_told_as_such(
     study = fake_study("first")
     store.save_study(study)
     other = store.save_definition("0" * 32, study.to_dict())
-    shutil.rmtree(store.study_directory(study.id))
+    shutil.rmtree(store.study_path(study.id))
     assert main(["show", str(store.directory)]) == 0
     told = "first: begun with another version of the solver; no data set yet"
     assert told in capsys.readouterr().out

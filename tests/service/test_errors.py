@@ -15,8 +15,8 @@ from starlette.exceptions import HTTPException
 from service import turns
 from service.app import create_app
 from service.errors import STATUS, on_field_error, on_http_error
+from service.middleware import StrictRequest
 from service.settings import Settings
-from service.strict import StrictRequest
 from studies import Study, StudyError
 from studies.errors import SceneError
 from tests.service.servers import Server, fake_study

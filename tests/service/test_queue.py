@@ -19,7 +19,7 @@ from service.jobs import Jobs, forget
 from service.overview import log_of
 from service.recovery import open_queue
 from studies import Store, StoreBusy, Study
-from studies.storage.lock import lock
+from studies.storage.claims import lock
 from studies.storage.seal import seal
 from tests.studies.test_goal import search_here
 

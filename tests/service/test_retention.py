@@ -67,7 +67,7 @@ class Place:
         with self.jobs.transaction("BEGIN") as queue:
             rows = queue.execute("SELECT 1 FROM run WHERE job = ?", (study.id,)).fetchall()
         known = study.id in {job.id for job in self.jobs.page(limit=100, offset=0)[0]}
-        return known or bool(rows) or self.store.study_directory(study.id).exists()
+        return known or bool(rows) or self.store.study_path(study.id).exists()
 
 
 @pytest.fixture

@@ -351,7 +351,7 @@ def test_the_definition_of_a_running_study_is_written_again(
     place: tuple[Study, Store, Jobs], content: str | None
 ) -> None:
     study, store, jobs = place
-    path = store.study_directory(study.id) / "study.json"
+    path = store.study_path(study.id, "study.json")
     before = path.read_bytes()
     shutil.rmtree(path.parent)
     if content is not None:
@@ -365,7 +365,7 @@ def test_the_definition_of_a_running_study_is_written_again(
 
 def test_the_definition_of_an_earlier_version_is_read(place: tuple[Study, Store, Jobs]) -> None:
     study, store, jobs = place
-    (store.study_directory(study.id) / "study.json").write_text(json.dumps(study.to_dict()))
+    (store.study_path(study.id, "study.json")).write_text(json.dumps(study.to_dict()))
     assert store.study(study.id) == study
     jobs.path.unlink()
     assert open_queue(jobs.path, store, None).get(study.id).state is StudyState.SUCCESSFUL

@@ -121,7 +121,7 @@ def test_a_study_that_is_deleted_from_the_folder_is_not_shown_any_more(tmp_path:
     (tmp_path / "aside").mkdir()
     seen = ViewedFolder(store.directory, tmp_path / "aside")
     for there in ([stays, goes], [stays], [stays, goes]):
-        shutil.rmtree(store.study_directory(goes.id), ignore_errors=True)
+        shutil.rmtree(store.study_path(goes.id), ignore_errors=True)
         for each in there:
             store.save_study(each)
         seen.look()

@@ -228,7 +228,7 @@ def test_combining_45_runs_takes_seconds(store: Store) -> None:
 
 def test_open_study_takes_a_directory_a_study_or_a_file(computed: ComputedStudy) -> None:
     study, store = computed
-    for path in (store.directory, store.study_directory(study.id), store.dataset_path(study.id)):
+    for path in (store.directory, store.study_path(study.id), store.dataset_path(study.id)):
         with open_study(str(path)) as together:
             assert together.attrs["id"] == study.id
             assert not together["residual_stress"].variable._in_memory

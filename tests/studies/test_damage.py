@@ -333,7 +333,7 @@ def test_a_damaged_file_of_a_study_is_written_anew(
     damaged: ComputedStudy, name: str, in_its_place: bytes | None
 ) -> None:
     study, store = damaged
-    path = store.study_directory(study.id) / name
+    path = store.study_path(study.id) / name
     before = path.read_bytes()
     path.unlink()
     if in_its_place is None:

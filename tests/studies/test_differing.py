@@ -30,7 +30,7 @@ def made(place: Path, change: Any = lambda run: run, **content: Any) -> Path:
         store.write_run(case, change(record(case.parameters)))
     store.save_study(study)
     combine(study, store, study.cases())
-    return store.study_directory(study.id)
+    return store.study_path(study.id)
 
 
 def found(first: Path, second: Path) -> Any:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from residua.cli import main
-from residua.cost import Foreseen
+from residua.progress import Foreseen
 from studies import Store, Study, StudyError
 from studies.execution.estimate import Bounds, Estimate, estimate, memory_needed
 from tests.counted import counted

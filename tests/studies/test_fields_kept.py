@@ -18,6 +18,7 @@ from solver.mesh import grid
 from studies import Store, Study, StudyError, run_study
 from studies.scenes.scene import read_scene
 from studies.storage import ugrid
+from studies.views import solution
 from studies.views.plots.picture import drawn_from
 from studies.views.reading import open_netcdf
 
@@ -110,7 +111,7 @@ def test_plastic_strain_keeps_the_volume_and_makes_the_equivalent_one(pressed: S
 def test_the_fields_are_those_of_the_solution(pressed: Solution) -> None:
     fields = pressed.mesh_fields()
     made = xr.Dataset(ugrid.variables(fields), attrs={"keep": "fields", "id": "x"})
-    again = ugrid.read(made)
+    again = solution.read(made)
     assert list(again.stages) == ["loaded", "unloaded"]
     np.testing.assert_array_equal(again.X, fields.X)
     for name, (element, cells) in fields.bodies.items():
@@ -179,7 +180,7 @@ def test_what_cannot_be_exported_is_refused(
 
 def test_a_run_of_a_study_is_found_by_its_place(kept: tuple[Study, Store], tmp_path: Path) -> None:
     study, store = kept
-    where = str(store.study_directory(study.id))
+    where = str(store.study_path(study.id))
     for k, load in enumerate(("0.2", "0.5")):
         folder = tmp_path / load
         assert main(["export", where, "--select", f"load_ratio={load}", "--vtu", str(folder)]) == 0
@@ -239,7 +240,7 @@ def test_the_maps_of_a_study_are_drawn_on_the_mesh_of_the_run_and_numbers_over_a
     kept: tuple[Study, Store], tmp_path: Path
 ) -> None:
     study, store = kept
-    where = store.study_directory(study.id)
+    where = store.study_path(study.id)
     with open_netcdf(store.dataset_path(study.id)) as dataset:
         chosen = {"load_ratio": "0.2"}
         with drawn_from(where, dataset, "map_mises", {**chosen, "stage": "loaded"}) as found:

@@ -8,7 +8,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,10 @@ import pytest
 from distributed.system import MEMORY_LIMIT
 
 from studies import Access, GridLost, Limits, StudyError, own_workers
-from studies.execution.executor import Finished, Message, Waiting
+from studies.execution.executor import Event, Finished, Function, Message, StopCheck, Waiting
 from studies.execution.forks import variables
 from studies.execution.grid import Grid
+from studies.execution.run import DEFAULT
 from studies.execution.workers import connect
 from tests.studies.chores import chatter, freeze, nap, need
 
@@ -43,6 +44,22 @@ def nobody() -> Iterator[Access]:
 
 def never() -> bool:
     return False
+
+
+def run(
+    grid: Grid,
+    function: Function,
+    tasks: Iterable[Any],
+    should_stop: StopCheck,
+    limits: Limits = DEFAULT,
+    *,
+    priority: int = 0,
+    hear: Callable[[Event], None] | None = None,
+) -> list[Event]:
+    """Run tasks, and return what happened."""
+    events: list[Event] = []
+    grid.run(function, tasks, hear or events.append, should_stop, limits, priority)
+    return events
 
 
 def workers() -> list[psutil.Process]:
@@ -163,9 +180,12 @@ def test_one_task_is_served_beside_a_thousand_of_another(two: Access) -> None:
     def many() -> None:
         tasks = (0.1 for _ in range(1000) if next(drawn) >= 0)
         with Grid(two) as grid:
-            for item in grid.events(nap, tasks, leave.is_set):
+
+            def hear(item: Any) -> None:
                 if isinstance(item, Finished) and next(done) == 4:
                     begun.set()
+
+            run(grid, nap, tasks, leave.is_set, hear=hear)
 
     crowd = threading.Thread(target=many)
     crowd.start()
@@ -173,7 +193,7 @@ def test_one_task_is_served_beside_a_thousand_of_another(two: Access) -> None:
         assert begun.wait(60)
         with Grid(two) as grid:
             before = next(done)
-            assert [type(each) for each in grid.events(nap, [0.0], never)] == [Message, Finished]
+            assert [type(each) for each in run(grid, nap, [0.0], never)] == [Message, Finished]
             assert next(done) - before < 20
         assert next(drawn) <= next(done) + 10, "tasks are built when their turn comes"
     finally:
@@ -186,9 +206,12 @@ def test_who_has_just_come_goes_before_what_another_keeps_in_stock(two: Access) 
     order: list[str] = []
 
     def many(grid: Grid) -> None:
-        for item in grid.events(nap, [0.4, 1.0] * 4, never):
+
+        def hear(item: Any) -> None:
             if isinstance(item, Finished):
                 order.append("stock")
+
+        run(grid, nap, [0.4, 1.0] * 4, never, hear=hear)
 
     with Grid(two) as stock, Grid(two) as new:
         crowd = threading.Thread(target=many, args=(stock,))
@@ -196,9 +219,12 @@ def test_who_has_just_come_goes_before_what_another_keeps_in_stock(two: Access) 
         while not order:  # two run, two wait
             time.sleep(0.01)
         began = len(order)
-        for item in new.events(nap, [0.0], never):
+
+        def hear(item: Any) -> None:
             if isinstance(item, Finished):
                 order.append("new")
+
+        run(new, nap, [0.0], never, hear=hear)
         crowd.join(30)
     assert order.index("new") - began <= 2, "those that were running, and no more"
 
@@ -207,9 +233,12 @@ def test_the_higher_priority_goes_first(two: Access) -> None:
     order: list[str] = []
 
     def study(grid: Grid, name: str, priority: int) -> None:
-        for item in grid.events(nap, [0.3] * 8, never, priority=priority):
+
+        def hear(item: Any) -> None:
             if isinstance(item, Finished):
                 order.append(name)
+
+        run(grid, nap, [0.3] * 8, never, priority=priority, hear=hear)
 
     with Grid(two) as low, Grid(two) as high:
         first = threading.Thread(target=study, args=(low, "low", 0))
@@ -227,11 +256,14 @@ def test_a_frozen_worker_is_replaced_and_others_are_not_blamed(two: Access) -> N
     ends: dict[Any, Finished] = {}
     tasks = [("freeze", 0.0), *(("nap", 0.1 + i / 100) for i in range(12))]
     with Grid(two) as grid:
-        for item in grid.events(freeze, tasks, never, Limits(stall_seconds=2.0)):
+
+        def hear(item: Any) -> None:
             if isinstance(item, Message) and "seconds" not in item.content:
                 frozen.append(item.content["pid"])
             elif isinstance(item, Finished):
                 ends[item.task] = item
+
+        run(grid, freeze, tasks, never, Limits(stall_seconds=2.0), hear=hear)
         assert set(ends) == set(tasks)
         failed = {task: str(end.error) for task, end in ends.items() if end.error}
         assert failed == {
@@ -240,7 +272,7 @@ def test_a_frozen_worker_is_replaced_and_others_are_not_blamed(two: Access) -> N
         }
         pids = {
             item.content["pid"]
-            for item in grid.events(nap, [1.0] * 6, never)
+            for item in run(grid, nap, [1.0] * 6, never)
             if isinstance(item, Message)
         }
         assert frozen[0] not in pids
@@ -250,7 +282,7 @@ def test_a_frozen_worker_is_replaced_and_others_are_not_blamed(two: Access) -> N
 def test_a_path_that_takes_too_long_is_ended_though_it_reports(two: Access) -> None:
     with Grid(two) as grid:
         limits = Limits(stall_seconds=5.0, path_seconds=1.0)
-        *_, end = grid.events(chatter, [0.0], never, limits)
+        *_, end = run(grid, chatter, [0.0], never, limits)
     assert isinstance(end, Finished)
     assert "took longer than 1 s (limit path_seconds)" in str(end.error)
 
@@ -258,7 +290,7 @@ def test_a_path_that_takes_too_long_is_ended_though_it_reports(two: Access) -> N
 def test_time_in_the_queue_does_not_count(two: Access) -> None:
     with Grid(two) as grid:
         limits = Limits(stall_seconds=3.0, path_seconds=3.0)
-        ends = [e for e in grid.events(nap, [0.7] * 10, never, limits) if isinstance(e, Finished)]
+        ends = [e for e in run(grid, nap, [0.7] * 10, never, limits) if isinstance(e, Finished)]
     assert [end.error for end in ends] == [None] * 10
 
 
@@ -266,7 +298,8 @@ def test_stopping_does_not_wait_for_a_frozen_worker(two: Access) -> None:
     frozen, ended = list[int](), list[Finished]()
     with Grid(two) as grid:
         tasks = [("freeze", 0.0), ("nap", 600.0)]
-        for item in grid.events(freeze, tasks, lambda: bool(frozen)):
+
+        def hear(item: Any) -> None:
             if isinstance(item, Message) and "seconds" not in item.content:
                 stopped = psutil.Process(item.content["pid"])
                 while stopped.status() != psutil.STATUS_STOPPED:
@@ -274,6 +307,8 @@ def test_stopping_does_not_wait_for_a_frozen_worker(two: Access) -> None:
                 frozen.append(stopped.pid)
             elif isinstance(item, Finished):
                 ended.append(item)
+
+        run(grid, freeze, tasks, lambda: bool(frozen), hear=hear)
         assert frozen and not [end for end in ended if not end.error], "no task came to its end"
     os.kill(frozen[0], 9)
 
@@ -284,8 +319,7 @@ def test_no_worker_is_told_and_ends_by_a_setting(
     monkeypatch.setattr("studies.execution.watch._QUIET", 1.0)
     told = []
     with Grid(nobody) as grid, pytest.raises(GridLost, match="no worker is connected"):
-        for item in grid.events(nap, [0.0], never, Limits(patience=3.0)):
-            told.append(item)
+        run(grid, nap, [0.0], never, Limits(patience=3.0), hear=told.append)
     (item,) = told
     assert isinstance(item, Waiting)
     assert item.reason.startswith("no worker is connected to the scheduler: start one")
@@ -311,10 +345,13 @@ def test_workers_killed_on_sight_are_told_and_the_study_goes_on(
         thread.start()
         items = []
         try:
-            for item in grid.events(nap, [0.5, 0.5], never, Limits(patience=120.0)):
+
+            def hear(item: Any) -> None:
                 items.append(item)
                 if isinstance(item, Waiting) and item.reason:
                     spared.set()
+
+            run(grid, nap, [0.5, 0.5], never, Limits(patience=120.0), hear=hear)
         finally:
             spared.set()
             thread.join()
@@ -328,12 +365,15 @@ def test_a_worker_that_is_not_fit_is_told_and_its_task_is_kept(two: Access, tmp_
     file = tmp_path / "needed"
     items = []
     with Grid(two) as grid:
-        for item in grid.events(need, [str(file)], never):
+
+        def hear(item: Any) -> None:
             items.append(item)
             if isinstance(item, Waiting) and item.reason:
                 assert item.reason.startswith("the worker tls://127.0.0.1:")
                 assert item.reason.endswith(" lacks the file")
                 file.touch()
+
+        run(grid, need, [str(file)], never, hear=hear)
     assert [type(item) for item in items][-3:] == [Waiting, Message, Finished]
     assert items[-1].error is None
     assert items[-3].reason == ""
@@ -346,8 +386,11 @@ def test_time_for_which_the_caller_was_held_up_is_not_the_tasks(
     with Grid(two) as grid:
         limits = Limits(stall_seconds=2.5, patience=2.5)
         items = []
-        for item in grid.events(nap, [1.5] * 6, never, limits):
+
+        def hear(item: Any) -> None:
             if not items:
                 time.sleep(4.0)
             items.append(item)
+
+        run(grid, nap, [1.5] * 6, never, limits, hear=hear)
     assert [item.error for item in items if isinstance(item, Finished)] == [None] * 6

@@ -61,7 +61,7 @@ def again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Make:
 
 def states(study: Study, store: Store) -> dict[str, tuple[int, int]]:
     """Return what every writing of a file of the study changes."""
-    files = store.study_directory(study.id).iterdir()
+    files = store.study_path(study.id).iterdir()
     return {path.name: (path.stat().st_ino, path.stat().st_mtime_ns) for path in files}
 
 
@@ -83,7 +83,7 @@ def test_a_complete_study_is_told_again_and_nothing_is_made(
         monkeypatch.setattr(maker, refused)
     assert main(arguments(tmp_path)) == 0
     assert states(*complete) == before
-    told, directory = capsys.readouterr().out, complete[1].study_directory(complete[0].id)
+    told, directory = capsys.readouterr().out, complete[1].study_path(complete[0].id)
     assert told.startswith((directory / "report.txt").read_text().rstrip() + ", 0 computed in ")
     assert told.splitlines()[-3:] == [f"kept {directory / name}" for name in RESULTS]
 
@@ -142,7 +142,7 @@ def test_a_result_that_is_damaged_or_gone_is_made_again(
     complete: tuple[Study, Store], again: Make, damage: Callable[[Path], None], name: str
 ) -> None:
     study, store = complete
-    path = store.study_directory(study.id) / name
+    path = store.study_path(study.id) / name
     before = path.read_bytes()
     damage(path)
     # the data set tells when it was made: what is made of it is made anew
@@ -157,7 +157,7 @@ def test_where_it_is_not_known_what_results_were_made_of_all_are_made_again(
     complete: tuple[Study, Store], again: Make, content: bytes
 ) -> None:
     study, store = complete
-    (store.study_directory(study.id) / "made.json").write_bytes(content)
+    (store.study_path(study.id, "made.json")).write_bytes(content)
     assert "dataset.nc" in again()
     assert again() == []
 

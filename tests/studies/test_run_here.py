@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from residua.cli import main
-from residua.cost import ALONE
+from residua.progress import ALONE
 from studies import Store, StudyEvent, open_study, run_study
 from studies.errors import StudyError
 from studies.execution.executor import Here
@@ -142,7 +142,7 @@ def test_the_command_starts_no_workers_for_a_short_study(
         raise StudyError("study", "fake", "is not computed here")
 
     found = SimpleNamespace(cpu_seconds=(seconds / 2, seconds, 2 * seconds))
-    monkeypatch.setattr("residua.cost.estimate", lambda *of: found)
+    monkeypatch.setattr("residua.progress.estimate", lambda *of: found)
     monkeypatch.setattr("studies.execution.run.run_study", computed)
     assert main(["run", str(study_file()), "--out", str(tmp_path / "out"), *options]) == 2
     assert asked == [workers, alone]

@@ -31,7 +31,7 @@ from solver.scenes.driver import _labelled, _merged
 from solver.shipped import SCENES
 from solver.tensors import to_mandel, von_mises
 from studies import Store, Study, StudyError, open_netcdf, open_study
-from studies.storage import ugrid
+from studies.views import solution
 from studies.views.plots.mapped import whole
 from studies.views.plots.picture import picture
 from studies.views.tables import runs_table
@@ -324,7 +324,7 @@ def test_fields_that_are_kept_are_read_as_they_were(computed: tuple[Study, Store
     rail = Rail()
     with open_netcdf(store.run_path(next(study.cases()).id)) as run:
         assert run["mesh"].attrs["node_coordinates"] == "mesh_node_x mesh_node_y mesh_node_z"
-        kept = ugrid.read(run)
+        kept = solution.read(run)
     np.testing.assert_array_equal(kept.X, rail.X)
     np.testing.assert_allclose(kept.stages["unloaded"]["stress"], rail.stress)
     np.testing.assert_allclose(kept.stages["loaded"]["displacement"], 2 * displaced(rail.X))

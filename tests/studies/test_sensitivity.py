@@ -247,7 +247,7 @@ def test_a_method_that_is_not_there_says_what_to_install(monkeypatch: pytest.Mon
 def test_the_command_prints_and_draws(
     doubled: tuple[Store, list[int]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = doubled[0].study_directory(sample(128).id)
+    out = doubled[0].study_path(sample(128).id)
     asked = ["sensitivity", str(out), "--of", OF]
     assert main([*asked, "--out", str(tmp_path / "a.png")]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]

@@ -125,7 +125,7 @@ def test_a_file_of_a_study_is_set_aside_and_made_again(
     special: Special, name: str, copied: ComputedStudy
 ) -> None:
     study, store = copied
-    path = store.study_directory(study.id) / name
+    path = store.study_path(study.id) / name
     path.unlink(missing_ok=True)
     special(path)
     assert main(["table", str(store.directory)]) in (0, 2)

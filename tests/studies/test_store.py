@@ -79,7 +79,7 @@ def test_reading_makes_nothing(store: Store) -> None:
 
 @pytest.mark.parametrize("bad", ["", "x" * 32, "../../etc/passwd", "0" * 31, "0" * 32 + "\n"])
 def test_ids_that_are_not_ids_reach_no_file(store: Store, bad: str) -> None:
-    for locate in (store.run_path, store.study_directory, store.dataset_path):
+    for locate in (store.run_path, store.study_path, store.dataset_path):
         with pytest.raises(ValueError, match="content id"):
             locate(bad)
 
@@ -87,7 +87,7 @@ def test_ids_that_are_not_ids_reach_no_file(store: Store, bad: str) -> None:
 def test_a_saved_study_is_found_again(computed: ComputedStudy) -> None:
     study, store = computed
     assert store.study(study.id) == study
-    text = (store.study_directory(study.id) / "study.json").read_text()
+    text = (store.study_path(study.id, "study.json")).read_text()
     assert json.loads(text)["name"] == study.name
 
 

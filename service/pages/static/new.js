@@ -1,6 +1,6 @@
 // The form of a new study: what it costs, and what is wrong in it, as one types.
 
-import { element, encoded, text } from "./page.js";
+import { element, encoded } from "./page.js";
 
 const form = /** @type {HTMLFormElement} */ (document.querySelector("[data-study]"));
 const REST = 450;
@@ -19,9 +19,6 @@ let drawn = "";
 document.querySelector("[data-scene]").addEventListener("change", (event) => /** @type {HTMLSelectElement} */ (event.target).form.submit());
 for (const each of document.querySelectorAll("[data-check], [data-take]")) each.hidden = true;
 
-const time = (seconds) => (seconds < 90 ? `${text(Number(seconds.toPrecision(2)))} s` : seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${text(Number((seconds / 3600).toPrecision(2)))} h`);
-const size = (bytes) => (bytes < 1e9 ? `${text(Number((bytes / 1e6).toPrecision(2)))} MB` : `${text(Number((bytes / 1e9).toPrecision(2)))} GB`);
-
 function told(wrong) {
   const places = new Map([...form.querySelectorAll("[data-wrong]")].map((each) => [each.dataset.wrong, each]));
   const rest = [];
@@ -37,17 +34,8 @@ function told(wrong) {
 }
 
 function costs(estimate) {
-  const place = form.querySelector("[data-estimate]");
-  const rows = estimate === null ? [["Runs", "–"]] : [
-    ["Runs", estimate.runs],
-    ...(estimate.to_compute === estimate.runs ? [] : [["To compute", estimate.to_compute]]),
-    ["Loading paths", estimate.paths],
-    ["Unknowns of a run", estimate.unknowns === null ? "unknown" : estimate.unknowns.toLocaleString("en")],
-    ["Processor time", estimate.cpu_seconds === null ? "unknown" : time(estimate.cpu_seconds[1])],
-    ...(estimate.cpu_seconds === null ? [] : [["", `${time(estimate.cpu_seconds[0])} – ${time(estimate.cpu_seconds[2])}`]]),
-    ["On the disk", size(estimate.bytes)],
-  ];
-  place.replaceChildren(...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, String(value))]));
+  const rows = Object.entries(estimate ?? { runs: "–" });
+  form.querySelector("[data-estimate]").replaceChildren(...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
 }
 
 // The picture depends on the parameters alone; one with a mistake is not asked for.

@@ -84,12 +84,12 @@ export function choice(label, options, value, chosen) {
 
 export const words = (name) => String(name).replaceAll("_", " ");
 
-// Four digits, as the tables of the service.
+// Four digits, as `number_text` of studies/numbers.py has them.
 export function text(value) {
   if (typeof value !== "number") return words(value);
   if (Number.isNaN(value)) return "–";
   const size = Math.abs(value);
-  if (value !== 0 && (size < 1e-4 || size >= 1e6)) return value.toExponential(3).replace(/\.?0+e/, "e").replace("-", "−");
+  if (value !== 0 && (size < 1e-4 || size >= 1e6)) return value.toExponential(3).replace(/\.?0+e/, "e").replace(/(?<=e.)(?=\d$)/, "0").replaceAll("-", "−");
   return String(size < 1e4 ? Number(value.toPrecision(4)) : Math.round(value)).replace("-", "−");
 }
 

@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from solver.results.quantities import QUANTITIES
+from studies.numbers import number_text
 from studies.views.plots.captions import axis_label, label, words, wrapped
 from studies.views.plots.sheets import add_head, plain_axes
 
@@ -91,4 +92,4 @@ def _sure(dataset: xr.Dataset, name: str) -> str:
     """Return the value of a parameter and its standard deviation."""
     value, sigma = dataset[name].item(), dataset[f"{name}_sigma"].item()
     unit = dataset[name].attrs.get("units", "1")
-    return f"{value:.4g} ± {sigma:.2g}" + ("" if unit == "1" else f" {unit}")
+    return f"{number_text(value)} ± {number_text(sigma, 2)}" + ("" if unit == "1" else f" {unit}")

@@ -16,7 +16,8 @@ from skfem import Mesh
 from solver.model.body import Body
 from solver.model.loads import Load
 from solver.model.rigid import Pushed, RigidBody
-from studies.views.plots.captions import short_number, words
+from studies.numbers import typeset_number
+from studies.views.plots.captions import words
 from studies.views.plots.meshed import Array
 
 _FORCE, _MOTION, _FIELD, _HELD = "#c2410c", "#15803d", "#b45309", "0.15"
@@ -77,7 +78,9 @@ def acting(bodies: Sequence[Body], rigid: Sequence[RigidBody]) -> Iterator[Arrow
             yield _travelling(body)
         if body.axle is not None:
             force = body.axle.force
-            text = f"force on the axle of {body.name}: {short_number(np.abs(force.value).max())} N"
+            text = (
+                f"force on the axle of {body.name}: {typeset_number(np.abs(force.value).max())} N"
+            )
             yield _single(text, body.axle.centre, (0.0, -1.0), _FORCE)
     for each in rigid:
         for axis, way in (("x", (1.0, 0.0)), ("y", (0.0, 1.0)), ("rotation", (0.0, 0.0))):
@@ -88,7 +91,7 @@ def acting(bodies: Sequence[Body], rigid: Sequence[RigidBody]) -> Iterator[Arrow
                 kind, unit = ("turned", "rad") if turns else (f"moved {axis}", "mm")
                 if pushed:
                     kind, unit = ("moment", "N mm") if turns else (f"force {axis}", "N")
-                text = f"{each.name}: {kind} {short_number(motion.value)} {unit}"
+                text = f"{each.name}: {kind} {typeset_number(motion.value)} {unit}"
                 to = np.sign(motion.value) * np.array(way)
                 yield _single(text, _place_of(each), to, _FORCE if pushed else _MOTION)
 
@@ -150,7 +153,7 @@ def _travelling(body: Body) -> Arrows:
     force = load.pushing(middle)(at, ends[:, :, 1] - ends[:, :, 0]) / length
     there = np.flatnonzero(np.linalg.norm(force, axis=0) > 0.0)
     there = there[_spread(length[there])]
-    peak, half = short_number(load.peak), short_number(load.half_width)
+    peak, half = typeset_number(load.peak), typeset_number(load.half_width)
     return Arrows(
         text=f"travelling pressure {body.name}.{load.boundary}: {peak}, half-width {half}",
         at=at[:, there],
@@ -172,7 +175,7 @@ def _told(load: Load) -> str:
             parts.append(f"{own}varies")
         elif isinstance(value, int | float) and value:
             unit = _unit_in(hints[each.name])
-            parts.append(f"{own}{short_number(value)}{'' if unit == '1' else f' {unit}'}")
+            parts.append(f"{own}{typeset_number(value)}{'' if unit == '1' else f' {unit}'}")
     return f": {', '.join(parts)}" if parts else ""
 
 

@@ -12,6 +12,7 @@ import xarray as xr
 from solver.errors import ModelError
 from solver.tensors import AXES
 from studies.definition.parameters import defaults, parameters_of, plain
+from studies.numbers import number_text
 from studies.scenes.registry import scene_of
 from studies.storage.frame import FRACTION
 from studies.views.columns import counted
@@ -140,21 +141,13 @@ def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:
         return {name: parameter.default for name, parameter in known.items()}
 
 
-def short_number(value: float, digits: int = 4) -> str:
-    """Return a few digits of a number, without a power of ten up to a million."""
-    text = f"{value:.{digits}g}"
-    if "e" in text and 1e-4 <= abs(value) < 1e6:
-        text = f"{float(text):.0f}"
-    return text.replace("-", "\N{MINUS SIGN}")
-
-
 def wrapped(text: str, width: float, points: int) -> str:
     """Return text in lines that fit `width` [in] at a font size [points]."""
     return textwrap.fill(text, int(width * 72.0 / (0.52 * points)), break_long_words=False)
 
 
 def _text(value: Any, unit: str) -> str:
-    text = f"{value:g}" if isinstance(value, int | float) else words(counted(value))
+    text = number_text(value, 6) if isinstance(value, int | float) else words(counted(value))
     return text if unit in {"", "1"} or isinstance(value, str) else f"{text} {unit}"
 
 

@@ -12,7 +12,7 @@ import xarray as xr
 
 from solver.model.friction import PatchStatus
 from studies.errors import StudyError, one_of
-from studies.views.plots.captions import short_number
+from studies.numbers import typeset_number
 from studies.views.plots.fields import (
     Window,
     check_field,
@@ -177,10 +177,10 @@ def limit(there: np.ndarray, area: np.ndarray, signed: bool, unit: str) -> tuple
     high = _percentile(size[size > 0.0], area[size > 0.0])
     if size.max() <= _WORTHWHILE * high:
         return float(size.max()), ""
-    least, most = (short_number(float(each)) for each in (there.min(), there.max()))
+    least, most = (typeset_number(float(each)) for each in (there.min(), there.max()))
     beyond = f"{area[size > high].sum() / area.sum():.1%} of the map lies beyond"
     return high, (
-        f"Colours end at {'±' if signed else ''}{short_number(high, 3)}"
+        f"Colours end at {'±' if signed else ''}{typeset_number(high, 3)}"
         f"{'' if unit == '1' else f' {unit}'}: {beyond}. Values go from {least} to {most}."
     )
 

@@ -22,6 +22,7 @@ from solver.model.friction import PatchStatus
 from solver.results.invariants import PRINCIPAL, principal_of
 from solver.tensors import AXES
 from studies.errors import StudyError
+from studies.numbers import number_text
 from studies.views.picking import one_run
 from studies.views.plots.captions import capitalised, label, setting, symbol, wrapped
 from studies.views.plots.fields import (
@@ -76,7 +77,7 @@ def draw_patch(axes: Axes, run: xr.Dataset, field: str, window: Window) -> None:
             scale=longest / (1.2 * step), width=step / 12, color="0.1",
         )  # fmt: skip
         unit = arrows[0].attrs.get("units", "1")
-        name = f"{kind.removeprefix('patch_')} on the surface, at most {longest:.3g}"
+        name = f"{kind.removeprefix('patch_')} on the surface, at most {number_text(longest, 3)}"
         label = name if unit == "1" else f"{name} {unit}"
         handles.append(Line2D([], [], color="0.1", marker=r"$\rightarrow$", ls="none", label=label))
     down = ScaledTranslation(0.0, BELOW / 72.0, axes.figure.dpi_scale_trans)

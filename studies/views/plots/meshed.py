@@ -14,7 +14,6 @@ from solver.results.mesh_fields import NO_NODE, MeshFields
 from solver.results.quantities import QUANTITIES
 from solver.tensors import AXES
 from studies.errors import StudyError, one_of
-from studies.storage.ugrid import keeps, read
 from studies.views.plots.fields import (
     Window,
     component_name,
@@ -27,6 +26,7 @@ from studies.views.plots.fields import (
     too_close,
 )
 from studies.views.plots.mapped import STAGE, Mapped, limit
+from studies.views.solution import keeps, read
 
 Array = np.ndarray
 Box = tuple[float, float, float, float]

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from studies.errors import StudyError, one_of
 from studies.kinds.kind import Kind
-from studies.storage.ugrid import keeps
 from studies.views.picking import (
     file_of,
     one_run,
@@ -41,6 +40,7 @@ from studies.views.plots.meshed import MESH_MAPS, mesh_maps
 from studies.views.plots.sheets import png, resolved
 from studies.views.plots.sweep import sweep_figure
 from studies.views.reading import find_study, open_netcdf
+from studies.views.solution import keeps
 
 
 def picture(

@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from studies.numbers import number_text
 from studies.views.picking import select
 from studies.views.plots.captions import capitalised, short_label, words
 from studies.views.plots.runs import known_values
@@ -99,7 +100,7 @@ def _tornado(axes: Axes, found: xr.Dataset, values: xr.DataArray, names: list[st
         effect, place = (found[e].sel(parameter=name).to_numpy() for e in ("effect", "place"))
         ends = [(effect.argmin(), "right", low), (effect.argmax(), "left", high)]
         for at, side, end in ends:
-            text = f" {place[at]:.3g} "
+            text = f" {number_text(place[at], 3)} "
             axes.text(end[k].item(), k, text, ha=side, va="center", fontsize=7)
     axes.set_yticks(range(len(names)), [""] * len(names))
     axes.invert_yaxis()

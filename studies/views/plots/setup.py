@@ -27,8 +27,9 @@ from solver.scenes.sketch import Sketch
 from solver.tensors import AXES
 from studies.definition.parameters import build, defaults, parameters_of
 from studies.errors import StudyError
+from studies.numbers import typeset_number
 from studies.views.plots.acting import acting, draw_acting, draw_supports, outward
-from studies.views.plots.captions import capitalised, named, short_number, words, wrapped
+from studies.views.plots.captions import capitalised, named, words, wrapped
 from studies.views.plots.fields import Window, empty_window
 from studies.views.plots.meshed import Array, Box
 
@@ -450,7 +451,7 @@ def _told(body: Body) -> str:
     mesh = body.mesh
     sides = np.linalg.norm(np.diff(mesh.p[:, mesh.facets], axis=1)[:, 0], axis=0)
     law = "elastic" if body.material.elastic else "elastic-plastic"
-    width, height, least, most = map(short_number, (*body.box, sides.min(), sides.max()))
+    width, height, least, most = map(typeset_number, (*body.box, sides.min(), sides.max()))
     count = f"{mesh.t.shape[1]} elements {body.element}"
     return f"{body.name}: {law}, {width} × {height} mm\n{count}, sides {least} to {most} mm"
 
@@ -471,13 +472,13 @@ def _draw_results(axes: Axes, view: View, places: NamedPlaces | None) -> dict[st
             linestyle="--",
         )
         axes.add_patch(frame)
-        size = f"{short_number(x1 - x0)} × {short_number(y1 - y0)} mm"
+        size = f"{typeset_number(x1 - x0)} × {typeset_number(y1 - y0)} mm"
         handles[f"map: {size}"] = Line2D([], [], color=_RESULTS, linewidth=1.0, linestyle="--")
     if view.station.size and view.depth.size:
         rows = [AXES.index(name) for name in view.map_axes]
         for profile in np.split(view.profiles[rows], view.station.size, axis=1):
             axes.plot(*profile, color=_RESULTS, linewidth=1.0, linestyle=":")
-        text = f"profiles, {short_number(view.depth.max())} mm deep"
+        text = f"profiles, {typeset_number(view.depth.max())} mm deep"
         handles[text] = Line2D([], [], color=_RESULTS, linewidth=1.0, linestyle=":")
     for name, line in (places.lines if places else {}).items():
         axes.plot(*line.X[:2], color=_RESULTS, linewidth=1.3)

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from studies.errors import StudyError
+from studies.numbers import number_text
 from studies.views.picking import sweep_axes
 from studies.views.plots.captions import capitalised, setting, short_label, words, wrapped
 from studies.views.rules import MOST_LINES, NUMBERS
@@ -55,7 +56,9 @@ def add_bar(axes: Axes, coordinate: xr.DataArray) -> None:
         ScalarMappable(cells, ListedColormap([colours[i] for i in order])), ax=axes,
         location="bottom", aspect=40.0, label=capitalised(short_label(coordinate)),
     )  # fmt: skip
-    bar.set_ticks(shown.tolist(), labels=[f"{coordinate[order[i]].item():g}" for i in shown])
+    bar.set_ticks(
+        shown.tolist(), labels=[number_text(coordinate[order[i]].item(), 6) for i in shown]
+    )
     bar.minorticks_off()
 
 

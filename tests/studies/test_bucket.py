@@ -1,0 +1,159 @@
+"""A store at an address of fsspec, with a folder for what is in use."""
+
+from __future__ import annotations
+
+import json
+import time
+import uuid
+from pathlib import Path
+
+import fsspec
+import pytest
+import xarray as xr
+
+from studies import Store, StoreBusy, StudyError, open_study, run_study
+from studies.execution.part import run_part
+from studies.storage.blobs import directory_of
+from studies.storage.claims import Claim
+from studies.views.reading import begun_studies
+from tests.studies.conftest import fake_study
+
+FILES = fsspec.filesystem("memory")
+
+
+@pytest.fixture
+def address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.setenv("RESIDUA_CACHE", str(tmp_path / "here"))
+    return f"memory://{uuid.uuid4().hex}/results"
+
+
+def elsewhere(address: str, monkeypatch: pytest.MonkeyPatch) -> Store:
+    """The store as another machine has it, where nothing was brought yet."""
+    monkeypatch.setenv("RESIDUA_CACHE", f"{directory_of(address)}-{uuid.uuid4().hex}")
+    return Store(address)
+
+
+def test_a_study_is_computed_resumed_and_read(
+    address: str, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = fake_study()
+    ids = sorted(study.run_ids())
+    assert sorted(run_study(study, Store(address), workers=0).computed) == ids
+    other = elsewhere(address, monkeypatch)
+    assert not list(other.directory.glob("*/*"))
+    outcome = run_study(study, other, workers=0, resume=True)
+    assert not outcome.computed and not outcome.anew and outcome.ok
+    assert other.address == address and outcome.dataset.is_relative_to(other.directory)
+    elsewhere(address, monkeypatch)
+    run_study(study, store, workers=0)
+    with open_study(store.directory) as own, open_study(address, study.name) as found:
+        xr.testing.assert_equal(own.drop_vars("cpu_seconds"), found.drop_vars("cpu_seconds"))
+    with pytest.raises(StudyError, match="must be a data set, a study or an output directory"):
+        open_study(address, "nothing")
+    assert not list(directory_of(address).glob("runs/*")), "only what is read is brought"
+    run_study(fake_study("other", friction=0.1, sweep={"load_ratio": [0.1]}), other, workers=0)
+    with pytest.raises(StudyError, match="holds several studies"):
+        open_study(f"{address}/")
+
+
+def test_what_others_store_is_seen(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    study, here = fake_study(sweep={"friction": [0.0, 0.2]}), Store(address)
+    run_study(study, here, workers=0)
+    first, second = study.run_ids()
+    other = elsewhere(address, monkeypatch)
+    with other.writing():
+        other.discard([first])
+        case = next(case for case in study.cases() if case.id == second)
+        other.write_run(case, "it failed")
+    here.reconcile()
+    assert here.run(first) is None and here.run(second)["message"] == "it failed"  # type: ignore[index]
+    assert here.catalogue.counts() == {"error": 1}
+    other.save_study(fake_study("begun", sweep={"friction": [0.3]}))
+    assert begun_studies(here.directory)[0].startswith("begun: 0 of 1 runs finished")
+    here.discard_study(study.id)
+    assert other.study_ids() != [study.id] and study.id not in other.study_ids()
+
+
+def test_many_blobs_are_listed_as_each_is_asked_for(address: str) -> None:
+    blobs, root = Store(address).blobs, address.removeprefix("memory:/")
+    names = [f"runs/{number:032x}.nc" for number in range(30)]
+    for name in [*names, "runs/x/y.nc", "studies/z/study.json"]:
+        FILES.pipe_file(f"{root}/{name}", name.encode())
+    assert sorted(blobs.names("runs/*.nc")) == names
+    assert blobs.stamps([*names, "runs/none.nc"]) == {n: blobs.stamps([n])[n] for n in names}
+    assert blobs.names("studies/*/study.json") == ["studies/z/study.json"]
+    path = blobs.path(names[0])
+    state = path.stat()
+    assert (state.st_size, state.st_mtime_ns) == blobs.stamps([names[0]])[names[0]]
+    assert not blobs.path("runs/none.nc").exists() and blobs.stamps([]) == {}
+
+
+def test_a_damaged_blob_is_set_aside_and_a_damaged_copy_brought_again(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, store = fake_study(sweep={"friction": [0.0, 0.2]}), Store(address)
+    run_study(study, store, workers=0)
+    first, second = study.run_ids()
+    root = address.removeprefix("memory:/")
+    store.run_path(first).write_bytes(b"damaged")
+    assert store.found(first) is None and store.found(first) is not None
+    assert FILES.exists(f"{root}/runs/{first}.nc") and not FILES.exists(f"{root}/unreadable")
+    FILES.pipe_file(f"{root}/runs/{second}.nc", b"damaged")
+    other = elsewhere(address, monkeypatch)
+    assert run_study(study, other, workers=0, resume=True).computed == [second]
+    assert FILES.cat_file(f"{root}/unreadable/{second}.nc") == b"damaged"
+    assert run_study(study, store, workers=0, resume=True).ok
+
+
+def test_a_writer_has_a_lease(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    here, other = Store(address), elsewhere(address, monkeypatch)
+    with here.writing(), pytest.raises(StoreBusy, match="on another machine computes here"):
+        other.writing().__enter__()
+    with other.writing():
+        pass
+    lease = f"{address.removeprefix('memory:/')}/lock/writer.0"
+    own = json.loads((here.directory / "origin.json").read_text())["id"]
+    for owner, age, free in (("x", 100.0, False), ("x", 400.0, True), (own, 1.0, True)):
+        known = {"owner": owner, "at": time.time() - age, "done": False}
+        FILES.pipe_file(lease, json.dumps(known).encode())
+        if free:
+            with here.writing():
+                continue
+        with pytest.raises(StoreBusy), here.writing():
+            pass
+
+
+def test_parts_meet_at_an_address(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    study, here = fake_study(), Store(address)
+    other = elsewhere(address, monkeypatch)
+    claims = here.blobs.claims()
+    with claims.held("a") as claim:
+        assert claim == Claim(0)
+        with other.blobs.claims().held("a") as second:
+            assert second is None
+    with claims.held("a") as claim:
+        assert claim == Claim(0)
+        claim.done = True
+    with claims.held("a") as claim:
+        assert claim is None, "it stays for those that do not see yet what was done"
+    computed = run_part(study, other.directory, (1, 2)).computed
+    assert sorted(computed) == sorted(study.run_ids())
+    assert not run_part(study, here.directory, (2, 2)).computed
+    assert not run_study(study, here, workers=0, resume=True).computed
+
+
+def test_an_address_that_cannot_be_used_is_named(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(StudyError, match=r"directory = 'nowhere://x': cannot be used: Protocol"):
+        Store("nowhere://x/")
+    with pytest.raises(StudyError, match=r"directory = 's3:/x': is an address: give it as a text"):
+        Store(Path("s3://x"))
+    store = Store(address)
+
+    def lost(*given: object, **named: object) -> None:
+        raise RuntimeError("no route to the host")
+
+    monkeypatch.setattr(type(FILES), "info", lost)
+    with pytest.raises(StudyError, match=r"directory = 'memory://.*can be reached: no route"):
+        store.run("0" * 32)
