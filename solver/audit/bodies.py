@@ -110,12 +110,7 @@ class AuditedBody:
 
     def applied(self) -> Array:
         """Return the resultant of the loads (dim,) [N]."""
-        time, travelling = self._converged.state.time, self.plain.body.travelling
-        if travelling is None:
-            return np.asarray(self._declared[0])
-        share, _, ratio = travelling.now(time)
-        whole = np.pi / 2 * travelling.half_width * travelling.peak * share
-        return whole * self.plain.body.thickness * np.array([ratio, -1.0])
+        return np.asarray(self._declared[0])
 
     @cached_property
     def _declared(self) -> Array:
@@ -125,14 +120,15 @@ class AuditedBody:
         """Return the error (dim, dim) of first moments of nodal forces, over the body's size [N].
 
         First moments, force times position, also show loads without a resultant, such as
-        centrifugal forces. Moving loads are left out.
+        centrifugal forces. Wheels are left out.
         """
         body, whole = self.plain.body, self.plain.part
-        if body.axle or body.travelling:
+        if body.axle:
             return np.zeros((2, 2))
-        fixed = np.zeros(whole.n)  # forces at the places before loading; others follow
+        # forces at the places before loading; with large strain others follow
+        fixed = np.zeros(whole.n) if body.large else self._external
         for load, field in zip(whole.loads.cases, whole.loads.fields.T, strict=True):
-            if not (body.large and load.follows):
+            if body.large and not load.follows:
                 fixed += load_factor(load.amplitude, self._converged.state.time) * field
         follows = vectors(self._external - fixed, whole.dim)
         moments = self.plain.moments(vectors(fixed, whole.dim), whole.X) - self._declared

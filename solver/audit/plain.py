@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from solver.audit.stretched import logarithmic, nominal
 from solver.fem.cells import smooth_cells
 from solver.fem.discretisation import Discretisation
 from solver.fem.dofs import vectors
+from solver.fem.loads import Push
 from solver.fem.surface import edges_of
 from solver.materials.heated import Heated
 from solver.materials.law import Law
@@ -240,9 +241,12 @@ class PlainBody:
             at_factor_one = own
             if self.body.large and load.follows and u is not None:
                 x = self.part.X + vectors(u, self.part.dim)
-                each = [self._on_boundary(load, b, x) for b in load.boundaries]
+                each = [self._on_boundary(load.push, b, x) for b in load.boundaries]
                 at_factor_one = np.sum(each, axis=0)
             total += load_factor(load.amplitude, time) * at_factor_one
+            for boundary in load.boundaries if load.moves else ():
+                push = partial(load.push_at, time)
+                total += self._on_boundary(push, boundary, self.part.X)
         return total
 
     @cached_property
@@ -252,7 +256,7 @@ class PlainBody:
             return [np.zeros((4, 3)) for _ in self.body.every_load]
         return [
             sum(
-                (self._on_boundary(load, b, self.part.X) for b in load.boundaries),
+                (self._on_boundary(load.push, b, self.part.X) for b in load.boundaries),
                 self._on_volume(load),
             )
             for load in self.body.every_load
@@ -263,7 +267,7 @@ class PlainBody:
         arm = x - self.part.X.mean(axis=1, keepdims=True)
         return np.asarray(np.vstack([np.ones_like(arm[:1]), arm]) @ force.T)
 
-    def _on_boundary(self, load: Load, boundary: str, x_nodes: Array) -> Array:
+    def _on_boundary(self, push: Push, boundary: str, x_nodes: Array) -> Array:
         """Return the `moments` (3, 2) of the forces on a boundary, by Gauss's rule on chords."""
         edges = x_nodes[:, edges_of(self.part, boundary)]
         row = np.repeat(np.arange(edges.shape[1]), _CHORDS)
@@ -281,7 +285,7 @@ class PlainBody:
             forces = []
             for share in (*_GAUSS, *_INSIDE):
                 x = at(share)
-                force = load.push(x, width * at(share, shape_derivatives))
+                force = push(x, width * at(share, shape_derivatives))
                 if force is None:
                     return total
                 forces.append(self._depth(x) * np.broadcast_to(force, x.shape))

@@ -33,9 +33,9 @@ _WARNED = {
     ),
 }  # fmt: skip
 """Figures with a warning: the value above which it is given, and its text."""
-_REACTIONS, _TRAVELLING = 1e-5, 5e-3
-"""Limits of ``audit_reactions``; the second is for a travelling Hertz pressure, whose steep ends
-cause an error of integration."""
+_REACTIONS, _MOVING = 1e-5, 5e-3
+"""Limits of ``audit_reactions``; the second is for loads that move, such as a Hertz pressure: its
+steep ends cause an error of integration."""
 _ENERGY, _TURNING = 1e-5, 0.02
 """Limits of ``audit_energy``; the second is for finite sliding, whose normals rotate within an
 increment."""
@@ -223,7 +223,7 @@ def _violations(
 ) -> tuple[str, ...]:
     limits = limits_at(
         loaded.state.force_scale or 1.0,
-        travelling=any(body.travelling for body in system.model.bodies),
+        moving=any(load.moves for body in system.model.bodies for load in body.every_load),
         turning=system.model.large or any(contact.finite for contact in loaded.state.contacts),
     )
     yield_stress = max(
@@ -248,17 +248,17 @@ def _severed(bodies: Sequence[AuditedBody]) -> tuple[str, ...]:
     )
 
 
-def limits_at(scale: float, *, travelling: bool = False, turning: bool = False) -> dict[str, float]:
+def limits_at(scale: float, *, moving: bool = False, turning: bool = False) -> dict[str, float]:
     """Return the limits of the figures that every kind of run has.
 
     Parameters
     ----------
     scale : force level [N]
-    travelling : whether a pressure moves along a body
+    moving : whether a load moves along a body
     turning : whether contact normals or bodies rotate within an increment
     """
     return LIMITS | {
-        "audit_reactions": _TRAVELLING if travelling else _REACTIONS,
+        "audit_reactions": _MOVING if moving else _REACTIONS,
         "audit_energy": _TURNING if turning else _ENERGY,
         "audit_tension": _FORCE * scale,
         "audit_friction_excess": _FORCE * scale,

@@ -54,7 +54,7 @@ def _part(whole: Discretisation | RigidPart, own: list[Surface], linear_solver: 
     body = whole.body
     if body.axle is not None:
         return Wheel(whole, own, linear_solver)
-    constant = not (whole.driven.cases or whole.softening or body.large)
+    constant = not (whole.driven.cases or whole.softening or whole.moving or body.large)
     if body.material.elastic and body.condense and own and constant:
         return Substructure(whole, own, linear_solver)
     return whole
@@ -265,8 +265,14 @@ class System:
 
     @cached_property
     def moves(self) -> bool:
-        """Whether a load moves along a body."""
-        return any(part.moves for part in self.parts)
+        """Whether a load or a wheel moves along a body."""
+        loads = (load for body in self.model.bodies for load in body.every_load)
+        return self.rolls or any(load.moves for load in loads)
+
+    @cached_property
+    def rolls(self) -> bool:
+        """Whether a wheel rolls: it is set down to touch at the beginning of each lap."""
+        return any(body.axle is not None for body in self.model.bodies)
 
     @property
     def has_amplitude(self) -> bool:
@@ -287,9 +293,9 @@ class System:
         return self.overlaps(self.initial())
 
     def overlaps(self, state: State) -> bool:
-        """Whether bodies overlap in a state; false if loads move: these are set down to touch."""
+        """Whether bodies overlap in a state; false with wheels, which are set down to touch."""
         gaps = (contact.gap for contact in state.contacts)
-        return not self.moves and any((gap < -self.gap_tolerance).any() for gap in gaps)
+        return not self.rolls and any((gap < -self.gap_tolerance).any() for gap in gaps)
 
     @cached_property
     def proportional(self) -> bool:
@@ -298,11 +304,13 @@ class System:
         True without friction, or if all facing vertices touch before loading: their status does not
         change while the load grows. False if the friction bound is not proportional to the pressure
         (cohesion, shear limit), if bodies overlap before loading, or if sliding is declared finite:
-        normals rotate, and the work of contact needs increments. False with large strain.
+        normals rotate, and the work of contact needs increments. False with large strain and with
+        loads that move: on their way they may cause more than at the end.
         """
         finite = any(i.declared.sliding == "finite" for i in self.interfaces)
         if (
             self.model.large
+            or self.moves
             or finite
             or self.overlapping
             or not all(i.law.proportional for i in self.interfaces)

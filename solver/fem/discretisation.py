@@ -15,9 +15,9 @@ from solver.fem.loads import (
     Superposed,
     check_removed,
     eigenstrains,
+    moving_forces,
     nodal_forces,
     prescribed,
-    travelling_forces,
 )
 from solver.fem.nodes import Nodes
 from solver.fem.part import Part
@@ -47,6 +47,7 @@ class Discretisation(Nodes, Part):
     dofs : (n_elements, dim n_element_nodes) unknowns of the elements
     kinematics : how strain follows from displacements
     loads : nodal forces (n,) of pressures and tractions [N]
+    moving : loads that move along its boundaries, which are not in ``loads``
     condensable : ``loads`` plus the nodal forces of the eigenstrain in an elastic body [N]
     free : unknowns that no support holds
     driven : prescribed displacements (n,) [mm]
@@ -67,8 +68,8 @@ class Discretisation(Nodes, Part):
         gradients = np.array([b[0].grad for b in self.basis.basis]).swapaxes(0, 1)
         mean = kind.mean_dilatation and body.kinematics != "plane_stress"
         self.kinematics = self._measure(values, gradients, mean=mean)
-        self.moves = body.travelling is not None
-        self._travelling: tuple[float, Array] = (np.nan, np.zeros(0))
+        self.moving = tuple(load for load in body.every_load if load.moves)
+        self._moved: tuple[float, Array] = (np.nan, np.zeros(0))
         self.loads = nodal_forces(self)
         check_removed(self, self.loads)
         self.eigenstrains = eigenstrains(self)
@@ -125,18 +126,16 @@ class Discretisation(Nodes, Part):
 
     def external(self, time: float, u: Array | None = None) -> Array:
         """See `Part.external`."""
-        if self.body.travelling is None:
+        if not self.moving:
             return super().external(time)
-        if self._travelling[0] != time:  # an increment needs it many times
-            self._travelling = time, travelling_forces(self, self.body.travelling, time)
-        return self._travelling[1]
+        if self._moved[0] != time:  # an increment needs it many times
+            self._moved = time, super().external(time) + moving_forces(self, self.moving, time)
+        return self._moved[1]
 
     def grows(self, before: float, after: float) -> bool:
         """Whether the external load grows from one time to another."""
-        travelling = self.body.travelling
-        if travelling is None:
-            return super().grows(before, after)
-        return travelling.now(after)[0] > travelling.now(before)[0]
+        grown = (abs(load.factor(after)) > abs(load.factor(before)) for load in self.moving)
+        return super().grows(before, after) or any(grown)
 
     # -- the law at all points ---------------------------------------------------------------
 
@@ -187,7 +186,10 @@ class Discretisation(Nodes, Part):
         """Return the norm of the forces that load the body at a time, with eigenstrain [N]."""
         if not self.eigenstrains.cases:
             return super().force_level(time)
-        return float(np.linalg.norm(self.condensable.at(time)))
+        force = self.condensable.at(time)
+        if self.moving:
+            force = force + self.external(time) - self.loads.at(time)
+        return float(np.linalg.norm(force))
 
     def clamped(self, time: float) -> tuple[float, float]:
         """Return force [N] and energy [N mm] of heat, initial stress and motion, as if clamped.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from solver.fem.nodes import Nodes
 from solver.fem.surface import edges_of
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.model.loads import Load, checked
-from solver.model.motion import TravellingPressure
 from solver.tensors import AXES, to_mandel
 from solver.typing import Array, Bools, Ints
 
@@ -66,10 +66,11 @@ class Superposed:
 
 
 def nodal_forces(part: Nodes) -> Superposed:
-    """Return the nodal forces (n,) of the loads on a body [N]."""
+    """Return the nodal forces (n,) of the loads on a body that do not move [N]."""
     each: list[tuple[Load, Array]] = []
     for load in part.body.every_load:
-        edges = load.boundaries if part.dim == 2 else ()  # no load acts on faces yet
+        # no load acts on faces yet
+        edges = load.boundaries if part.dim == 2 and not load.moves else ()
         own = [_tractions(part, b, load.push) for b in edges]
         own.append(_body_forces(part, load))
         given = [force for force in own if force is not None]
@@ -224,14 +225,20 @@ def _check_plane(stress: Array) -> None:
 def check_removed(part: Nodes, loads: Superposed) -> None:
     """Raise `ModelError` if a load acts on nodes that only removed elements have.
 
-    ``loads`` are nodal forces [N].
+    ``loads`` are nodal forces [N]. A load that moves may act on all nodes of its boundaries.
     """
+    acting = list(zip(loads.cases, loads.fields.T, strict=True))
+    for load in (each for each in part.body.every_load if each.moves):
+        reached = np.zeros(part.n)
+        for boundary in load.boundaries:
+            reached[Dofs(part.boundary_nodes(boundary), part.dim).every] = 1.0
+        acting.append((load, reached))
     for removal in (load for load in part.body.every_load if load.removes):
         gone = np.zeros(part.basis.element_dofs.shape[1], dtype=bool)
         gone[part.body.region(removal.removes)] = True
         alone = np.ones(part.X.shape[1], dtype=bool)
         alone[part.basis.element_dofs[:, ~gone]] = False
-        for load, field in zip(loads.cases, loads.fields.T, strict=True):
+        for load, field in acting:
             if not vectors(field, part.dim)[:, alone].any():
                 continue
             after = [t for t in comparing([load, removal]) if removal.factor(t) >= 1]
@@ -243,10 +250,18 @@ def check_removed(part: Nodes, loads: Superposed) -> None:
                 raise ModelError(load.name, load.boundaries or part.body.name, allowed)
 
 
-def travelling_forces(part: Nodes, travelling: TravellingPressure, time: float) -> Array:
-    """Return the nodal forces (n,) of a travelling pressure at a time [N]."""
-    force = _tractions(part, travelling.boundary, travelling.pushing(time), 8)
-    return np.zeros(part.n) if force is None else force
+def moving_forces(part: Nodes, loads: Iterable[Load], time: float) -> Array:
+    """Return the nodal forces (n,) of loads that move at a time [N].
+
+    Each edge has eight Gauss points: to find where a force has kinks would take longer than the
+    increment, and it moves on.
+    """
+    force = np.zeros(part.n)
+    for load in loads:
+        for boundary in load.boundaries:
+            own = _tractions(part, boundary, partial(load.push_at, time), 8)
+            force += 0.0 if own is None else own
+    return force
 
 
 def _tractions(part: Nodes, boundary: str, push: Push, points: int = 0) -> Array | None:

@@ -43,7 +43,6 @@ class Part(ABC):
     free : unknowns that no support holds
     active : free unknowns without the pins that hold its rigid motions
     rigid : (n, n_rigid) rigid motions that the supports leave free
-    moves : whether its load moves along a body
     """
 
     n: int
@@ -52,7 +51,6 @@ class Part(ABC):
     free: Ints
     active: Ints
     rigid: Array
-    moves: bool = False
 
     @abstractmethod
     def elastic_matrix(self) -> sparse.csr_array:

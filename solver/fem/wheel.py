@@ -26,8 +26,6 @@ _X, _Y, _TURN = range(3)
 class Wheel(Substructure):
     """A part whose unknowns are rim displacements in the hub's frame, then (cx, cy, w)."""
 
-    moves = True
-
     def __init__(self, whole: Discretisation, surfaces: list[Surface], linear_solver: str) -> None:
         super().__init__(whole, surfaces, linear_solver)
         axle = whole.body.axle

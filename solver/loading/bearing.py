@@ -7,6 +7,7 @@ import numpy as np
 from solver.contact.system import System
 from solver.errors import LimitLoad
 from solver.materials.law import Law
+from solver.model.loads import TravellingPressure
 
 
 def excess_shear(system: System) -> LimitLoad | None:
@@ -16,14 +17,14 @@ def excess_shear(system: System) -> LimitLoad | None:
     yield surface, so a larger shear has no equilibrium.
     """
     for body in system.model.bodies:
-        travelling = body.travelling
-        if travelling is None:
-            continue
-        times = np.union1d(travelling.amplitude.time, travelling.shear_ratio.time)
-        now = (travelling.now(time) for time in times)
-        shear = max(abs(share * ratio) for share, _, ratio in now) * travelling.peak
-        if (limit := too_much_shear(body.material, shear)) is not None:
-            return limit
+        for load in body.every_load:
+            if not isinstance(load, TravellingPressure) or load.amplitude is None:
+                continue
+            times = np.union1d(load.amplitude.time, load.shear_ratio.time)
+            now = (load.now(time) for time in times)
+            shear = max(abs(share * ratio) for share, _, ratio in now) * load.peak
+            if (limit := too_much_shear(body.material, shear)) is not None:
+                return limit
     return None
 
 

@@ -113,8 +113,8 @@ class Predictor:
 
     def _way(self, before: float, after: float) -> float:
         """Return the motion of the wheels between two times [mm]; 0 if their motions differ."""
-        moving = (part for part in self._system.parts if part.moves)
-        ways = {p.way(before, after) if isinstance(p, Wheel) else 0.0 for p in moving}
+        parts = self._system.parts
+        ways = {part.way(before, after) for part in parts if isinstance(part, Wheel)}
         return ways.pop() if len(ways) == 1 else 0.0
 
     def _steps(self, before: State, now: State, way: float) -> list[int] | None:

@@ -138,13 +138,16 @@ class Stepper:
         return self.system.at_rest(balanced.state)
 
     def again(self, point: Point, time: float) -> Point:
-        """Return the first point of a later lap: wheels are set down, other bodies unchanged."""
+        """Return the first point of a later lap: wheels are set down, other bodies unchanged.
+
+        Where a load or a wheel moves, its energy counts from there.
+        """
         state = point.now.state
         if self.system.moves:
             begun = self.begin(state, time, point.tally)
             history, met = (*point.history, *begun.history), point.met | begun.met
             timing = point.now.timing.then(begun.now.timing)
-            # bodies under moving loads do not overlap at rest: setting down adds no error
+            # the bodies are apart at rest: to begin adds no error
             now = replace(begun.now, timing=timing, missed=point.now.missed)
             return replace(begun, now=now, history=history, met=met)
         now = replace(point.now, state=replace(state, time=time), added=0.0)

@@ -18,7 +18,7 @@ from solver.mesh.opening import faces_of
 from solver.mesh.rounding import with_zeros
 from solver.model.amplitude import Amplitude
 from solver.model.loads import Centrifugal, Displacement, Kinematics, Load, Pressure
-from solver.model.motion import Axle, TravellingPressure
+from solver.model.motion import Axle
 from solver.parameters import Thickness, check
 from solver.tensors import AXES
 
@@ -56,7 +56,6 @@ class Body:
     loads : further loads, each with an amplitude of its own (`solver.model.loads`)
     condense : whether to reduce the body to its contact surfaces if its material is elastic
     axle : makes an elastic body a wheel, which its supports connect to the hub
-    travelling : a pressure that moves along a boundary
     strain : ``small``, or ``large``: logarithmic strain and equilibrium in the deformed body
     cracks : names of the cracks of the mesh (`solver.mesh.opened`), whose faces lie on one another
     """
@@ -74,7 +73,6 @@ class Body:
     loads: tuple[Load, ...] = ()
     condense: bool = True
     axle: Axle | None = None
-    travelling: TravellingPressure | None = None
     strain: Literal["small", "large"] = "small"
     cracks: tuple[str, ...] = ()
 
@@ -113,16 +111,10 @@ class Body:
                 self.region(load.removes, f"{load.name}.region")
         if self.axle is not None and not self.material.elastic:
             raise ModelError("axle", self.name, "a wheel must be elastic: leave out yield_stress")
-        if self.travelling is not None:
-            self.facets(self.travelling.boundary, "travelling", outer=True)
-            if self.material.elastic and self.condense:
-                raise ModelError("travelling", self.name, "an elastic body needs condense=False")
         if self.large:
             self._check_large()
-        moved = self.axle is not None or self.travelling is not None
-        for load in self.every_load if moved else ():
-            allowed = "must not be given on a body with an axle or a travelling pressure"
-            raise ModelError(load.name, load.boundaries, allowed)
+        for load in self.every_load if self.axle is not None else ():
+            raise ModelError(load.name, load.boundaries, "must not be given on a body with an axle")
 
     @property
     def large(self) -> bool:
@@ -132,10 +124,12 @@ class Body:
     @property
     def of_small_strain(self) -> list[str]:
         """Names of what it has and bodies of large strain do not have yet."""
-        moved = {"axle": self.axle, "travelling": self.travelling}
-        named = [name for name, given in moved.items() if given is not None]
-        loads = (load for load in self.every_load if load.removes or isinstance(load, Centrifugal))
-        return [*named, *(load.name for load in loads)]
+        loads = (
+            load.name
+            for load in self.every_load
+            if load.removes or load.moves or isinstance(load, Centrifugal)
+        )
+        return [*(["axle"] if self.axle is not None else []), *loads]
 
     def _check_large(self) -> None:
         """Refuse what bodies of large strain do not have yet."""
@@ -157,7 +151,7 @@ class Body:
 
     def _check_solid(self) -> None:
         """Refuse what bodies in space have not yet: all but supports and displacements."""
-        plane = ("kinematics", "thickness", "pressure", "axle", "travelling", "strain")
+        plane = ("kinematics", "thickness", "pressure", "axle", "strain")
         defaults = {each.name: each.default for each in fields(self)} | {"pressure": {}}
         given = {name: getattr(self, name) for name in plane}
         given |= {

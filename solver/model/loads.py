@@ -6,7 +6,7 @@ of stiffness and strength, or the removal of elements. The solver knows only the
 kinds.
 
 Values are those at load factor 1. The load factor follows the amplitude; without an amplitude it is
-the time itself. A `Value` may vary in space.
+the time itself. A `Value` may vary in space. Loads that move return their force at a time.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.model.amplitude import Amplitude
-from solver.parameters import Coordinate, check
+from solver.parameters import Coordinate, Length, check
 from solver.parts import Parts
 from solver.typing import Array
 
@@ -32,7 +32,7 @@ Value = float | Field
 StressValue = Annotated[Value, Unit("MPa")]
 PerKelvin = Annotated[float, Unit("1/K")]
 
-_ALWAYS = Amplitude.constant(1.0)
+_ALWAYS, _NOUGHT = Amplitude.constant(1.0), Amplitude.constant(0.0)
 _VECTOR, _TENSOR = ("x", "y"), ("xx", "yy", "zz", "xy")
 
 
@@ -91,6 +91,19 @@ class Load:
             times length is ``(along[1], -along[0])``
         """
         return None
+
+    def push_at(self, time: float, x: Array, along: Array) -> Array | None:
+        """Return the forces of `push` at a time, with the load factor.
+
+        A load that moves along its boundaries overrides this instead of `push`.
+        """
+        force = self.push(x, along)
+        return None if force is None else self.factor(time) * force
+
+    @property
+    def moves(self) -> bool:
+        """Whether it overrides `push_at`: the shape of its force changes with time."""
+        return type(self).push_at is not Load.push_at
 
     def body_force(self, x: Array) -> Array | None:
         """Return the force per volume (2, n) at positions x [N/mm3]."""
@@ -165,6 +178,39 @@ class Traction(BoundaryLoad):
         """Return the forces (2, n) on pieces of the boundary [N/mm]."""
         traction = _components(f"traction.{self.boundary}", self, _VECTOR, x, "MPa")
         return traction * np.linalg.norm(along, axis=0)
+
+
+@LOADS.word("travelling_pressure")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TravellingPressure(BoundaryLoad):
+    """A Hertz pressure with proportional shear that moves along a boundary facing upwards.
+
+    Attributes
+    ----------
+    half_width, peak : a [mm] and p0 [MPa]
+    position : position of its centre along x [mm]
+    shear_ratio : ratio of the shear along +x to the pressure
+    """
+
+    half_width: Length
+    peak: Annotated[float, Interval(ge=0.0), Unit("MPa")]
+    position: Amplitude = _NOUGHT
+    shear_ratio: Amplitude = _NOUGHT
+
+    def now(self, time: float) -> tuple[float, float, float]:
+        """Return the factor of the pressure, its centre [mm] and the shear ratio at a time."""
+        return self.factor(time), self.position.at(time), self.shear_ratio.at(time)
+
+    def at(self, time: float, x: Array) -> tuple[Array, float]:
+        """Return the pressure at positions x [MPa] and the ratio of shear to it."""
+        factor, centre, ratio = self.now(time)
+        inside = 1 - ((x - centre) / self.half_width) ** 2
+        return factor * self.peak * np.sqrt(np.maximum(inside, 0.0)), ratio
+
+    def push_at(self, time: float, x: Array, along: Array) -> Array:
+        """Return the forces (2, n) on pieces of the boundary at a time [N/mm]."""
+        pressure, ratio = self.at(time, x[0])
+        return pressure * (np.stack([-along[1], along[0]]) - ratio * along)
 
 
 @LOADS.word("body_force")

@@ -1,14 +1,10 @@
-"""Moving loads: the axle of a wheel, and a travelling pressure."""
+"""The axle of a wheel that rolls."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from solver.model.amplitude import Amplitude
-from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,43 +29,3 @@ class Axle:
     position: Amplitude
     rotation: Amplitude | None = None
     turned: float = 0.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TravellingPressure:
-    """A Hertz pressure with proportional shear that moves along a boundary facing upwards.
-
-    Attributes
-    ----------
-    boundary : name of the boundary
-    half_width, peak : a [mm] and p0 [MPa]
-    amplitude : factor of the pressure
-    position : position of its centre along x [mm]
-    shear_ratio : ratio of the shear along +x to the pressure
-    """
-
-    boundary: str
-    half_width: float
-    peak: float
-    amplitude: Amplitude
-    position: Amplitude
-    shear_ratio: Amplitude
-
-    def now(self, time: float) -> tuple[float, float, float]:
-        """Return the factor of the pressure, its centre [mm] and the shear ratio at a time."""
-        return self.amplitude.at(time), self.position.at(time), self.shear_ratio.at(time)
-
-    def at(self, time: float, x: Array) -> tuple[Array, float]:
-        """Return the pressure at positions x [MPa] and the ratio of shear to it."""
-        amplitude, centre, ratio = self.now(time)
-        inside = 1 - ((x - centre) / self.half_width) ** 2
-        return amplitude * self.peak * np.sqrt(np.maximum(inside, 0.0)), ratio
-
-    def pushing(self, time: float) -> Callable[[Array, Array], Array]:
-        """Return its traction at a time, as a function like `solver.model.loads.Load.push`."""
-
-        def push(x: Array, along: Array) -> Array:
-            pressure, ratio = self.at(time, x[0])
-            return pressure * (np.stack([-along[1], along[0]]) - ratio * along)
-
-        return push

@@ -13,7 +13,7 @@ from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.fem.frame import RigidMotion
 from solver.fem.wheel import Wheel
-from solver.model.motion import TravellingPressure
+from solver.model.loads import TravellingPressure
 from solver.results.contact_result import ContactResult, contact_result
 from solver.results.fields import Remembered, Solved
 from solver.results.view import ALONG_X, Axis
@@ -109,6 +109,7 @@ def acting_on(system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> Calla
         pair = partial(of_pair, system, symmetric=symmetric, axis=axis)
         return lambda at: known.of(at, "", partial(pair, at))
     for body in system.model.bodies:
-        if body.travelling is not None:
-            return partial(of_pressure, body.travelling)
+        for load in body.every_load:
+            if isinstance(load, TravellingPressure):
+                return partial(of_pressure, load)
     return lambda at: Acting()

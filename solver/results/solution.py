@@ -325,7 +325,7 @@ def _check_ends(model: Model, times: Sequence[float]) -> None:
     """Raise `ModelError` if loads differ at the ends of cycles, some of which may be left out."""
     bodies: list[Body | RigidBody] = [*model.bodies, *model.rigid]
     of: list[tuple[str, Callable[[float], float]]] = [
-        (f"{load.name} of {body.name}", load.factor)
+        (f"{load.name} of {body.name}", float if load.moves else load.factor)
         for body in bodies
         for load in body.every_load
         if load.varies
@@ -335,7 +335,6 @@ def _check_ends(model: Model, times: Sequence[float]) -> None:
     for k, contact in enumerate(model.contacts):
         of.append((f"contacts[{k}].interference", contact.offset))
         of += [(f"contacts[{k}].presence", each.at) for each in (contact.presence,) if each]
-    of += [(f"travelling of {body.name}", float) for body in model.bodies if body.travelling]
     of += [(f"axle of {body.name}", float) for body in model.bodies if body.axle]
     for name, value in of:
         ends = [value(time) for time in times]

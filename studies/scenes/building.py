@@ -234,8 +234,11 @@ class Builder:
         where, files = f"loads[{k}]", self.meshes
         if files is not None and any(t.file not in files for t in table.tabulated.values()):
             return None  # reported already
-        amplitude = self._amplitude(where, getattr(table, "amplitude", None))
-        return self.attempt(where, lambda: load_of(table, amplitude, files))
+        courses = {"amplitude": self._amplitude(where, getattr(table, "amplitude", None))}
+        for name, given in table.amplitudes.items():
+            if name != "amplitude":
+                courses[name] = self._amplitude(where, given, name)
+        return self.attempt(where, lambda: load_of(table, courses, files))
 
     def _contact(self, k: int, table: tables.ContactTable) -> ContactPair | None:
         from solver.model.contact_pair import ContactPair
@@ -279,21 +282,27 @@ class Builder:
             ),
         )
 
-    def _amplitude(self, where: str, given: tables.Amplitude | None) -> Amplitude | None:
-        """Return a load factor over time; stage k ends at time k."""
+    def _amplitude(
+        self, where: str, given: tables.Amplitude | None, name: str = "amplitude"
+    ) -> Amplitude | None:
+        """Return a number over time; stage k ends at time k.
+
+        A load factor is 0 at the end of a stage that releases loads, if none is given for it.
+        """
         passages = self.scene.passages
         if not passages:
             if given is not None:
                 allowed = "needs stages: with loading all loads grow together"
-                self.mistakes.append(StudyError(f"{where}.amplitude", given, allowed))
+                self.mistakes.append(StudyError(f"{where}.{name}", given, allowed))
             return None
         times, values = [0.0], [0.0]
         courses: dict[str, list[tuple[float, float]]] = {}
         for k, (stage, cycle) in enumerate(passages):
             if cycle <= 2:  # all later ones begin as the second does
                 usual = 1.0 if given is None else values[-1]
-                factor = (given or {}).get(stage.name, 0.0 if stage.release else usual)
-                field = f"{where}.amplitude.{stage.name}"
+                ends = stage.release and name == "amplitude"
+                factor = (given or {}).get(stage.name, 0.0 if ends else usual)
+                field = f"{where}.{name}.{stage.name}"
                 found = self.attempt(field, partial(course_of, factor, values[-1], self.meshes))
                 known = [(1.0, values[-1])] if found is None else found.tolist()
                 courses[stage.name] = known
@@ -376,14 +385,15 @@ def _bends(scene: tables.SceneFile, files: Mapping[str, MeshFile] | None) -> dic
     """Return for each stage the shares of it at which an amplitude bends, in order."""
     motions = [getattr(body, axis) for body in scene.rigid.values() for axis in _MOTIONS]
     found: dict[str, set[float]] = {}
-    for table in (*scene.loads, *scene.contacts, *motions):
-        for stage, given in (getattr(table, "amplitude", None) or {}).items():
-            if not isinstance(given, int | float):
-                try:
-                    course = course_of(given, None, files)
-                except ModelError:  # a mistake of the amplitude
-                    continue
-                found.setdefault(stage, set()).update(course[:-1, 0].round(12).tolist())
+    amplitudes = [given for load in scene.loads for given in load.amplitudes.values()]
+    amplitudes += [table.amplitude or {} for table in (*scene.contacts, *motions)]
+    for stage, given in (entry for amplitude in amplitudes for entry in amplitude.items()):
+        if not isinstance(given, int | float):
+            try:
+                course = course_of(given, None, files)
+            except ModelError:  # a mistake of the amplitude
+                continue
+            found.setdefault(stage, set()).update(course[:-1, 0].round(12).tolist())
     return {stage: sorted(shares) for stage, shares in found.items()}
 
 
@@ -418,15 +428,27 @@ def friction_of(table: tables.PairTable) -> FrictionLaw:
 
 def load_of(
     table: Any,
-    amplitude: Amplitude | None = None,
+    courses: Mapping[str, Amplitude | None] | None = None,
     files: Mapping[str, MeshFile] | None = None,
 ) -> Load:
-    """Return the load of a table; ``files`` are those beside the scene, None if not at hand."""
+    """Return the load of a table.
+
+    Parameters
+    ----------
+    courses : its entries that are functions of time, by name; zero if none are given
+    files : those beside the scene, None if not at hand
+    """
     kind = LOADS[table.kind]
-    given = {n: getattr(table, n) for n in table.model_fields_set - {"kind", "body", "amplitude"}}
+    taken = {"kind", "body", "amplitude", *table.amplitudes}
+    given = {name: getattr(table, name) for name in table.model_fields_set - taken}
     for name, each in table.tabulated.items():
         given[name] = _table_of(f"{name}.file", each, files)
-    return kind(**given, **{"amplitude": amplitude} if kind.varies else {})
+    if courses is None:
+        courses = dict.fromkeys(table.amplitudes, Amplitude.constant(0.0))
+    for name, course in courses.items():
+        if course is not None and (kind.varies or name != "amplitude"):
+            given[name] = course
+    return kind(**given)
 
 
 def _table_of(field: str, given: TabulatedTable, files: Mapping[str, MeshFile] | None) -> Tabulated:

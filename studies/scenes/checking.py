@@ -193,21 +193,25 @@ def _loads(scene: tables.SceneFile, files: set[str] | None) -> Iterator[StudyErr
             if files is not None and each.file not in files:
                 allowed = "there is no such file beside the scene"
                 yield StudyError(f"loads[{k}].{name}.file", each.file, allowed)
-    amplitudes = [(f"loads[{k}]", getattr(a, "amplitude", None)) for k, a in enumerate(scene.loads)]
-    amplitudes += [(f"contacts[{k}]", a.amplitude) for k, a in enumerate(scene.contacts)]
+    amplitudes: list[tuple[str, tables.Amplitude | None]] = [
+        (f"loads[{k}].{name}", given)
+        for k, load in enumerate(scene.loads)
+        for name, given in load.amplitudes.items()
+    ]
+    amplitudes += [(f"contacts[{k}].amplitude", a.amplitude) for k, a in enumerate(scene.contacts)]
     amplitudes += [
-        (f"rigid.{name}.{axis}", getattr(rigid, axis).amplitude)
+        (f"rigid.{name}.{axis}.amplitude", getattr(rigid, axis).amplitude)
         for name, rigid in scene.rigid.items()
         for axis in ("x", "y", "rotation")
     ]
     names = [stage.name for stage in scene.stages]
     for where, amplitude in amplitudes:
         for stage, course in (amplitude or {}).items() if names else ():
-            yield from _one_of(f"{where}.amplitude", stage, names)
+            yield from _one_of(where, stage, names)
             file = getattr(course, "file", None)
             if file is not None and files is not None and file not in files:
                 allowed = "there is no such file beside the scene"
-                yield StudyError(f"{where}.amplitude.{stage}.file", file, allowed)
+                yield StudyError(f"{where}.{stage}.file", file, allowed)
 
 
 def _contacts(scene: tables.SceneFile) -> Iterator[StudyError]:

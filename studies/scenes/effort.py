@@ -54,8 +54,10 @@ def effort_of(
         elements += size.elements
         own = {boundary for of, boundary in sides if of == name}
         loads = [load_of(load.plain) for load in scene.loads if load.body == name]
-        driven = any(each.components or each.softening(np.zeros((2, 0))) is not None
-                     for each in loads)  # fmt: skip
+        driven = any(
+            each.components or each.moves or each.softening(np.zeros((2, 0))) is not None
+            for each in loads
+        )
         # an elastic body is condensed to its surfaces in contact and links
         whole = driven or body.strain == "large" or not is_elastic(scene, body)
         condensed = size.on(own) if own and not whole else None
@@ -100,6 +102,8 @@ def in_one_increment(scene: tables.SceneFile) -> bool:
     if scene.loading is None or scene.loading.cycles is not None:
         return False
     if any(body.strain == "large" for body in scene.bodies.values()):
+        return False
+    if any(load_of(load.plain).moves for load in scene.loads):
         return False
     laws = [(friction_of(pair), pair) for pair in scene.contacts]
     flat = [pair.sliding == "small" and not pair.gap for law, pair in laws if law.rough]

@@ -27,6 +27,7 @@ from pydantic import AfterValidator, Field, StringConstraints, create_model
 from solver.errors import ModelError
 from solver.loading.control import INCREMENT_ERROR
 from solver.mesh.lines import closer
+from solver.model.amplitude import Amplitude as OverTime
 from solver.model.link import Components, Springs
 from solver.model.loads import LOADS, Load
 from solver.parameters import Accuracy, Coordinate, Length, Needs, Other, Stress
@@ -220,6 +221,12 @@ class LoadTable(SceneTable):
         return {name: entry for name, entry in each if isinstance(entry, TabulatedTable)}
 
     @property
+    def amplitudes(self) -> dict[str, Amplitude]:
+        """Its entries that are functions of time."""
+        each = ((name, getattr(self, name)) for name in type(self).model_fields)
+        return {name: entry for name, entry in each if isinstance(entry, dict)}
+
+    @property
     def plain(self) -> Self:
         """The load with zero in the place of tables of values, which needs no files."""
         return self.model_copy(update=dict.fromkeys(self.tabulated, 0.0))
@@ -231,8 +238,11 @@ def _load(word: str, kind: type[Load]) -> type[LoadTable]:
     known["kind"] = (Literal[word], ...)
     for name, (hint, field) in declared(kind).items():
         kept = _in_file(hint)
-        if kept is not None and name != "amplitude":
-            known[name] = (kept, ... if field.default is dataclasses.MISSING else field.default)
+        needed = field.default is dataclasses.MISSING
+        if hint is OverTime:
+            known[name] = (Amplitude, ...) if needed else (Amplitude | None, None)
+        elif kept is not None and name != "amplitude":
+            known[name] = (kept, ... if needed else field.default)
     made: type[LoadTable] = create_model(f"{kind.__name__}Table", __base__=LoadTable, **known)
     made.__doc__ = kind.__doc__
     return made

@@ -13,7 +13,7 @@ from solver.audit.surfaces import PairState, Surfaces, deformed
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.mesh.edges import shape_derivatives, shape_functions
-from solver.model.motion import TravellingPressure
+from solver.model.loads import TravellingPressure
 from solver.rolling.plane.wheel import RollingContact
 
 Array = NDArray[np.float64]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from solver.audit import links
 from solver.audit.plain import PlainBody, load_factor
 from solver.fem.discretisation import Discretisation
+from solver.model.loads import TravellingPressure
 from solver.model.rigid import Moved, RigidBody
 from solver.results.body_fields import STORED
 from solver.results.named_places import NamedPlaces
@@ -282,8 +283,8 @@ class Rules:
 
     @property
     def _travelling(self) -> Any:
-        each = (body.travelling for body in self.system.model.bodies)
-        return next((moving for moving in each if moving is not None), None)
+        each = (load for body in self.system.model.bodies for load in body.every_load)
+        return next((load for load in each if isinstance(load, TravellingPressure)), None)
 
     def _centre(self, stage: str) -> float:
         """Position of s = 0 along the axis of the view [mm]."""

@@ -8,14 +8,10 @@ import pytest
 from solver import Body, ContactPair, Material, Model, ModelError
 from solver.fem.discretisation import Discretisation
 from solver.mesh import grid
-from solver.model.amplitude import Amplitude
-from solver.model.motion import TravellingPressure
+from solver.model.loads import TravellingPressure
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
-NONE = Amplitude(np.zeros(1), np.zeros(1))
-TRAVELLING = TravellingPressure(
-    boundary="seam", half_width=0.5, peak=1.0, amplitude=NONE, position=NONE, shear_ratio=NONE,
-)  # fmt: skip
+TRAVELLING = TravellingPressure(boundary="seam", half_width=0.5, peak=1.0)
 
 
 def plate(name="plate", height=0.0, **fields):
@@ -34,7 +30,7 @@ def plate(name="plate", height=0.0, **fields):
     ("fields", "field"),
     [
         ({"pressure": {"seam": 1.0}}, "pressure"),
-        ({"travelling": TRAVELLING, "condense": False}, "travelling"),
+        ({"loads": (TRAVELLING,)}, "travelling_pressure"),
     ],
 )
 def test_loads_inside_a_body_are_refused(fields, field):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import solver.fem.discretisation
 import solver.fem.loads
 from solver import Body, ContactPair, Material, Model, ModelError, System, solve
 from solver.fem.discretisation import Discretisation
@@ -15,13 +16,14 @@ from solver.fem.substructure import Substructure
 from solver.mesh import grid
 from solver.mesh.elements import element_type, known_elements
 from solver.mesh.grids import mapped, merged
-from solver.model.loads import Array, BodyForce, BoundaryLoad, Load
+from solver.model.loads import Array, BodyForce, BoundaryLoad, Load, Pressure
 
 pytestmark = pytest.mark.solves
 
 E, NU = 2e5, 0.3
 A, B = 20.0, 60.0
 STEEL = Material(youngs_modulus=E, poisson_ratio=NU)
+YIELDING = replace(STEEL, yield_stress=400.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,6 +55,25 @@ class Water(BoundaryLoad):
 
     def push(self, x: Array, along: Array) -> Array:
         return -self.weight * x[1] * np.stack([-along[1], along[0]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Bell(BoundaryLoad):
+    """A pressure like a bell around a place, which moves to x = 3 at time 1 and on."""
+
+    peak: float
+
+    def push_at(self, time: float, x: Array, along: Array) -> Array:
+        level = self.factor(time) * self.peak * np.exp(-((x[0] - 3.0 * time) ** 2))
+        return level * np.stack([-along[1], along[0]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Crossing(Bell):
+    """The same, largest halfway and zero at time 1."""
+
+    def push_at(self, time: float, x: Array, along: Array) -> Array:
+        return np.sin(np.pi * time) / (time or 1.0) * Bell.push_at(self, time, x, along)
 
 
 def block(element: str = "quad8", load: Load | None = None, **own: Any) -> Body:
@@ -162,6 +183,51 @@ def test_a_condensed_body_has_its_force_per_volume() -> None:
         assert reduced.stress(name, "loaded") == pytest.approx(
             whole.stress(name, "loaded"), abs=1e-9
         )
+
+
+def standing(peak: float) -> Pressure:
+    """Return the bell as it stands at time 1."""
+    return Pressure(boundary="top", value=lambda x: peak * np.exp(-((x[0] - 3.0) ** 2)))
+
+
+def test_a_load_that_moves_acts_on_an_elastic_body_in_contact() -> None:
+    """Two blocks overlap before loading. At time 1 all is as under a pressure at this place."""
+    lower = replace(block(), name="lower", mesh=block().mesh.translated((0.0, -6.0 + 1e-4)))
+    pair = ContactPair(slave=("block", "bottom"), master=("lower", "top"), friction=0.3)
+    moved, stood = (
+        solve(Model(bodies=(block(load=load, supports={"left": "x"}), lower), contacts=(pair,)))
+        for load in (Bell(boundary="top", peak=100.0), standing(100.0))
+    )
+    assert moved.audit().passed, moved.audit().violations
+    for name in ("block", "lower"):  # friction remembers the way, little of it
+        found, expected = (each.stress(name, "loaded") for each in (moved, stood))
+        assert found == pytest.approx(expected, abs=0.02 * np.abs(expected).max())
+    assert moved.stress("lower", "unloaded") == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_a_load_that_moves_does_on_its_way_remains() -> None:
+    """The load is large halfway, and gone at the end: one increment would not show the strain."""
+    body = replace(block(load=Crossing(boundary="top", peak=750.0)), material=YIELDING)
+    found = solve(Model(bodies=(body,)))
+    assert found.plastic_strain("block").max() > 1e-4
+    assert found.audit().passed, found.audit().violations
+
+
+def test_a_moving_force_shifted_in_the_solver_alone_is_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    body = block(load=Bell(boundary="top", peak=100.0))
+    own = solver.fem.discretisation.moving_forces
+    assert solve(Model(bodies=(body,))).audit().passed
+    late = "solver.fem.discretisation.moving_forces"
+    monkeypatch.setattr(late, lambda part, loads, time: own(part, loads, time + 0.02))
+    broken = solve(Model(bodies=(body,))).audit()
+    assert any("audit_reactions" in each for each in broken.violations), broken.violations
+
+
+def test_a_load_that_moves_is_refused_on_a_body_of_large_strain() -> None:
+    with pytest.raises(ModelError, match=r"bell = .*strain must be"):
+        block("quad4", Bell(boundary="top", peak=1.0), strain="large")
 
 
 BODIES = {

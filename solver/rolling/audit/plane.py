@@ -56,7 +56,7 @@ def audit_pass(
         "audit_plastic_strain": largest(found.after.whole.accumulated),
         **_of_contact(material, found),
     }
-    limits = limits_at(level, travelling=True) | _LIMITS
+    limits = limits_at(level, moving=True) | _LIMITS
     return judged(material, figures, limits, neglected)
 
 

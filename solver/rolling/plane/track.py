@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from solver.contact.state import BodyState
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
-from solver.fem.loads import travelling_forces
+from solver.fem.loads import moving_forces
 from solver.fem.surface import Surface, extract
 from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
@@ -21,7 +21,7 @@ from solver.memory import kept
 from solver.mesh.grids import grid, within
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
-from solver.model.motion import TravellingPressure
+from solver.model.loads import TravellingPressure
 from solver.rolling.body import LOADED, RELEASED
 from solver.rolling.load import Given
 from solver.rolling.passing import Pass
@@ -176,7 +176,7 @@ class Track:
         half_width : half-width of the pressure [mm]; that of the track by default
         """
         pressure = standing_pressure(half_width or self.half_width, peak, shear_ratio)
-        force = travelling_forces(self.part, pressure, 0.0)
+        force = moving_forces(self.part, [pressure], 0.0)
         return Given(force=force, u=self.operator.solve(self.operator.condense(force)))
 
 

@@ -13,8 +13,9 @@ from solver.materials.material import Material
 from solver.mesh.grids import grid, grid_size, mapped, merged, within
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
+from solver.model.loads import TravellingPressure
 from solver.model.model import Model
-from solver.model.motion import Axle, TravellingPressure
+from solver.model.motion import Axle
 from solver.rolling.plane.lines import half_space_nodes, rim_elements, track_lines, wheel_nodes
 from solver.rolling.plane.track import CONTACT, half_space_body, standing_pressure
 from solver.rolling.scenes.rolling import RollingParameters
@@ -36,11 +37,11 @@ def _lines(parameters: RollingParameters) -> tuple[Array, Array]:
 
 def _half_space(parameters: RollingParameters) -> Body:
     x, y = _lines(parameters)
-    travelling = None
+    loads: tuple[TravellingPressure, ...] = ()
     if parameters.load == "hertz":
         schedule = parameters.schedule
         ratio = parameters.friction * parameters.traction
-        travelling = TravellingPressure(
+        pressure = TravellingPressure(
             boundary="top",
             half_width=parameters.half_width,
             peak=parameters.peak_pressure,
@@ -48,13 +49,14 @@ def _half_space(parameters: RollingParameters) -> Body:
             position=schedule.position,
             shear_ratio=schedule.way.times(ratio),
         )
+        loads = (pressure,)
     return Body(
         name="half_space",
         mesh=within(grid(x, y), "track", ["top"], x=(-parameters.fine, parameters.fine)),
         material=parameters.material(),
         element=parameters.element,
         supports={"left": "x", "right": "x", "bottom": "xy"},
-        travelling=travelling,
+        loads=loads,
     )
 
 
@@ -118,7 +120,7 @@ def sketch(parameters: RollingParameters) -> Sketch | None:
     half_space = replace(body, material=p.material())
     if p.load == "hertz":
         pressure = standing_pressure(p.peak_pressure, p.friction * p.traction, p.half_width)
-        return Sketch((replace(half_space, travelling=pressure),))
+        return Sketch((replace(half_space, loads=(pressure,)),))
     still = Amplitude.constant(0.0)
     axle = Axle(
         centre=(0.0, p.radius), radius=p.radius, force=Amplitude.constant(p.force), moment=still,

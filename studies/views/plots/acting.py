@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.markers import CARETDOWN, CARETLEFT, CARETRIGHT, CARETUP
 from skfem import Mesh
 
+from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.loads import Load
 from solver.model.rigid import Pushed, RigidBody
@@ -74,8 +75,6 @@ def acting(bodies: Sequence[Body], rigid: Sequence[RigidBody]) -> Iterator[Arrow
         for load in body.every_load:
             if not load.removes:
                 yield _of_load(body, load)
-        if body.travelling is not None:
-            yield _travelling(body)
         if body.axle is not None:
             force = body.axle.force
             text = (
@@ -127,12 +126,16 @@ def _of_load(body: Body, load: Load) -> Arrows:
     ends, normal = outward(body.mesh, facets)
     at, along = ends.mean(axis=2), ends[:, :, 1] - ends[:, :, 0]
     length, colour = np.linalg.norm(normal, axis=0), _FORCE
-    if (force := load.push(at, along)) is not None:
+    chosen = _spread(length)
+    force = load.push_at(_fullest(load), at, along) if load.moves else load.push(at, along)
+    if force is not None:
         way = np.asarray(force) / length
+        if load.moves:
+            there = np.flatnonzero(way.any(axis=0))
+            chosen = there[_spread(length[there])]
     else:
         moved = np.array([load.components.get(axis, 0.0) for axis in (0, 1)])
         way, colour = np.repeat(moved[:, None], len(length), axis=1), _MOTION
-    chosen = _spread(length)
     way = _unit(way)
     inward = (way * normal).sum(axis=0) < -1e-9 * length
     return Arrows(
@@ -140,27 +143,13 @@ def _of_load(body: Body, load: Load) -> Arrows:
     )
 
 
-def _travelling(body: Body) -> Arrows:
-    """Return a travelling pressure at the time at which it is largest, nearest to x = 0."""
-    load = body.travelling
-    assert load is not None
-    factor = load.amplitude
-    times = np.unique(np.concatenate([factor.time, load.position.time]))
-    full = [t for t in times if factor.at(t) >= 0.999 * factor.value.max()] or [times[-1]]
-    middle = (full[0] + full[-1]) / 2
-    ends, normal = outward(body.mesh, body.facets(load.boundary))
-    at, length = ends.mean(axis=2), np.linalg.norm(normal, axis=0)
-    force = load.pushing(middle)(at, ends[:, :, 1] - ends[:, :, 0]) / length
-    there = np.flatnonzero(np.linalg.norm(force, axis=0) > 0.0)
-    there = there[_spread(length[there])]
-    peak, half = typeset_number(load.peak), typeset_number(load.half_width)
-    return Arrows(
-        text=f"travelling pressure {body.name}.{load.boundary}: {peak}, half-width {half}",
-        at=at[:, there],
-        way=_unit(force)[:, there],
-        inward=np.ones(len(there), dtype=bool),
-        colour=_FORCE,
-    )
+def _fullest(load: Load) -> float:
+    """Return the time in the middle of those at which a load that moves is largest."""
+    each = (getattr(load, own.name) for own in fields(load))
+    times = np.unique([0.0, 1.0, *(t for a in each if isinstance(a, Amplitude) for t in a.time)])
+    factor = np.array([load.factor(time) for time in times])
+    full = times[factor >= 0.999 * factor.max()]
+    return float(full[0] + full[-1]) / 2
 
 
 def _told(load: Load) -> str:

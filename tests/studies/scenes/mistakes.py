@@ -42,6 +42,14 @@ def without(*path: Any) -> Callable[[Tables], None]:
 
 
 SHAPE = ("bodies", "upper", "shape")
+MOVING = {
+    "body": "upper",
+    "boundary": "top",
+    "kind": "travelling_pressure",
+    "peak": 9.0,
+    "half_width": 1.0,
+}
+"""A load that moves."""
 MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
     "text for a number": (
         put("contacts", 0, "friction", "high"),
@@ -108,7 +116,7 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         put("loads", 0, "kind", "presure"),
         "loads[0].kind",
         "must be one of body_force, centrifugal, displacement, gravity, initial_stress, pressure, "
-        "temperature, traction; did you mean pressure?",
+        "temperature, traction, travelling_pressure; did you mean pressure?",
     ),
     "no kind": (without(*SHAPE, "kind"), "bodies.upper.shape.kind", "must be one of disc, fillet"),
     "wrong derived number": (
@@ -212,6 +220,16 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         put("outputs", "least", "stage", "loaded"),
         "outputs.least.stage",
         "one of pressed",
+    ),
+    "unknown stage of a position": (
+        put("loads", 0, MOVING | {"position": {"presed": 1.0}}),
+        "loads[0].position",
+        "did you mean pressed?",
+    ),
+    "a number for a position": (
+        put("loads", 0, MOVING | {"position": 1.0}),
+        "loads[0].position",
+        "must be",
     ),
     "unknown stage of an amplitude": (
         put("loads", 0, "amplitude", {"later": 1.0}),

@@ -453,6 +453,20 @@ def test_a_temperature_may_have_no_value_outside_its_body() -> None:
     assert effort.unknowns == System(scene.model(scene.parameters())).n_unknowns
 
 
+def test_an_elastic_body_under_a_load_that_moves_is_not_condensed() -> None:
+    tables = blocks()
+    tables["materials"]["steel"] = {"youngs_modulus": 2e5, "poisson_ratio": 0.3}
+    del tables["parameters"]["rule"]
+    moving = {"kind": "travelling_pressure", "peak": 9.0, "half_width": 1.0}
+    tables["loads"][0] = {"body": "upper", "boundary": "top", "position": {"pressed": 2.0}} | moving
+    scene = built(tables)
+    assert scene.effort is not None
+    effort = scene.effort(scene.parameters(), [None])
+    assert effort.unknowns == System(scene.model(scene.parameters())).n_unknowns
+    (load,) = scene.model(scene.parameters()).bodies[0].loads
+    assert load.now(0.5) == (0.5, 1.0, 0.0)
+
+
 @pytest.mark.processes
 def test_numbers_in_another_unit_reach_the_user(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
