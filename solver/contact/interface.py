@@ -18,7 +18,6 @@ from solver.fem.rigid import RigidPart
 from solver.fem.softening import Softening
 from solver.fem.surface import Surface
 from solver.model.contact_pair import ContactPair
-from solver.model.friction import FrictionLaw
 from solver.model.model import Model
 from solver.typing import Array
 
@@ -37,7 +36,6 @@ class Interface:
     master: int
     slave_surface: Surface
     master_surface: Surface
-    law: FrictionLaw
     hot: tuple[Softening | None, Softening | None]
     parts: tuple[Part, Part]
     reach: float
@@ -46,7 +44,7 @@ class Interface:
     @property
     def rough(self) -> bool:
         """Whether the contact carries shear."""
-        return self.law.rough
+        return self.declared.law.rough
 
     @property
     def sides(self) -> tuple[tuple[int, Part, Surface], tuple[int, Part, Surface]]:
@@ -204,7 +202,6 @@ def interface_of(
         master=master,
         slave_surface=slave_surface,
         master_surface=master_surface,
-        law=contact.law,
         hot=(hot[0], hot[1]),
         parts=both,
         reach=reach,

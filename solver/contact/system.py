@@ -313,7 +313,7 @@ class System:
             or self.moves
             or finite
             or self.overlapping
-            or not all(i.law.proportional for i in self.interfaces)
+            or not all(contact.law.proportional for contact in self.model.contacts)
         ):
             return False
         gaps = np.concatenate([np.zeros(0), *(c.gap for c in self.initial().contacts)])
@@ -327,7 +327,7 @@ class System:
         """
         interface, contact = self.interfaces[pair], start.contacts[pair]
         return lines_of(
-            interface.law,
+            interface.declared.law,
             ContactPlaces(
                 n=len(pairing.gap),
                 find_strength=lambda: interface.strength(pairing, time),

@@ -6,7 +6,6 @@ import numpy as np
 from scipy import sparse
 
 from solver.errors import ModelError
-from solver.fem.deformation import without_points
 from solver.fem.discretisation import Discretisation
 from solver.fem.nodes import Nodes
 from solver.fem.part import Part
@@ -158,4 +157,4 @@ def elastic_energy(part: Part, u: Array, response: Response, time: float) -> flo
     if isinstance(part, Discretisation):
         law = part.law(time)
         return float(law.elasticity.energy_density(response.stress) / law.stiff @ part.volumes)
-    return part.stiffness_along(u, without_points(part.n, response))[1] / 2
+    return part.elastic_along(u) / 2

@@ -81,8 +81,12 @@ class Part(ABC):
 
     def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
         """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
-        energy = float(step @ (self.elastic_matrix() @ step))
+        energy = self.elastic_along(step)
         return energy, energy
+
+    def elastic_along(self, step: Array) -> float:
+        """Return ``step' K step`` with the elastic stiffness [N mm]."""
+        return float(step @ (self.elastic_matrix() @ step))
 
     def during(self, time: float, u: Array) -> Self:
         """Return the part for an increment from a time and unknowns u (n,)."""

@@ -106,10 +106,9 @@ class Substructure(Part):
         rest = np.zeros((self.n - len(self._kept),) * 2)
         return sparse.csr_array(sparse.block_diag([self._condensed.stiffness, rest]))
 
-    def stiffness_along(self, step: Array, response: PartResponse) -> tuple[float, float]:
-        """Return ``step' K step`` with the tangent and with the elastic stiffness [N mm]."""
-        energy = float(step[self.elastic] @ self._condensed.stiffness @ step[self.elastic])
-        return energy, energy
+    def elastic_along(self, step: Array) -> float:
+        """Return ``step' K step`` with the elastic stiffness [N mm]."""
+        return float(step[self.elastic] @ self._condensed.stiffness @ step[self.elastic])
 
     def on_whole(self, force: Array) -> Array:
         """Return the nodal forces (n,) of the whole body for those of this part [N]."""

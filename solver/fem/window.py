@@ -97,7 +97,6 @@ class Windowed(Discretisation):
 
     _begin: Array
     _outer: Eliminated
-    _plastic: PlasticState
 
     def __init__(self, whole: Discretisation, region: Region, linear_solver: str) -> None:
         nodes = np.zeros(whole.X.shape[1], dtype=bool)
@@ -156,8 +155,11 @@ class Windowed(Discretisation):
         out = self.whole.residual(time, u, response)
         out[self.kept] += self.undeformed.internal_force(response.law.stress[:, self._at])
         here._outer, here._begin = self._schur.begin(out), u
-        here._plastic = plastic.at(self._at)
         return here
+
+    def inside(self, plastic: PlasticState) -> PlasticState:
+        """Return the internal variables of its points for those of the whole body."""
+        return plastic.at(self._at)
 
     def expand(self, u: Array, time: float) -> Array:
         """Return the whole body's displacements [mm]."""
@@ -183,10 +185,6 @@ class Windowed(Discretisation):
         return at[touches], block[:, touches]
 
     # -- the window as a body ------------------------------------------------------------------
-
-    def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
-        """Return the response, from the internal variables that `at` has set."""
-        return super().respond(u, self._plastic, time)
 
     def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,), including the condensed rest [N]."""

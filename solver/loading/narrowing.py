@@ -196,6 +196,9 @@ def _around(
 
 
 def _inside(state: State, parts: tuple[Part, ...]) -> State:
-    """Return a state with the unknowns of the windows."""
-    each = zip(parts, state.u, strict=True)
-    return replace(state, u=tuple(u[p.kept] if isinstance(p, Windowed) else u for p, u in each))
+    """Return a state with the unknowns and the points of the windows."""
+    u, plastic = list(state.u), list(state.plastic)
+    for k, part in enumerate(parts):
+        if isinstance(part, Windowed):
+            u[k], plastic[k] = u[k][part.kept], part.inside(plastic[k])
+    return replace(state, u=tuple(u), plastic=tuple(plastic))

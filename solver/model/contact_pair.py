@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from solver.errors import ModelError
 from solver.model.amplitude import Amplitude
-from solver.model.friction import FrictionLaw, law_of
+from solver.model.friction import Coulomb, FrictionLaw
 from solver.parameters import Coordinate, Friction, check
 
 
@@ -26,6 +26,7 @@ class ContactPair:
     friction : Coulomb coefficient; zero, or a value that counts as zero (`effective_friction`),
         leaves out the tangential unknowns. Or a law of friction, as `Coulomb` with cohesion and a
         limit of shear
+    law : the law of friction; that of a coefficient is Coulomb's
     sliding : which point of the master belongs to a point of the slave, and along which normal.
         ``small``: the point that it faces before loading; consistent with small strains, and
         exactly linear between changes of status. ``finite``: the point that it faces in the current
@@ -46,6 +47,7 @@ class ContactPair:
     slave: tuple[str, str]
     master: tuple[str, str]
     friction: Friction | FrictionLaw = 0.0
+    law: FrictionLaw = field(init=False, repr=False, compare=False)
     sliding: Literal["auto", "small", "finite"] = "auto"
     gap: Coordinate = 0.0
     interference: Coordinate = 0.0
@@ -54,13 +56,11 @@ class ContactPair:
 
     def __post_init__(self) -> None:
         check(self)
+        own = self.friction
+        law = own if isinstance(own, FrictionLaw) else Coulomb(friction=own)
+        object.__setattr__(self, "law", law)
         if self.presence is not None and (least := float(np.min(self.presence.value))) < 0:
             raise ModelError("presence", least, "must not be negative")
-
-    @property
-    def law(self) -> FrictionLaw:
-        """The law of friction."""
-        return law_of(self.friction)
 
     def offset(self, time: float) -> float:
         """Return the gap added at a time to the distance of the surfaces in the mesh [mm]."""

@@ -12,13 +12,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.parameters import Checked, Friction, Other, described
+from solver.parameters import Checked, Friction, Needs, Other, described
 from solver.parts import Parts
 from solver.typing import Array, Bools, Ints
 
@@ -153,6 +153,11 @@ class FrictionLaw(Checked, ABC):
         """Raise `ModelError` if the law does not suit the bodies; ``elastic``: both are elastic."""
 
 
+def coefficient(default: float, needs: Needs | None = None) -> Any:
+    """Return the field of Coulomb's coefficient, with its default and what it needs."""
+    return described(default, "Coulomb friction coefficient", needs=needs)
+
+
 FRICTION: Parts[FrictionLaw] = Parts("friction_law")
 """Friction laws by the words that name them in studies and scene files."""
 
@@ -169,7 +174,7 @@ class Coulomb(FrictionLaw):
     flows instead of slipping, and its strain grows as the mesh is refined.
     """
 
-    friction: Friction = described(0.0, "Coulomb friction coefficient")
+    friction: Friction = coefficient(0.0)
     shear_limit: Annotated[float, Interval(ge=0.0, le=10.0), Unit("1")] = described(
         0.0,
         "ratio of the largest contact shear to the shear yield stress of the weaker body; 0 sets "
@@ -209,11 +214,6 @@ class Coulomb(FrictionLaw):
         return lines
 
 
-def law_of(friction: float | FrictionLaw) -> FrictionLaw:
-    """Return the law of a coefficient, Coulomb's, or the law that is given."""
-    return friction if isinstance(friction, FrictionLaw) else Coulomb(friction=friction)
-
-
 def effective_friction(friction: float) -> float:
     """Return the coefficient that the solver uses: zero up to `LEAST_FRICTION`."""
     return friction if friction > LEAST_FRICTION else 0.0
@@ -248,10 +248,8 @@ def lines_of(law: FrictionLaw, at: ContactPlaces) -> BoundLines:
     return found
 
 
-def pressure_lines(friction: float | FrictionLaw, n: int, strength: float) -> BoundLines:
+def pressure_lines(law: FrictionLaw, n: int, strength: float) -> BoundLines:
     """Return the lines of a law that depends on pressure alone, at n places of one strength [MPa].
-
-    A coefficient is Coulomb's law.
 
     Raises
     ------
@@ -259,7 +257,6 @@ def pressure_lines(friction: float | FrictionLaw, n: int, strength: float) -> Bo
         naming the law, if it asks for slip or plastic strain; naming its shear limit, if the body
         is elastic, of infinite strength
     """
-    law = law_of(friction)
     law.check_bodies(elastic=bool(np.isinf(strength)))
 
     def nothing() -> Array:

@@ -6,6 +6,7 @@ from dataclasses import MISSING, dataclass
 
 import numpy as np
 
+from solver.model.friction import coefficient
 from solver.parameters import Checked, Friction, Length, Stress, described
 from solver.results.contact_result import ContactResult
 from solver.results.outputs import output
@@ -130,7 +131,7 @@ class PressureError(Checked):
 
     half_width: Length = described(MISSING, "half-width a of the punch")
     mean_pressure: Stress = described(MISSING, "mean pressure p0 under the punch")
-    friction: Friction = described(0.0, "Coulomb friction coefficient")
+    friction: Friction = coefficient(0.0)
 
     def __call__(self, run: FinishedRun) -> Values:
         """Return the error of a run."""

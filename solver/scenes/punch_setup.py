@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 
@@ -50,9 +51,8 @@ def model(parameters: PunchParameters) -> Model:
         strain=p.strain,
         supports={"left": "x", "bottom": "y"},
     )
-    contact = p.contact(slave=("punch", "bottom"), master=("half_plane", "top"))
-    if p.strain == "large":
-        contact = replace(contact, sliding="finite")
+    sliding: Literal["small", "finite"] = "finite" if p.strain == "large" else "small"
+    contact = p.contact(("punch", "bottom"), ("half_plane", "top"), sliding)
     return Model(bodies=(punch, half_plane), contacts=(contact,), singular=(p.corner,))
 
 

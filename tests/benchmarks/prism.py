@@ -18,6 +18,7 @@ from scipy.interpolate import LinearNDInterpolator
 
 from solver.linear.threads import one_thread
 from solver.materials import Material
+from solver.model.friction import Coulomb
 from solver.rolling.load import RollingLoad
 from solver.rolling.passing import Pass, passing
 from solver.rolling.rail.flow import PrismState
@@ -175,7 +176,7 @@ def _wheel(track: PrismTrack) -> RollingPatch:
         profile=lambda z: profile.height(z + 4.0), radius=460.0, elasticity=HARDENS.elasticity
     )
     return RollingPatch(
-        grid=track.grid, compliance=track.compliance, wheel=wheel, friction=0.17,
+        grid=track.grid, compliance=track.compliance, wheel=wheel, friction=Coulomb(friction=0.17),
         load=RollingLoad(force=150e3, drive=0.0),
     )  # fmt: skip
 

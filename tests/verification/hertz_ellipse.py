@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from solver.materials import Elasticity
-from solver.model.friction import FrictionLaw
+from solver.model.friction import Coulomb, FrictionLaw
 from solver.rolling.load import RollingLoad
 from solver.rolling.rail.half_space import half_space
 from solver.rolling.rail.patch import RollingPatch
@@ -33,10 +33,10 @@ def wheel_on(
     """Return a wheel on a surface; ``drive`` is its moment over that of Coulomb's full slip."""
     moment = drive if not drive else drive * getattr(friction, "friction", friction) * force
     load = RollingLoad(force=force, drive=moment, **rolls)
+    law = friction if isinstance(friction, FrictionLaw) else Coulomb(friction=friction)
     return kind(
-        grid=grid, compliance=compliance, wheel=wheel, friction=friction, strength=strength,
-        load=load,
-    )  # fmt: skip
+        grid=grid, compliance=compliance, wheel=wheel, friction=law, strength=strength, load=load
+    )
 
 
 def ellipse(a: float, b: float, peak: float = 1e-3) -> HertzEllipse:

@@ -67,8 +67,8 @@ class RollingPatch(PatchLoad):
         along axis b at vertex j, in x, y, z. Negative d are at the end, as in an FFT; a prism of N
         stations that repeats itself has every d once
     wheel : the wheel
-    friction : Coulomb coefficient, or a friction law that depends on pressure alone; without
-        friction moment and lateral force are left out
+    friction : law that depends on pressure alone; without friction moment and lateral force are
+        left out
     strength : initial shear yield stress of the prism [MPa]
     load : force and motion; creepages and spin are those of `ProfiledWheel.rolling`
     """
@@ -76,7 +76,7 @@ class RollingPatch(PatchLoad):
     grid: PatchGrid
     compliance: Array
     wheel: ProfiledWheel
-    friction: float | FrictionLaw
+    friction: FrictionLaw
     strength: float = np.inf
 
     def __post_init__(self) -> None:

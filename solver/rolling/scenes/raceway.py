@@ -21,10 +21,11 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.late import late
-from solver.parameters import Fraction, Length, Other, Ratio, Stress, described
+from solver.model.friction import coefficient
+from solver.parameters import Fraction, Length, Ratio, Stress, described
 from solver.rolling.scenes.hertz_ellipse import HertzEllipse, radii_of
 from solver.rolling.scenes.rail_scene import PrismParameters, rail_scene
-from solver.rolling.scenes.wheel_parameters import check_given_shear
+from solver.rolling.scenes.wheel_parameters import ROLLED, check_given_shear
 
 ELEMENTS: Mapping[str, int] = {"draft": 4, "standard": 6, "fine": 10}
 """Elements per semi-axis of the elastic Hertz contact: across, along, and in depth for the shorter
@@ -62,11 +63,7 @@ class RacewayParameters(PrismParameters):
     force: Annotated[float, Interval(gt=0.0, le=1e9), Unit("N")] = described(
         2000.0, "vertical force on the ball or roller", needs={"load_by": ("force",)}
     )
-    friction: Fraction = described(
-        0.1,
-        "Coulomb friction coefficient",
-        needs={"load": ("contact",), "traction": Other(0.0)},
-    )
+    friction: Fraction = coefficient(0.1, ROLLED)
     radius: Length = described(10.0, "radius of the ball or roller in the plane of rolling")
     crown_radius: Annotated[
         Annotated[float, Interval(gt=0.0, le=1e6)] | Literal["same"], Unit("mm")

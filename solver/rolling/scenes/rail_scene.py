@@ -9,6 +9,7 @@ from typing import Annotated, Any, Self
 from annotated_types import Interval, Unit
 
 from solver.late import Late, late
+from solver.model.friction import coefficient
 from solver.parameters import Fraction, Other, described
 from solver.results.record import Status
 from solver.rolling.load import FULL_SLIP, RollingLoad
@@ -24,7 +25,7 @@ class PrismParameters(WheelParameters):
     """Passes and motion of a wheel on a prism that yields (N, mm, MPa)."""
 
     passes: Annotated[int, Interval(ge=1, le=1000)] = described(1, "number of passes")
-    friction: Fraction = described(0.17, "Coulomb friction coefficient")
+    friction: Fraction = coefficient(0.17)
     given_creepage: Annotated[float, Interval(ge=-0.1, le=0.1), Unit("1")] = described(
         0.0,
         "prescribed creepage 1 - w R / V of a wheel that turns by w and advances by V",

@@ -9,19 +9,19 @@ from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
-from solver.parameters import Friction, Other, Poisson, described
+from solver.model.friction import coefficient
+from solver.parameters import Friction, Needs, Other, Poisson, described
 from solver.scenes.material_parameters import ContactParameters
+
+ROLLED: Needs = {"load": ("contact",), "traction": Other(0.0)}
+"""Parameters of which the friction of a wheel needs one to have an effect."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WheelParameters(ContactParameters):
     """Material of a body, and motion and elasticity of a wheel that rolls on it (N, mm, MPa)."""
 
-    friction: Friction = described(
-        0.3,
-        "Coulomb friction coefficient",
-        needs={"load": ("contact",), "traction": Other(0.0)},
-    )
+    friction: Friction = coefficient(0.3, ROLLED)
     traction: Annotated[float, Interval(ge=-0.99, le=1.0), Unit("1")] = described(
         0.0,
         "ratio of the longitudinal force to that of full slip, friction times load: positive "
