@@ -93,6 +93,7 @@ class Windowed(Discretisation):
     whole : the meshed body
     elements : (n_elements,) whether the window has an element; it has at least those of the region
     kept : (n,) its unknowns in the whole body
+    inside : (n_points,) its points in the whole body
     """
 
     _begin: Array
@@ -127,12 +128,12 @@ class Windowed(Discretisation):
         per_element = whole.weights.shape[1]
         elements = np.repeat(np.flatnonzero(self.elements), per_element)
         self.softening = Softening.of(self, self.positions, elements)
-        self._at = np.flatnonzero(np.repeat(self.elements, per_element))
+        self.inside = np.flatnonzero(np.repeat(self.elements, per_element))
         strains = whole.eigenstrains
         components, cases = self.components, len(strains.cases)
-        fields = strains.fields.reshape(components, whole.weights.size, cases)[:, self._at]
+        fields = strains.fields.reshape(components, whole.weights.size, cases)[:, self.inside]
         self.eigenstrains = Superposed(
-            strains.cases, fields.reshape(components * len(self._at), cases)
+            strains.cases, fields.reshape(components * len(self.inside), cases)
         )
 
     def _condense(self, whole: Discretisation, linear_solver: str) -> None:
@@ -153,13 +154,9 @@ class Windowed(Discretisation):
         here = copy(self)
         response = self.whole.respond(u, plastic, time)
         out = self.whole.residual(time, u, response)
-        out[self.kept] += self.undeformed.internal_force(response.law.stress[:, self._at])
+        out[self.kept] += self.undeformed.internal_force(response.law.stress[:, self.inside])
         here._outer, here._begin = self._schur.begin(out), u
         return here
-
-    def inside(self, plastic: PlasticState) -> PlasticState:
-        """Return the internal variables of its points for those of the whole body."""
-        return plastic.at(self._at)
 
     def expand(self, u: Array, time: float) -> Array:
         """Return the whole body's displacements [mm]."""

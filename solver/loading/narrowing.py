@@ -200,5 +200,5 @@ def _inside(state: State, parts: tuple[Part, ...]) -> State:
     u, plastic = list(state.u), list(state.plastic)
     for k, part in enumerate(parts):
         if isinstance(part, Windowed):
-            u[k], plastic[k] = u[k][part.kept], part.inside(plastic[k])
+            u[k], plastic[k] = u[k][part.kept], plastic[k].at(part.inside)
     return replace(state, u=tuple(u), plastic=tuple(plastic))

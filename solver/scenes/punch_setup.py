@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from solver.audit.cut import cut_force
+from solver.fem.fields import Sampler, recovery
 from solver.loading.program import Program, load_and_release, walked
 from solver.mesh.elements import element_type
 from solver.mesh.grids import grid, grid_size
@@ -154,9 +154,11 @@ def figures(run: FinishedRun) -> Values:
     side = samples.fields.at_nodes(unloaded, "punch").stress[0, nodes]
     out[FREE_SURFACE] = float(np.abs(side).max() / run.parameters.yield_stress)
     # nothing pushes on the half-plane any more: a horizontal cut carries no normal force
-    width = float(system.full("half_plane").X[0].max())
-    line = np.linspace(0.0, width * (1 - 1e-9), 8000)
+    part = system.full("half_plane")
+    line = np.linspace(0.0, part.X[0].max() * (1 - 1e-9), 8000)
     cut = np.stack([line, np.full_like(line, -0.5 * a)])
-    stress = system.state("half_plane", unloaded).stress
-    out[SELF_EQUILIBRIUM] = abs(cut_force(system.full("half_plane"), stress, cut))
+    along = recovery(part) @ system.state("half_plane", unloaded).stress[1]
+    depth = np.broadcast_to(part.measure(cut), line.shape)
+    force, area = np.trapezoid([Sampler(part, cut)(along) * depth, depth], line)
+    out[SELF_EQUILIBRIUM] = abs(float(force)) / (area * run.parameters.yield_stress)
     return out

@@ -191,7 +191,7 @@ class Builder:
         motions: dict[str, Moved | Pushed] = {}
         for axis in _MOTIONS:
             motion: tables.MotionTable = getattr(table, axis)
-            amplitude = self._amplitude(f"rigid.{name}.{axis}", motion.amplitude)
+            amplitude = self._amplitude(f"rigid.{name}.{axis}.amplitude", motion.amplitude)
             if motion.pushed is not None:
                 locked = self.scene.end_of(motion.locked) if motion.locked else math.inf
                 motions[axis] = Pushed(value=motion.pushed, amplitude=amplitude, locked=locked)
@@ -234,10 +234,8 @@ class Builder:
         where, files = f"loads[{k}]", self.meshes
         if files is not None and any(t.file not in files for t in table.tabulated.values()):
             return None  # reported already
-        courses = {"amplitude": self._amplitude(where, getattr(table, "amplitude", None))}
-        for name, given in table.amplitudes.items():
-            if name != "amplitude":
-                courses[name] = self._amplitude(where, given, name)
+        every = {"amplitude": None, **table.amplitudes}
+        courses = {name: self._amplitude(f"{where}.{name}", own) for name, own in every.items()}
         return self.attempt(where, lambda: load_of(table, courses, files))
 
     def _contact(self, k: int, table: tables.ContactTable) -> ContactPair | None:
@@ -246,7 +244,7 @@ class Builder:
         slave, master = (tuple(side.split(".")) for side in (table.slave, table.master))
         for side, (body, boundary) in (("slave", slave), ("master", master)):
             self._has_boundary(f"contacts[{k}].{side}", body, boundary)
-        amplitude = self._amplitude(f"contacts[{k}]", table.amplitude)
+        amplitude = self._amplitude(f"contacts[{k}].amplitude", table.amplitude)
         presence = None
         if table.active is not None and self.scene.passages:
             there = [float(stage.name in table.active) for stage, _ in self.scene.passages]
@@ -282,27 +280,22 @@ class Builder:
             ),
         )
 
-    def _amplitude(
-        self, where: str, given: tables.Amplitude | None, name: str = "amplitude"
-    ) -> Amplitude | None:
-        """Return a number over time; stage k ends at time k.
-
-        A load factor is 0 at the end of a stage that releases loads, if none is given for it.
-        """
+    def _amplitude(self, where: str, given: tables.Amplitude | None) -> Amplitude | None:
+        """Return a number over time; stage k ends at time k. Its entry in the file is ``where``."""
         passages = self.scene.passages
         if not passages:
             if given is not None:
                 allowed = "needs stages: with loading all loads grow together"
-                self.mistakes.append(StudyError(f"{where}.{name}", given, allowed))
+                self.mistakes.append(StudyError(where, given, allowed))
             return None
         times, values = [0.0], [0.0]
         courses: dict[str, list[tuple[float, float]]] = {}
         for k, (stage, cycle) in enumerate(passages):
             if cycle <= 2:  # all later ones begin as the second does
                 usual = 1.0 if given is None else values[-1]
-                ends = stage.release and name == "amplitude"
+                ends = stage.release and where.endswith(".amplitude")  # positions stay
                 factor = (given or {}).get(stage.name, 0.0 if ends else usual)
-                field = f"{where}.{name}.{stage.name}"
+                field = f"{where}.{stage.name}"
                 found = self.attempt(field, partial(course_of, factor, values[-1], self.meshes))
                 known = [(1.0, values[-1])] if found is None else found.tolist()
                 courses[stage.name] = known
@@ -431,12 +424,9 @@ def load_of(
     courses: Mapping[str, Amplitude | None] | None = None,
     files: Mapping[str, MeshFile] | None = None,
 ) -> Load:
-    """Return the load of a table.
+    """Return the load of a table, with its functions of time by name: zero if none are given.
 
-    Parameters
-    ----------
-    courses : its entries that are functions of time, by name; zero if none are given
-    files : those beside the scene, None if not at hand
+    ``files`` are those beside the scene, None if not at hand.
     """
     kind = LOADS[table.kind]
     taken = {"kind", "body", "amplitude", *table.amplitudes}

@@ -105,6 +105,12 @@ def test_a_dragged_block_slides_at_the_bound_of_its_law(pressure: float) -> None
     assert found.audit().passed, found.audit().violations
 
 
+def test_a_pair_makes_its_law_once() -> None:
+    (number,), (given,) = (dragged(1.0, of).contacts for of in (0.3, Coulomb(friction=0.3)))
+    assert number.law is number.law == given.law is given.friction
+    assert number == replace(number, friction=0.3) and number.friction == 0.3
+
+
 @pytest.mark.solves
 def test_a_coefficient_is_coulombs_law_to_the_bit() -> None:
     numbers = solve(dragged(100.0, 0.3, WEAK))

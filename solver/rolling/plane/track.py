@@ -193,7 +193,6 @@ def standing_pressure(half_width: float, peak: float, shear_ratio: float) -> Tra
         half_width=half_width,
         peak=peak,
         amplitude=Amplitude(np.array([0.0, 1.0]), np.array([1.0, 0.0])),
-        position=Amplitude.constant(0.0),
         shear_ratio=Amplitude.constant(shear_ratio),
     )
 
