@@ -120,11 +120,3 @@ class PartResponse(NamedTuple):
     def linear(self) -> Bools:
         """Whether the stiffness of the points (n_points,) is the elastic one before loading."""
         return ~self.law.yielding & self.deformation.linear
-
-
-def without_points(n: int, law: Response) -> PartResponse:
-    """Return the response of a part without points; ``law`` is that of zero points."""
-    dofs, strain = np.zeros((0, 0), dtype=np.int64), law.stress
-    nothing = np.zeros((0, 0, len(strain), 0))
-    at = Deformation(n=n, dofs=dofs, strain=strain, B=nothing, weights=np.zeros((0, 0)))
-    return PartResponse(law, at)

@@ -10,7 +10,7 @@ import numpy as np
 import scipy  # loads scipy.spatial at its first use: few models need it
 from scipy import sparse
 
-from solver.fem.deformation import PartResponse, without_points
+from solver.fem.deformation import Deformation, PartResponse
 from solver.fem.dofs import Dofs, vectors
 from solver.fem.loads import Superposed
 from solver.fem.surface import Surface
@@ -72,8 +72,10 @@ class Part(ABC):
 
     def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
         """Return stress, tangent and new internal variables at all points."""
-        none = np.zeros_like(state.plastic_strain)
-        return without_points(self.n, self.body.law.respond(none, state))
+        strain = np.zeros_like(state.plastic_strain)
+        B, dofs = np.zeros((0, 0, len(strain), 0)), np.zeros((0, 0), dtype=np.int64)
+        at = Deformation(n=self.n, dofs=dofs, strain=strain, B=B, weights=np.zeros((0, 0)))
+        return PartResponse(self.body.law.respond(strain, state), at)
 
     def residual(self, time: float, u: Array, response: PartResponse) -> Array:
         """Return external minus internal forces (n,), without contact forces [N]."""
