@@ -172,9 +172,10 @@ def _on_face(
     for load in part.body.every_load:
         for boundary in load.boundaries:
             loaded = np.isin(edges[:, 2], edges_of(part, boundary)[:, 2])
-            pushed = load.push(x[:, loaded].reshape(2, -1), along[:, loaded].reshape(2, -1))
+            here = (each[:, loaded].reshape(2, -1) for each in (x, along))
+            pushed = load.push_at(time, *here)
             if pushed is not None:
-                total[:, loaded] += load.factor(time) * pushed.reshape(2, -1, x.shape[2])
+                total[:, loaded] += pushed.reshape(2, -1, x.shape[2])
     if contact is not None:
         total += contact(x, edges) * np.linalg.norm(along, axis=0)
     return total
