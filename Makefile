@@ -19,7 +19,8 @@ help: ## list the targets
 
 setup: $(STAMP) $(COMPILED) ## make the environment .venv, or bring it up to date
 
-run: setup ## compute the punch study into out/
+run: setup ## compute a first study in seconds, then the 45 runs of the punch, into out/
+	$(BIN)/residua run data/studies/tour.toml --out out
 	$(BIN)/residua run data/studies/punch.toml --out out
 
 check: setup ## check style and types, and run the tests that compute nothing (90 s)
@@ -49,6 +50,7 @@ bench: setup ## draw CPU time against error
 	$(BIN)/python -m tests.benchmarks
 
 stress: setup ## run a thousand seeded scenes, and see that none is answered wrongly (20 minutes)
+	$(BIN)/python -m tests.stability.estimates 39
 	$(BIN)/python -m tests.stability
 
 stress-service: setup ## put the service under stress, and see what it stands (15 minutes)

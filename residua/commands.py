@@ -51,8 +51,8 @@ def run(options: argparse.Namespace) -> int:
     if options.scheduler_file:
         access = Access.of_file(options.scheduler_file, *certificates)
     foreseen = Foreseen.of(study, store)
-    if foreseen.warning:
-        print(foreseen.warning, file=sys.stderr)
+    if foreseen.text:
+        print(foreseen.text, file=sys.stderr, flush=True)
     alone = 0.0
     if options.workers is None and foreseen.short and limits == Limits():
         alone = ALONE
@@ -143,11 +143,14 @@ def scenes(options: argparse.Namespace) -> int:
 
 def draw(options: argparse.Namespace) -> int:
     """Draw a scene before anything is computed: meshes, boundaries, supports, loads, contacts."""
+    from studies.views.doubts import doubts_of
     from studies.views.plots.setup import setup_figure
     from studies.views.plots.sheets import resolved
     from studies.views.scene_tables import described_scene
 
     scene, values = described_scene(options.what, _selection(options.set, "--set"))
+    for doubt in doubts_of(scene, values):
+        print(f"warning: {doubt}", file=sys.stderr)
     sheet = setup_figure(scene, values, options.zoom, options.window)
     _save(resolved(sheet, options.resolution), options.out)
     print(f"wrote {options.out}")

@@ -16,6 +16,7 @@ from studies.execution.run import StudyEvent
 from studies.storage.store import Store
 from studies.toml import CASE
 from studies.views.columns import counted, value_text
+from studies.views.doubts import doubts_of
 from studies.views.summary import bar
 
 _REDRAW = 0.1
@@ -126,9 +127,6 @@ def _place(study: Study, case: Case) -> str:
     return ", ".join(parts) or study.name
 
 
-_LONG = 3600.0
-"""Seconds of processor time above which `residua run` prints the estimate before it begins."""
-
 _SHORT = 8.0
 """Likely seconds of processor time up to which `residua run` starts no workers: to start them takes
 more than a second, and two would save no more than half of the time."""
@@ -141,20 +139,22 @@ def dry_run(study: Study, store: Store) -> str:
     """Return the estimated cost of computing `study` into `store`."""
     found = estimate(study, store)
     table = (f"{name:<16}{text}" for name, text in found.costs(study.kind.chooses).items())
-    return "\n".join([f"{study.name}: nothing is computed or written", *table])
+    first = {**next(study.cases()).values, **study.kind.begins}
+    warnings = (f"warning: {each}" for each in doubts_of(study.problem, first))
+    return "\n".join([f"{study.name}: nothing is computed or written", *warnings, *table])
 
 
 @dataclass(frozen=True, slots=True)
 class Foreseen:
-    """What `residua run` tells and does because of the time that a study is likely to take.
+    """What `residua run` says and does because of the time that a study is likely to take.
 
     Attributes
     ----------
-    warning : one line if it takes more than an hour of processor time; else empty
+    text : one line: how many runs it will compute, and the time; empty if there are none
     short : whether it takes less than workers need to start
     """
 
-    warning: str = ""
+    text: str = ""
     short: bool = False
 
     @classmethod
@@ -164,9 +164,9 @@ class Foreseen:
             found = estimate(study, store)
         except Exception:  # a damaged catalogue must not prevent computing, which makes it again
             return cls()
+        runs = f"about {found.usual_runs}" if study.kind.chooses else f"{found.to_compute}"
+        text = f"{study.name}: {runs} {'run' if runs == '1' else 'runs'} to compute"
         if found.cpu_seconds is None:
-            return cls()
-        likely, warning = found.cpu_seconds[1], ""
-        if likely >= _LONG:
-            warning = f"{study.name}: {found.time} of processor time; --dry-run shows more"
-        return cls(warning, likely <= _SHORT)
+            return cls(text)
+        text += f", {found.time} of processor time"
+        return cls(text if found.to_compute else "", found.cpu_seconds[1] <= _SHORT)

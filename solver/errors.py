@@ -60,6 +60,10 @@ class NoContact(NotConverged):
     """The contact problem has no solution for this shape of the surfaces, but may for another."""
 
 
+class Runaway(NotConverged):
+    """Plastic strain grows far beyond small strains, though the material hardens."""
+
+
 class TooLong(NotConverged):
     """A search has used all the work allowed to it; the message says how to make it easier."""
 

@@ -38,6 +38,19 @@ class NoFile(OSError):
         return type(self), (self.filename, str(self.strerror))
 
 
+def number_of(text: str) -> float:
+    """Return the number that a cell of a file is, with the digits 0 to 9 as in TOML and JSON.
+
+    Raises
+    ------
+    ValueError
+        if it is none
+    """
+    if not text.isascii() or "_" in text:
+        raise ValueError(f"could not convert string to float: {text!r}")
+    return float(text)
+
+
 def special(path: Path, links: bool = True) -> str:
     """Return the kind of a path that is not a regular file, such as "a pipe"; otherwise empty.
 

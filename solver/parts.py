@@ -179,7 +179,8 @@ def load_own_parts() -> None:
             continue
         spec = importlib.util.spec_from_file_location(name, path)
         if spec is None or spec.loader is None or not path.is_file():
-            raise ModelError(SETTING, str(path), "must name Python files")
+            there = "" if path.is_file() else ", and there is no such file"
+            raise ModelError(SETTING, str(path), f"must name Python files{there}")
         module = importlib.util.module_from_spec(spec)
         sys.modules[name] = module
         _RUNNING.append(name)

@@ -70,7 +70,9 @@ class StudyError(ValueError):
     def listed(self) -> list[str]:
         """The mistakes as text; the last one tells how many more there are."""
         more = self.count - len(self.each)
-        texts = [f"{each.field} = {reprlib.repr(each.value)}: {each.allowed}" for each in self.each]
+        given = ("" if e.value is None else f" = {reprlib.repr(e.value)}" for e in self.each)
+        every = zip(self.each, given, strict=True)
+        texts = [f"{each.field}{value}: {each.allowed}" for each, value in every]
         return [*texts, *([f"and {more} more"] if more else [])]
 
     def renamed(self, rename: Callable[[str], str]) -> StudyError:

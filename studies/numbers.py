@@ -28,11 +28,12 @@ def typeset_number(value: float, digits: int = 4) -> str:
     return typeset(number_text(value, digits))
 
 
-def time_text(likely: float, low: float, high: float) -> str:
-    """Return a time [s] and its range, in a unit in which it is at least 2."""
+def time_text(likely: float, low: float, high: float, worst: float | None = None) -> str:
+    """Return a time [s] and its range, also the worst, in a unit in which it is at least 2."""
     size, unit = next((each for each in _TIMES if likely >= 2 * each[0]), _TIMES[-1])
     about, least, most = (number_text(each / size, 2) for each in (likely, low, high))
-    return f"about {about} {unit} ({least} to {most})"
+    beyond = f"; at most {number_text(worst / size, 2)}" if worst else ""
+    return f"about {about} {unit} ({least} to {most}{beyond})"
 
 
 def size_text(count: float) -> str:

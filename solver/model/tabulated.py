@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 
 from solver.errors import ModelError
-from solver.files import read_file
+from solver.files import number_of, read_file
 from solver.mesh.rounding import ROUNDED
 from solver.typing import Array
 
@@ -44,7 +44,7 @@ def columns_of(text: str, names: Sequence[str]) -> dict[str, Array]:
         raise ModelError("table", ", ".join(header), f"must have one column {twice[0]}")
     columns = dict(zip(header, zip(*rows[1:], strict=True), strict=True))
     try:
-        found = {name: np.array(columns[name], dtype=float) for name in names}
+        found = {name: np.array([*map(number_of, columns[name])]) for name in names}
     except ValueError as error:
         raise ModelError("table", str(error), allowed) from None
     if not all(np.isfinite(each).all() for each in found.values()):

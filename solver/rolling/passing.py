@@ -22,7 +22,7 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-from solver.errors import LimitLoad, NotConverged, TooLong, WindowTooSmall
+from solver.errors import LimitLoad, NotConverged, Runaway, TooLong, WindowTooSmall
 from solver.linear.krylov import gmres
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
@@ -310,7 +310,7 @@ def _diverged(material: Law, most_added: float) -> NotConverged:
     """Return the error for a pass whose plastic strain became too large in Newton's method."""
     if not material.hardens:
         return LimitLoad("plastic strain grows without bound in a steady pass")
-    return NotConverged(
+    return Runaway(
         f"no steady pass was found up to a plastic strain of {most_added:.0%}, "
         "far beyond small strains; the material hardens, this is not its limit"
     )

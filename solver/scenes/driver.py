@@ -53,8 +53,11 @@ def record(scene: Scene, run: FinishedRun) -> Record:
 
 def _message(scene: Scene, run: FinishedRun, status: Status, messages: tuple[str, ...]) -> str:
     """Return the message of a run; `TooLong` has its own advice, opposite to a finer mesh."""
+    if status is Status.OK or isinstance(run.outcome.error, TooLong):
+        return "; ".join(messages)
     table = scene.advice(run.parameters) if callable(scene.advice) else scene.advice
-    advice = None if isinstance(run.outcome.error, TooLong) else table.get(status)
+    reasons: tuple[Any, ...] = (*type(run.outcome.error).__mro__, status)
+    advice = next((table[each] for each in reasons if each in table), None)
     return "; ".join((*messages, advice) if advice else messages)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Seq
 from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn
 
+from solver.errors import NotConverged
 from solver.late import late
 from solver.loading.control import INCREMENT_ERROR
 from solver.loading.program import Program, StepRefinement
@@ -52,6 +53,9 @@ class Effort:
 Monitor = Callable[[float], None]
 """Called after every increment with the fraction of the work done (0-1).
 An exception it raises stops the work and reaches the caller unchanged."""
+
+Advice = Mapping[Status | type[NotConverged], str]
+"""What the user can do, by status or by error."""
 
 Method = Callable[["Scene", Any, Monitor], Iterator[Any]]
 """Computes the `FinishedRun`s of a scene from their parameters, in the order of the branch
@@ -104,7 +108,8 @@ class Scene:
         run; a study gives runs with an equal one to the same worker. It must take milliseconds, as
         it is asked for every path before the first is computed
     warnings : (run) -> texts for the user, added to the message of its record
-    advice : status -> what the user can do; or (parameters) -> such a table
+    advice : status, or the class of the error that ended a run, which comes before it -> the one
+        thing that the user can do; or (parameters) -> such a table
     quantities : quantities that only this scene declares
     source : digest of the data it was made from, if any; it counts in the ids of runs
     allow : what all its studies allow: with ``large_strain`` runs outside small-strain theory are
@@ -131,9 +136,7 @@ class Scene:
     effort: Callable[[Any, Sequence[float]], Effort] | None = None
     setup: Callable[[Any], Hashable] | None = None
     warnings: Callable[[Any], tuple[str, ...]] | None = None
-    advice: Mapping[Status, str] | Callable[[Any], Mapping[Status, str]] = field(
-        default_factory=dict, hash=False
-    )
+    advice: Advice | Callable[[Any], Advice] = field(default_factory=dict, hash=False)
     quantities: tuple[Quantity, ...] = ()
     source: str = ""
     allow: tuple[str, ...] = ()

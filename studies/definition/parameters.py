@@ -20,6 +20,7 @@ from annotated_types import Unit
 from pydantic import TypeAdapter, ValidationError
 
 from solver.parameters import is_number
+from solver.parts import SETTING, own_files
 from solver.scenes import Scene
 from studies.errors import Mistakes, StudyError, one_of
 from studies.materials import MATERIAL, parameters_in
@@ -52,6 +53,7 @@ class Parameter:
     schema: Mapping[str, Any]
     _type: TypeAdapter[Any] = dataclasses.field(repr=False)
     _range: TypeAdapter[Any] = dataclasses.field(repr=False)
+    _of_parts: bool = dataclasses.field(default=False, repr=False)
 
     @property
     def allowed(self) -> str:
@@ -68,7 +70,8 @@ class Parameter:
         Raises
         ------
         StudyError
-            naming `field`, when the value has the wrong type, another dimension, or is not finite
+            naming `field`, when the value has the wrong type, another dimension, or is not in the
+            declared range
         """
         value = self.in_own_unit(value, field)
         if value is None and self.default is None:  # left out, as a stored study has it
@@ -77,7 +80,7 @@ class Parameter:
             typed = self._type.validate_json(json.dumps(value, allow_nan=False), strict=True)
         except (ValidationError, ValueError, TypeError, RecursionError):
             raise self.refusal(field, value) from None
-        if isinstance(typed, float) and not math.isfinite(typed):
+        if (isinstance(typed, float) and not math.isfinite(typed)) or not self.in_range(typed):
             raise self.refusal(field, value)
         return self._type.dump_python(typed, mode="json")
 
@@ -147,14 +150,17 @@ class Parameter:
 
     def refusal(self, field: str, value: Any) -> StudyError:
         """Return the error for a value that is not allowed: it says what is."""
-        return StudyError(field, value, f"must be {self.allowed}")
+        hint = ""
+        if self._of_parts and isinstance(value, str) and not own_files():
+            hint = f"; a word of your own needs its file in the environment variable {SETTING}"
+        return StudyError(field, value, f"must be {self.allowed}{hint}")
 
 
 @lru_cache(maxsize=128)
 def parameters_of(scene: Scene) -> dict[str, Parameter]:
     """Return the parameters of a scene by name, in the order of declaration."""
     hints = get_type_hints(scene.parameters, include_extras=True)
-    found = {}
+    found, parts = {}, {each.kind for each in getattr(scene.parameters, "PARTS", ())}
     for field in dataclasses.fields(scene.parameters):
         hint = hints[field.name]
         in_range: TypeAdapter[Any] = TypeAdapter(hint)
@@ -165,6 +171,7 @@ def parameters_of(scene: Scene) -> dict[str, Parameter]:
             default=_plain(in_range, field.default),
             description=field.metadata.get("description", ""),
             schema=in_range.json_schema(),
+            _of_parts=field.name in parts,
             _type=TypeAdapter(_bare(hint)),
             _range=in_range,
         )

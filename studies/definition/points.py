@@ -133,6 +133,8 @@ def _value(field: str, value: Any, parameter: Parameter, unit: str) -> Any:
     if unit != parameter.unit and is_finite(plain):
         return parameter.normalise(under(unit, plain, parameter.unit), field)
     if isinstance(value, str) and plain is not None:
+        if parameter.whole and isinstance(plain, float) and plain.is_integer():
+            plain = int(plain)  # as a spreadsheet writes it: 2.0
         with suppress(StudyError):
             return parameter.normalise(plain, field)
     return parameter.normalise(value, field)

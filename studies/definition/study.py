@@ -280,17 +280,22 @@ class Study(StudyTable):
         base = cls.known(theirs, scenes, studies, count)
         if not base.kind.everywhere:
             raise StudyError(EXTENDS, base.name, "chooses its runs itself: extend another study")
-        own = content.get("scene", base.scene)
+        own, wrong, more = content.get("scene", base.scene), Mistakes(), {}
         if own != base.scene and name_of(scene_named(own, scenes)) != base.scene:
             allowed = f"must be that of {base.name}, which is extended, or left out"
-            raise StudyError("scene", own, allowed)
+            wrong.add("", StudyError("scene", own, allowed))
         if parameters := content.get("parameters"):
             allowed = "cannot be changed when a study is extended: add values under sweep"
-            raise StudyError("parameters", parameters, allowed)
+            wrong.add("", StudyError("parameters", parameters, allowed))
         adds = ("sweep", *ENTRIES)
         added = {key: content[key] for key in adds if key in content}
-        added |= {"name": base.name, "scene": base.scene}
-        more = cls.known(added, scenes, count=count).sweep
+        if wrong.failed:  # else they are found in the whole study
+            beside = ("name", "note", "tags", "keep", "allow")
+            added |= {key: content[key] for key in beside if key in content}
+        with wrong.at():
+            whole = {"name": base.name, **added, "scene": base.scene}
+            more = cls.known(whole, scenes, count=count).sweep
+        wrong.report()
         axes = Extended(base.name, base.sweep, base.fixed).with_axes(more)
         rest = {key: each for key, each in content.items() if key not in (EXTENDS, *adds)}
         fixed = {key: value for key, value in base.parameters.items() if key not in owners(axes)}
@@ -381,6 +386,11 @@ class Study(StudyTable):
     def size(self) -> int:
         """Number of runs; of a study that chooses them the largest possible one."""
         return self.kind.most_runs(self.expansion.size)
+
+    @property
+    def usual_runs(self) -> int:
+        """Number of runs; of a study that chooses them the expected one."""
+        return self.kind.usual_runs(self.expansion.size)
 
     def stage(self, ended: int = 0, told: str = "") -> str:
         """Return how far a study that chooses its runs is, as text; empty for others.

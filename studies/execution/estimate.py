@@ -30,9 +30,12 @@ from studies.execution.limits import LOADED
 from studies.numbers import size_text, time_text
 from studies.storage.store import Store
 
-_PER_RUN, _PER_SETUP = 0.5, 1.0
-"""Seconds for the results, audit and file of a run; for the mesh and the operators, which a path
-has alone or shares with others of equal `Scene.setup`."""
+_PER_RUN, _PER_SETUP = (0.075, 40e-6), (0.075, 40e-6)
+"""Seconds, and seconds per element: for the results, audit and file of a run; for the mesh and the
+operators, which a path has alone or shares with others of equal `Scene.setup`. Measured: 0.15 to
+0.35 s a run of some hundred elements, then 50 to 150 us per element."""
+_AROUND = 2.5
+"""Factor of the low and high estimates of these seconds."""
 _BYTES, _COMBINED = 1.1e6, 1.8
 """Size of a run's file if none is known; factor for the data set of a study beside the files."""
 _FIELDS = 100
@@ -46,7 +49,8 @@ _BATCH = 500
 class Estimate:
     """The cost of a study. All numbers except `runs` are for the runs that the store lacks.
 
-    Of a study that chooses its runs they are the most that it may cost: see `Kind.longest`.
+    Of a study that chooses its runs they are the most that it may cost: see `Kind.longest`; only
+    `cpu_seconds` are those that it is expected to take: see `Kind.usual_runs`.
 
     Attributes
     ----------
@@ -57,7 +61,9 @@ class Estimate:
     increments : number of increments of all paths, if none is cut
     longest : largest number of increments of one path, if all are halved as often as permitted
     cpu_seconds : processor time, low, likely and high: 16 %, 50 % and 84 % quantiles of past runs;
-        half, once and twice what the scene tells, if it tells seconds
+        half, once and twice what the scene states, if it states seconds
+    usual_runs : the number of runs for which these are
+    most_cpu_seconds : high processor time of the most runs
     bytes : size on the disk, with the data set
     memory : most bytes of a worker process: libraries, the path that needs most, and what is kept
         of paths before
@@ -73,6 +79,8 @@ class Estimate:
     increments: int | None
     longest: int | None
     cpu_seconds: tuple[float, ...] | None
+    usual_runs: int
+    most_cpu_seconds: float | None
     bytes: int
     memory: int | None
     basis: str
@@ -81,14 +89,19 @@ class Estimate:
     def time(self) -> str:
         """The processor time and its range as text; empty if it is not known."""
         low, likely, high = self.cpu_seconds or (0.0, 0.0, 0.0)
-        return time_text(likely, low, high) if self.cpu_seconds else ""
+        if self.cpu_seconds is None:
+            return ""
+        most = self.most_cpu_seconds if self.usual_runs < self.runs else None
+        return time_text(likely, low, high, most)
 
     def costs(self, chooses: bool) -> dict[str, str]:
         """Return all as text by name, of a study that chooses its runs or of another one."""
-        unknown, most = "not known", f"at most {self.runs}, of which some may be there"
+        unknown = "not known"
+        most = f"about {self.usual_runs}, at most {self.runs}; some of them may be there"
+        lacking = f"{self.to_compute} to compute" if self.to_compute else "all are stored"
         times = f"{self.increments} in all, at most {self.longest} on a path"
         return {
-            "runs": most if chooses else f"{self.runs} in all, {self.to_compute} to compute",
+            "runs": most if chooses else f"{self.runs} in all, {lacking}",
             "loading paths": f"{self.paths} to walk",
             "unknowns": unknown if self.unknowns is None else f"at most {self.unknowns} a run",
             "increments": unknown if self.increments is None else times,
@@ -202,20 +215,23 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
     pace = pace_of(store, scene.name)
     to_compute, paths, unknowns, increments, longest, memory = 0, 0, 0, 0, 0, 0
     set_ups: dict[Hashable, list[float]] = {}
-    basis, alone, kept = pace.basis, 0.0, most_kept()
-    seconds = [0.0, 0.0, 0.0]
+    basis, alone, results, kept = pace.basis, 0.0, 0.0, most_kept()
+    usual = study.usual_runs
+    share, seconds = usual / max(study.size, 1), [0.0, 0.0, 0.0]
     refused: list[StudyError] = []
     for path, missing in _missing(study, store):
         to_compute += len(missing)
         paths += 1
-        set_up = _PER_SETUP
+        elements = 0
+        set_up = 0.0
         if scene.effort is not None:
             try:
                 effort = scene.effort(path.parameters, missing)
             except ModelError as error:
                 refused.append(study.expansion.located(error, path.cases[0].index))
+                results += len(missing) * _of(_PER_RUN, 0)
                 continue
-            set_up += effort.set_up
+            set_up, elements = effort.set_up, effort.elements
             unknowns = max(unknowns, effort.unknowns)
             memory = max(memory, _of_a_worker(effort, kept))
             increments += effort.increments
@@ -227,15 +243,18 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
                 basis = f"what passes of {scene.name} took elsewhere"
             seconds = [sum(both) for both in zip(seconds, more, strict=True)]
             if bounds:
-                bounds.check_so_far(unknowns, longest, seconds[1])
+                bounds.check_so_far(unknowns, longest, share * seconds[1])
+        results += len(missing) * _of(_PER_RUN, elements)
+        set_up += _of(_PER_SETUP, elements)
         if scene.setup is None:
             alone += set_up
         else:
             set_ups.setdefault(setup_of(scene, path), []).append(set_up)
     if refused and len(refused) == paths and to_compute == study.size:
         raise refused[0]
-    fixed = _PER_RUN * to_compute + alone + _shared(list(set_ups.values()))
-    low, likely, high = (fixed + each for each in seconds)
+    fixed = results + alone + _shared(list(set_ups.values()))
+    factors = 1 / _AROUND, 1.0, _AROUND
+    most = [fixed * factor + each for factor, each in zip(factors, seconds, strict=True)]
     known = scene.effort is not None
     found = Estimate(
         runs=study.size,
@@ -244,7 +263,9 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
         unknowns=unknowns if known else None,
         increments=increments if known else None,
         longest=longest if known else None,
-        cpu_seconds=(low, likely, high) if known else None,
+        cpu_seconds=tuple(share * each for each in most) if known else None,
+        usual_runs=usual,
+        most_cpu_seconds=most[-1] if known else None,
         bytes=round(to_compute * _file_size(scene.name, study.keep, store, unknowns) * _COMBINED),
         memory=memory if known else None,
         basis=basis if known else f"{scene.name} does not estimate the work of its paths",
@@ -252,6 +273,10 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
     if bounds:
         bounds.check(found)
     return found
+
+
+def _of(seconds: tuple[float, float], elements: int) -> float:
+    return seconds[0] + seconds[1] * elements
 
 
 def memory_needed(study: Study) -> int:
@@ -327,12 +352,15 @@ _PAST = 1000
 """Largest number of past runs in the fit, the latest ones."""
 _ENOUGH = 8
 """Smallest number of past runs for a fit."""
-_RATE, _AT, _EXPONENT = 15e-6, 14_000, 1.15
+_RATE, _AT, _EXPONENT = 6e-6, 14_000, 1.15
 """Measured: seconds per unknown and increment, the number of unknowns at which, and p."""
+_LEAST = 1_500
+"""Number of unknowns below which an increment takes no less time."""
 _DOUBT = 0.2
 """Uncertainty of p; it matters for other numbers of unknowns than those of past runs."""
-_WIDE = 3.0
-"""Factor of the low and high estimates without past runs; 45 runs of one mesh differ by 1.5."""
+_WIDE = 5.0
+"""Factor of the low and high estimates without past runs: increments of bodies that yield take 1.5
+to 30 us per unknown, by how far they yield (`tests/stability/estimates.py`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -355,8 +383,9 @@ class Pace:
 
     def seconds(self, unknowns: int, least: float, most: float) -> tuple[float, float, float]:
         """Return low, likely and high seconds of a path of `least` to `most` increments."""
-        one = self.rate * unknowns**self.exponent
-        doubt = math.exp(_DOUBT * abs(math.log(unknowns / self.known_at)))
+        size = max(unknowns, _LEAST)
+        one = self.rate * size**self.exponent
+        doubt = math.exp(_DOUBT * abs(math.log(size / self.known_at)))
         likely = one * math.sqrt(least * most)
         return one * least * self.low / doubt, likely, one * most * self.high * doubt
 
@@ -371,6 +400,7 @@ def pace_of(store: Store, scene: str) -> Pace:
         return Pace(rate, _EXPONENT, 1 / _WIDE, _WIDE, _AT, basis)
     basis = f"the pace of the last {len(past)} runs of {scene} stored here"
     unknowns, increments, seconds = past.T
+    unknowns = np.maximum(unknowns, _LEAST)
     return _fitted(unknowns, increments, seconds, basis)
 
 

@@ -174,6 +174,10 @@ class Kind(StudyTable):
         """Return the largest number of runs, with so many places on the axes."""
         raise NotImplementedError
 
+    def usual_runs(self, places: int) -> int:
+        """Return the number of runs that are expected, at most that of `most_runs`."""
+        return self.most_runs(places)
+
     def stage(self, places: int, ended: int, told: str) -> str:
         """Return how far it is, as text: see `Study.stage`."""
         return "ended" if ended else told or f"at most {self.most_runs(places)} runs"

@@ -38,6 +38,16 @@ _NASTRAN = ("CTRIA3", "CTRIA6", "CTRIAR", "CTRIAX6", "CQUAD4", "CQUAD8", "CQUADR
 """Plane elements of Nastran that are read."""
 
 
+_ADVICE = {
+    "parametric nodes": "its nodes have parameters: save it with Mesh.SaveParametric = 0",
+    "Need mesh format": "save it with Mesh.MshFileVersion = 4.1",
+    "ENS_MAA": "it has no mesh of MED 3 or later: save it as such",
+    "file signature not found": "it is no HDF5 file, as those of MED 3 or later",
+    "Unknown file format": "it is no netCDF file, as those of Exodus are",
+}
+"""What to do, by words of the libraries that read files."""
+
+
 def read_mesh(name: str, data: bytes) -> MeshData:
     """Return the content of a mesh file.
 
@@ -58,7 +68,8 @@ def read_mesh(name: str, data: bytes) -> MeshData:
         reason = str(error) or f"{type(error).__name__}; save it in another format, such as .msh"
         if isinstance(error, LookupError | AssertionError):
             reason = f"{type(error).__name__} {error}"
-        raise ModelError("mesh", name, f"cannot be read: {reason}") from None
+        known = (advice for words, advice in _ADVICE.items() if words in reason)
+        raise ModelError("mesh", name, f"cannot be read: {next(known, reason)}") from None
 
 
 def load_readers() -> None:
@@ -95,6 +106,9 @@ def _gmsh(data: bytes) -> MeshData:
     A group of lines and one of surfaces may share a name; an entity whose line runs backwards has
     the number of its group with a minus.
     """
+    if b"$MeshFormat" not in data:
+        reason = "it has no $MeshFormat, as those of gmsh 1: save it with Mesh.MshFileVersion = 4.1"
+        raise ValueError(reason)
     section = data.partition(b"$PhysicalNames")[2].partition(b"$EndPhysicalNames")[0].decode()
     named = re.findall(r'(\d+)\s+(\d+)\s+"(.*)"', section)
     names = {(int(dim), int(number)): name for dim, number, name in named}

@@ -13,6 +13,8 @@ from studies.scenes.mending import Where
 
 _KINDS = ("union_tag_not_found", "union_tag_invalid")
 
+_KEY = "[key]"
+"""What pydantic adds to the place of a name that is wrong itself."""
 _TABLES = frozenset({"properties", "additionalProperties", "patternProperties"})
 """Keys in the schema of a table; it has at least one of them."""
 
@@ -127,4 +129,5 @@ def _resolved(schema: Mapping[str, Any], node: Mapping[str, Any]) -> Mapping[str
 
 def dotted(where: Where) -> str:
     """Return the name of an entry: ``contacts[0].friction``."""
-    return "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in where).removeprefix(".")
+    named = (k for k in where if k != _KEY)
+    return "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in named).removeprefix(".")

@@ -7,16 +7,39 @@ from collections.abc import Iterable, Mapping
 from typing import Annotated, Any
 
 from annotated_types import Interval, Unit
-from pydantic import AfterValidator, BaseModel, ConfigDict, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from solver.parameters import Coordinate
 from studies.scenes.arithmetic import ExpressionError, Field
 
-Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,59}$")]
+
+def _spelled(pattern: re.Pattern[str], words: str) -> tuple[Any, Any]:
+    """Return the marks of a text of this pattern, which an error says in words."""
+
+    def checked(text: str) -> str:
+        if not pattern.fullmatch(text):
+            raise PydanticCustomError("spelled", "must be {words}", {"words": words})
+        return text
+
+    return AfterValidator(checked), WithJsonSchema(
+        {"type": "string", "pattern": f"^{pattern.pattern}$"}
+    )
+
+
+Label = Annotated[
+    str,
+    *_spelled(
+        re.compile("[A-Za-z][A-Za-z0-9_]{0,59}"),
+        "1 to 60 of A-Z a-z 0-9 _, beginning with a letter",
+    ),
+]
 """A name: 1 to 60 of ``A-Z a-z 0-9 _``, beginning with a letter."""
 FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
-FileName = Annotated[str, StringConstraints(pattern=f"^{FILE_NAME.pattern}$")]
+FileName = Annotated[
+    str,
+    *_spelled(FILE_NAME, "the name of a file beside the scene file: 1 to 100 of A-Z a-z 0-9 _ . -"),
+]
 """The name of a file beside the scene file."""
 
 
@@ -68,5 +91,7 @@ Place = tuple[Coordinate, Coordinate]
 Span = tuple[Coordinate, Coordinate]
 Angles = tuple[Angle, Angle]
 Count = Annotated[int, Interval(ge=1, le=10_000)]
-Side = Annotated[str, StringConstraints(pattern=r"^[^.]+\.[^.]+$")]
+Side = Annotated[
+    str, *_spelled(re.compile(r"[^.]+\.[^.]+"), "a boundary of a body, such as punch.bottom")
+]
 """A boundary of a body: ``body.boundary``."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import textwrap
 from collections.abc import Sequence
 from typing import Any
@@ -17,6 +18,8 @@ _HEADING = 9
 _WIDTH = 120
 """Largest width of a table in characters; wider ones continue below, with the axes repeated."""
 _GAP = "  "
+_PLACE = re.compile(r"(?P<of>peak_\w+)_(?P<axis>[sxyz])")
+"""Names of places of largest values."""
 
 
 def value_text(value: Any) -> str:
@@ -94,5 +97,7 @@ def aligned(lines: Sequence[Sequence[str]], right: int | None = None) -> str:
 
 
 def plain(name: str) -> str:
-    """Return a name in words."""
+    """Return a name in words; the place of a peak, such as ``peak_pressure_s``, is named first."""
+    if place := _PLACE.fullmatch(name):
+        name = f"{place['axis']} of {place['of']}"
     return name.replace("_", " ")

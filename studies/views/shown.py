@@ -19,19 +19,20 @@ from studies.views.plots.fields import (
     component_names,
     component_of,
     depth_shown,
+    floor_of,
     line_axis,
     line_fields,
     map_axes,
     map_fields,
     placed,
     usual_field,
+    without_rounding,
 )
 from studies.views.plots.mapped import mapped
 from studies.views.written import as_csv
 
-_NOTHING = {"MPa": 1e-3, "mm": 1e-9}
-"""Largest value of lines that are only rounding, by unit."""
-
+_LENGTH = 1e-9
+"""Largest value of lines, such as displacements [mm], that are only rounding."""
 _COURSES = ("increment", *REPEATED)
 """Dimensions of lines over time."""
 _FIRST = {"depth": "residual_profile", "contact": "pressure", "line": "surface_residual"}
@@ -83,7 +84,7 @@ def outline(run: xr.Dataset) -> dict[str, list[dict[str, Any]]]:
         "maps": [_described(run, name) for name in maps if run[name].notnull().any()],
         "lines": [
             _described(run, name) | _pictures(name, line_axis(run[name], sweep))
-            for name in sorted(lines, key=lambda name: _rank(run[name]))
+            for name in sorted(lines, key=lambda name: _rank(run[name], run))
         ],
     }
 
@@ -95,9 +96,9 @@ def _pictures(name: str, along: str | None) -> dict[str, Any]:
     return {"along": along, "pictures": [kind, "line"], "usual": usual}
 
 
-def _rank(values: xr.DataArray) -> int:
+def _rank(values: xr.DataArray, run: xr.Dataset) -> int:
     """Return the place of a line among others."""
-    if float(abs(values).max()) <= _NOTHING.get(str(values.attrs.get("units", "1")), 0.0):
+    if float(abs(values).max()) <= max(floor_of(values, run), _LENGTH):
         return 2
     name = str(values.name)
     return 0 if name.startswith("residual_") or name.endswith("stress") else 1
@@ -164,7 +165,7 @@ def _map(
 
 
 def _lines(run: xr.Dataset, field: str, component: str | None) -> Shown:
-    values = placed(component_of(run[field], component), run)
+    values = without_rounding(placed(component_of(run[field], component), run), run)
     along = line_axis(values)
     assert along is not None
     for name in values.dims:

@@ -77,6 +77,12 @@ class Column:
         several = "," in condition and condition not in self.said
         return [each.strip() for each in (condition.split(",") if several else [condition])]
 
+    @property
+    def whole(self) -> bool:
+        """Whether its numbers are counts."""
+        quantity = QUANTITIES.get(self.name)
+        return quantity is not None and quantity.count
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunTable:

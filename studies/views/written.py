@@ -149,7 +149,8 @@ def _cells(column: Column, at: np.ndarray) -> list[str]:
     """Return the texts of cells: numbers with all their digits, nothing where there is no value."""
     values = _values(column, at)
     if column.number:
-        return ["" if each is None else str(each) for each in values]
+        write = "{:.0f}".format if column.whole else str
+        return ["" if each is None else write(each) for each in values]
     texts = (f"'{each}" if each.startswith(FORMULA) else each for each in map(str, values))
     return [each.replace("\r", " ") for each in texts]  # the only end of a line not put in quotes
 

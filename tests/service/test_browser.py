@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,10 @@ def dataset(service: Server, study: str) -> xr.Dataset:
     return open_study(f"http://127.0.0.1:{service.port}/studies/{study}")
 
 
+WHOLE = ".list td:has(.status), .differ tr:first-child td.right, .scroll .audit td:last-child, pre"
+"""What a phone shows whole: status of studies, numbers of two runs, audit, code."""
+
+
 def base(server: Server) -> str:
     return f"http://127.0.0.1:{server.port}"
 
@@ -83,10 +88,11 @@ def cell(page: Any, x: float, y: float) -> tuple[float, float]:
 def test_no_page_has_a_serious_barrier_or_is_wider_than_a_phone(
     context: Any, open_study_page: Any, service: Server, study: str
 ) -> None:
-    run = runs(service, study)[0]
+    run, other, *_ = runs(service, study)
     waited = {
         "/ui": "table.list",
         f"/ui/runs/{run}": DRAWN.format("map"),
+        f"/ui/compare?run={run}&run={other}": "table.differ",
         "/ui/new?scene=punch": "[data-estimate] dd",
         "/ui/health": ".tiles",
         "/ui/sign-in": "form.stack",
@@ -99,6 +105,9 @@ def test_no_page_has_a_serious_barrier_or_is_wider_than_a_phone(
         with opened(context, base(service) + path) as page:
             page.wait_for_selector(there)
             see(page, dark="new" in path)  # the others have the same colours
+            for cut in page.locator(WHOLE).all():
+                box = cut.bounding_box()
+                assert box is None or box["x"] + box["width"] < 380, page.url
 
 
 def see(page: Any, *, dark: bool) -> None:
@@ -309,6 +318,23 @@ def test_a_study_is_made_by_the_form(context: Any, service: Server) -> None:
         page.click("button[name=submit]")
         page.wait_for_selector("[data-live=status] .successful", timeout=60_000)
         assert page.locator(".runs tbody tr").count() == 6
+
+
+def test_a_scene_that_is_refused_stays_chosen(
+    context: Any, service: Server, tmp_path: Path
+) -> None:
+    file = tmp_path / "wrong.toml"
+    file.write_text('name = "wrong"\n')
+    page = context.new_page()  # not `opened`: the browser reports the answer 422 as an error
+    page.goto(f"{base(service)}/ui/new")
+    page.click(".drop summary")
+    page.set_input_files("[name=scene][type=file]", str(file))
+    page.click("text=Post it")
+    page.wait_for_selector(".drop [role=alert] li")
+    assert "wrong.toml is not taken" in page.locator(".drop [role=alert]").text_content()
+    names = "document.querySelector('[name=scene][type=file]').files[0].name"
+    assert page.evaluate(names) == "wrong.toml"
+    page.close()
 
 
 def test_a_page_without_scripts_has_table_and_picture(

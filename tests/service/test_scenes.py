@@ -193,7 +193,7 @@ def test_a_scene_is_drawn_before_anything_is_computed(service: Server, pin: str)
     assert len(set(sizes.values())) == 3
     for asked, field, allowed in (
         ({"clarence": 1}, "clarence", "did you mean clearance"),
-        ({"clearance": 9}, "clearance", "at most 0.2"),
+        ({"clearance": 9}, "clearance", "<= 0.2 [mm]"),
         ({"clearance": "wide"}, "clearance", "must be a finite number"),
         ({"window": [5, 4, 0, 1]}, "window", "must be x0 x1 y0 y1"),
         ({"zoom": -1}, "zoom", "greater than 0"),
@@ -310,8 +310,18 @@ def test_bodies_are_built_before_a_scene_is_kept(service: Server) -> None:
         (PIN, {"pin_msh": b"$MeshFormat"}, "bodies.plate.mesh", "cannot be read"),
         (PIN, {"pin_msh": MESH, "other_msh": MESH}, "meshes", "that the scene names: pin.msh"),
         (PIN.replace(b"pin.msh", b"pin.xdmf"), {"pin_xdmf": MESH}, "meshes", "end in one of .msh"),
-        (PIN.replace(b'"pin.msh"', b'"../pin.msh"'), {}, "bodies.plate.mesh", "must match"),
-        (PIN.replace(b'"pin.msh"', b'"/etc/passwd"'), {}, "bodies.plate.mesh", "must match"),
+        (
+            PIN.replace(b'"pin.msh"', b'"../pin.msh"'),
+            {},
+            "bodies.plate.mesh",
+            "must be the name of a file",
+        ),
+        (
+            PIN.replace(b'"pin.msh"', b'"/etc/passwd"'),
+            {},
+            "bodies.plate.mesh",
+            "must be the name of a file",
+        ),
     ],
 )
 def test_what_is_no_scene_is_refused_by_its_entry(

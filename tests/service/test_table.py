@@ -400,7 +400,7 @@ def test_a_form_computes_a_goal_and_tells_its_mistakes_beside_its_fields(seen: S
     fields = {"scene": "punch", "name": "sought", "choose": "goal", "p.friction": "0, 0.2", **GOAL}
     accepts = {"accept": "application/json"}
     answer = seen.client.post("/ui/new", data=fields, headers=accepts).json()
-    assert answer["wrong"] == {} and answer["estimate"]["runs"].startswith("at most ")
+    assert answer["wrong"] == {} and answer["estimate"]["runs"].startswith("about ")
     assert "goal = {of = " in answer["toml"]
     fields |= {"goal.between": "[2, 1]", "goal.within": "7", "goal.at": "3 mm"}
     answer = seen.client.post("/ui/new", data=fields, headers=accepts).json()

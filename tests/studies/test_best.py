@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from residua.cli import main
 from studies import Store, Study, StudyError, open_study
-from studies.views.best import best_runs
+from studies.views.best import best_runs, table_of
+from studies.views.written import as_csv
 from tests.studies.conftest import compute_here, fake_study
 
 OF = "peak_contact_pressure"
@@ -70,3 +72,13 @@ def test_a_mistake_is_told_in_one_line(
         best_runs(dataset, of, where)
     assert told in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_counts_are_whole_numbers_in_csv(store: Store) -> None:
+    compute_here(fake_study(), store)
+    with open_study(store.directory) as dataset:
+        columns = [table_of(dataset).column(name) for name in ("increments", "load_ratio")]
+    head, first, *_ = b"".join(as_csv(columns, np.arange(4))).decode().splitlines()
+    assert head == "increments,load_ratio"
+    count, load = first.split(",")
+    assert count.isdecimal() and "." in load

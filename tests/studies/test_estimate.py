@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -11,14 +12,16 @@ import numpy as np
 import pytest
 
 from residua.cli import main
-from residua.progress import Foreseen
+from residua.progress import Foreseen, dry_run
 from studies import Store, Study, StudyError
 from studies.execution.estimate import Bounds, Estimate, estimate, memory_needed
 from tests.counted import counted
+from tests.stability.estimates import drawn, timed
 from tests.studies.conftest import fake_study
 from tests.studies.test_study import many
 
 ROOT = Path(__file__).parents[2]
+STUDIES = ROOT / "data" / "studies"
 PUNCH = {"name": "small", "scene": "punch", "sweep": {"load_ratio": [0.3, 0.6]}}
 LAW = 2e-6, 1.3
 """Rate and exponent of the seconds of made-up runs."""
@@ -57,14 +60,14 @@ def ids(count: int) -> list[str]:
 
 
 def test_a_study_is_counted_and_nothing_is_written(store: Store) -> None:
-    study = Study.from_toml(ROOT / "data" / "studies" / "punch.toml")
+    study = Study.from_toml(STUDIES / "punch.toml")
     found = estimate(study, store)
     assert (found.runs, found.to_compute, found.paths) == (45, 45, 15)
     assert (found.unknowns, found.longest, found.increments) == (14833, 35, 15 * 35)
     assert found.cpu_seconds is not None
     low, likely, high = found.cpu_seconds
     assert low < likely < high
-    assert 4 < high / low < 10, "wide where no runs are known"
+    assert 4 < high / low < 30, "wide where no runs are known"
     assert "fewer than 8 runs of punch" in found.basis
     assert not store.directory.exists()
 
@@ -94,11 +97,32 @@ def test_the_pace_is_that_of_past_runs(store: Store, outliers: int) -> None:
     found = estimate(study, store)
     assert found.cpu_seconds is not None and found.increments is not None
     low, likely, high = found.cpu_seconds
-    exact = rate * 14833**exponent * found.increments + 2 * 0.5 + 1.0
+    exact = rate * 14833**exponent * found.increments + 0.4
     # 60 runs that scatter by 0.3: their mean is known to 4 %, that of the exponential is 5 % higher
     assert likely == pytest.approx(exact, rel=0.2)
     assert 1.5 < high / low < 3.5, "one sixth of them is outside on either side"
     assert f"{len(figures)} runs of punch" in found.basis
+
+
+@pytest.mark.solves
+def test_own_scenes_take_as_long_as_estimated(tmp_path: Path) -> None:
+    """18 of 20; `make stress` has more of them, with finer meshes too."""
+    found = [timed(*each, tmp_path / str(k)) for k, each in enumerate(drawn(20))]
+    outside = [each for each in found if not each.inside]
+    assert len(outside) <= 2, outside
+
+
+def test_a_goal_is_estimated_by_the_search_that_is_expected(store: Store) -> None:
+    """Computed, it takes 42 runs and 23 s; the most that it may ask for are 132."""
+    study = Study.from_toml(STUDIES / "shakedown-limit.toml")
+    found = estimate(study, store)
+    assert (found.runs, found.usual_runs) == (132, 48)
+    assert found.cpu_seconds is not None and found.most_cpu_seconds is not None
+    low, likely, high = found.cpu_seconds
+    assert low < 23 < high and likely == pytest.approx(23, rel=0.4)
+    assert found.most_cpu_seconds == pytest.approx(132 / 48 * high)
+    assert "runs            about 48, at most 132" in (text := dry_run(study, store))
+    assert f"; at most {found.most_cpu_seconds:.0f})" in text
 
 
 def test_a_mesh_larger_than_any_known_is_told_with_more_doubt(store: Store) -> None:
@@ -112,7 +136,7 @@ def test_a_mesh_larger_than_any_known_is_told_with_more_doubt(store: Store) -> N
         assert found.cpu_seconds is not None
         spread.append(found.cpu_seconds[2] / found.cpu_seconds[0])
     assert spread == sorted(spread)
-    assert spread[-1] > 1.5 * spread[0]
+    assert spread[-1] > 1.4 * spread[0]
 
 
 def test_a_scene_that_does_not_tell_its_work_is_told_by_its_runs(store: Store) -> None:
@@ -264,13 +288,25 @@ def test_too_many_runs_are_refused_before_they_are_gone_through() -> None:
 def test_dry_run_tells_the_cost_and_writes_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = ROOT / "data" / "studies" / "punch.toml"
+    path = STUDIES / "punch.toml"
     assert main(["run", str(path), "--dry-run", "--out", str(tmp_path / "none")]) == 0
     told = capsys.readouterr().out
     for words in ("nothing is computed or written", "45 in all, 45 to compute", "15 to walk",
-                  "at most 14833 a run", "525 in all", "minutes (", " MB"):  # fmt: skip
+                  "at most 14833 a run", "525 in all", "seconds (", " MB"):  # fmt: skip
         assert words in told
     assert not list(tmp_path.iterdir())
+
+
+def test_dry_run_and_draw_name_a_wrong_unit_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "soft.toml"
+    path.write_text('name = "soft"\nscene = "punch"\n[parameters]\nyoungs_modulus = 210\n')
+    warning = "warning: punch.youngs_modulus = 210: 210000 MPa was probably meant"
+    assert main(["run", str(path), "--dry-run", "--out", str(tmp_path / "none")]) == 0
+    assert capsys.readouterr().out.splitlines()[1].startswith(warning)
+    assert main(["draw", str(path), "--out", str(tmp_path / "soft.png")]) == 0
+    assert capsys.readouterr().err.startswith(warning)
 
 
 def test_dry_run_tells_what_is_not_known(
@@ -281,15 +317,25 @@ def test_dry_run_tells_what_is_not_known(
     assert lines["unknowns"] == lines["increments"] == "not known"
 
 
-def test_a_long_study_is_said_to_be_long_and_a_tour_short(
-    store: Store,
-) -> None:
-    usual, long = Study.from_dict(many(40)), Study.from_dict(many(4000))
-    tour = Study.from_toml(ROOT / "data" / "studies" / "tour.toml")
-    assert Foreseen.of(tour, store) == Foreseen(short=True)
-    assert Foreseen.of(usual, store) == Foreseen()
-    told = Foreseen.of(long, store).warning
-    assert told.startswith("many: about ") and "hours (" in told and "\n" not in told
+def test_run_says_at_once_how_many_runs_it_will_compute(store: Store) -> None:
+    usual, tour = Study.from_dict(many(40)), Study.from_toml(STUDIES / "tour.toml")
+    search = Study.from_toml(STUDIES / "first-yield.toml")
+    short = Foreseen.of(tour, store)
+    assert short.short and short.text.startswith("tour: 4 runs to compute, about ")
+    assert not Foreseen.of(usual, store).short
+    assert Foreseen.of(search, store).text.startswith("first-yield: about 24 runs to compute, ")
+    assert Foreseen.of(fake_study(), store) == Foreseen("fake: 4 runs to compute")
+    remember(store, list(tour.run_ids()), [(5_000, 11, 1.0)] * 4, keep="fields")
+    assert Foreseen.of(tour, store).text == ""
+
+
+@pytest.mark.processes
+def test_make_run_computes_first_what_takes_seconds(store: Store) -> None:
+    command = ["make", "--dry-run", "--assume-old", "setup", "run"]
+    asked = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    first, *_ = re.findall(r"residua run (\S+\.toml)", asked)
+    told = estimate(Study.from_toml(ROOT / first), store).cpu_seconds
+    assert told is not None and told[1] < 10
 
 
 def test_runs_that_cannot_be_set_up_cost_nothing_and_are_refused_if_all_are(store: Store) -> None:

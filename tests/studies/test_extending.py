@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from studies import Store, Study, StudyError
+from studies import Store, Study, StudyError, run_study
 from studies.definition.files import read_study
 from studies.kinds.goal.search import Goal
 from tests.studies.conftest import compute_here
@@ -176,3 +177,28 @@ def test_a_scene_is_beside_the_first_of_three_study_files(tmp_path: Path) -> Non
     (tmp_path / "c.toml").write_text('name = "c"\nextends = "one/b.toml"\n')
     content = read_study(tmp_path / "c.toml")
     assert content["extends"]["extends"]["scene"] == "one/two/pin.toml"
+
+
+def test_two_studies_of_two_directories_become_one_without_computing(tmp_path: Path) -> None:
+    """As docs/howto/points.md says."""
+    content = [
+        {"name": name, "scene": "fake", "sweep": {"load_ratio": values}}
+        for name, values in (("a", [0.3, 0.5]), ("b", [0.7]))
+    ]
+    stores = [Store(tmp_path / each["name"]) for each in content]
+    for each, store in zip(content, stores, strict=True):
+        run_study(Study.from_dict(each), store, workers=0)
+    for file in (stores[1].directory / "runs").glob("*.nc"):
+        shutil.copy(file, stores[0].directory / "runs")
+    both = {"name": "both", "extends": content[0], "sweep": content[1]["sweep"]}
+    found = run_study(Study.from_dict(both), stores[0], workers=0)
+    assert found.ok and not found.computed and found.counts == {"ok": 3}
+
+
+def test_all_mistakes_of_a_study_that_extends_another_are_reported_at_once() -> None:
+    base = {"name": "a", "scene": "fake", "sweep": {"load_ratio": [0.3]}}
+    wrong = {"parameters": {"friction": 0.1}, "sweep": {"load_ratio": [-1]}, "tags": ["a b"]}
+    with pytest.raises(StudyError) as caught:
+        Study.from_dict({"name": "b", "extends": base, **wrong})
+    fields = {each.field for each in caught.value.each}
+    assert fields == {"parameters", "sweep.load_ratio[0]", "tags[0]"}

@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+from solver.errors import ModelError
+from solver.files import number_of
+from solver.rolling.rail.profiles.points import read_points
 from solver.shipped import SCENES
 from studies import Study
 from studies.definition.parameters import parameters_of
@@ -120,3 +123,30 @@ def test_an_error_at_a_profile_is_short() -> None:
     with pytest.raises(StudyError, match="must be 0 without friction") as caught:
         Study.from_dict(content)
     assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize("cell", ["\u0666.5", "1_000"])
+def test_digits_of_files_are_those_of_toml_and_json(tmp_path: Path, cell: str) -> None:
+    with pytest.raises(ValueError, match="could not convert"):
+        number_of(cell)
+    (tmp_path / "p.csv").write_text(f"{cell},0\n" + "".join(f"{z},0\n" for z in range(9)))
+    with pytest.raises(ModelError, match="line 1 is"):
+        read_points(tmp_path / "p.csv")
+
+
+def test_whole_numbers_of_tables_may_have_a_decimal_point(tmp_path: Path) -> None:
+    for cell, told in (("2.0", None), ("2.5", r"passes = '2.5': must be an integer")):
+        (tmp_path / "t.csv").write_text(f"passes,friction\n{cell},0.1\n")
+        path = tmp_path / "study.toml"
+        path.write_text('name = "p"\nscene = "rolling"\n[points]\nfile = "t.csv"\n')
+        if told is None:
+            (case,) = Study.from_toml(path).cases()
+            assert case.values["passes"] == 2 and isinstance(case.values["passes"], int)
+        else:
+            with pytest.raises(StudyError, match=told):
+                Study.from_toml(path)
+
+
+def test_an_unknown_word_says_where_own_words_come_from() -> None:
+    with pytest.raises(StudyError, match=r"a word of your own needs its file in .* RESIDUA_PARTS"):
+        Study.from_dict({"name": "p", "scene": "punch", "parameters": {"hardening": "swift"}})

@@ -36,7 +36,7 @@ def test_a_range_of_a_parameter_that_counts_has_whole_numbers() -> None:
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        ({"start": 0.0, "stop": 0.4}, "sweep.friction.num = None: must be given"),
+        ({"start": 0.0, "stop": 0.4}, "sweep.friction.num: must be given"),
         (
             {"start": 0.0, "stop": 0.4, "num": 5, "step": 1},
             "sweep.friction.step = 1: there is no such entry",

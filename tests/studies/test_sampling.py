@@ -152,7 +152,7 @@ def test_a_wrong_sample_is_refused_in_one_line(
 
 @pytest.mark.parametrize("sample", [[{"friction": 0.1}], "lhs", None])
 def test_what_is_no_table_is_no_sample(sample: Any) -> None:
-    with pytest.raises(StudyError, match=r"sample = .*must be a table"):
+    with pytest.raises(StudyError, match=r"sample.*: must be a table"):
         study(sample)
-    with pytest.raises(StudyError, match=r"sample\.method = None: must be given"):
+    with pytest.raises(StudyError, match=r"sample\.method: must be given"):
         study({"num": 4, "ranges": {"friction": [0.0, 0.5]}})

@@ -84,8 +84,9 @@ def test_all_mistakes_of_a_study_are_reported_at_once() -> None:
     assert [each.field for each in error.each] == [
         "name", "parameters.frictoin", "parameters.half_width", "sweep.load_ratio[1]",
         "sweep.load_ratio[2]", "sweep.friction.stop", "sweep.friction.num",
-        "sweep.steel.hard.yield_strain", "tags[1]", "peace", "fit.ranges.load_step",
-        "fit.measured[0].values", "fit.measured[1].of", "fit.measured[1].values", "fit.most",
+        "sweep.steel.soft.yield_stress", "sweep.steel.hard.yield_strain", "tags[1]", "peace",
+        "fit.ranges.load_step", "fit.measured[0].values", "fit.measured[1].of",
+        "fit.measured[1].values", "fit.most",
     ]  # fmt: skip
     assert [each.value for each in error.each][:3] == ["no name", 0.1, "20 MPa"]
     assert str(error).count("\n") == len(error.each) - 1

@@ -105,12 +105,12 @@ def test_bad_input_names_field_value_and_what_is_allowed(
         (
             "punch",
             {"parameters": {"half_width": -1}},
-            "parameters.half_width = -1.0: must be a finite number > 0 and <= 1e+06 [mm]",
+            "parameters.half_width = -1: must be a finite number > 0 and <= 1e+06 [mm]",
         ),
         (
             "punch",
             {"sweep": {"friction": [0.1, 11], "hardening": ["none", "mixed"]}},
-            "sweep.friction[1] = 11.0: must be a finite number >= 0 and <= 10",
+            "sweep.friction[1] = 11: must be a finite number >= 0 and <= 10",
         ),
         (
             "punch",
@@ -121,8 +121,7 @@ def test_bad_input_names_field_value_and_what_is_allowed(
         (
             "rolling",
             {"sweep": {"passes": [1, 2], "wheel": {"a": {"traction": 1}, "b": {"traction": 2}}}},
-            "sweep.wheel.b.traction = 2.0: must be a finite number >= -0.99 and <= 1, "
-            "where wheel = b",
+            "sweep.wheel.b.traction = 2: must be a finite number >= -0.99 and <= 1",
         ),
         (
             "rolling",
@@ -138,14 +137,6 @@ def test_what_a_scene_refuses_is_told_in_the_words_of_the_study(
     with pytest.raises(StudyError) as caught:
         Study.from_dict({"name": "wrong", "scene": scene} | content)
     assert str(caught.value) == told
-
-
-def test_the_scene_alone_decides_what_a_value_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tests.studies.fakes.check_ranges", lambda parameters: None)
-    (case,) = Study.from_dict(
-        {"name": "free", "scene": "fake", "parameters": {"points": 1}}
-    ).cases()
-    assert case.parameters.points == 1
 
 
 def many(runs: int) -> dict[str, Any]:
@@ -411,11 +402,11 @@ def test_a_swept_parameter_that_changes_nothing_is_refused(
 
 def test_all_known_mistakes_of_a_study_are_told_in_other_processes_too() -> None:
     idle = {"saturation": 20.0, "isotropic_fraction": 0.3, "hardening_ratio": 0.05}
-    sweep = {"load_ratio": [0.5, 20.0], "friction": [0.1, 0.95, 0.97]}
+    sweep = {"load_ratio": [0.5, 20.0], "friction": [0.1, -0.95]}
     refused = {"name": "no", "scene": "fake", "parameters": {"state": "plane_strain"}}
     for content, fields in (
         ({"name": "idle", "scene": "punch", "parameters": idle}, [f"parameters.{n}" for n in idle]),
-        (refused | {"sweep": sweep}, ["sweep.friction[1]", "sweep.load_ratio[1]"]),
+        (refused | {"sweep": sweep}, ["sweep.load_ratio[1]", "sweep.friction[1]"]),
     ):
         with pytest.raises(StudyError) as told:
             Study.from_dict(content)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from solver import ModelError, Record
-from solver.errors import NoContact, NotConverged, WindowTooSmall
+from solver.errors import NoContact, NotConverged, Runaway, WindowTooSmall
 from solver.results.record import Status
 from solver.rolling import search
 from solver.rolling.scenes import rail_passes as prism_passes
@@ -83,16 +83,29 @@ def test_easier_passes_lead_to_one_that_newtons_method_does_not_find(
     assert record.scalars["audit_reactions"] < 1e-6
 
 
-def test_where_no_contact_is_found_at_the_corner_a_finer_accuracy_is_advised(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(
+    ("error", "friction", "remedy"),
+    [
+        (NoContact("no contact forces were found"), 0.17, "choose a finer accuracy"),
+        (NoContact("no contact forces were found"), 0.4, "of 290 MPa: set shear_limit = 1"),
+        (Runaway("plastic strain grows"), 0.4, "lower load or traction"),
+        (WindowTooSmall("too small"), 0.4, "lower the load"),
+    ],
+)
+def test_a_pass_that_is_not_found_names_the_one_remedy_of_its_reason(
+    monkeypatch: pytest.MonkeyPatch, error: NotConverged, friction: float, remedy: str
 ) -> None:
+    """With friction 0.4 at 2 mm no mesh has a contact, and with this limit there is one."""
+
     def lost(*given: object, **settings: object) -> None:
-        raise NoContact("no contact forces were found")
+        raise error
 
     monkeypatch.setattr(search, "passing", lost)
-    (record,) = SCENE.path(SCENE.parameters(**DRAFT), [1], lambda share: None)
+    parameters = SCENE.parameters(**{**DRAFT, "friction": friction})
+    (record,) = SCENE.path(parameters, [1], lambda share: None)
     assert record.status is Status.NOT_CONVERGED
-    assert "choose a finer accuracy, above all at the gauge corner" in record.message
+    assert record.message.startswith(str(error))
+    assert record.message.endswith(remedy) and record.message.count("; ") == 1
 
 
 def test_a_lateral_force_that_no_contact_at_this_position_has_is_told_with_the_least() -> None:
@@ -110,7 +123,7 @@ def test_the_largest_zone_is_told_if_it_is_too_small(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(prism_passes, "search", beyond)
     (record,) = SCENE.path(SCENE.parameters(**DRAFT), [1], lambda share: None)
     assert record.status is Status.NOT_CONVERGED
-    told = r"steady pass, in the largest zone, \d\d.* mm wide and 13.* mm deep; choose a finer acc"
+    told = r"steady pass, in the largest zone, \d\d.* mm wide and 13.* mm deep; lower the load"
     assert re.search(told, record.message)
 
 

@@ -123,5 +123,16 @@ drop?.addEventListener("drop", ({ dataTransfer }) => {
     input.files = list.files;
   }
   drop.open = true;
-  if (post.reportValidity()) post.submit();
+  if (post.reportValidity()) post.requestSubmit();
+});
+// Sent by the script, so that the files stay chosen if they are refused.
+drop?.querySelector("form").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const post = /** @type {HTMLFormElement} */ (event.target);
+  const answer = await fetch(post.action, { method: "POST", body: new FormData(post) });
+  if (answer.redirected && answer.ok) location.assign(answer.url);
+  const text = await answer.text();
+  const said = new DOMParser().parseFromString(text, "text/html").querySelector("[data-drop] [role=alert]");
+  drop.querySelector("[role=alert]")?.remove();
+  drop.append(said ?? element("p", { className: "wrong", role: "alert" }, answer.redirected ? "" : `not taken: ${answer.status} ${answer.statusText}`));
 });

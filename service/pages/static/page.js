@@ -82,7 +82,7 @@ export function choice(label, options, value, chosen) {
   return made;
 }
 
-export const words = (name) => String(name).replaceAll("_", " ");
+export const words = (name) => String(name).replace(/^(peak_\w+)_([sxyz])$/, "$2 of $1").replaceAll("_", " ");
 
 // Four digits, as `number_text` of studies/numbers.py has them.
 export function text(value) {

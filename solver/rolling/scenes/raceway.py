@@ -232,5 +232,4 @@ RACEWAY = rail_scene(
         *late("rolling.scenes.rail_outputs", "cycles"),
         *late("rolling.scenes.raceway_setup", "elastic"),
     ),
-    advice="lower load or traction, or choose another accuracy",
 )

@@ -30,11 +30,11 @@ from solver.rolling.rail.section import Section
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.pass_runner import by_passes
 from solver.rolling.scenes.raceway import BESIDE, RacewayParameters
-from solver.rolling.scenes.rail_outputs import sketched
+from solver.rolling.scenes.rail_outputs import remedies, sketched
 from solver.rolling.scenes.rail_passes import REACHES, RailPasses, RolledPrism
 from solver.rolling.scenes.rail_window import PrismGeometry, split_rows, whole
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
-from solver.scenes.scene import Effort, Method
+from solver.scenes.scene import Advice, Effort, Method
 from solver.scenes.sketch import Sketch
 
 _BLOCK = 32.0
@@ -233,3 +233,8 @@ def effort(parameters: RacewayParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
     own = geometry(parameters)
     return own.effort(section_of(own), passes)
+
+
+def advice(parameters: RacewayParameters) -> Advice:
+    """Return what the user can do."""
+    return remedies(parameters, parameters.ellipse.peak_pressure)

@@ -9,15 +9,19 @@ from typing import Any
 import numpy as np
 import scipy
 
+from solver.errors import NoContact, Runaway, WindowTooSmall
 from solver.materials.law import Law
 from solver.model.friction import PatchStatus
 from solver.results.cycles import shakedown
 from solver.results.quantities import declare
+from solver.results.record import Status
 from solver.results.run import FinishedRun, Values
 from solver.results.shakedown import ShakedownState
 from solver.rolling.rail.section import Section
 from solver.rolling.scenes.passes import mean_added, passes, shakedown_of
+from solver.rolling.scenes.rail_scene import PrismParameters
 from solver.rolling.scenes.rolling_setup import CREEPAGE, LONGITUDINAL_FORCE
+from solver.scenes.scene import Advice
 from solver.scenes.sketch import Sketch
 from solver.typing import Array
 
@@ -167,6 +171,25 @@ def section(run: FinishedRun) -> Values:
         MOST_STRAINED_Z: float(X[2, accumulated.argmax()]) if len(yielded) else np.nan,
         LEAST_YIELDED_DEPTH: float(yielded.min()) if len(yielded) else np.nan,
         MOST_YIELDED_DEPTH: float(yielded.max()) if len(yielded) else np.nan,
+    }
+
+
+def remedies(parameters: PrismParameters, pressure: float) -> Advice:
+    """Return what the user can do, given the peak pressure of the elastic contact [MPa].
+
+    Where friction carries more shear than the body does, it flows at its surface: no contact is
+    found on any mesh.
+    """
+    strength, friction = parameters.material().shear_yield_stress, parameters.friction
+    beyond = not getattr(parameters, "shear_limit", 0.0) and friction * pressure > strength
+    shear = f"friction would carry {friction * pressure:.0f} MPa, more than the shear yield stress"
+    accuracy = "choose a finer accuracy"
+    return {
+        Status.LIMIT_LOAD: "lower load or traction, or let the material harden",
+        Runaway: "lower load or traction",
+        WindowTooSmall: "lower the load",
+        NoContact: f"{shear} of {strength:.0f} MPa: set shear_limit = 1" if beyond else accuracy,
+        Status.NOT_CONVERGED: accuracy,
     }
 
 

@@ -11,7 +11,6 @@ from annotated_types import Interval, Unit
 from solver.late import Late, late
 from solver.model.friction import coefficient
 from solver.parameters import Fraction, Other, described
-from solver.results.record import Status
 from solver.rolling.load import FULL_SLIP, RollingLoad
 from solver.rolling.scenes.wheel_parameters import WheelParameters
 from solver.scenes.scene import Scene
@@ -63,7 +62,6 @@ class PrismParameters(WheelParameters):
 
 def rail_scene(
     name: str, summary: str, parameters: type[Any], *, geometry: Late, outputs: tuple[Late, ...],
-    advice: str,
 ) -> Scene:  # fmt: skip
     """Return a scene whose set-up is in ``NAME_setup``.
 
@@ -71,10 +69,9 @@ def rail_scene(
     ----------
     geometry : (parameters) -> what the set-up depends on
     outputs : further ones, after maps, profiles, extremes, the contact patch and the section
-    advice : what to do if a pass does not converge
     """
-    method, view, sketch, effort = late(
-        f"rolling.scenes.{name}_setup", "method", "view", "sketch", "effort"
+    method, view, sketch, effort, advice = late(
+        f"rolling.scenes.{name}_setup", "method", "view", "sketch", "effort", "advice"
     )
     return Scene(
         name=name,
@@ -95,8 +92,5 @@ def rail_scene(
         warnings=late("rolling.scenes.rail_outputs", "undecided")[0],
         effort=effort,
         setup=geometry,
-        advice={
-            Status.LIMIT_LOAD: "lower load or traction, or let the material harden",
-            Status.NOT_CONVERGED: advice,
-        },
+        advice=advice,
     )

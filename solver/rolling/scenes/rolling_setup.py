@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.errors import Runaway, WindowTooSmall
 from solver.loading.program import Program, StepRefinement
 from solver.mesh.lines import cells
 from solver.results.cycles import shakedown
@@ -22,7 +23,7 @@ from solver.rolling.scenes.passes import Trace, passes, profiles, shakedown_of
 from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import by_steady_passes
 from solver.scenes.driver import by_increments
-from solver.scenes.scene import Method
+from solver.scenes.scene import Advice, Method
 from solver.typing import Array
 
 CREEPAGE = declare("creepage", "creepage of the last pass")
@@ -214,14 +215,15 @@ def warnings(run: FinishedRun) -> tuple[str, ...]:
     )
 
 
-def advice(parameters: RollingParameters) -> dict[Status, str]:
-    """Return what the user can do by status; on an endless track nothing advances by steps."""
-    refined = "refine the mesh by element_size or growth"
+def advice(parameters: RollingParameters) -> Advice:
+    """Return what the user can do; on an endless track nothing advances by steps."""
     return {
         Status.LIMIT_LOAD: "lower load_ratio or traction, or let the material harden",
-        Status.NOT_CONVERGED: f"{refined}, or lower load_ratio or traction"
+        Runaway: "lower load_ratio or traction",
+        WindowTooSmall: "lower load_ratio",
+        Status.NOT_CONVERGED: "refine the mesh by element_size"
         if parameters.endless
-        else f"reduce advance_step, or {refined}",
+        else "reduce advance_step",
     }
 
 

@@ -290,6 +290,4 @@ WHEEL_RAIL = rail_scene(
     WheelRailParameters,
     geometry=_geometry,
     outputs=late("rolling.scenes.wheel_rail_setup", "traffic", "wheel"),
-    advice="choose a finer accuracy, above all at the gauge corner, or another "
-    "position; or lower load or traction",
 )

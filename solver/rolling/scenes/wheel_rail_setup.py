@@ -15,13 +15,13 @@ from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.pass_runner import by_passes
-from solver.rolling.scenes.rail_outputs import cycles, sketched
+from solver.rolling.scenes.rail_outputs import cycles, remedies, sketched
 from solver.rolling.scenes.rail_passes import REACHES, RailPasses, RolledPrism
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
 from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
 from solver.rolling.scenes.wheel_rail_track import geometry, meshed, stressed_track
-from solver.scenes.scene import Effort, Method
+from solver.scenes.scene import Advice, Effort, Method
 from solver.scenes.sketch import Sketch
 from solver.typing import Array
 
@@ -139,3 +139,9 @@ def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
     own, turns = geometry(parameters), len({id(each) for each in parameters.block})
     return own.effort(meshed(parameters, own), passes, turns, scattered=parameters.scattered)
+
+
+def advice(parameters: WheelRailParameters) -> Advice:
+    """Return what the user can do."""
+    contact = expected_contact(parameters)
+    return remedies(parameters, 1.5 * parameters.load / (np.pi * contact.widest * contact.along))

@@ -18,6 +18,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, GetJsonSchemaHandler, PlainValidator, ValidationInfo, model_validator
 
+from solver.files import number_of
 from solver.scenes import Scene
 from solver.typing import Array
 from studies.definition.parameters import in_unit
@@ -238,8 +239,8 @@ def _columns(rows: Any, scene: Scene) -> dict[str, Any]:
 
 def _number(heading: str, text: Any) -> float:
     try:
-        return float(text)
-    except (TypeError, ValueError):
+        return number_of(text)
+    except (AttributeError, ValueError):
         raise StudyError(heading, text, "must be a number in every row") from None
 
 

@@ -65,6 +65,9 @@ _PARTS = 4
 """Parts into which a round of a loading path divides the bracket."""
 _STEPS = 3
 """Steps of a search that began where its goal was expected, before it halves what is left."""
+_ALONE, _NEAR = 3, 3
+"""Number of searches that are expected to halve their whole bracket; runs of each of the others,
+which begin where their neighbours let expect the goal, and of interpolation besides both ends."""
 _ROUNDING = 1.0001
 """Factor on the width of a narrow bracket, whose ends are rounded."""
 _SLACK = 1
@@ -274,6 +277,14 @@ class Goal(Kind):
     def most_runs(self, places: int) -> int:
         """Return the most runs of the searches at so many places."""
         return places * self.most[1]
+
+    def usual_runs(self, places: int) -> int:
+        """Return the runs that are expected: few where neighbours or interpolation say where."""
+        most = self.most[1]
+        if self.halves:
+            each = most - _STEPS - 1
+            return places * each if places <= _ALONE else _ALONE * each + (places - _ALONE) * _NEAR
+        return places * (min(most, _NEAR + 2) if self.kind == "at" and self.parts == 2 else most)
 
     def stage(self, places: int, ended: int, told: str) -> str:
         """Return how many searches have ended."""

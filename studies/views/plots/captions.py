@@ -10,19 +10,21 @@ from typing import Any
 import xarray as xr
 
 from solver.errors import ModelError
+from solver.parameters import unmet
 from solver.tensors import AXES
-from studies.definition.parameters import defaults, parameters_of, plain
+from studies.definition.parameters import build, defaults, parameters_of, plain
 from studies.numbers import number_text
 from studies.scenes.registry import scene_of
 from studies.storage.frame import FRACTION
 from studies.views.columns import counted
+from studies.views.columns import plain as in_words
 
 _STAY = "\N{NO-BREAK SPACE}"
 
 
 def words(identifier: str) -> str:
     """Return an identifier in words."""
-    return identifier.replace("_", " ")
+    return in_words(identifier)
 
 
 def value_text(coordinate: xr.DataArray) -> str:
@@ -103,6 +105,7 @@ def setting(run: xr.Dataset) -> str:
     known = parameters_of(scene_of(run.attrs))
     given: Mapping[str, Any] = json.loads(run.attrs["parameters"])
     usual = _usual(run, given)
+    idle = _idle(run, given)
     plane = given.get("state")
     state = [words(plane)] if isinstance(plane, str) and "state" not in run.coords else []
     place = [
@@ -112,18 +115,31 @@ def setting(run: xr.Dataset) -> str:
             each.attrs.get("units", ""),
         )
         for name, each in run.coords.items()
-        if each.ndim == 0 and not str(name).endswith(FRACTION)
+        if each.ndim == 0 and not str(name).endswith(FRACTION) and name not in idle
     ]
     others = [
         named(name, value, known[name].unit)
         for name, value in given.items()
         if name in known
-        and name not in run.coords
+        and name not in {*run.coords, *idle}
         and value not in (None, usual[name])
         and not (state and name == "state")
     ]
     parts = [scene, *state, *place, *others]
     return f"{_STAY}· ".join(part.replace(" ", _STAY) for part in parts)
+
+
+def _idle(run: xr.Dataset, given: Mapping[str, Any]) -> set[str]:
+    """Return the parameters that change nothing in a run, such as a load ratio beside a force."""
+    scene = scene_of(run.attrs)
+    own = {str(name): each.item() for name, each in run.coords.items() if each.ndim == 0}
+    known = parameters_of(scene)
+    values = {name: value for name, value in {**given, **own}.items() if name in known}
+    try:
+        parameters = build(scene, {k: plain(v, known[k].default) for k, v in values.items()})
+    except ModelError:  # consistent only with values that differ between the runs
+        return set()
+    return {name for name in known if unmet(parameters, name)}
 
 
 def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -26,6 +26,13 @@ REPEATED = ("cycle", "pass")
 """Dimensions of numbers that are lines over them where one run is drawn."""
 _STRAIGHT = 1e-9
 """Largest height of a line along x, over its length."""
+_LEVELS = (
+    "highest_mises", "peak_contact_pressure", "peak_patch_pressure", "hertz_pressure",
+    "contact_pressure", "patch_pressure", "map_mises", "map_stress",
+)  # fmt: skip
+"""Stresses under load; the largest value of the first that a run has is its level."""
+_ROUNDING, _NO_STRESS = 1e-6, 1e-3
+"""Share of the level of a run up to which stress is rounding; without a level, stress [MPa]."""
 _DECAYED = 0.02
 """Depth is shown as far as values exceed this share of the peak."""
 OUTLINE = "outline"
@@ -114,6 +121,26 @@ def placed(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
         if np.nanmax(np.ptp(y.to_numpy(), axis=-1), initial=0.0) <= _STRAIGHT * size:
             distance = x.assign_attrs(long_name="position x along the slave")
     return values.assign_coords({DISTANCE: distance})
+
+
+def floor_of(values: xr.DataArray, run: xr.Dataset) -> float:
+    """Return the stress up to which it is rounding [MPa]; of other quantities 0."""
+    if values.attrs.get("units") != "MPa":
+        return 0.0
+    known = (float(abs(run[name]).max()) for name in _LEVELS if name in run)
+    return next((_ROUNDING * level for level in known if level > 0.0), _NO_STRESS)
+
+
+def without_rounding(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
+    """Return values, zeros where all of them are rounding."""
+    if not (floor := floor_of(values, run)) or not float(abs(values).max()) <= floor:
+        return values
+    return xr.zeros_like(values).where(values.notnull()).assign_attrs(values.attrs)
+
+
+def none_of(values: xr.DataArray) -> str:
+    """Return the sentence that a quantity is zero everywhere."""
+    return f"No {values.attrs.get('long_name', values.name)}: it is zero everywhere."
 
 
 def depth_shown(values: xr.DataArray, others: Sequence[Hashable]) -> int:

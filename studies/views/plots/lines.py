@@ -27,8 +27,10 @@ from studies.views.plots.fields import (
     focus,
     line_axis,
     line_fields,
+    none_of,
     placed,
     too_close,
+    without_rounding,
 )
 from studies.views.plots.mapped import STAGE
 from studies.views.plots.maps import entitle
@@ -126,6 +128,11 @@ def line_figure(
                     markersize=4.0,
                 )
                 _mark_stages(axes, run, line, at)
+    if values.attrs.get("units") == "MPa" and not (values.fillna(0.0) != 0.0).any():
+        axes.set_ylim(-1.0, 1.0)
+        axes.annotate(
+            none_of(values), (0.5, 0.55), xycoords="axes fraction", ha="center", color="0.3"
+        )
     axes.axhline(0.0, color="0.35", linewidth=0.8, zorder=0)
     if against is not None and against == DIAGRAM.get(field):
         _draw_limit(axes, run, against)
@@ -198,7 +205,7 @@ def _drawn(
         values = values.dropna(name, how="all")
     if not values.size:
         raise StudyError("field", field, "has no value in the run selected")
-    sizes = values.sizes
+    values, sizes = without_rounding(values, run), values.sizes
     if own is not None:
         for name in values.dims:
             if name not in (along, own):

@@ -25,8 +25,10 @@ from studies.views.plots.fields import (
     is_signed,
     map_axes,
     map_fields,
+    none_of,
     too_close,
     usual_field,
+    without_rounding,
 )
 
 STATUS = "patch_status"
@@ -41,8 +43,6 @@ sharp corner stress is unbounded."""
 
 _SIGNED = 0.1
 """Ratio of the lowest value of a number to the highest; below minus this it has both signs."""
-_NOTHING = 1e-3
-"""Stress up to which it is rounding [MPa]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,6 +83,7 @@ def mapped(
     field = field or usual_field(run)
     check_field(field, map_fields(run))
     values = _at_stage(component_of(run[field], component), stage)
+    values = without_rounding(values, run)
     across, up = map_axes(values)
     values = values.isel({name: -1 for name in values.dims if name not in (up, across)})
     if zoom is not None:
@@ -97,7 +98,7 @@ def mapped(
     signed = is_signed(component_name(values)) or bool(values.min() < -_SIGNED * values.max())
     known = np.isfinite(values.to_numpy())
     there, area = values.to_numpy()[known], _areas(values)[known]
-    high, note = limit(there, area, signed, str(values.attrs.get("units", "1")))
+    high, note = limit(there, area, signed, values)
     return Mapped(values=values, signed=signed, high=high, note=note)
 
 
@@ -161,19 +162,18 @@ def _inside(values: xr.DataArray, window: Window, nothing: StudyError) -> xr.Dat
     return part
 
 
-def limit(there: np.ndarray, area: np.ndarray, signed: bool, unit: str) -> tuple[float, str]:
+def limit(there: np.ndarray, area: np.ndarray, signed: bool, of: xr.DataArray) -> tuple[float, str]:
     """Return the largest value of the colours, and a note on values beyond it.
 
     Parameters
     ----------
     there : (n,) finite values
     area : (n,) of each of them
+    of : the quantity, with its unit
     """
-    size = np.abs(there) if signed else there
+    size, unit = np.abs(there) if signed else there, str(of.attrs.get("units", "1"))
     if not size.size or not size.max() > 0.0:
-        return 1.0, ""
-    if unit == "MPa" and size.max() < _NOTHING:
-        return 1.0, f"No value is larger than {_NOTHING:g} MPa."
+        return 1.0, none_of(of) if unit == "MPa" else ""
     high = _percentile(size[size > 0.0], area[size > 0.0])
     if size.max() <= _WORTHWHILE * high:
         return float(size.max()), ""

@@ -24,6 +24,7 @@ from studies.views.plots.fields import (
     is_odd,
     is_signed,
     too_close,
+    without_rounding,
 )
 from studies.views.plots.mapped import STAGE, Mapped, limit
 from studies.views.solution import keeps, read
@@ -91,6 +92,7 @@ def on_mesh(
     fields = read(run)
     at = _stage_of(fields, field, stage)
     values, tensor = _values(run, fields.stages[at], field, component)
+    values = without_rounding(values, run)
     if field not in _AT_THE_END:
         values = values.assign_coords({STAGE: at})
     moved = fields.stages[at]["displacement"]
@@ -119,8 +121,7 @@ def on_mesh(
     area = np.zeros(X.shape[1])
     np.add.at(area, triangles[shown], _areas(X, triangles[shown])[:, None] / 3.0)
     signed = is_signed(name)
-    unit = str(values.attrs.get("units", "1"))
-    most, note = limit(numbers[inside], area[inside], signed, unit)
+    most, note = limit(numbers[inside], area[inside], signed, values)
     if deformed:
         note = f"Displacements are drawn {deformed:g} times as large. {note}".rstrip()
     return MappedMesh(

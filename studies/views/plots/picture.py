@@ -14,6 +14,7 @@ from studies.kinds.kind import Kind
 from studies.views.picking import (
     file_of,
     one_run,
+    point_axes,
     positions,
     runs_over,
     select,
@@ -37,6 +38,7 @@ from studies.views.plots.lines import line_figure
 from studies.views.plots.mapped import STAGE
 from studies.views.plots.maps import map_figure
 from studies.views.plots.meshed import MESH_MAPS, mesh_maps
+from studies.views.plots.runs import number_over
 from studies.views.plots.sheets import png, resolved
 from studies.views.plots.sweep import sweep_figure
 from studies.views.reading import find_study, open_netcdf
@@ -113,10 +115,15 @@ def picture(
         else:
             _refuse({"deformed": deformed}, f"{field} is no map: leave it out")
             own = _own(dataset, field)
-            axis = None if over in own else over
-            if axis is not None and axis not in (known := sweep_axes(dataset)):
-                raise StudyError("over", axis, one_of(axis, [*known, *own]))
+            swept = sweep_coordinates(dataset)
+            axis = None if over in own or over is None else swept.get(over)
+            if axis is None and over not in (None, *own):
+                raise StudyError("over", over, one_of(over, [*swept, *own]))
             part = _part(dataset, field, selection or {}, axis, against)
+            if axis is not None:  # colours are those of a parameter, not of numbers of points
+                if over in point_axes(dataset):
+                    over = str(number_over(part, axis).name)
+                part = part if over == axis else part.swap_dims({axis: over})
             figure = line_figure(part, field, component, zoom, over, window, against)
     return resolved(figure, resolution)
 

@@ -76,7 +76,7 @@ def standing(dataset: xr.Dataset) -> tuple[list[xr.DataArray], list[xr.DataArray
     """
     several = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
     planes = {axis: names for axis in point_axes(dataset) if (names := plane_of(dataset, axis))}
-    every = [_standing(dataset, axis) for axis in several if axis not in planes]
+    every = [number_over(dataset, axis) for axis in several if axis not in planes]
     numbers = sorted((each for each in every if each.dtype.kind in "fiu"), key=_rank)
     both = [dataset[name] for names in planes.values() for name in names]
     return both + numbers, [each for each in every if each.dtype.kind not in "fiu"]
@@ -91,7 +91,7 @@ def plane_of(dataset: xr.Dataset, axis: str) -> list[str]:
     )
 
 
-def _standing(dataset: xr.Dataset, axis: str) -> xr.DataArray:
+def number_over(dataset: xr.Dataset, axis: str) -> xr.DataArray:
     """Return the first number that has different values at all points of an axis, or the axis.
 
     Where words differ too, a number would not tell what the points are.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from studies.views.plots.acting import acting, draw_acting, draw_supports, outwa
 from studies.views.plots.captions import capitalised, named, words, wrapped
 from studies.views.plots.fields import Window, empty_window
 from studies.views.plots.meshed import Array, Box
+from studies.views.plots.sheets import STYLES
 
 _PANEL, _LEGEND = (4.4, 5.4), 3.3
 """Largest width and height of a panel; width of a column of the legend [in]."""
@@ -39,8 +41,8 @@ _LINES = 40
 """Lines of text in a column of the legend, about."""
 _FILLS = ("#dfe8f3", "#f6ead7", "#e2efdd", "#f1dfe9", "#e8e8e8")
 _PAIRS = ("#d62728", "#1f77b4", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2")
-_RESULTS = "#7b3fa0"
-_LINKED = "#0f766e"
+_RESULTS, _POINTS = "#7b3fa0", "PXD*o^"
+_LINKED = ("#0f766e", "#7a5c00", "#1e3a8a", "#9d174d", "#3f6212", "#5b21b6")
 _MARGIN, _WORTHWHILE = 0.1, 0.35
 """Frame around what is drawn, over its larger side; largest ratio of the sides of the close-up to
 those of the whole for a second panel."""
@@ -311,8 +313,8 @@ def _draw(
             _label(axes, ends, name, inch, taken, outside=thin)
         handles |= _draw_removed(axes, body)
         handles |= draw_supports(axes, body, inch, shown.own.springs.get(body.name, ()))
-    for link in shown.links:
-        handles |= _draw_link(axes, shown.own.bodies, link)
+    for link, colour in zip(shown.links, cycle(_LINKED), strict=False):
+        handles |= _draw_link(axes, shown.own.bodies, link, colour)
     for each in acting(shown.own.bodies, shown.rigid):
         handles |= draw_acting(axes, each, inch)
     if shown.middle:
@@ -323,7 +325,7 @@ def _draw(
     return handles | _draw_results(axes, view, places)
 
 
-def _draw_link(axes: Axes, bodies: Sequence[Body], link: Link) -> dict[str, Any]:
+def _draw_link(axes: Axes, bodies: Sequence[Body], link: Link, colour: str) -> dict[str, Any]:
     """Draw the boundaries of a link; return its entry of the legend."""
     known = {body.name: body for body in bodies}
     sides = [side for side in (link.slave, link.master) if side is not None]
@@ -331,12 +333,12 @@ def _draw_link(axes: Axes, bodies: Sequence[Body], link: Link) -> dict[str, Any]
         if name in known:
             lines = _polylines(known[name].mesh, known[name].facets(boundary))
             pieces = list(lines.transpose(2, 1, 0))
-            axes.add_collection(LineCollection(pieces, colors=_LINKED, linewidths=2.4))
+            axes.add_collection(LineCollection(pieces, colors=colour, linewidths=2.4))
     kind = "springs" if math.isfinite(link.stiffness) else "link"
     last = link.rigid or ("ground" if link.grounded else "")
     ends = " – ".join([*(".".join(side) for side in sides), *([last] if last else [])])
     text = f"{kind} {link.components}: {ends}"
-    return {text: Line2D([], [], color=_LINKED, linewidth=2.4)}
+    return {text: Line2D([], [], color=colour, linewidth=2.4)}
 
 
 def _striped(lines: Array, colours: Sequence[str]) -> list[str]:
@@ -480,10 +482,11 @@ def _draw_results(axes: Axes, view: View, places: NamedPlaces | None) -> dict[st
             axes.plot(*profile, color=_RESULTS, linewidth=1.0, linestyle=":")
         text = f"profiles, {typeset_number(view.depth.max())} mm deep"
         handles[text] = Line2D([], [], color=_RESULTS, linewidth=1.0, linestyle=":")
-    for name, line in (places.lines if places else {}).items():
-        axes.plot(*line.X[:2], color=_RESULTS, linewidth=1.3)
-        handles[f"line {name}"] = Line2D([], [], color=_RESULTS, linewidth=1.3)
-    for name, point in (places.points if places else {}).items():
-        axes.plot(*point.X[:2], color=_RESULTS, marker="P", linestyle="none")
-        handles[f"point {name}"] = Line2D([], [], color=_RESULTS, marker="P", linestyle="none")
+    lines, points = (places.lines, places.points) if places else ({}, {})
+    for (name, line), dashes in zip(lines.items(), cycle(STYLES), strict=False):
+        axes.plot(*line.X[:2], color=_RESULTS, linewidth=1.3, linestyle=dashes)
+        handles[f"line {name}"] = Line2D([], [], color=_RESULTS, linewidth=1.3, linestyle=dashes)
+    for (name, point), marker in zip(points.items(), cycle(_POINTS), strict=False):
+        axes.plot(*point.X[:2], color=_RESULTS, marker=marker, linestyle="none")
+        handles[f"point {name}"] = Line2D([], [], color=_RESULTS, marker=marker, linestyle="none")
     return handles

@@ -31,6 +31,7 @@ from studies.views.plots.captions import (
     value_text,
     words,
 )
+from studies.views.plots.fields import without_rounding
 from studies.views.plots.limits import draw_shakedown_limits
 from studies.views.plots.runs import (
     POINTS,
@@ -106,6 +107,7 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
     StudyError
         if nothing is swept, more than `MOST_PANELS` panels would be drawn, or no run has a value
     """
+    dataset = dataset.assign({field: without_rounding(dataset[field], dataset)})
     for axis in point_axes(dataset):
         varied = parameters_over(dataset, axis)
         if len(varied) < 2:

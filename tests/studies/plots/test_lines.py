@@ -14,6 +14,7 @@ from residua.cli import main
 from studies import Store, Study, StudyError, open_study
 from studies.views.plots.lines import line_figure
 from studies.views.plots.picture import picture
+from tests.studies.conftest import compute_here
 from tests.studies.plots.test_maps import grid_map, texts_of
 from tests.studies.rolled import data_set, written
 
@@ -169,3 +170,16 @@ def test_a_course_is_drawn_over_increments_and_has_no_zoom() -> None:
     assert np.asarray(line.get_xdata()).tolist() == [0.0, 1.0, 2.0]
     with pytest.raises(StudyError, match="force lies over increment, no length: leave it out"):
         line_figure(run, "force", zoom=1.0)
+
+
+def test_lines_over_points_have_the_colours_of_a_parameter(store: Store) -> None:
+    points = [{"friction": 0.1, "load_ratio": 0.5}, {"friction": 0.3, "load_ratio": 0.4}]
+    study = Study.from_dict({"name": "fake", "scene": "fake", "points": points})
+    compute_here(study, store)
+    with open_study(store.directory) as dataset:
+        for over, name, first in (("point", "load ratio", "0.5"), ("friction", "friction", "0.1")):
+            legend = picture(dataset, "contact_pressure", over=over).axes[0].get_legend()
+            assert legend is not None and legend.get_title().get_text().startswith(name)
+            assert legend.get_texts()[0].get_text().startswith(first)
+        with pytest.raises(StudyError, match=r"over = 'wear': must be one of .*point.*friction"):
+            picture(dataset, "contact_pressure", over="wear")

@@ -18,6 +18,7 @@ from matplotlib.text import Text
 from solver.shipped import SCENES
 from studies import Store, Study, StudyError, open_netcdf, open_study
 from studies.views.plots.captions import setting
+from studies.views.plots.lines import line_figure
 from studies.views.plots.mapped import whole
 from studies.views.plots.maps import map_figure
 from studies.views.plots.picture import picture
@@ -156,7 +157,7 @@ def test_a_map_ends_at_the_outlines_of_the_bodies() -> None:
 def test_a_window_below_the_surface_shows_that_part_alone() -> None:
     run = grid_map(np.arange(9.0), np.arange(-8.0, 1.0), "xx")
     axes, _ = mesh_of(map_figure(run, "quantity", window=(2.0, 6.0, -8.0, -4.0)))
-    assert axes.get_ylim() == (-8.5, -3.5)
+    assert axes.get_ylim() == (-8.0, -4.0)
     assert not axes.lines, "the edge of contact lies outside"
 
 
@@ -259,8 +260,8 @@ def test_what_lies_beyond_the_colours_is_told_as_an_area() -> None:
 def test_a_window_shows_that_part_of_both_halves() -> None:
     run = grid_map(np.arange(20.0) + 0.5, np.arange(-20.0, 0.0), symmetric=True)
     axes, mesh = mesh_of(map_figure(run, "quantity", window=(-3.0, 5.0, -8.0, -2.0)))
-    assert axes.get_xlim() == (-3.0, 5.0)
-    assert axes.get_ylim() == (-8.5, -1.5)
+    assert axes.get_xlim() == (-2.5, 4.5)
+    assert axes.get_ylim() == (-8.0, -2.0)
     assert np.shape(mesh.get_array()) == (7, 8)
     for wrong in [(5.0, -3.0, -8.0, -2.0), (30.0, 40.0, -8.0, -2.0), (0.0, 1.0, -8.0, -2.0)]:
         with pytest.raises(StudyError, match=r"window = .* must be x0 x1 y0 y1"):
@@ -293,7 +294,7 @@ def test_zoom_is_about_the_centre_of_a_contact_computed_whole() -> None:
     for half_width in (6.0, np.nan):
         run["contact_half_width"] = half_width
         axes, _ = mesh_of(map_figure(run, "quantity", zoom=4.0))
-        assert axes.get_xlim() == (-4.5, 4.5)
+        assert axes.get_xlim() == (-4.0, 4.0)
 
 
 def test_zoom_to_an_edge_that_is_not_known_says_what_is_missing() -> None:
@@ -465,10 +466,46 @@ def test_flags_are_named_beside_their_colours() -> None:
     assert {"open", "stick", "slip"} <= set(labels)
 
 
+@pytest.mark.parametrize(("stress", "level", "none"), [(2e-5, 900.0, True), (2e-5, 1e-3, False)])
+def test_stress_below_rounding_of_the_level_is_drawn_as_none(
+    stress: float, level: float, none: bool
+) -> None:
+    run = grid_map(np.arange(9.0), np.arange(-8.0, 1.0), "xx")
+    run["quantity"] = run["quantity"] * 0.0 + stress
+    run["quantity"].attrs |= {"long_name": "residual stress", "units": "MPa"}
+    run["highest_mises"] = ((), level, {"units": "MPa"})
+    sheet = map_figure(run, "quantity")
+    assert ("No residual stress: it is zero everywhere." in texts_of(sheet)) == none
+    _, mesh = mesh_of(sheet)
+    assert bool(np.any(mesh.get_array())) != none
+    line = run.rename(x="s")[["quantity", "highest_mises", "status", "message"]].isel(y=0)
+    drawn = line_figure(line, "quantity").axes[0]
+    assert bool(np.any(drawn.lines[0].get_ydata())) != none
+    assert any("No residual stress" in text.get_text() for text in drawn.texts) == none
+
+
+def test_a_map_of_one_body_is_drawn_between_its_points_and_one_of_two_in_cells() -> None:
+    """Along the border of two bodies stress jumps."""
+    run = grid_map(np.arange(9.0), np.arange(-8.0, 1.0), "xx")
+    for bodies, shading in ((["rail"], "gouraud"), (["punch", "half_plane"], "flat")):
+        _, mesh = mesh_of(map_figure(run.assign_coords(body=bodies), "quantity"))
+        assert mesh._shading == shading
+
+
+def test_a_caption_leaves_out_what_changes_nothing() -> None:
+    given = {"load_by": "force", "load_ratio": 2.5, "force": 8000.0, "friction": 0.1}
+    run = xr.Dataset(
+        coords={"load_ratio": 2.5, "force": 8000.0},
+        attrs={"scene": "raceway", "parameters": json.dumps(given)},
+    )
+    words = setting(run).replace("\N{NO-BREAK SPACE}", " ")
+    assert "force 8000" in words and "load ratio" not in words
+
+
 def test_a_section_is_drawn_with_the_wheel_above_it() -> None:
     axes, _ = mesh_of(map_figure(rolled(), "map_mises"))
     assert names_of(axes) == ["wheel before contact"]
-    assert axes.get_ylim() == (-4.5, 3.0)
+    assert axes.get_ylim() == (-4.0, 3.0)
     below, _ = mesh_of(map_figure(rolled(), "map_mises", window=(-5.0, 5.0, -4.0, -1.0)))
     assert below.get_legend() is None
 

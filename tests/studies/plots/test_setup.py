@@ -18,6 +18,7 @@ from residua.cli import main
 from solver.mesh import grid
 from studies import StudyError
 from studies.scenes.registry import beside, scene_named
+from studies.scenes.scene import read_scene
 from studies.views.plots.acting import outward
 from studies.views.plots.setup import setup_figure
 from tests.studies.plots.test_many import check_inside
@@ -241,3 +242,16 @@ def test_pairs_on_one_boundary_have_their_own_colours_and_removed_regions_are_ha
     (skin,) = (each for each in axes.collections if each.get_hatch())
     assert len(skin.get_paths()) == 2 * 2
     assert "removal block.skin" in [text.get_text() for text in legend.get_texts()]
+
+
+def test_each_link_line_and_point_differs_in_the_legend() -> None:
+    for name in ("bolt", "pin"):
+        sheet = setup_figure(read_scene(DATA / f"{name}.toml"))
+        (legend,) = sheet.legends
+        drawn = zip(legend.legend_handles, legend.get_texts(), strict=True)
+        looks = [
+            (line.get_color(), line.get_linestyle(), line.get_marker())
+            for line, text in drawn
+            if isinstance(line, Line2D) and text.get_text().startswith(("link", "springs", "line "))
+        ]
+        assert len(looks) > 1 and len({*looks}) == len(looks)

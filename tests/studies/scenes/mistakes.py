@@ -345,10 +345,20 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "bodies.upper.mesh",
         "no such file",
     ),
+    "a stage of two words": (
+        put("stages", 0, "name", "o n"),
+        "stages[0].name",
+        "1 to 60 of A-Z a-z 0-9 _, beginning with a letter",
+    ),
+    "a body alone": (
+        put("contacts", 0, "slave", "upper"),
+        "contacts[0].slave",
+        "a boundary of a body, such as punch.bottom",
+    ),
     "mesh elsewhere": (
         put("bodies", "upper", "mesh", "../a.msh"),
         "bodies.upper.mesh",
-        "must match",
+        "must be the name of a file beside the scene file",
     ),
     "stages and loading": (
         put("loading", {"factor": 1.0, "step": 0.1}),

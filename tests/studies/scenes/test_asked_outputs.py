@@ -83,7 +83,7 @@ def test_accuracy_sets_the_numbers_that_are_left_out() -> None:
         ),
         (lambda t: t["accuracy"]["fine"].update(wide=5), "accuracy.fine.wide"),
         (lambda t: t["parameters"]["fine"].update(default=0.1), "accuracy.draft.fine"),
-        (lambda t: t.pop("accuracy"), "parameters.fine.default = None: must be given"),
+        (lambda t: t.pop("accuracy"), "parameters.fine.default: must be given"),
         (
             lambda t: t["parameters"].update(accuracy={"default": "a", "choices": ["a"]}),
             "parameters.accuracy",

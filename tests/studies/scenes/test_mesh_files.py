@@ -182,7 +182,8 @@ def test_a_damaged_gmsh_file_is_refused() -> None:
 @pytest.mark.parametrize(
     ("name", "data", "told"),
     [
-        ("a.msh", b"$MeshFormat\n5 0 8\n$EndMeshFormat\n", "Need mesh format in"),
+        ("a.msh", b"$MeshFormat\n5 0 8\n$EndMeshFormat\n", "save it with Mesh.MshFileVersion"),
+        ("a.msh", b"$NOD\n0\n$ENDNOD\n", "gmsh 1: save it with Mesh.MshFileVersion = 4.1"),
         ("a.mesh", b"MeshVersionFormatted 2\nVerticesOfAll\n", "Unknown keyword 'VerticesOfAll'"),
         ("a.bdf", b"BEGIN BULK\nGRID,1,,0,0,0\nCQUADX,1,,1,2,3,4\n", "line 3: CQUADX is not read"),
         (
@@ -191,7 +192,8 @@ def test_a_damaged_gmsh_file_is_refused() -> None:
             "line 1: coordinates must be in",
         ),
         ("a.vtu", b"<VTKFile", "ReadError; save it in another format, such as .msh"),
-        ("a.med", b"", "Truncated|not accessible|file signature"),
+        ("a.med", b"\x0emed 2.3 file", "it is no HDF5 file, as those of MED 3 or later"),
+        ("a.e", b"CDF\x01aaaa", "it is no netCDF file"),
         ("a.e", b"CDF", "NetCDF: Invalid argument"),
         ("a.xdmf", b"", r"must end in one of \.msh, \.inp, \.med"),
     ],
@@ -235,6 +237,16 @@ $Elements
 2 1 2 3 4
 $EndElements
 """
+
+
+def test_parameters_of_nodes_are_refused_with_what_to_do() -> None:
+    text = PIN.read_text()
+    head, nodes = text.split("$Nodes\n")
+    count, first, rest = nodes.split("\n", 2)
+    dim, entity, _, number = first.split()
+    data = f"{head}$Nodes\n{count}\n{dim} {entity} 1 {number}\n{rest}".encode()
+    with pytest.raises(ModelError, match=r"save it with Mesh.SaveParametric = 0"):
+        MeshFile("pin.msh", data).mesh("pin")
 
 
 def test_groups_of_gmsh_that_share_a_name_or_a_cell_or_run_backwards() -> None:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from solver.errors import ModelError
-from solver.files import read_file
+from solver.files import number_of, read_file
 from solver.parameters import Pairs, require
 from solver.typing import Array
 
@@ -44,9 +44,9 @@ def read_points(path: str | Path) -> Array:
     points = []
     for number, line in enumerate(lines, 1):
         try:
-            z, y = (float(each) for each in line)
+            z, y = map(number_of, line)
         except ValueError:
-            if number == 1 or not line:
+            if not line or (number == 1 and any(map(str.isalpha, "".join(line)))):
                 continue
             allowed = f"must have two numbers in each line; line {number} is {' '.join(line)!r}"
             raise ModelError("file", str(path), allowed) from None
