@@ -23,7 +23,7 @@ from solver.results.run import FinishedRun, Values
 from solver.results.shakedown import QUIET
 from solver.typing import Array, Ints
 
-_UNIT, _OVER = "MPa sqrt(mm)", ("tip", "stage")
+_UNIT, _OVER = "MPa mm^0.5", ("tip", "stage")
 TIP = declare("tip", "tip of a crack", "", dims=("tip",))
 TIP_AT = declare_along("tip_{}", "position of the tip along {}", "mm", dims=("tip",))
 MODES = tuple(
