@@ -6,7 +6,7 @@ thesis, on elements of 2 mm; with ``size = spacing = 1.0`` its figures settle.
 
 import numpy as np
 
-from solver import Material
+from solver import Coulomb, Material
 from solver.rolling.load import RollingLoad
 from solver.rolling.passing import passing
 from solver.rolling.rail.patch import RollingPatch
@@ -40,7 +40,7 @@ wheel = ProfiledWheel(
     profile=lambda z: s1002().height(z + 4.0), radius=460.0, elasticity=steel.elasticity
 )
 load = RollingPatch(
-    grid=track.grid, compliance=track.compliance, wheel=wheel, friction=0.17,
+    grid=track.grid, compliance=track.compliance, wheel=wheel, friction=Coulomb(friction=0.17),
     load=RollingLoad(force=150e3, drive=0.0),
 )  # fmt: skip
 found = passing(track, steel, load, track.virgin(steel))

@@ -39,4 +39,4 @@ def time_text(likely: float, low: float, high: float, worst: float | None = None
 def size_text(count: float) -> str:
     """Return a size [bytes] in MB or GB."""
     size, unit = (1e9, "GB") if count >= 1e9 else (1e6, "MB")
-    return f"{number_text(count / size, 2)} {unit}"
+    return f"{number_text(count / size, 3)} {unit}"

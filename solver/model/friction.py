@@ -257,6 +257,8 @@ def pressure_lines(law: FrictionLaw, n: int, strength: float) -> BoundLines:
         naming the law, if it asks for slip or plastic strain; naming its shear limit, if the body
         is elastic, of infinite strength
     """
+    if not isinstance(law, FrictionLaw):
+        raise ModelError("friction", law, "must be a law, such as Coulomb(friction=0.3)")
     law.check_bodies(elastic=bool(np.isinf(strength)))
 
     def nothing() -> Array:

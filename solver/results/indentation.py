@@ -121,18 +121,34 @@ IRREVERSIBLE_WORK = declare(
 class SharpIndentation(Checked):
     """Force and work of a rigid cone or wedge that moves into a body along y, and back.
 
-    Work is integrated by the trapezoidal rule over increments.
+    Work is integrated by the trapezoidal rule over increments. The share that withdrawal gives back
+    is known only if the body is still pressed after two increments of it.
     """
 
     rigid: str = described(MISSING, "name of the rigid body")
 
     def __call__(self, run: FinishedRun) -> Values:
         """Return the quantities of a run."""
-        _, _, y, _, _, force, _ = np.abs(curve(run.outcome.history, self.rigid))
-        deepest = int(y.argmax())
+        y, force, deepest, resolved = self._course(run)
         into = np.trapezoid(force[: deepest + 1], y[: deepest + 1])
         back = -np.trapezoid(force[deepest:], y[deepest:])
         return {
             LOADING_CURVATURE: float(force[deepest] / y[deepest] ** 2),
-            IRREVERSIBLE_WORK: float(1 - back / into),
+            IRREVERSIBLE_WORK: float(1 - back / into) if resolved else np.nan,
         }
+
+    def warnings(self, run: FinishedRun) -> tuple[str, ...]:
+        """Return a warning if withdrawal is in too few increments for its work."""
+        if self._course(run)[3]:
+            return ()
+        return (
+            f"{self.rigid} leaves the body within two increments of withdrawal, so that "
+            "irreversible_work is unknown: use more of them",
+        )
+
+    def _course(self, run: FinishedRun) -> tuple[Array, Array, int, bool]:
+        """Return depth, force, the number of the deepest, and whether withdrawal is resolved."""
+        _, _, y, _, _, force, _ = np.abs(curve(run.outcome.history, self.rigid))
+        deepest = int(y.argmax())
+        after = force[deepest + 1 : deepest + 3]
+        return y, force, deepest, len(after) == 2 and bool((after > 0).all())

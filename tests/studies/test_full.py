@@ -65,7 +65,7 @@ def test_the_command_ends_with_one_line_and_a_repeat_computes_the_rest(
     file = study_file(points=60)
     told = command(100_000, file, out)
     assert told.returncode == 1
-    assert told.stderr == f"residua: no room is left in {out}\n"
+    assert told.stderr == f"fake: 4 runs to compute\nresidua: no room is left in {out}\n"
     assert "Traceback" not in told.stdout
     store = Store(out)
     assert store.catalogue.runs(status="error")[1] == 0

@@ -334,7 +334,7 @@ def test_workers_killed_on_sight_are_told_and_the_study_goes_on(
 
     def killer() -> None:
         while not spared.wait(0.005):  # a fork computes 50 ms after its start
-            with suppress(psutil.NoSuchProcess):  # it has ended between two looks
+            with suppress(psutil.Error):  # it has ended between two looks
                 for worker in workers():
                     if worker.pid not in others:
                         worker.kill()

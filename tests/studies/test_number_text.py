@@ -32,7 +32,7 @@ def test_a_number_has_a_few_digits_and_no_power_of_ten(
 def test_times_and_sizes_have_a_unit_of_their_size() -> None:
     assert time_text(90.0, 45.0, 180.0) == "about 90 seconds (45 to 180)"
     assert time_text(5400.0, 60.0, 7200.0) == "about 90 minutes (1 to 120)"
-    assert (size_text(2.44e6), size_text(1.26e9)) == ("2.4 MB", "1.3 GB")
+    assert (size_text(2.44e6), size_text(1.26e9)) == ("2.44 MB", "1.26 GB")
     assert number("a-b") == "a-b" and number(None) == "–" and number(-2) == "−2"
 
 

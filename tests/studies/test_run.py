@@ -199,7 +199,7 @@ def test_the_command_builds_a_parameter_object_once_for_each_case_and_each_path(
     assert main(["run", str(study_file()), "--out", str(tmp_path / "out"), "--workers", "1"]) == 0
     points = [(each.load_ratio, each.friction) for each in built]
     assert points[:4] == [(0.3, 0.0), (0.3, 0.4), (0.9, 0.0), (0.9, 0.4)]
-    assert points[4:] == 2 * [(0.3, 0.0), (0.3, 0.4)]
+    assert points[4:] == [*2 * [(0.3, 0.0), (0.3, 0.4)], (0.9, 0.4)], "the last for its caption"
 
 
 def test_a_worker_with_another_solver_refuses(store: Store) -> None:

@@ -141,7 +141,9 @@ def test_the_command_starts_no_workers_for_a_short_study(
         asked.extend([given["workers"], given["alone"]])
         raise StudyError("study", "fake", "is not computed here")
 
-    found = SimpleNamespace(cpu_seconds=(seconds / 2, seconds, 2 * seconds))
+    found = SimpleNamespace(
+        cpu_seconds=(seconds / 2, seconds, 2 * seconds), to_compute=4, usual_runs=4, time="soon"
+    )
     monkeypatch.setattr("residua.progress.estimate", lambda *of: found)
     monkeypatch.setattr("studies.execution.run.run_study", computed)
     assert main(["run", str(study_file()), "--out", str(tmp_path / "out"), *options]) == 2

@@ -290,10 +290,10 @@ def test_the_picture_has_z_across_and_y_up(dataset: xr.Dataset) -> None:
     z, y = dataset["z"].to_numpy(), dataset["y"].to_numpy()
     expected = np.where(y[:, None] <= 0.0, 3 * z + 1, np.nan)
     np.testing.assert_allclose(drawn[y <= 0.0], expected[y <= 0.0], atol=1e-12)
-    assert axes.get_xlim() == (-3.25, 3.25)
-    assert axes.get_ylim() == (-4.25, 1.25)
+    assert axes.get_xlim() == (-3.0, 3.0)
+    assert axes.get_ylim() == (-4.0, 1.0)
     part, mesh = mesh_of(picture(dataset, "map_mises", window=(0.0, 1.0, -2.0, -1.0)))
-    assert part.get_xlim() == (-0.25, 1.25)
+    assert part.get_xlim() == (0.0, 1.0)
     with pytest.raises(StudyError, match="must be z0 z1 y0 y1"):
         picture(dataset, "map_mises", window=(9.0, 10.0, 0.0, 1.0))
 

@@ -252,6 +252,9 @@ def test_a_cone_has_the_published_force_of_its_depth() -> None:
     assert force / 0.1**2 == pytest.approx(2731.3, rel=0.02)
     assert record.scalars["loading_curvature"] == pytest.approx(force / 0.1**2, rel=1e-12)
     assert record.scalars["irreversible_work"] == pytest.approx(0.94147, abs=0.002)
+    (quick,) = cone.path(cone.parameters(**own | {"unload_steps": 5}), [1], lambda fraction: None)
+    assert np.isnan(quick.scalars["irreversible_work"])
+    assert "irreversible_work is unknown: use more of them" in quick.message
 
 
 @pytest.mark.parametrize(

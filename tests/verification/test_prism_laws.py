@@ -31,6 +31,7 @@ WORDS: dict[str, dict[str, Any]] = {
     "kinematic": {"hardening_ratio": 0.02},
     "mixed": {"hardening_ratio": 0.02},
     "voce": {"saturation": 100.0, "saturation_rate": 50.0},
+    "power": {"hardening_exponent": 0.1},
     "table": {"curve": CURVE},
     "chaboche": {"back_stresses": ((60_000.0, 600.0), (4000.0, 20.0))},
     "layered": {"curve": CURVE},
