@@ -239,8 +239,9 @@ def scan(paths: Array, counts: Ints, normals: Array) -> tuple[Array, Array, Arra
 
     Returns
     -------
-    amplitude of shear, at most 3.4 % too small: the largest of half its ranges along six directions
-    of the plane; largest normal component; half its range, each (n_points, n_planes)
+    amplitude of shear, the largest of half its ranges along six directions of the plane: at most
+    3.4 % too small for a straight path, 16.4 % for any (Jung's theorem); largest normal component;
+    half its range, each (n_points, n_planes)
     """
     n_points = len(paths)
     n_planes = len(normals)

@@ -25,9 +25,9 @@ _simplified, _scan, _resolve, _climb = late(
 
 _PLANES = 216
 """Number of planes in a scan; neighbours are 9 degrees apart."""
-_NEIGHBOURS, _WORSE = 3, 0.08
+_NEIGHBOURS, _WORSE = 3, 0.2
 """Newton's method starts at planes that are better than so many neighbours, and by at most this
-share worse than the best: the scan may be wrong by as much."""
+share worse than the best: the scan may be wrong by as much (`scan`, and `_SIMPLE`)."""
 _MISSED = 0.02
 """Share by which a maximum may exceed the planes nearest to it."""
 _SIMPLE = 0.02
