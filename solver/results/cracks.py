@@ -116,6 +116,13 @@ def _void(system: Any, part: Any, state: BodyState, tip: Tip, q: Array) -> str:
     stiff = np.broadcast_to(getattr(part.law(state.time), "stiff", 1.0), domain.shape)[domain]
     if (stiff != 1).any():
         return "stiffness differs in the domain"
+    held = np.isin(np.arange(part.n), part.free, invert=True).reshape(-1, 2).any(axis=1)
+    for link in system.model.links:
+        for name, boundary in link.sides:
+            if name == part.body.name:
+                held[part.boundary_nodes(boundary)] = True
+    if (q[held] > 0).any():
+        return "supports, prescribed displacements or links hold nodes of the domain"
     for interface in system.interfaces:
         pair = interface.declared
         sides = {pair.slave, pair.master}

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from solver import (
     Body,
+    Displacement,
     InitialStress,
+    Link,
     Material,
     Model,
     ModelError,
@@ -164,6 +166,23 @@ def test_plastic_strain_at_the_tip_is_allowed_but_not_through_the_domain() -> No
     near, far = (solution.stress_intensities(rings=r)[0] for r in (1, 8))
     assert np.isnan(near.K).all() and "plastic" in near.why
     assert not far.why and far.K[0] == pytest.approx(200 * 1.1215 * UNIT, rel=0.03)
+
+
+@pytest.mark.parametrize("how", ["displacement", "support", "link", "inside"])
+def test_forces_of_what_holds_nodes_of_the_domain_are_not_left_out(how: str) -> None:
+    mesh = opened(grid(*lines()), "root", (0.0, 0.0), (LENGTH, 0.0))
+    x, y = mesh.p[:, mesh.facets].mean(axis=1)
+    ahead = np.flatnonzero((np.abs(y) < 1e-9) & (x > LENGTH) & (x < LENGTH + 2 * SIDE))
+    mesh = mesh.with_boundaries({**mesh.boundaries, "ahead": ahead})
+    loads: tuple[Any, ...] = (Pressure(boundary="root_right", value=100.0),)
+    if how == "displacement":
+        loads += (Displacement(boundary="root_left", y=0.01),)
+    held = {"support": {"root_left": "y"}, "inside": {"ahead": "y"}}.get(how, {})
+    body = Body(name="plate", mesh=mesh, material=Material(**STEEL), loads=loads, cracks=("root",),
+                supports={"right": "xy", **held})  # fmt: skip
+    links = (Link(slave=("plate", "root_left"), stiffness=1e3),) if how == "link" else ()
+    (found,) = solve(Model(bodies=(body,), links=links), control=ONCE).stress_intensities()
+    assert np.isnan(found.K).all() and "hold nodes of the domain" in found.why
 
 
 @pytest.mark.parametrize(
