@@ -115,7 +115,7 @@ def by_displacements(tip: Tip, u: Array, elastic: PlaneElasticity) -> Array:
     upper, lower = (edges[0] for edges in tip.edges)
     length = np.hypot(*(tip.part.X[:, upper[1]] - tip.part.X[:, upper[0]]))
     apart = [u[upper[2]] - u[lower[2]], u[upper[0]] - u[lower[1]]]
-    along, across = tip.axes @ ((8 * apart[0] - apart[1]) / 3)
+    along, across = tip.axes @ (8 * apart[0] - apart[1]) / 3
     scale = elastic.shear / (elastic.kappa + 1) * np.sqrt(2 * np.pi / length)
     return np.array([across, along]) * scale
 

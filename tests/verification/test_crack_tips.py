@@ -71,7 +71,7 @@ def test_edge_crack_under_constant_and_linear_stress(cells: str) -> None:
             (tip,) = solution.stress_intensities(rings=rings)
             assert tip.K[0] == pytest.approx(100 * factor * UNIT, rel=2e-3)
             assert abs(tip.K[1]) < 5e-3 * tip.K[0]
-        assert tip.of_faces[0] == pytest.approx(tip.K[0], rel=0.08)
+        assert tip.of_faces[0] == pytest.approx(tip.K[0], rel=0.04)
     assert tip.tip == "plate.root" and tip.at.tolist() == [LENGTH, 0.0]
 
 
@@ -93,7 +93,7 @@ def test_shear_on_the_faces_of_a_crack_that_is_turned(outwards: bool) -> None:
     (found,) = solve(Model(bodies=(body,)), control=ONCE).stress_intensities()
     sign = -1 if outwards else 1
     assert found.K == pytest.approx(np.array([0.0, sign * 50 * 1.1215 * UNIT]), rel=2e-3, abs=1e-6)
-    assert np.sign(found.of_faces[1]) == sign and found.at == pytest.approx(np.array(tip))
+    assert found.of_faces[1] == pytest.approx(found.K[1], rel=0.09) and found.at == pytest.approx(np.array(tip))
 
 
 @pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress"])
