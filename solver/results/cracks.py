@@ -38,6 +38,8 @@ OF_FACES = tuple(
     for mode in ("I", "II")
 )  # fmt: skip
 _RINGS = 4
+_CLOSING = 0.01
+"""Negative K_I over K, up to which it may be an error of the integral."""
 
 
 class StressIntensity(NamedTuple):
@@ -50,6 +52,7 @@ class StressIntensity(NamedTuple):
     K : K_I and K_II (2,) by the interaction integral; NaN where it does not hold, see `why`
     of_faces : K_I and K_II (2,) from displacements of the faces
     why : why the integral does not hold; empty if it does
+    overlap : whether the faces overlap: they would close, and have no contact pair
     """
 
     tip: str
@@ -57,6 +60,7 @@ class StressIntensity(NamedTuple):
     K: Array
     of_faces: Array
     why: str
+    overlap: bool = False
 
 
 def stress_intensities(system: Any, converged: Any, rings: int = _RINGS) -> list[StressIntensity]:
@@ -102,7 +106,9 @@ def _at(system: Any, converged: Any, state: Any, tip: Tip, rings: int) -> Stress
         partial(_on_face, _acting(system, converged, tip, k), part, time) for k in (0, 1)
     )
     K = by_integral(tip, field, elastic, q, (upper, lower))
-    return StressIntensity(tip.name, tip.at, K, of_faces, "")
+    touching = any({i.declared.slave, i.declared.master} == tip.sides for i in system.interfaces)
+    overlap = bool(K[0] < -_CLOSING * np.hypot(*K)) and not touching
+    return StressIntensity(tip.name, tip.at, K, of_faces, "", overlap)
 
 
 def _void(system: Any, part: Any, state: BodyState, tip: Tip, q: Array) -> str:
@@ -198,7 +204,11 @@ class Cracks(Checked):
     )
 
     def _each(self, run: FinishedRun) -> list[list[StressIntensity]]:
-        return [stress_intensities(run.system, at, self.rings) for at, _ in run.stages]
+        if self not in run.kept:
+            run.kept[self] = [stress_intensities(run.system, at, self.rings)
+                              for at, _ in run.stages]  # fmt: skip
+        found: list[list[StressIntensity]] = run.kept[self]
+        return found
 
     def __call__(self, run: FinishedRun) -> Values:
         """Return the quantities of a run."""
@@ -216,7 +226,11 @@ class Cracks(Checked):
         }
 
     def warnings(self, run: FinishedRun) -> tuple[str, ...]:
-        """Return why intensities are not known."""
-        found = {f"K of tip {tip.tip} is not known: {tip.why}": None
-                 for stage in self._each(run) for tip in stage if tip.why}  # fmt: skip
-        return tuple(found)
+        """Return why intensities are not known, and where faces overlap."""
+        each = [tip for stage in self._each(run) for tip in stage]
+        found = [f"K of tip {tip.tip} is not known: {tip.why}" for tip in each if tip.why]
+        found += [
+            f"K_I of tip {tip.tip} is negative: the faces overlap, give them a contact"
+            for tip in each if tip.overlap
+        ]  # fmt: skip
+        return tuple(dict.fromkeys(found))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from solver.audit.report import Audit
@@ -32,6 +32,7 @@ class FinishedRun:
     notes : messages to the user about the computation
     singular : singular points, near which numbers depend on the mesh
     beside : function that returns the fields of further bodies at the same stages
+    kept : what outputs have computed and need again
     """
 
     parameters: Any
@@ -43,6 +44,7 @@ class FinishedRun:
     notes: tuple[str, ...] = ()
     singular: tuple[SingularPoint, ...] = ()
     beside: Callable[[], MeshFields] | None = None
+    kept: dict[Any, Any] = field(default_factory=dict)
 
     @property
     def system(self) -> Bodies:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -26,8 +27,10 @@ from solver import (
     solve,
 )
 from solver.fatigue import stress_intensity
+from solver.fracture.intensity import by_integral
 from solver.mesh import graded, grid, opened
 from solver.model.loads import BodyForce
+from solver.results import cracks
 from studies.scenes.scene import read_scene
 
 Array = NDArray[np.float64]
@@ -93,7 +96,9 @@ def test_shear_on_the_faces_of_a_crack_that_is_turned(outwards: bool) -> None:
     (found,) = solve(Model(bodies=(body,)), control=ONCE).stress_intensities()
     sign = -1 if outwards else 1
     assert found.K == pytest.approx(np.array([0.0, sign * 50 * 1.1215 * UNIT]), rel=2e-3, abs=1e-6)
-    assert found.of_faces[1] == pytest.approx(found.K[1], rel=0.09) and found.at == pytest.approx(np.array(tip))
+    assert found.of_faces[1] == pytest.approx(found.K[1], rel=0.09) and found.at == pytest.approx(
+        np.array(tip)
+    )
 
 
 @pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress"])
@@ -131,10 +136,27 @@ def test_an_inclined_crack_pulled_and_pressed_with_friction() -> None:
     shear, pressure = 100 * sine * cosine, 100 * sine**2
     pulled = {"I": pressure, "II": shear}
     pressed = {"I": 0.0, "II": -(shear - 0.3 * pressure)}
+    assert "overlap" not in found.message
     for mode, (dims, values) in K.items():
         assert dims == ("tip", "stage")
         expected = np.array([pulled[mode], pressed[mode]]) * UNIT
         assert values == pytest.approx(np.array([expected, expected]), rel=1e-3, abs=0.01)
+
+
+def test_faces_that_overlap_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pressed, without a contact; each state has its integrals once."""
+    text = "".join(
+        x for x in SCENE.read_text().splitlines(keepends=True) if not x.startswith("friction = {")
+    )
+    before, sep, after = text.partition("[[contacts]]")
+    own = tmp_path / "crack.toml"
+    own.write_text(before + after.partition("\n\n")[2])
+    scene, counted = read_scene(own), Mock(side_effect=by_integral)
+    monkeypatch.setattr(cracks, "by_integral", counted)
+    (found,) = scene.path(scene.parameters(angle=30.0, element=0.2), [], lambda done: None)
+    assert sep and counted.call_count == np.size(found.fields["K_I"][1])
+    for end in ("start", "end"):
+        assert found.message.count(f"K_I of tip plate.slit.{end} is negative: the faces over") == 1
 
 
 @pytest.mark.parametrize("cells", CELLS)
