@@ -22,6 +22,8 @@ from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.mesh.elements import ElementType
 from solver.typing import Array, Ints
 
+Faces = tuple[Ints, Ints]
+"""The facets of both faces of a crack."""
 _FOLDED = 1e-6
 """Least over greatest Jacobian: an element with a smaller ratio is folded. Also the sine of the
 angle between shortest and longest side: an element with a smaller one is flat."""
@@ -33,21 +35,21 @@ _ROUNDING = 8 * np.finfo(float).eps
 """Relative rounding error of coordinates after a few operations."""
 
 
-def check_mesh(mesh: Mesh, name: str, kind: ElementType, faces: Sequence[Ints] = ()) -> None:
+def check_mesh(mesh: Mesh, name: str, kind: ElementType, cracks: Sequence[Faces] = ()) -> None:
     """Raise `ModelError` if the mesh of body ``name`` is folded, overlaps, or is not one piece.
 
-    Errors give the numbers of elements and nodes in the mesh. ``faces`` are the facets of each face
-    of cracks: their nodes may lie on one another, and at a tip the Jacobian may be zero.
+    Errors give the numbers of elements and nodes in the mesh. At a tip of the
+    ``cracks`` the Jacobian may be zero, and nodes of a face may lie on the other one.
     """
     where = f'of body "{name}"'
     _check_nodes(mesh, where, kind)
-    on_face = np.unique(mesh.facets[:, np.concatenate([*faces, np.zeros(0, dtype=int)])])
-    sense = _check_elements(mesh, where, kind, on_face)
+    tips = [np.intersect1d(*(mesh.facets[:, face] for face in faces)) for faces in cracks]
+    sense = _check_elements(mesh, where, kind, np.concatenate([*tips, np.zeros(0, dtype=int)]))
     if kind.dim == 3:
         _check_connected(mesh, where)
         return
     _check_neighbours(mesh, where, sense)
-    _check_cracks(mesh, where, on_face)
+    _check_cracks(mesh, where, cracks)
     _check_connected(mesh, where)
     _check_hinges(mesh, where)
 
@@ -91,10 +93,10 @@ def _jacobians(mesh: Mesh, kind: ElementType) -> Array:
     return np.asarray(J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0])
 
 
-def _check_elements(mesh: Mesh, where: str, kind: ElementType, on_face: Ints) -> Array:
+def _check_elements(mesh: Mesh, where: str, kind: ElementType, tips: Ints) -> Array:
     """Return the orientation of every element: 1 counterclockwise, -1 clockwise."""
     jacobian = _jacobians(mesh, kind)
-    rows, columns = np.nonzero(np.isin(mesh.t, on_face))
+    rows, columns = np.nonzero(np.isin(mesh.t, tips))
     jacobian[columns, rows] = jacobian.mean(axis=1)[columns]  # its corners come first
     low, high = jacobian.min(axis=1), jacobian.max(axis=1)
     sense = np.where(high >= -low, 1.0, -1.0)
@@ -134,29 +136,44 @@ def _check_neighbours(mesh: Mesh, where: str, sense: Array) -> None:
         _refuse("elements " + " and ".join(map(str, elements)), where, allowed)
 
 
-def _check_cracks(mesh: Mesh, where: str, on_face: Ints) -> None:
+def _check_cracks(mesh: Mesh, where: str, cracks: Sequence[Faces]) -> None:
     """Refuse boundary nodes that lie on another node, or on an edge between its ends.
 
-    The faces of a declared crack may: ``on_face`` are their nodes.
+    Those of a face of a declared crack may lie on its other face.
     """
     start, end = mesh.p[:, mesh.facets[0]], mesh.p[:, mesh.facets[1]]
     length = np.hypot(*(end - start))
     shortest = np.full(mesh.p.shape[1], length.max())
     for ends in mesh.facets:  # one by one: when it broadcasts, numpy 2.4 gives a false warning
         np.minimum.at(shortest, ends, length)
-    nodes = np.setdiff1d(mesh.facets[:, mesh.boundary_facets()], on_face)
+    nodes = np.unique(mesh.facets[:, mesh.boundary_facets()])
     apart = "; surfaces meant to touch need two bodies and a contact pair"
     X = mesh.p[:, nodes]
     one, other = nodes[np.stack(_within(X, X, _close(mesh, nodes, shortest[nodes])))]
     distance = np.hypot(*(mesh.p[:, one] - mesh.p[:, other]))
     close = _close(mesh, one, np.minimum(shortest[one], shortest[other]))
-    for i in np.flatnonzero((one != other) & (distance <= close))[:1]:
+    same = (one != other) & (distance <= close)
+    one, other = one[same], other[same]
+    faced = np.zeros(len(one), dtype=bool)
+    for a, b in _both_ways(cracks):
+        faced |= np.isin(one, mesh.facets[:, a]) & np.isin(other, mesh.facets[:, b])
+    for i in np.flatnonzero(~faced)[:1]:
         allowed = f"lie on one another at {_at(mesh, one[i])}: merge them{apart}"
         _refuse(f"nodes {one[i]} and {other[i]}", where, allowed)
-    for node, facet in _hanging(mesh, nodes, shortest)[:1]:
+    hanging = _hanging(mesh, nodes, shortest)
+    node, facet = hanging.T
+    ends, n = mesh.facets[:, facet], mesh.nvertices
+    faced = np.isin(node * n + ends, one * n + other).any(axis=0)  # at an end of it
+    for a, b in _both_ways(cracks):
+        faced |= np.isin(node, mesh.facets[:, a]) & np.isin(facet, b)
+    for node, facet in hanging[~faced][:1]:
         a, b = mesh.facets[:, facet]
         allowed = f"lies on the edge from node {a} to node {b}: divide the element there{apart}"
         _refuse(f"node {node}", where, allowed)
+
+
+def _both_ways(cracks: Sequence[Faces]) -> list[Faces]:
+    return [pair for a, b in cracks for pair in ((a, b), (b, a))]
 
 
 def _close(mesh: Mesh, nodes: Ints, edges: Array) -> Array:
@@ -196,7 +213,8 @@ def _hanging(mesh: Mesh, nodes: Ints, shortest: Array) -> Ints:
     for _ in range(8):  # Gauss-Newton for the nearest point; one step on a straight edge
         t = (X * shape_derivatives(xi, 3).T).sum(axis=1)
         miss = mesh.p[:, node] - (X * shape_functions(xi, 3).T).sum(axis=1)
-        xi = np.clip(xi + (miss * t).sum(axis=0) / (t**2).sum(axis=0), -1, 1)
+        size = np.maximum((t**2).sum(axis=0), np.finfo(float).tiny)  # zero at a tip
+        xi = np.clip(xi + (miss * t).sum(axis=0) / size, -1, 1)
     lies = np.hypot(*miss) <= _close(mesh, node, np.minimum(shortest[node], 2 * half[edge]))
     return np.stack([node, facets[edge]], axis=1)[lies & (np.abs(xi) < 1)]
 

@@ -86,8 +86,9 @@ class Body:
                 "element", self.element, f"needs cells with {needed}; the mesh of body "
                 f"{self.name!r} has {has}; a mesh file with triangles gives no others",
             )  # fmt: skip
-        faces = [self.facets(face, "cracks") for crack in self.cracks for face in faces_of(crack)]
-        check_mesh(self.mesh, self.name, element, faces)
+        sides = (faces_of(crack) for crack in self.cracks)
+        cracks = [(self.facets(a, "cracks"), self.facets(b, "cracks")) for a, b in sides]
+        check_mesh(self.mesh, self.name, element, cracks)
         if self.cracks:
             self._check_cracked()
         if self.dim == 3:

@@ -8,7 +8,7 @@ from skfem import MeshQuad, MeshQuad2, MeshTri, MeshTri2
 
 from solver import Body, Material, ModelError
 from solver.fem.discretisation import Discretisation
-from solver.mesh import grid, mapped, merged
+from solver.mesh import grid, mapped, merged, opened
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 SQUARE = np.array([[0.0, 1.0, 1.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
@@ -279,6 +279,25 @@ def test_hanging_nodes_are_refused_on_curved_edges(bulge, lift, said):
     small = mapped(grid(np.linspace(0.1, 0.8, 4), np.array([1.0, 2.0]) + lift), bent)
     t = np.hstack([large.dofs.element_dofs, small.dofs.element_dofs + large.p.shape[1]])
     assert said in refusal(MeshQuad2(np.hstack([large.p, small.p]), t))
+
+
+@pytest.mark.parametrize("cells", ["quad", "tri"])
+def test_only_the_tip_of_a_crack_may_be_folded(cells):
+    mesh = opened(grid(np.arange(7.0), np.arange(7.0), cells), "root", (0.0, 3.0), (3.0, 3.0))
+    assert body(mesh, cracks=("root",))
+    vertex = node_at(mesh, 1, 3)
+    side = np.flatnonzero((mesh.facets == [[vertex], [node_at(mesh, 1, 4)]]).all(axis=0))
+    mesh.p[:, mesh.dofs.facet_dofs[0, side]] = [[1.0], [3.25]]
+    assert "folded" in refusal(mesh, cracks=("root",))
+
+
+def test_nodes_on_a_face_of_a_crack_may_lie_on_the_other_one_alone():
+    """A cut of one edge, not declared, starts at a face; it has no nodes at a quarter."""
+    mesh = opened(grid(np.arange(7.0), np.arange(7.0)), "root", (0.0, 3.0), (3.0, 3.0))
+    cut = opened(mesh, "cut", (1.0, 3.0), (1.0, 4.0))
+    plain = MeshQuad(cut.p[:, : cut.nvertices], cut.t).with_boundaries(cut.boundaries)
+    assert body(plain, cracks=("root", "cut"))
+    assert "lie on one another" in refusal(plain, cracks=("root",))
 
 
 def test_a_body_that_touches_itself_is_refused():
