@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from skfem import Mesh, MeshQuad, MeshQuad2, MeshTri, MeshTri2
 
 from solver.errors import ModelError
@@ -58,7 +60,7 @@ def opened(mesh: Mesh, name: str, start: Point, end: Point) -> Mesh:
     double = np.flatnonzero(on & (count > 0) & ~np.isin(np.arange(len(on)), tips))
     number = np.arange(mesh.nvertices)
     number[double] = mesh.nvertices + np.arange(len(double))
-    t = np.where(right, number[mesh.t], mesh.t)
+    t = np.where(_beyond(mesh, cut, double, right), number[mesh.t], mesh.t)
     plain, curved = (MeshQuad, MeshQuad2) if len(mesh.t) == 4 else (MeshTri, MeshTri2)
     straight = plain(np.hstack([corners, corners[:, double]]), t, sort_t=False)
     whole, before = curved.from_mesh(straight), mesh
@@ -90,6 +92,35 @@ def _on_line(mesh: Mesh, name: str, corners: Array, start: Array, end: Array) ->
         allowed = f"must run along edges inside the body, which cover {covered:g} of {length:g} mm"
         raise ModelError(f"cracks.{name}", [start.tolist(), end.tolist()], allowed)
     return np.asarray(on), cut
+
+
+def _beyond(mesh: Mesh, cut: Ints, double: Ints, right: Bools) -> Bools:
+    """Return which corners of elements (as ``mesh.t``) are at doubled vertices, on the right.
+
+    Around each vertex one walks from element to element, not over cut facets: at a reentrant corner
+    an element of the left side may be to the right of the whole line. Elements at cut facets are on
+    their side of it: ``right`` (n_elements,).
+    """
+    n, corners = mesh.nvertices, np.isin(mesh.t, double)
+    keys = (mesh.t + n * np.arange(mesh.nelements))[corners]
+    order = np.argsort(keys)
+    inner = np.setdiff1d(np.flatnonzero(mesh.f2t[1] >= 0), cut)
+    one, other = (_corners(mesh, inner, side, double) for side in (0, 1))
+    pairs = [order[np.searchsorted(keys, own, sorter=order)] for own in (one, other)]
+    joined = coo_array((np.ones(len(one)), tuple(pairs)), shape=(len(keys), len(keys)))
+    count, part = connected_components(joined, directed=False)
+    first = [_corners(mesh, cut[right[mesh.f2t[side, cut]]], side, double) for side in (0, 1)]
+    there = np.zeros(count, dtype=bool)
+    there[part[np.isin(keys, np.concatenate(first))]] = True
+    beyond = np.zeros(mesh.t.shape, dtype=bool)
+    beyond[corners] = there[part]
+    return beyond
+
+
+def _corners(mesh: Mesh, facets: Ints, side: int, double: Ints) -> Ints:
+    """Return keys of the corners at doubled vertices of facets, in the elements on one side."""
+    ends = mesh.facets[:, facets]
+    return np.asarray((ends + mesh.nvertices * mesh.f2t[side, facets])[np.isin(ends, double)])
 
 
 def _move_to_quarters(mesh: Mesh, nodes: Array, tips: Ints) -> None:

@@ -291,6 +291,22 @@ def test_only_the_tip_of_a_crack_may_be_folded(cells):
     assert "folded" in refusal(mesh, cracks=("root",))
 
 
+@pytest.mark.parametrize("cells", ["quad", "tri"])
+def test_a_crack_at_a_reentrant_corner_leaves_each_element_on_its_side(cells):
+    """Above the notch the body goes on below the line of the crack."""
+    lines = np.arange(-3.0, 4.0)
+    mesh = grid(lines, lines, cells)
+    x, y = mesh.p[:, mesh.t].mean(axis=1)
+    mesh = mesh.remove_elements(np.flatnonzero((x < 0) & (y < 0)))
+    p = np.stack([mesh.p[0], mesh.p[1] + 1.5 * np.minimum(mesh.p[0], 0)])
+    mesh = opened(type(mesh)(p, mesh.t), "root", (0.0, 0.0), (2.0, 0.0))
+    assert body(mesh, cracks=("root",))
+    shared = np.intersect1d(*(mesh.facets[:, mesh.boundaries[f"root_{s}"]]
+                              for s in ("left", "right")))  # fmt: skip
+    assert mesh.p[:, shared].T.tolist() == [[2.0, 0.0]]
+    assert np.bincount(mesh.facets[:, mesh.boundary_facets()].ravel()).max() == 2
+
+
 def test_nodes_on_a_face_of_a_crack_may_lie_on_the_other_one_alone():
     """A cut of one edge, not declared, starts at a face; it has no nodes at a quarter."""
     mesh = opened(grid(np.arange(7.0), np.arange(7.0)), "root", (0.0, 3.0), (3.0, 3.0))
