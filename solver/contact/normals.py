@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.fem.surface import Surface
+from solver.fem.surface import NO_TANGENT, Surface
 from solver.mesh.edges import shape_derivatives
 from solver.typing import Array
 
 _CORNER = float(np.cos(np.radians(40.0)))
 """Cosine of the angle between the normals of two edges: they form a corner at a larger angle."""
-_ZERO = 1e-9
-"""Length of a tangent over that of its edge: a shorter one is zero."""
 _STRAIGHT = 1e-6
 """Change of the normal along a straight surface by rounding [rad], at most; the sagitta of an
 element is then 1e-7 of its length."""
@@ -25,7 +23,7 @@ def _edge_normal(x: Array, surface: Surface, xi: float) -> Array:
     """
     d = shape_derivatives(np.array(xi), surface.edges.shape[1])
     t = x[:, surface.edges] @ d
-    gone = np.hypot(*(surface.X[:, surface.edges] @ d)) <= _ZERO * surface.lengths
+    gone = np.hypot(*(surface.X[:, surface.edges] @ d)) <= NO_TANGENT * surface.lengths
     t[:, gone] = np.diff(x[:, surface.edges[gone, :2]])[..., 0]
     n = np.stack([t[1], -t[0]])
     return np.asarray(n / np.linalg.norm(n, axis=0))

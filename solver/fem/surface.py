@@ -14,7 +14,7 @@ from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.typing import Array, Ints
 
 _CORNER = float(np.cos(np.radians(30.0)))
-_NO_TANGENT = 1e-9
+NO_TANGENT = 1e-9
 """Tangent over the length of an edge: a shorter one is rounding."""
 
 
@@ -204,4 +204,4 @@ def _leaving(X: Array, end: int, other: int, middle: int | None) -> Array:
     if middle is None:
         return chord
     along = np.asarray(4 * X[:, middle] - 3 * X[:, end] - X[:, other])
-    return along if np.hypot(*along) > _NO_TANGENT * np.hypot(*chord) else chord
+    return along if np.hypot(*along) > NO_TANGENT * np.hypot(*chord) else chord

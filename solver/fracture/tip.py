@@ -18,6 +18,7 @@ class Tip(NamedTuple):
     Attributes
     ----------
     name : that of the body and the crack, and ``start`` or ``end`` if it has two tips
+    crack : name of the crack
     part : the body
     vertex, at : vertex of its mesh, and position (2,) [mm]
     ahead : (2,) unit vector in which the crack would go on
@@ -27,6 +28,7 @@ class Tip(NamedTuple):
     """
 
     name: str
+    crack: str
     part: Nodes
     vertex: int
     at: Array
@@ -68,7 +70,7 @@ class Tip(NamedTuple):
     @property
     def sides(self) -> set[tuple[str, str]]:
         """Its faces, by body and boundary."""
-        return {(self.part.body.name, face) for face in faces_of(self.name.split(".")[1])}
+        return {(self.part.body.name, face) for face in faces_of(self.crack)}
 
     @property
     def facets(self) -> Ints:
@@ -100,7 +102,7 @@ def tips_of(part: Nodes) -> list[Tip]:
             along = part.X[:, node] - part.X[:, upper[0, 0]]
             end = (".end" if at_end else ".start") if len(nodes) > 1 else ""
             found.append(Tip(
-                f"{part.body.name}.{crack}{end}", part, int(vertex[node]), part.X[:, node],
+                f"{part.body.name}.{crack}{end}", crack, part, int(vertex[node]), part.X[:, node],
                 along / np.hypot(*along), (upper, lower), np.zeros(0, dtype=int),
             ))  # fmt: skip
     every = np.array([tip.vertex for tip in found], dtype=int)

@@ -156,14 +156,14 @@ def _check_cracks(mesh: Mesh, where: str, cracks: Sequence[Faces]) -> None:
     one, other = one[same], other[same]
     faced = np.zeros(len(one), dtype=bool)
     for a, b in _both_ways(cracks):
-        faced |= np.isin(one, mesh.facets[:, a]) & np.isin(other, mesh.facets[:, b])
+        faced = faced | np.isin(one, mesh.facets[:, a]) & np.isin(other, mesh.facets[:, b])
     for i in np.flatnonzero(~faced)[:1]:
         allowed = f"lie on one another at {_at(mesh, one[i])}: merge them{apart}"
         _refuse(f"nodes {one[i]} and {other[i]}", where, allowed)
     hanging = _hanging(mesh, nodes, shortest)
     node, facet = hanging.T
     ends, n = mesh.facets[:, facet], mesh.nvertices
-    faced = np.isin(node * n + ends, one * n + other).any(axis=0)  # at an end of it
+    faced = np.asarray(np.isin(node * n + ends, one * n + other).any(axis=0))  # at an end of it
     for a, b in _both_ways(cracks):
         faced |= np.isin(node, mesh.facets[:, a]) & np.isin(facet, b)
     for node, facet in hanging[~faced][:1]:

@@ -122,7 +122,8 @@ def _void(system: Any, part: Any, state: BodyState, tip: Tip, q: Array) -> str:
     stiff = np.broadcast_to(getattr(part.law(state.time), "stiff", 1.0), domain.shape)[domain]
     if (stiff != 1).any():
         return "stiffness differs in the domain"
-    held = np.isin(np.arange(part.n), part.free, invert=True).reshape(-1, 2).any(axis=1)
+    free = np.isin(np.arange(part.n), part.free).reshape(-1, 2)
+    held = np.asarray(~free.all(axis=1))
     for link in system.model.links:
         for name, boundary in link.sides:
             if name == part.body.name:

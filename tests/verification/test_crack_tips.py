@@ -86,7 +86,7 @@ def test_shear_on_the_faces_of_a_crack_that_is_turned(outwards: bool) -> None:
     ends = (tip, (0.0, 0.0)) if outwards else ((0.0, 0.0), tip)
     shear = {"left": 50 * turn[:, 0], "right": -50 * turn[:, 0]}
     body = Body(
-        name="plate", mesh=opened(replace(plain, doflocs=turn @ plain.p), "root", *ends),
+        name="plate.1", mesh=opened(replace(plain, doflocs=turn @ plain.p), "root", *ends),
         material=Material(**STEEL), cracks=("root",), supports={"right": "xy"},
         loads=tuple(
             Traction(boundary=f"root_{side}", x=float(x), y=float(y))
