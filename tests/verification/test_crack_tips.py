@@ -29,7 +29,8 @@ from solver import (
 from solver.fatigue import stress_intensity
 from solver.fracture.intensity import by_integral
 from solver.mesh import graded, grid, opened
-from solver.model.loads import BodyForce
+from solver.model.amplitude import Amplitude
+from solver.model.loads import BodyForce, TravellingPressure
 from solver.results import cracks
 from studies.scenes.scene import read_scene
 
@@ -122,6 +123,39 @@ def test_residual_stress_has_the_intensity_of_the_weight_function(
     each = [solved("quad", load, kinematics=kinematics).stress_intensities(rings=r)[0].K[0]
             for r in (1, 5)]  # fmt: skip
     assert each == pytest.approx([expected, expected], rel=7e-3)
+
+
+def under_hertz(depth: Array, x: float, a: float, peak: float, ratio: float) -> tuple[Array, Array]:
+    """Return xx and xz of a half-plane at x from the centre, z downwards: Flamant's integral."""
+    angle = (np.arange(400) + 0.5)[:, None] * np.pi / 400
+    d = x - a * np.cos(angle)
+    scale = -2 / np.pi * peak * a * np.sin(angle) ** 2 * np.pi / 400 / (d**2 + depth**2) ** 2
+    along = (scale * (d**2 * depth + ratio * d**3)).sum(axis=0)
+    return along, (scale * (d * depth**2 + ratio * d**2 * depth)).sum(axis=0)
+
+
+@pytest.mark.parametrize("position", [3.0, 4.0, 6.0])
+def test_a_hertz_pressure_that_has_passed_opens_and_shears_a_crack(position: float) -> None:
+    """Weight function on the stress of the half-plane; that of K_II is the same.
+
+    The plate is large: the stress of a force falls as one over the distance.
+    """
+    away = graded(6e3, SIDE, 1.3, 6e3)
+    within = LENGTH - graded(LENGTH, SIDE, 1.3, 0.2)[::-1]
+    x, depth = np.concatenate([-away[::-1], away[1:]]), np.concatenate([within, LENGTH + away[1:]])
+    body = Body(
+        name="plate", mesh=opened(grid(x, -depth[::-1]), "root", (0.0, 0.0), (0.0, -LENGTH)),
+        material=Material(**STEEL), cracks=("root",), supports={"bottom": "xy"},
+        loads=(TravellingPressure(
+            boundary="top", half_width=2.0, peak=1000.0, position=Amplitude.constant(position),
+            shear_ratio=Amplitude.constant(0.3),
+        ),),
+    )  # fmt: skip
+    (tip,) = solve(Model(bodies=(body,)), control=ONCE).stress_intensities()
+    z = np.linspace(1e-3, LENGTH, 201)
+    stress = np.stack(under_hertz(z, -position, 2.0, 1000.0, 0.3))
+    expected = stress_intensity(z, stress, np.array([LENGTH]))[:, 0]
+    assert expected[0] > 0 and tip.K == pytest.approx(expected, rel=5e-3)
 
 
 def test_an_inclined_crack_pulled_and_pressed_with_friction() -> None:
