@@ -16,7 +16,7 @@ import time
 import uuid
 import zlib
 from collections.abc import Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from fnmatch import fnmatch
 from glob import glob
 from hashlib import sha256
@@ -142,8 +142,9 @@ class Folder:
 class Bucket(Folder):
     """Blobs at an address, such as ``s3://bucket/results``; those in use are in a folder too.
 
-    Raises `Unusable` if the address cannot be reached. A lock is a lease that its owner renews; one
-    of this folder, which only one process locks, is free when that process has ended.
+    Raises `Unusable` if the address cannot be reached. The lock of a writer is a lease that its
+    owner renews; one of this folder, which only one process locks, is free when that process has
+    ended. Those who share the store have none: they respect it when they begin.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -210,8 +211,11 @@ class Bucket(Folder):
     def lock(self, busy: str, shared: bool) -> Iterator[None]:
         """See `Blobs`."""
         leases = Leases(self._ask, self._at("lock"), self._own)
-        with super().lock(busy, shared), leases.held("writer") as lease:
-            if lease is None:
+        with super().lock(busy, shared), ExitStack() as held:
+            taken = (
+                leases.taken("writer") if shared else not held.enter_context(leases.held("writer"))
+            )
+            if taken:
                 raise StoreBusy(f"{self.address}: a process on another machine {busy}")
             yield
 

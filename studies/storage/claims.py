@@ -24,6 +24,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -70,10 +71,8 @@ class Claims:
     @contextmanager
     def held(self, name: str) -> Iterator[Claim | None]:
         """Claim a name, until the end of the context; None if another owner may be alive."""
-        number = 0
         with self._own() as own:
-            while self._there(f"{name}.{number + 1}"):
-                number += 1
+            number = self._last(name)
             while not self._made(own, f"{name}.{number}"):
                 if not self._dead(own, f"{name}.{number}"):
                     yield None
@@ -92,6 +91,10 @@ class Claims:
                     for each in every:
                         with suppress(FileNotFoundError, IsADirectoryError):
                             self._remove(each)
+
+    def _last(self, name: str) -> int:
+        """Return the number of the last claim of a name; 0 also if there is none."""
+        return next(each for each in count() if not self._there(f"{name}.{each + 1}"))
 
     @contextmanager
     def _own(self) -> Iterator[Any]:
@@ -163,6 +166,11 @@ class Leases(Claims):
 
     def __init__(self, ask: Callable[..., Any], folder: str, owner: str = "") -> None:
         self._ask, self._folder, self._owner = ask, folder, owner
+
+    def taken(self, name: str) -> bool:
+        """Whether another owner that may be alive has claimed a name."""
+        last = f"{name}.{self._last(name)}"
+        return self._there(last) and not self._dead(None, last)
 
     @contextmanager
     def _own(self) -> Iterator[Any]:

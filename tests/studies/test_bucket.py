@@ -123,6 +123,19 @@ def test_a_writer_has_a_lease(address: str, monkeypatch: pytest.MonkeyPatch) -> 
             pass
 
 
+def test_parts_share_a_store_and_respect_its_writer(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here, other = Store(address), elsewhere(address, monkeypatch)
+    with here.sharing():
+        with other.sharing(), here.sharing(), pytest.raises(StoreBusy):
+            other.writing().__enter__()  # on one machine a writer sees those who share
+        with other.writing(), pytest.raises(StoreBusy, match="on another machine computes here"):
+            elsewhere(address, monkeypatch).sharing().__enter__()
+    with here.sharing(), other.sharing():
+        pass
+
+
 def test_parts_meet_at_an_address(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     study, here = fake_study(), Store(address)
     other = elsewhere(address, monkeypatch)
