@@ -283,8 +283,12 @@ def directory_of(place: Path | str) -> Path:
     directory = Path(cache) / own.strip("-")
     if not (directory / ORIGIN).exists():
         directory.mkdir(parents=True, exist_ok=True)
-        with appearing(directory / ORIGIN) as part:
-            part.write_text(json.dumps({"address": address, "id": uuid.uuid4().hex}))
+        identity = uuid.uuid4().hex
+        part = directory / f"{identity}.own"
+        part.write_text(json.dumps({"address": address, "id": identity}))
+        with suppress(FileExistsError):  # another process was first: its id is that of the folder
+            os.link(part, directory / ORIGIN)
+        part.unlink()
     return directory
 
 

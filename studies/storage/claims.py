@@ -161,11 +161,13 @@ class Leases(Claims):
     ----------
     ask : calls a method of a file system of fsspec for a name
     folder : the folder
-    owner : whose claims these are; those of the same owner are dead. Empty if others may have it
+    owner : whose claims these are; those of the same owner on this machine are dead. Empty if
+        others may have it
     """
 
     def __init__(self, ask: Callable[..., Any], folder: str, owner: str = "") -> None:
-        self._ask, self._folder, self._owner = ask, folder, owner
+        self._ask, self._folder = ask, folder
+        self._owner = f"{owner} {_machine()}" if owner else ""
 
     def taken(self, name: str) -> bool:
         """Whether another owner that may be alive has claimed a name."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import time
 import uuid
 from pathlib import Path
@@ -13,6 +14,7 @@ import xarray as xr
 
 from studies import Store, StoreBusy, StudyError, open_study, run_study
 from studies.execution.part import run_part
+from studies.storage import claims
 from studies.storage.blobs import directory_of
 from studies.storage.claims import Claim
 from studies.views.reading import begun_studies
@@ -112,7 +114,8 @@ def test_a_writer_has_a_lease(address: str, monkeypatch: pytest.MonkeyPatch) -> 
     with other.writing():
         pass
     lease = f"{address.removeprefix('memory:/')}/lock/writer.0"
-    own = json.loads((here.directory / "origin.json").read_text())["id"]
+    with here.writing():
+        own = json.loads(FILES.cat_file(lease))["owner"]
     for owner, age, free in (("x", 100.0, False), ("x", 400.0, True), (own, 1.0, True)):
         known = {"owner": owner, "at": time.time() - age, "done": False}
         FILES.pipe_file(lease, json.dumps(known).encode())
@@ -121,6 +124,18 @@ def test_a_writer_has_a_lease(address: str, monkeypatch: pytest.MonkeyPatch) -> 
                 continue
         with pytest.raises(StoreBusy), here.writing():
             pass
+
+
+def test_machines_with_one_home_are_two_owners(
+    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Store(address)
+    with here.writing():
+        shutil.copytree(tmp_path / "here", tmp_path / "again")  # without its lock
+        monkeypatch.setenv("RESIDUA_CACHE", str(tmp_path / "again"))
+        monkeypatch.setattr(claims, "_machine", lambda: "another")
+        with pytest.raises(StoreBusy, match="on another machine"):
+            Store(address).writing().__enter__()
 
 
 def test_parts_share_a_store_and_respect_its_writer(
@@ -139,15 +154,15 @@ def test_parts_share_a_store_and_respect_its_writer(
 def test_parts_meet_at_an_address(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     study, here = fake_study(), Store(address)
     other = elsewhere(address, monkeypatch)
-    claims = here.blobs.claims()
-    with claims.held("a") as claim:
+    leases = here.blobs.claims()
+    with leases.held("a") as claim:
         assert claim == Claim(0)
         with other.blobs.claims().held("a") as second:
             assert second is None
-    with claims.held("a") as claim:
+    with leases.held("a") as claim:
         assert claim == Claim(0)
         claim.done = True
-    with claims.held("a") as claim:
+    with leases.held("a") as claim:
         assert claim is None, "it stays for those that do not see yet what was done"
     computed = run_part(study, other.directory, (1, 2)).computed
     assert sorted(computed) == sorted(study.run_ids())
