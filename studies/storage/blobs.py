@@ -2,8 +2,9 @@
 
 A `Bucket` has a folder on this machine too. What is asked for is brought there, because netCDF
 needs files; what is written appears there when it is at the address. A blob in the folder has the
-time of change of that at the address, with a digest of its tag (of S3 one of its content) in the
-last three digits: by size and time `follow` finds what others have changed.
+time of change of that at the address. If this has a tag (of S3 one of its content), the time is in
+whole seconds, as one of two ways to ask has no others, and a digest of the tag is the fraction. By
+size and time `follow` finds what others have changed.
 """
 
 from __future__ import annotations
@@ -301,4 +302,9 @@ def _stamp(info: dict[str, Any]) -> Stamp:
     at: Any = next((info[name] for name in _TIMES if info.get(name)), 0.0)
     tag = next((str(info[name]) for name in _TAGS if info.get(name)), "")
     seconds = at.timestamp() if hasattr(at, "timestamp") else float(at)
-    return int(info["size"] or 0), int(seconds * 1e6) * 1000 + zlib.crc32(tag.encode()) % 1000
+    time_ns = (
+        int(seconds) * 10**9 + zlib.crc32(tag.encode()) % 10**9
+        if tag
+        else int(seconds * 1e6) * 1000
+    )
+    return int(info["size"] or 0), time_ns

@@ -6,6 +6,7 @@ import json
 import shutil
 import time
 import uuid
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import fsspec
@@ -88,6 +89,27 @@ def test_many_blobs_are_listed_as_each_is_asked_for(address: str) -> None:
     state = path.stat()
     assert (state.st_size, state.st_mtime_ns) == blobs.stamps([names[0]])[names[0]]
     assert not blobs.path("runs/none.nc").exists() and blobs.stamps([]) == {}
+
+
+def test_stamps_agree_where_a_listing_has_milliseconds(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blobs, root = Store(address).blobs, address.removeprefix("memory:/")
+    tags = [f'"{number}"' for number in range(30)]
+    at = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+
+    def known(path: str, more: timedelta) -> dict[str, object]:
+        tag = tags[int(path[-2:])]
+        return {"type": "file", "size": 1, "LastModified": at + more, "ETag": tag}
+
+    names = [f"runs/{number:02}" for number in range(30)]
+    exact, listed = timedelta(0), timedelta(milliseconds=678)
+    found = {f"{root}/{name}": known(name, listed) for name in names}
+    monkeypatch.setattr(type(FILES), "info", lambda self, path: known(path, exact))
+    monkeypatch.setattr(type(FILES), "find", lambda self, path, detail: found)
+    stamps = blobs.stamps(names)
+    assert stamps == {name: blobs.stamps([name])[name] for name in names}
+    assert len(set(stamps.values())) == 30, "the tag counts"
 
 
 def test_a_damaged_blob_is_set_aside_and_a_damaged_copy_brought_again(
