@@ -57,7 +57,7 @@ class Blobs(Protocol):
         """Return the names that match a pattern, in which ``*`` stands for no slash."""
 
     def stamps(self, names: Iterable[str]) -> dict[str, Stamp]:
-        """Return, by name, the stamps of those blobs that exist."""
+        """Return, by name, the stamps of those blobs that exist, in the order of the names."""
 
     def path(self, name: str) -> Path:
         """Return the path at which a blob can be read; if there is none, there is no file."""
@@ -169,10 +169,10 @@ class Bucket(Folder):
 
     def stamps(self, names: Iterable[str]) -> dict[str, Stamp]:
         """See `Blobs`."""
-        wanted = set(names)
+        wanted = list(dict.fromkeys(names))
         if len(wanted) > _FEW:
             found = self._listed(os.path.commonpath(wanted))
-            return {name: stamp for name, stamp in found.items() if name in wanted}
+            return {name: found[name] for name in wanted if name in found}
         few = {name: self._stamp(name) for name in wanted}
         return {name: stamp for name, stamp in few.items() if stamp}
 

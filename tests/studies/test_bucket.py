@@ -84,6 +84,8 @@ def test_many_blobs_are_listed_as_each_is_asked_for(address: str) -> None:
         FILES.pipe_file(f"{root}/{name}", name.encode())
     assert sorted(blobs.names("runs/*.nc")) == names
     assert blobs.stamps([*names, "runs/none.nc"]) == {n: blobs.stamps([n])[n] for n in names}
+    for some in (names[::-1], names[:9][::-1]):
+        assert list(blobs.stamps(some)) == some
     assert blobs.names("studies/*/study.json") == ["studies/z/study.json"]
     path = blobs.path(names[0])
     state = path.stat()
