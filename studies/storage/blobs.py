@@ -201,12 +201,18 @@ class Bucket(Folder):
         super().remove(name)
 
     def move(self, name: str, target: str) -> None:
-        """See `Blobs`: if only the file here is damaged, the blob stays, and is brought again."""
+        """See `Blobs`: if a file here is not its blob, the blobs stay, and are brought again."""
         here = super().path(name)
+        files = filter(Path.is_file, here.rglob("*")) if here.is_dir() else [here]
         with suppress(FileNotFoundError, NoFile):
-            if here.is_dir() or self._ask("cat_file", self._at(name)) == read_file(here, 1 << 40):
+            if all(map(self._same, files)):
                 self._ask("mv", self._at(name), self._at(target), recursive=True)
         super().move(name, target)
+
+    def _same(self, file: Path) -> bool:
+        """Whether a file here has the content of its blob."""
+        name = file.relative_to(self.directory).as_posix()
+        return bool(self._ask("cat_file", self._at(name)) == read_file(file, 1 << 40))
 
     @contextmanager
     def lock(self, busy: str, shared: bool) -> Iterator[None]:

@@ -131,6 +131,24 @@ def test_a_damaged_blob_is_set_aside_and_a_damaged_copy_brought_again(
     assert run_study(study, store, workers=0, resume=True).ok
 
 
+def test_a_damaged_file_of_a_scene_is_brought_again(address: str) -> None:
+    blobs, root = Store(address).blobs, address.removeprefix("memory:/")
+    names = ["scenes/a/scene.json", "scenes/a/wheel.msh"]
+
+    def brought() -> list[bytes]:
+        return [blobs.path(name).read_bytes() for name in names]
+
+    for name in names:
+        FILES.pipe_file(f"{root}/{name}", name.encode())
+    sound = brought()
+    (blobs.directory / "unreadable").mkdir()
+    blobs.path(names[1]).write_bytes(b"damaged")
+    blobs.move("scenes/a", "unreadable/a")
+    assert brought() == sound and not FILES.exists(f"{root}/unreadable")
+    blobs.move("scenes/a", "unreadable/b")
+    assert not FILES.exists(f"{root}/scenes/a") and not blobs.path(names[0]).exists()
+
+
 def test_a_writer_has_a_lease(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     here, other = Store(address), elsewhere(address, monkeypatch)
     with here.writing(), pytest.raises(StoreBusy, match="on another machine computes here"):
