@@ -99,7 +99,7 @@ class Keeper:
         study, size = found.study, found.estimate.bytes
         with self._one:
             self.check_room(found)
-            there = self.store.definition(study.id) is not None
+            there = bool(self.store.blobs.names(f"studies/{study.id}/*"))  # also damaged ones
             self.store.save_study(study)
             content, most = study.to_dict(), study.size
             try:

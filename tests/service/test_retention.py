@@ -7,13 +7,14 @@ import shutil
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
-from service.errors import Conflict, NotFound
+from service.errors import Busy, Conflict, NotFound
 from service.job import StudyState
 from service.jobs import Jobs, put
 from service.pool import Pool
@@ -295,3 +296,17 @@ def test_deletion_over_http(place: Place) -> None:
     assert [answer.status_code for answer in answers] == [204, 404]
     assert answers[0].content == b"" and client.get(url).status_code == 404
     assert not place.runs() and not place.there(study)
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_full_queue_deletes_nothing_that_was_there(place: Place, there: bool) -> None:
+    study = place.computed("a", [0.0], known=False)
+    folder = place.store.study_path(study.id)
+    (folder / "study.json").write_text("damaged")
+    if not there:
+        shutil.rmtree(folder)
+    place.jobs.longest = 0
+    found = SimpleNamespace(study=study, estimate=SimpleNamespace(bytes=0), runs=ids(study))
+    with pytest.raises(Busy):
+        place.keeper().accept(found, 0)  # type: ignore[arg-type]
+    assert (folder / "dataset.nc").exists() == there == folder.exists()
