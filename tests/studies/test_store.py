@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import subprocess
 import sys
 import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -48,6 +51,24 @@ def test_the_writer_clears_what_killed_writers_left(store: Store) -> None:
     (runs / f"{'0' * 32}.nc.abc.part").write_text("half")
     with store.writing():
         assert list(runs.iterdir()) == []
+
+
+def test_a_claim_that_cannot_be_deleted_ends_no_writer(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    claims, unlink = store.directory / "claims", os.unlink
+    claims.mkdir(parents=True)
+    for name in (".nfs01", "a.0", "b.0"):
+        (claims / name).touch()
+
+    def held(path: Any, **more: Any) -> None:
+        if str(path).endswith(".nfs01"):
+            raise OSError(errno.EBUSY, "busy")
+        unlink(path, **more)
+
+    monkeypatch.setattr(os, "unlink", held)
+    with store.writing():
+        assert [path.name for path in claims.iterdir()] == [".nfs01"]
 
 
 @pytest.mark.processes
