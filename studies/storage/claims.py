@@ -36,6 +36,8 @@ BEAT = 20.0
 STALE = 300.0
 """Age of a claim of another machine at which it is dead [s]."""
 _DONE = b"\ndone\n"
+_HALF = 1.0
+"""Seconds after which a lease that is half written is read again."""
 _LONGEST = 1000
 """Largest size of a claim [bytes]."""
 
@@ -85,11 +87,11 @@ class Claims:
                     yield claim
             finally:
                 if claim.done:
-                    with suppress(OSError):  # then it counts as a death
+                    with suppress(OSError, Unusable):  # then it counts as a death
                         self._end(own, every[-1])
                 else:
                     for each in every:
-                        with suppress(FileNotFoundError, IsADirectoryError):
+                        with suppress(FileNotFoundError, IsADirectoryError, Unusable):
                             self._remove(each)
 
     def _last(self, name: str) -> int:
@@ -186,6 +188,10 @@ class Leases(Claims):
             self._write(claim, mode="create")
         except FileExistsError:
             return False
+        except Unusable:  # as some stores answer if two make it at the same time
+            if self._there(claim):
+                return False
+            raise
         return True
 
     def _dead(self, own: Any, claim: str) -> bool:
@@ -210,12 +216,21 @@ class Leases(Claims):
         self._ask("pipe_file", f"{self._folder}/{claim}", text.encode(), mode=mode)
 
     def _read(self, claim: str) -> dict[str, Any]:
-        """Return the content of a claim; one that is gone has ended, and is none that died."""
-        try:
-            known: dict[str, Any] = json.loads(self._ask("cat_file", f"{self._folder}/{claim}"))
-        except FileNotFoundError:
-            return {"owner": None, "at": time.time(), "done": True}
-        return known
+        """Return the content of a claim; one that is gone has ended, and is none that died.
+
+        One that stays half written is that of an owner that has died.
+        """
+        for pause in (_HALF, 0.0):
+            try:
+                text = self._ask("cat_file", f"{self._folder}/{claim}")
+            except FileNotFoundError:
+                return {"owner": None, "at": time.time(), "done": True}
+            try:
+                known = json.loads(text)
+                return {"owner": known["owner"], "at": float(known["at"]), "done": known["done"]}
+            except (ValueError, LookupError, TypeError):
+                time.sleep(pause)
+        return {"owner": None, "at": 0.0, "done": False}
 
 
 def _free(descriptor: int) -> bool:

@@ -212,6 +212,34 @@ def test_parts_meet_at_an_address(address: str, monkeypatch: pytest.MonkeyPatch)
     assert not run_study(study, here, workers=0, resume=True).computed
 
 
+def test_leases_survive_trouble(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    leases, root = Store(address).blobs.claims(), f"{address.removeprefix('memory:/')}/claims"
+    monkeypatch.setattr(claims, "_HALF", 0.0)
+    FILES.pipe_file(f"{root}/a.0", b'{"owner": "", "at"')
+    with leases.held("a") as claim:
+        assert claim == Claim(1), "half a lease is that of an owner that died"
+
+    def lost(*given: object, **named: object) -> None:
+        raise RuntimeError("412 Precondition Failed")
+
+    for done in (False, True):
+        with monkeypatch.context() as patch, leases.held(f"b{done}") as claim:
+            assert claim == Claim(0)
+            claim.done = done
+            for method in ("rm_file", "pipe_file"):
+                patch.setattr(type(FILES), method, lost)
+    with leases.held("c") as claim:
+        assert claim == Claim(0)
+        monkeypatch.setattr(type(FILES), "pipe_file", lost)
+        with leases.held("c") as second:
+            assert second is None
+        with pytest.raises(StudyError), leases.held("d"):
+            pass
+        monkeypatch.setattr(type(FILES), "cat_file", lost)
+        with pytest.raises(StudyError), leases.held("c"):
+            pass  # who cannot read a lease does not take it over
+
+
 def test_an_address_that_cannot_be_used_is_named(
     address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
