@@ -10,6 +10,7 @@ size and time `follow` finds what others have changed.
 from __future__ import annotations
 
 import json
+import logging
 import os
 import re
 import shutil
@@ -36,6 +37,7 @@ _FEW = 20
 _TIMES = ("mtime", "LastModified", "last_modified", "updated", "created")
 _TAGS = ("ETag", "etag", "md5Hash")
 """What kinds of file systems call the time of change of a blob, and a digest of its content."""
+_LOG = logging.getLogger("studies")
 
 Stamp = tuple[int, int]
 """Length of a blob [bytes], and its time of change [ns]."""
@@ -159,6 +161,8 @@ class Bucket(Folder):
             found = fsspec.url_to_fs(address, use_listings_cache=False, **folders)
         except (ImportError, ValueError) as error:
             raise Unusable("directory", address, f"cannot be used: {error}") from None
+        except Exception as error:  # of whichever library, such as one without credentials
+            raise _unreachable(address, error) from None
         self.address, (self._fs, self._root) = address, found
 
     def names(self, pattern: str) -> list[str]:
@@ -263,8 +267,7 @@ class Bucket(Folder):
         except (FileNotFoundError, FileExistsError):
             raise
         except Exception as error:  # of whichever library
-            allowed = f"must be an address that can be reached: {error}"
-            raise Unusable("directory", str(self.address), allowed) from None
+            raise _unreachable(str(self.address), error) from None
 
 
 def blobs_at(place: Path | str) -> Blobs:
@@ -302,6 +305,13 @@ def directory_of(place: Path | str) -> Path:
 def is_address(place: Path | str) -> bool:
     """Whether a text is an address, such as ``s3://bucket/results``, of no service."""
     return isinstance(place, str) and bool(re.match(r"(?!https?:)[\w+.-]+://", place))
+
+
+def _unreachable(address: str, error: Exception) -> Unusable:
+    """Return the error for users; what the library says is for the log, not for callers of HTTP."""
+    _LOG.warning("%s cannot be reached: %s: %s", address, type(error).__name__, error)
+    allowed = "must be an address that can be reached; the log has the reason"
+    return Unusable("directory", address, allowed)
 
 
 def _stamp(info: dict[str, Any]) -> Stamp:

@@ -241,7 +241,7 @@ def test_leases_survive_trouble(address: str, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_an_address_that_cannot_be_used_is_named(
-    address: str, monkeypatch: pytest.MonkeyPatch
+    address: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     with pytest.raises(StudyError, match=r"directory = 'nowhere://x': cannot be used: Protocol"):
         Store("nowhere://x/")
@@ -253,5 +253,10 @@ def test_an_address_that_cannot_be_used_is_named(
         raise RuntimeError("no route to the host")
 
     monkeypatch.setattr(type(FILES), "info", lost)
-    with pytest.raises(StudyError, match=r"directory = 'memory://.*can be reached: no route"):
+    reached = r"directory = 'memory://.*': must be an address that can be reached; the log has"
+    with pytest.raises(StudyError, match=reached):
         store.run("0" * 32)
+    monkeypatch.setattr(fsspec, "url_to_fs", lost)
+    with pytest.raises(StudyError, match=reached):
+        Store(address)
+    assert caplog.text.count("cannot be reached: RuntimeError: no route to the host") == 2
