@@ -11,8 +11,9 @@ from typing import Any, NoReturn
 from residua import commands, keys
 from residua.status import BAD_INPUT, complain
 from solver.version import __version__
+from studies.errors import StudyError
 from studies.execution.limits import Limits
-from studies.storage.blobs import directory_of
+from studies.storage.blobs import directory_of, is_address
 
 
 def parser() -> argparse.ArgumentParser:
@@ -40,11 +41,11 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("name", nargs="?")
 
     one = add("show", commands.show)
-    one.add_argument("path", type=_path, metavar="DIR|RUN")
+    one.add_argument("path", type=_store, metavar="DIR|RUN")
     _study(one)
 
     one = add("export", commands.export)
-    one.add_argument("path", type=_path, metavar="RUN|DIR")
+    one.add_argument("path", type=_store, metavar="RUN|DIR")
     _study(one)
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
     one.add_argument(
@@ -58,11 +59,11 @@ def parser() -> argparse.ArgumentParser:
     one = add("serve", commands.serve)
     one.add_argument("--host", help="default: 127.0.0.1; with another one callers need API keys")
     one.add_argument("--port", type=_integer(0, 65535), help="default: 8000")
-    one.add_argument("--data", type=_path, metavar="DIR", help="default: out")
+    one.add_argument("--data", type=_store, metavar="DIR", help="default: out")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
 
     one = add("view", commands.view)
-    one.add_argument("path", type=_path, metavar="DIR|DATASET")
+    one.add_argument("path", type=_store, metavar="DIR|DATASET")
     _study(one)
     one.add_argument(
         "--port", type=_integer(0, 65535), default=0, help="default: any port that is free"
@@ -97,7 +98,7 @@ def _study(one: argparse.ArgumentParser) -> None:
 
 def _results(one: argparse.ArgumentParser) -> None:
     one.add_argument(
-        "--out", type=_path, default=Path("out"), metavar="DIR",
+        "--out", type=_store, default=Path("out"), metavar="DIR",
         help="folder of all results, which studies share, or an address such as s3://bucket/x "
         "(default: %(default)s)",
     )  # fmt: skip
@@ -235,7 +236,7 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
     one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
 
     one = add("predict", commands.predict)
-    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("path", type=_store, metavar="DIR")
     _study(one)
     one.add_argument("at", nargs="+", metavar="NAME=VALUE", help="each parameter that varies")
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
@@ -246,7 +247,7 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
     )
 
     one = add("sensitivity", commands.sensitivity)
-    one.add_argument("path", type=_path, metavar="DIR")
+    one.add_argument("path", type=_store, metavar="DIR")
     _study(one)
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
@@ -270,7 +271,7 @@ def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:
         name = act.__name__.strip("_")
         one = actions.add_parser(name, help=act.__doc__, description=act.__doc__)
         one.set_defaults(act=act)
-        one.add_argument("--data", type=_path, metavar="DIR", help="of the service; default: out")
+        one.add_argument("--data", type=_store, metavar="DIR", help="of the service; default: out")
         if name != "list":
             one.add_argument("name", metavar="NAME")
         if name == "add":
@@ -301,12 +302,22 @@ def _add_remote(add: Callable[..., argparse.ArgumentParser]) -> None:
 def _path(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError(f"{text!r}: must be the name of a file or a folder")
-    return directory_of(text)
+    if is_address(text):
+        raise argparse.ArgumentTypeError("must be on this machine, not at an address")
+    return Path(text)
+
+
+def _store(text: str) -> Path:
+    """Return the folder of a store, also of one at an address."""
+    try:
+        return directory_of(text) if text else _path(text)
+    except (OSError, StudyError) as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _place(text: str) -> Path | str:
     """Return the path of a study, or its URL as it is: a path has no double slash."""
-    return text if text.startswith(("http://", "https://")) else _path(text)
+    return text if text.startswith(("http://", "https://")) else _store(text)
 
 
 def _part(text: str) -> tuple[int, int]:

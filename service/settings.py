@@ -198,6 +198,9 @@ def chosen(**given: Any) -> Settings:
     except OSError as error:
         raise StudyError("RESIDUA_SCHEDULER_CA", error.filename, f"{error.strerror}") from None
     except ValidationError as error:
+        for each in error.errors():
+            if isinstance(refused := each.get("ctx", {}).get("error"), StudyError):
+                raise refused.renamed(lambda name: "RESIDUA_DATA") from None  # without a password
         found = StudyError.of([*mistakes_of(error, Settings).values()])
         raise found.renamed(lambda name: f"RESIDUA_{name}".upper()) from None
     for part in ("limits", "outside_access", "bounds"):

@@ -37,6 +37,8 @@ _FEW = 20
 _TIMES = ("mtime", "LastModified", "last_modified", "updated", "created")
 _TAGS = ("ETag", "etag", "md5Hash")
 """What kinds of file systems call the time of change of a blob, and a digest of its content."""
+_PASSWORD = re.compile(r"://[^/@]*(:(?!\d+/)[^@]*)@")
+"""A password in an address, with its colon; a number before a slash is a port."""
 _LOG = logging.getLogger("studies")
 
 Stamp = tuple[int, int]
@@ -288,6 +290,10 @@ def directory_of(place: Path | str) -> Path:
             )
         return Path(place)
     address = str(place).rstrip("/")
+    if found := _PASSWORD.search(address):
+        shown = address.replace(found[1], "***", 1)
+        allowed = "must have no password, which logs and scripts would show: give it to fsspec"
+        raise StudyError("directory", shown, f"{allowed}, in the files of ~/.config/fsspec")
     cache = os.environ.get("RESIDUA_CACHE") or Path.home() / ".cache" / "residua"
     own = re.sub(r"\W+", "-", address)[-40:] + sha256(address.encode()).hexdigest()[:8]
     directory = Path(cache) / own.strip("-")

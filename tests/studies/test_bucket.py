@@ -13,6 +13,8 @@ import fsspec
 import pytest
 import xarray as xr
 
+from residua.cli import main
+from service.settings import chosen
 from studies import Store, StoreBusy, StudyError, open_study, run_study
 from studies.execution.part import run_part
 from studies.storage import claims
@@ -238,6 +240,48 @@ def test_leases_survive_trouble(address: str, monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setattr(type(FILES), "cat_file", lost)
         with pytest.raises(StudyError), leases.held("c"):
             pass  # who cannot read a lease does not take it over
+
+
+@pytest.mark.parametrize("address", ["sftp://me:se/cret@host/x", "ftp://:secret@host:21/x"])
+def test_a_password_in_an_address_is_refused_and_not_shown(
+    address: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("RESIDUA_CACHE", str(tmp_path))
+    monkeypatch.setenv("RESIDUA_DATA", address)
+    for refused in (lambda: Store(address), chosen):
+        with pytest.raises(StudyError, match=r"must have no password.* ~/.config/fsspec") as error:
+            refused()
+        assert "cret" not in str(error.value)
+    with pytest.raises(SystemExit) as end:
+        main(["table", address])
+    assert end.value.code == 2
+    told = capsys.readouterr().err
+    assert "must have no password" in told and "cret" not in told and told.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_addresses_with_ports_and_signs_have_no_password(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RESIDUA_CACHE", str(tmp_path))
+    for address in ("sftp://me@host:22/a", "hdfs://host:8020/a@b", "abfs://box@host/a:b@c"):
+        assert directory_of(address).is_dir()
+
+
+def test_a_file_at_an_address_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("RESIDUA_CACHE", str(tmp_path))
+    with pytest.raises(SystemExit):
+        main(["table", str(tmp_path), "--out", "s3://bucket/table.csv"])
+    assert "--out: must be on this machine, not at an address" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["table", "s3:/bucket"])
+    assert "is an address" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 def test_an_address_that_cannot_be_used_is_named(
