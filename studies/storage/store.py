@@ -203,8 +203,9 @@ class Store:
             self.blobs.remove(name)
 
     def size(self, *patterns: str) -> int:
-        """Return the bytes of the files whose names match."""
-        names = (name for pattern in patterns for name in self.blobs.names(pattern))
+        """Return the bytes of the files whose names match, or are given."""
+        found = ([each] if "*" not in each else self.blobs.names(each) for each in patterns)
+        names = chain.from_iterable(found)
         return sum(size for size, _ in self.blobs.stamps(names).values())
 
     def dataset(self, study_id: str) -> Path:

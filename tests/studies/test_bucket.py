@@ -8,6 +8,7 @@ import time
 import uuid
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from unittest.mock import Mock
 
 import fsspec
 import pytest
@@ -79,8 +80,11 @@ def test_what_others_store_is_seen(address: str, monkeypatch: pytest.MonkeyPatch
     assert other.study_ids() != [study.id] and study.id not in other.study_ids()
 
 
-def test_many_blobs_are_listed_as_each_is_asked_for(address: str) -> None:
-    blobs, root = Store(address).blobs, address.removeprefix("memory:/")
+def test_many_blobs_are_listed_as_each_is_asked_for(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = Store(address)
+    blobs, root = store.blobs, address.removeprefix("memory:/")
     names = [f"runs/{number:032x}.nc" for number in range(30)]
     for name in [*names, "runs/x/y.nc", "studies/z/study.json"]:
         FILES.pipe_file(f"{root}/{name}", name.encode())
@@ -89,6 +93,11 @@ def test_many_blobs_are_listed_as_each_is_asked_for(address: str) -> None:
     for some in (names[::-1], names[:9][::-1]):
         assert list(blobs.stamps(some)) == some
     assert blobs.names("studies/*/study.json") == ["studies/z/study.json"]
+    with monkeypatch.context() as patch:
+        find = Mock(side_effect=FILES.find)
+        patch.setattr(type(FILES), "find", find)
+        assert store.size("studies/z/*", *names, "runs/none.nc") == sum(map(len, names)) + 20
+    assert find.call_count == 2, "the folder, and all at once"
     path = blobs.path(names[0])
     state = path.stat()
     assert (state.st_size, state.st_mtime_ns) == blobs.stamps([names[0]])[names[0]]
