@@ -259,6 +259,7 @@ def moving_forces(part: Nodes, loads: Iterable[Load], time: float) -> Array:
     force = np.zeros(part.n)
     for load in loads:
         for boundary in load.boundaries:
+            load.check_at(time, part.X[:, edges_of(part, boundary)[:, :2]])
             own = _tractions(part, boundary, partial(load.push_at, time), 8)
             force += 0.0 if own is None else own
     return force

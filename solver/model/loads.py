@@ -32,6 +32,8 @@ Value = float | Field
 StressValue = Annotated[Value, Unit("MPa")]
 PerKelvin = Annotated[float, Unit("1/K")]
 
+_ROUNDED = 1e-9
+"""Length that may be rounding, over the width of a pressure."""
 _ALWAYS, _NOUGHT = Amplitude.constant(1.0), Amplitude.constant(0.0)
 _VECTOR, _TENSOR = ("x", "y"), ("xx", "yy", "zz", "xy")
 
@@ -99,6 +101,9 @@ class Load:
         """
         force = self.push(x, along)
         return None if force is None else self.factor(time) * force
+
+    def check_at(self, time: float, edges: Array) -> None:
+        """Raise `ModelError` if a load that moves cannot act on the edges (2, n, 2) at a time."""
 
     @property
     def moves(self) -> bool:
@@ -206,6 +211,26 @@ class TravellingPressure(BoundaryLoad):
         factor, centre, ratio = self.now(time)
         inside = 1 - ((x - centre) / self.half_width) ** 2
         return factor * self.peak * np.sqrt(np.maximum(inside, 0.0)), ratio
+
+    def check_at(self, time: float, edges: Array) -> None:
+        """Raise `ModelError` if it reaches beyond the edges, or is narrower than one of them."""
+        factor, centre, _ = self.now(time)
+        if not factor:
+            return
+        name, width = f"{self.name}.{self.boundary}", 2 * self.half_width
+        low, high = centre - self.half_width, centre + self.half_width
+        first, last = edges[0].min(axis=1), edges[0].max(axis=1)
+        on = np.clip(last, low, high) - np.clip(first, low, high)
+        if on.sum() < width * (1 - _ROUNDED):
+            raise ModelError(
+                f"{name}.position", float(f"{centre:.6g}"),
+                f"must keep the pressure, from {low:.6g} to {high:.6g} mm at time {time:.6g}, on "
+                f"the boundary, from {first.min():.6g} to {last.max():.6g} mm",
+            )  # fmt: skip
+        longest = float((last - first)[on > _ROUNDED * width].max())
+        if width < longest * (1 - _ROUNDED):
+            allowed = f"must be at least {longest / 2:.6g} mm, half of an edge under the pressure"
+            raise ModelError(f"{name}.half_width", self.half_width, allowed)
 
     def push_at(self, time: float, x: Array, along: Array) -> Array:
         """Return the forces (2, n) on pieces of the boundary at a time [N/mm]."""
