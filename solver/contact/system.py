@@ -266,10 +266,13 @@ class System:
     @cached_property
     def moves(self) -> bool:
         """Whether a load or a wheel moves along a body."""
-        return any(
-            body.axle is not None or any(load.moves for load in body.every_load)
-            for body in self.model.bodies
-        )
+        loads = (load for body in self.model.bodies for load in body.every_load)
+        return self.rolls or any(load.moves for load in loads)
+
+    @property
+    def rolls(self) -> bool:
+        """Whether a wheel rolls: it is set down to touch at the beginning of each lap."""
+        return any(body.axle is not None for body in self.model.bodies)
 
     @property
     def has_amplitude(self) -> bool:
@@ -292,8 +295,7 @@ class System:
     def overlaps(self, state: State) -> bool:
         """Whether bodies overlap in a state; false with wheels, which are set down to touch."""
         gaps = (contact.gap for contact in state.contacts)
-        wheels = any(body.axle is not None for body in self.model.bodies)
-        return not wheels and any((gap < -self.gap_tolerance).any() for gap in gaps)
+        return not self.rolls and any((gap < -self.gap_tolerance).any() for gap in gaps)
 
     @cached_property
     def proportional(self) -> bool:

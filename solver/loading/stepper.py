@@ -140,14 +140,14 @@ class Stepper:
     def again(self, point: Point, time: float) -> Point:
         """Return the first point of a later lap: wheels are set down, other bodies unchanged.
 
-        Where a load or a wheel moves, its energy counts from there.
+        With wheels, which are apart at rest, the energy counts from there.
         """
         state = point.now.state
-        if self.system.moves:
+        if self.system.rolls:
             begun = self.begin(state, time, point.tally)
             history, met = (*point.history, *begun.history), point.met | begun.met
             timing = point.now.timing.then(begun.now.timing)
-            # the bodies are apart at rest: to begin adds no error
+            # the wheels are set down apart: to begin adds no error
             now = replace(begun.now, timing=timing, missed=point.now.missed)
             return replace(begun, now=now, history=history, met=met)
         now = replace(point.now, state=replace(state, time=time), added=0.0)

@@ -13,10 +13,13 @@ import solver.fem.loads
 from solver import Body, ContactPair, Material, Model, ModelError, System, solve
 from solver.fem.discretisation import Discretisation
 from solver.fem.substructure import Substructure
+from solver.loading.control import Control
+from solver.loading.stepper import Stepper
 from solver.mesh import grid
 from solver.mesh.elements import element_type, known_elements
 from solver.mesh.grids import mapped, merged
-from solver.model.loads import Array, BodyForce, BoundaryLoad, Load, Pressure
+from solver.model.amplitude import Amplitude
+from solver.model.loads import Array, BodyForce, BoundaryLoad, Load, Pressure, TravellingPressure
 
 pytestmark = pytest.mark.solves
 
@@ -205,6 +208,27 @@ def test_a_load_that_moves_acts_on_an_elastic_body_in_contact() -> None:
     assert moved.stress("lower", "unloaded") == pytest.approx(0.0, abs=1e-9)
 
 
+def test_a_fit_keeps_its_stress_when_a_load_moves_again() -> None:
+    lower = replace(block(), name="lower", mesh=block().mesh.translated((0.0, -6.0 + 1e-3)))
+    pair = ContactPair(slave=("block", "bottom"), master=("lower", "top"), friction=0.3)
+    load = hertz(1.0, 1.5, 2.5, shear_ratio=Amplitude.constant(1.0))
+    upper = block(load=load, supports={"left": "x", "top": "y"})
+    stepper = Stepper(System(Model(bodies=(upper, lower), contacts=(pair,))), Control())
+    point = stepper.begin(stepper.system.initial(), 0.0)
+    pressed = point.now.state.contacts[0].normal.max()
+    assert pressed > 0.0
+    point = stepper.reach(point, 1.0)
+    again = stepper.again(point, 1.0)
+    shear, stress = (
+        [each.now.state.contacts[0].tangential for each in (point, again)],
+        [each.now.responses[0].stress for each in (point, again)],
+    )
+    assert np.abs(shear[0]).max() > 1e-3 * pressed
+    assert shear[1] == pytest.approx(shear[0], rel=1e-12)
+    assert stress[1] == pytest.approx(stress[0], rel=1e-12)
+    assert again.now.energy.stored == pytest.approx(point.now.energy.stored, rel=1e-12)
+
+
 def test_what_a_load_that_moves_does_on_its_way_remains() -> None:
     """The load is large halfway, and gone at the end: one increment would not show the strain."""
     body = replace(block(load=Crossing(boundary="top", peak=750.0)), material=YIELDING)
@@ -223,6 +247,40 @@ def test_a_moving_force_shifted_in_the_solver_alone_is_found(
     monkeypatch.setattr(late, lambda part, loads, time: own(part, loads, time + 0.02))
     broken = solve(Model(bodies=(body,))).audit()
     assert any("audit_reactions" in each for each in broken.violations), broken.violations
+
+
+def hertz(half_width: float, *way: float, **own: Any) -> TravellingPressure:
+    """Return a pressure that is at these x at times 0, 1, ..."""
+    position = Amplitude(np.arange(len(way)), np.array(way))
+    own = {"boundary": "top", "peak": 100.0} | own
+    return TravellingPressure(half_width=half_width, position=position, **own)
+
+
+@pytest.mark.parametrize(
+    ("load", "field"),
+    [
+        (hertz(1.0, 4.0), "position"),
+        (hertz(1.0, 2.0, 3.5), "position"),
+        (hertz(0.4, 2.2), "half_width"),
+    ],
+    ids=["beyond", "on its way", "between points"],
+)
+def test_a_moving_pressure_that_the_boundary_cannot_take_whole_is_refused(
+    load: TravellingPressure, field: str
+) -> None:
+    """The top has four edges of 1 mm, from 0 to 4."""
+    with pytest.raises(
+        ModelError, match=rf"^travelling_pressure\.top\.{field} = .*must"
+    ) as refused:
+        solve(Model(bodies=(block(load=load),)))
+    assert refused.value.field.endswith(field)
+
+
+def test_a_moving_pressure_may_be_beyond_the_boundary_while_it_does_not_act() -> None:
+    off = Amplitude(np.array([0.0, 0.5, 1.0]), np.array([0.0, 1.0, 0.0]))
+    system = System(Model(bodies=(block(load=hertz(1.0, -2.0, 6.0, amplitude=off)),)))
+    at = [system.parts[0].external(time).sum() for time in (0.0, 0.5, 1.0)]
+    assert at == pytest.approx([0.0, -50.0 * np.pi, 0.0], rel=0.02)
 
 
 def test_a_load_that_moves_is_refused_on_a_body_of_large_strain() -> None:
