@@ -133,9 +133,11 @@ class Discretisation(Nodes, Part):
         return self._moved[1]
 
     def grows(self, before: float, after: float) -> bool:
-        """Whether the external load grows from one time to another."""
-        grown = (abs(load.factor(after)) > abs(load.factor(before)) for load in self.moving)
-        return super().grows(before, after) or any(grown)
+        """Whether the external load grows from one time to another, at a node if it moves."""
+        if super().grows(before, after) or not self.moving:
+            return super().grows(before, after)
+        then, now = (np.abs(moving_forces(self, self.moving, time)) for time in (before, after))
+        return bool((now > then).any())
 
     # -- the law at all points ---------------------------------------------------------------
 

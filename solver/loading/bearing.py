@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from solver.contact.system import System
@@ -10,19 +12,25 @@ from solver.materials.law import Law
 from solver.model.loads import TravellingPressure
 
 
-def excess_shear(system: System) -> LimitLoad | None:
+def excess_shear(system: System, targets: Sequence[float]) -> LimitLoad | None:
     """Return the error if a prescribed shear exceeds the shear yield stress, else None.
+
+    Without an amplitude the load factor is the time, up to the farthest of the ``targets``.
 
     The traction equals the stress at the surface. Without hardening the stress cannot leave the
     yield surface, so a larger shear has no equilibrium.
     """
     for body in system.model.bodies:
         for load in body.every_load:
-            if not isinstance(load, TravellingPressure) or load.amplitude is None:
+            if not isinstance(load, TravellingPressure):
                 continue
-            times = np.union1d(load.amplitude.time, load.shear_ratio.time)
+            if load.amplitude is None:
+                times = np.union1d(targets, load.shear_ratio.time)
+                times = times[np.abs(times) <= np.abs(targets).max(initial=0.0)]
+            else:
+                times = np.union1d(load.amplitude.time, load.shear_ratio.time)
             now = (load.now(time) for time in times)
-            shear = max(abs(share * ratio) for share, _, ratio in now) * load.peak
+            shear = max((abs(share * ratio) for share, _, ratio in now), default=0.0) * load.peak
             if (limit := too_much_shear(body.material, shear)) is not None:
                 return limit
     return None

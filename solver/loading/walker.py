@@ -164,8 +164,7 @@ class Walker:
             point = self._stepper.begin(self._system.initial(), program.laps[0].start, tally)
         except PathEnded as ended:
             return _Walk(point=ended.point, error=ended.error)
-        error = excess_shear(self._system)
-        return _Walk(point=point, work=point.tally.plastic_work, error=error)
+        return _Walk(point=point, work=point.tally.plastic_work)
 
     def _directly(self, program: Program, start: _Walk | None) -> _Walk | None:
         """Return the walk of a program in one increment if nothing yields, else None.
@@ -188,6 +187,9 @@ class Walker:
         """Return the walk over the targets of a program from number ``first`` to ``end``."""
         at = first
         targets = program.targets
+        if walk.error is None:
+            error = excess_shear(self._system, [target.time for target in targets[first:end]])
+            walk = replace(walk, error=error)
         while at < end and walk.error is None:
             quiet = len(walk.past) == program.cycle and not any(y for _, y in walk.past)
             if targets[at].begins is not None and program.cycle and quiet:

@@ -10,10 +10,11 @@ import pytest
 
 import solver.fem.discretisation
 import solver.fem.loads
-from solver import Body, ContactPair, Material, Model, ModelError, System, solve
+from solver import Body, ContactPair, LimitLoad, Material, Model, ModelError, System, solve
 from solver.fem.discretisation import Discretisation
 from solver.fem.substructure import Substructure
 from solver.loading.control import Control
+from solver.loading.program import Stage
 from solver.loading.stepper import Stepper
 from solver.mesh import grid
 from solver.mesh.elements import element_type, known_elements
@@ -281,6 +282,27 @@ def test_a_moving_pressure_may_be_beyond_the_boundary_while_it_does_not_act() ->
     system = System(Model(bodies=(block(load=hertz(1.0, -2.0, 6.0, amplitude=off)),)))
     at = [system.parts[0].external(time).sum() for time in (0.0, 0.5, 1.0)]
     assert at == pytest.approx([0.0, -50.0 * np.pi, 0.0], rel=0.02)
+
+
+def test_a_load_that_travels_over_a_weak_beam_ends_at_its_limit_load() -> None:
+    """A cantilever holds the load close to its support, and fails as it moves on."""
+    mesh = grid(np.linspace(0.0, 8.0, 17), np.linspace(-1.0, 0.0, 3))
+    on = Amplitude(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
+    load = hertz(0.5, 0.5, 0.5, 7.5, peak=51.0, amplitude=on)
+    beam = Body(name="beam", mesh=mesh, material=YIELDING, supports={"left": "xy"}, loads=(load,))
+    stages = [Stage(name="on", target=1.0), Stage(name="across", target=2.0, steps=5)]
+    with pytest.raises(LimitLoad) as ended:
+        solve(Model(bodies=(beam,)), stages=stages)
+    assert 1.2 < ended.value.reached < 1.6
+
+
+def test_a_shear_above_the_yield_stress_is_named_before_loading() -> None:
+    """Without an amplitude the factor is the time, and the shear ratio 1 at its end."""
+    ratio = Amplitude(np.array([0.0, 2.0]), np.array([0.0, 2.0]))
+    load = hertz(1.0, 2.0, shear_ratio=ratio, peak=300.0)
+    body = replace(block(load=load), material=YIELDING)
+    with pytest.raises(LimitLoad, match=r"shear, 300 MPa, is above the shear yield stress"):
+        solve(Model(bodies=(body,)))
 
 
 def test_a_load_that_moves_is_refused_on_a_body_of_large_strain() -> None:
