@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -102,6 +102,17 @@ def of_pressure(travelling: TravellingPressure, at: Solved) -> Acting:
     return Acting(along=along, half_width=width, peak=peak, force=force, centre=centre)
 
 
+def _of_all(loads: Sequence[TravellingPressure], at: Solved) -> Acting:
+    """Return the sum of what several travelling pressures do; it has no half-width and no peak."""
+    each = [of_pressure(load, at) for load in loads]
+
+    def along(x: Array) -> tuple[Array, Array, Array]:
+        pressure, shear, gap = np.sum([acting.along(x) for acting in each], axis=0)
+        return pressure, shear, gap
+
+    return Acting(along=along, force=sum(acting.force for acting in each), centre=each[0].centre)
+
+
 def acting_on(system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> Callable[[Any], Acting]:
     """Return the function from states to what acts between the bodies of a system, or on one."""
     if system.interfaces:
@@ -109,7 +120,7 @@ def acting_on(system: System, *, symmetric: bool, axis: Axis = ALONG_X) -> Calla
         pair = partial(of_pair, system, symmetric=symmetric, axis=axis)
         return lambda at: known.of(at, "", partial(pair, at))
     for body in system.model.bodies:
-        for load in body.every_load:
-            if isinstance(load, TravellingPressure):
-                return partial(of_pressure, load)
+        loads = [load for load in body.every_load if isinstance(load, TravellingPressure)]
+        if loads:
+            return partial(of_pressure, loads[0]) if len(loads) == 1 else partial(_of_all, loads)
     return lambda at: Acting()

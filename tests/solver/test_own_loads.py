@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from solver.mesh.elements import element_type, known_elements
 from solver.mesh.grids import mapped, merged
 from solver.model.amplitude import Amplitude
 from solver.model.loads import Array, BodyForce, BoundaryLoad, Load, Pressure, TravellingPressure
+from solver.results.acting import acting_on
 
 pytestmark = pytest.mark.solves
 
@@ -303,6 +305,19 @@ def test_a_shear_above_the_yield_stress_is_named_before_loading() -> None:
     body = replace(block(load=load), material=YIELDING)
     with pytest.raises(LimitLoad, match=r"shear, 300 MPa, is above the shear yield stress"):
         solve(Model(bodies=(body,)))
+
+
+def test_two_pressures_on_one_body_are_reported_as_their_sum() -> None:
+    loads = hertz(1.0, 1.0), hertz(0.5, 3.0, peak=50.0, shear_ratio=Amplitude.constant(0.4))
+    system = System(Model(bodies=(block(loads=loads),)))
+    at = SimpleNamespace(state=replace(system.initial(), time=1.0))
+    acting = acting_on(system, symmetric=False)(at)
+    pressure, shear, gap = acting.along(np.array([1.0, 2.5, 3.0]))
+    assert pressure == pytest.approx([100.0, 0.0, 50.0])
+    assert shear == pytest.approx([0.0, 0.0, 20.0])
+    assert np.isnan(gap).all()
+    assert np.isnan([acting.half_width, acting.peak]).all()
+    assert acting.force == pytest.approx(0.25 * np.pi * 20.0)
 
 
 def test_a_load_that_moves_is_refused_on_a_body_of_large_strain() -> None:
