@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from solver.errors import NoContact, NotConverged, Runaway, WindowTooSmall
 from solver.results.record import Status
 from solver.rolling import search
 from solver.rolling.scenes import rail_passes as prism_passes
+from solver.rolling.scenes.rail_outputs import remedies
 from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
 from solver.rolling.scenes.wheel_rail_track import geometry
@@ -106,6 +108,14 @@ def test_a_pass_that_is_not_found_names_the_one_remedy_of_its_reason(
     assert record.status is Status.NOT_CONVERGED
     assert record.message.startswith(str(error))
     assert record.message.endswith(remedy) and record.message.count("; ") == 1
+
+
+def test_shear_beyond_yield_is_named_with_coulombs_law_alone() -> None:
+    """Another law need not have this coefficient, nor `shear_limit`."""
+    usual = SCENE.parameters(**{**DRAFT, "friction": 0.4})
+    other = SimpleNamespace(material=usual.material, friction=0.4, friction_law="tanh")
+    assert "set shear_limit = 1" in remedies(usual, 1e3)[NoContact]
+    assert remedies(other, 1e3)[NoContact] == "choose a finer accuracy"
 
 
 def test_a_lateral_force_that_no_contact_at_this_position_has_is_told_with_the_least() -> None:

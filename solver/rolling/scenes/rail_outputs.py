@@ -181,7 +181,9 @@ def remedies(parameters: PrismParameters, pressure: float) -> Advice:
     found on any mesh.
     """
     strength, friction = parameters.material().shear_yield_stress, parameters.friction
-    beyond = not getattr(parameters, "shear_limit", 0.0) and friction * pressure > strength
+    coulomb = getattr(parameters, "friction_law", "coulomb") == "coulomb"
+    unlimited = coulomb and not getattr(parameters, "shear_limit", 0.0)
+    beyond = unlimited and friction * pressure > strength
     shear = f"friction would carry {friction * pressure:.0f} MPa, more than the shear yield stress"
     accuracy = "choose a finer accuracy"
     return {
