@@ -7,10 +7,11 @@ import time
 from dataclasses import dataclass
 from typing import Self, TextIO
 
+from solver.errors import ModelError
 from studies.definition.cases import Case
 from studies.definition.points import is_points
 from studies.definition.study import Study
-from studies.definition.vocabulary import OK
+from studies.definition.vocabulary import OK, SOLVED
 from studies.execution.estimate import estimate
 from studies.execution.run import StudyEvent
 from studies.storage.store import Store
@@ -140,7 +141,11 @@ def dry_run(study: Study, store: Store) -> str:
     found = estimate(study, store)
     table = (f"{name:<16}{text}" for name, text in found.costs(study.kind.chooses).items())
     first = {**next(study.cases()).values, **study.kind.begins}
-    warnings = (f"warning: {each}" for each in doubts_of(study.problem, first))
+    try:
+        doubts = doubts_of(study.problem, first)
+    except ModelError as error:  # other runs may be possible
+        doubts = (f"the first run cannot be computed: {error}",)
+    warnings = (f"warning: {each}" for each in doubts)
     return "\n".join([f"{study.name}: nothing is computed or written", *warnings, *table])
 
 
@@ -162,11 +167,16 @@ class Foreseen:
         """Return it for the runs of a study that the store lacks."""
         try:
             found = estimate(study, store)
+            asked = store.asked(study) if study.kind.chooses else None
+            if asked is not None and asked <= store.catalogue.having(SOLVED, asked, study.keep):
+                return cls(short=True)  # its search has ended
         except Exception:  # a damaged catalogue must not prevent computing, which makes it again
             return cls()
         runs = f"about {found.usual_runs}" if study.kind.chooses else f"{found.to_compute}"
         text = f"{study.name}: {runs} {'run' if runs == '1' else 'runs'} to compute"
+        if not found.to_compute:
+            text = ""
         if found.cpu_seconds is None:
             return cls(text)
-        text += f", {found.time} of processor time"
-        return cls(text if found.to_compute else "", found.cpu_seconds[1] <= _SHORT)
+        text = text and f"{text}, {found.time} of processor time"
+        return cls(text, found.cpu_seconds[1] <= _SHORT)

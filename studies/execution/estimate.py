@@ -312,9 +312,13 @@ def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any
         yield from _longest(study)
         return
     paths = study.paths()
+    # the catalogue of an address may lack runs of other machines until something is computed here
+    stored = store.stored_runs() if isinstance(store.address, str) else set()
     while batch := list(itertools.islice(paths, _BATCH)):
-        ids = (case.id for path in batch for case in path.cases)
+        ids = [case.id for path in batch for case in path.cases]
         done = store.catalogue.having(SOLVED, ids, study.keep)
+        there = stored.intersection(ids)
+        done |= there - store.catalogue.rows(there).keys()
         for path in batch:
             if missing := [case.values.get(branch) for case in path.cases if case.id not in done]:
                 yield path, missing

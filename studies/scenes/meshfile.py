@@ -44,7 +44,7 @@ _TRIANGLE = {"quad": "triangle", "quad8": "triangle6", "quad9": "triangle6"}
 """Quadrilaterals -> the triangles into which they are divided."""
 _LINES = ("line", "line3")
 _POINTS = {"quad": 4, "quad8": 8, "quad9": 9, "triangle": 3, "triangle6": 6, "line": 2, "line3": 3}
-"""Ints of the points of these cells and lines."""
+"""Numbers of points of these cells and lines."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -17,6 +17,7 @@ import xarray as xr
 from residua.cli import main
 from service.settings import chosen
 from studies import Store, StoreBusy, StudyError, open_study, run_study
+from studies.execution.estimate import estimate
 from studies.execution.part import run_part
 from studies.storage import claims
 from studies.storage.blobs import directory_of
@@ -46,6 +47,7 @@ def test_a_study_is_computed_resumed_and_read(
     ids = sorted(study.run_ids())
     assert sorted(run_study(study, Store(address), workers=0).computed) == ids
     other = elsewhere(address, monkeypatch)
+    assert estimate(study, other).to_compute == 0
     assert not list(other.directory.glob("*/*"))
     outcome = run_study(study, other, workers=0, resume=True)
     assert not outcome.computed and not outcome.anew and outcome.ok

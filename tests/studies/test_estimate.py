@@ -327,6 +327,16 @@ def test_run_says_at_once_how_many_runs_it_will_compute(store: Store) -> None:
     assert Foreseen.of(fake_study(), store) == Foreseen("fake: 4 runs to compute")
     remember(store, list(tour.run_ids()), [(5_000, 11, 1.0)] * 4, keep="fields")
     assert Foreseen.of(tour, store).text == ""
+    remember(store, list(fake_study().run_ids()), [(5_000, 11, 1.0)] * 4)
+    assert Foreseen.of(fake_study(), store) == Foreseen()
+
+
+def test_dry_run_counts_where_the_first_run_is_refused(store: Store) -> None:
+    content = {"name": "aside", "scene": "wheel_rail", "parameters": {"accuracy": "draft"}}
+    study = Study.from_dict(content | {"sweep": {"lateral_position": [5.0, -4.0]}})
+    lines = dry_run(study, store).splitlines()
+    assert lines[1].startswith("warning: the first run cannot be computed: lateral_position = 5")
+    assert lines[2].split() == ["runs", "2", "in", "all,", "2", "to", "compute"]
 
 
 @pytest.mark.processes
