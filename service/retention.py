@@ -116,7 +116,8 @@ class Keeper:
         size, promised = found.estimate.bytes, self.jobs.promised(but=found.study.id)
         free = shutil.disk_usage(self.store.directory).free
         if size and size + promised > free:
-            takes, has, others = map(size_text, (size, free, promised))
+            each = ([size_text(b, n) for b in (size, free, promised)] for n in range(3, 17))
+            takes, has, others = next(texts for texts in each if promised or texts[0] != texts[1])
             told = f"the study takes about {takes}, and {has} are free on the disk of the data"
             before = f", of which studies before it take {others}" if promised else ""
             raise NoRoom(f"{told} directory{before}: use fewer runs, or make room")

@@ -36,7 +36,7 @@ def time_text(likely: float, low: float, high: float, worst: float | None = None
     return f"about {about} {unit} ({least} to {most}{beyond})"
 
 
-def size_text(count: float) -> str:
+def size_text(count: float, digits: int = 3) -> str:
     """Return a size [bytes] in MB or GB."""
     size, unit = (1e9, "GB") if count >= 1e9 else (1e6, "MB")
-    return f"{number_text(count / size, 3)} {unit}"
+    return f"{number_text(count / size, digits)} {unit}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import re
 import resource
 import shutil
 import socket
@@ -331,6 +332,10 @@ def test_a_study_larger_than_the_free_disk_or_the_default_limits_is_refused(
     with pytest.raises(NoRoom, match=r"takes about 1\.58 GB, and 1\.5 GB are free on the disk of"):
         keeper.accept(one, 0)
     assert status_of(NoRoom("")) == 507
+    free = round(found.bytes) - 1
+    with pytest.raises(NoRoom, match=r"takes about 1\.58\d+ GB, and 1\.58\d+ GB are free") as told:
+        keeper.accept(one, 0)
+    assert len(set(re.findall(r"[\d.]+ GB", str(told.value)))) == 2
     free = 3_000_000_000
     keeper.accept(one, 0)
     for check in (keeper.check_room, lambda found: keeper.accept(found, 0)):

@@ -79,7 +79,10 @@ async function check() {
     else said(sheet.hidden ? "wait" : "before");
     [found.toml, found.curl, found.python].forEach((each, k) => (copies[k].textContent = each));
   } catch (error) {
-    if (error.name !== "AbortError") throw error;
+    if (error.name === "AbortError") return;
+    costs(null);
+    told({ "": "no estimate: the service cannot be reached" });
+    throw error;
   }
 }
 
@@ -129,10 +132,20 @@ drop?.addEventListener("drop", ({ dataTransfer }) => {
 drop?.querySelector("form").addEventListener("submit", async (event) => {
   event.preventDefault();
   const post = /** @type {HTMLFormElement} */ (event.target);
-  const answer = await fetch(post.action, { method: "POST", body: new FormData(post) });
-  if (answer.redirected && answer.ok) location.assign(answer.url);
-  const text = await answer.text();
-  const said = new DOMParser().parseFromString(text, "text/html").querySelector("[data-drop] [role=alert]");
+  let said = null;
+  let reason = "not taken: the service cannot be reached";
+  try {
+    const answer = await fetch(post.action, { method: "POST", body: new FormData(post) });
+    if (answer.redirected && answer.ok) {
+      location.assign(answer.url);
+      return;
+    }
+    const failed = `${answer.status} ${answer.statusText}`;
+    reason = answer.redirected ? `taken, but its form is not shown: ${failed}` : `not taken: ${failed}`;
+    said = new DOMParser().parseFromString(await answer.text(), "text/html").querySelector("[data-drop] [role=alert]");
+  } catch {
+    // the reason is known
+  }
   drop.querySelector("[role=alert]")?.remove();
-  drop.append(said ?? element("p", { className: "wrong", role: "alert" }, answer.redirected ? "" : `not taken: ${answer.status} ${answer.statusText}`));
+  drop.append(said ?? element("p", { className: "wrong", role: "alert" }, reason));
 });
