@@ -334,6 +334,11 @@ def test_a_scene_that_is_refused_stays_chosen(
     assert "wrong.toml is not taken" in page.locator(".drop [role=alert]").text_content()
     names = "document.querySelector('[name=scene][type=file]').files[0].name"
     assert page.evaluate(names) == "wrong.toml"
+    page.route("**/ui/*", lambda route: route.abort())
+    page.click("text=Post it")
+    page.wait_for_selector(".drop [role=alert]:has-text('the service cannot be reached')")
+    page.fill("[name=name]", "lost")
+    page.wait_for_selector("[data-wrong='']:has-text('the service cannot be reached')")
     page.close()
 
 
