@@ -44,6 +44,8 @@ _HEAD_START = 60.0
 """Seconds by which each submitted task of a study delays its next one, in favour of others."""
 _RESTART = 30.0
 """Seconds within which the nanny of a worker, if it has one, must have killed it."""
+_DROPPED = 0.02
+"""Seconds between two questions whether the scheduler has dropped a task."""
 _STARTS = 2
 """Number of starts of a task that ended with the death of the worker, before the task is blamed."""
 _ROUNDS = 3
@@ -221,7 +223,7 @@ class _HandedOut:
         for key, ticket in list(self._tickets.items()):
             if passed := ticket.overdue(self._limits):
                 _drop(self._tickets.pop(key))
-                self._replace(ticket.worker)
+                self._replace(ticket.worker, key)
                 yield Finished(ticket.task, RuntimeError(passed), ticket.path)
         yield from self._watch.look(at_workers, self._tickets, held_up)
 
@@ -232,8 +234,11 @@ class _HandedOut:
             return dict(_asked(self._client, "processing", workers=None))
         return None
 
-    def _replace(self, worker: str) -> None:
-        """Restart a worker, without waiting for it."""
+    def _replace(self, worker: str, key: str) -> None:
+        """Restart a worker, without waiting for it, when the scheduler has dropped its task.
+
+        The scheduler would give a task that it still has to another worker, which nobody watches.
+        """
         for ticket in self._tickets.values():
             if ticket.worker == worker:
                 ticket.starts -= 1  # the death is not the fault of this task, which begins again
@@ -241,6 +246,9 @@ class _HandedOut:
 
         def restart() -> None:
             with contextlib.suppress(Exception):  # it is removed if its nanny is gone too
+                until = time.monotonic() + _RESTART
+                while self._has(key) and time.monotonic() < until:
+                    time.sleep(_DROPPED)
                 _asked(
                     self._client, "restart_workers", 2 * _RESTART, workers=[worker],
                     timeout=_RESTART, wait_for_workers=False, on_error="return",
@@ -249,6 +257,11 @@ class _HandedOut:
 
         self._replacing.append(threading.Thread(target=restart, daemon=True))
         self._replacing[-1].start()
+
+    def _has(self, key: str) -> bool:
+        """Whether the scheduler still has a task at a worker."""
+        at_workers = _asked(self._client, "processing", workers=None)
+        return any(key in keys for keys in at_workers.values())
 
     def _stop(self) -> Iterator[Message]:
         """Cancel all tasks, and wait a little for those that run."""
