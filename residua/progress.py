@@ -172,11 +172,9 @@ class Foreseen:
                 return cls(short=True)  # its search has ended
         except Exception:  # a damaged catalogue must not prevent computing, which makes it again
             return cls()
+        short = found.cpu_seconds is not None and found.cpu_seconds[1] <= _SHORT
+        if not found.to_compute:
+            return cls(short=short)
         runs = f"about {found.usual_runs}" if study.kind.chooses else f"{found.to_compute}"
         text = f"{study.name}: {runs} {'run' if runs == '1' else 'runs'} to compute"
-        if not found.to_compute:
-            text = ""
-        if found.cpu_seconds is None:
-            return cls(text)
-        text = text and f"{text}, {found.time} of processor time"
-        return cls(text, found.cpu_seconds[1] <= _SHORT)
+        return cls(f"{text}, {found.time} of processor time" if found.time else text, short)

@@ -376,9 +376,8 @@ class Stepper:
         growing = any(part.grows(reached, attempted) for part in self.system.parts)
         if why.limit and growing:
             return LimitLoad(f"no equilibrium {way}: {why}", reached, attempted)
-        hint = "; ".join([
-            spent(self.system, point.now.state), *self.system.distorted(point.now.state)
-        ])  # fmt: skip
+        hint = spent(self.system, point.now.state)
+        hint += "".join(f"; {each}" for each in self.system.distorted(point.now.state))
         return NotConverged(f"the increment {way} failed: {failure}{hint}", reached, attempted)
 
     def _timed(self, tally: Tally) -> Tally:

@@ -90,13 +90,15 @@ class Power(Checked):
 
     def flow_stress(self, accumulated: Array) -> Array:
         """See `Curve`."""
-        grown = 1 + accumulated * (self.youngs_modulus / self.yield_stress)
-        return np.asarray(self.yield_stress * grown**self.exponent)
+        return np.asarray(self.yield_stress * self._grown(accumulated) ** self.exponent)
 
     def slope(self, accumulated: Array) -> Array:
         """See `Curve`."""
-        grown = 1 + accumulated * (self.youngs_modulus / self.yield_stress)
-        return np.asarray(self.exponent * self.youngs_modulus * grown ** (self.exponent - 1))
+        grown = self._grown(accumulated) ** (self.exponent - 1)
+        return np.asarray(self.exponent * self.youngs_modulus * grown)
+
+    def _grown(self, accumulated: Array) -> Array:
+        return 1 + accumulated * (self.youngs_modulus / self.yield_stress)
 
     @property
     def limit(self) -> float:

@@ -231,8 +231,11 @@ class _HandedOut:
         """Return the task keys at each worker; None if the scheduler does not answer."""
         with contextlib.suppress(OSError, TimeoutError):
             self._room = _SPARE + sum(_asked(self._client, "ncores", workers=None).values())
-            return dict(_asked(self._client, "processing", workers=None))
+            return self._at_workers()
         return None
+
+    def _at_workers(self) -> dict[str, Any]:
+        return dict(_asked(self._client, "processing", workers=None))
 
     def _replace(self, worker: str, key: str) -> None:
         """Restart a worker, without waiting for it, when the scheduler has dropped its task.
@@ -247,7 +250,9 @@ class _HandedOut:
         def restart() -> None:
             with contextlib.suppress(Exception):  # it is removed if its nanny is gone too
                 until = time.monotonic() + _RESTART
-                while self._has(key) and time.monotonic() < until:
+                while any(key in keys for keys in self._at_workers().values()):
+                    if time.monotonic() > until:
+                        break
                     time.sleep(_DROPPED)
                 _asked(
                     self._client, "restart_workers", 2 * _RESTART, workers=[worker],
@@ -257,11 +262,6 @@ class _HandedOut:
 
         self._replacing.append(threading.Thread(target=restart, daemon=True))
         self._replacing[-1].start()
-
-    def _has(self, key: str) -> bool:
-        """Whether the scheduler still has a task at a worker."""
-        at_workers = _asked(self._client, "processing", workers=None)
-        return any(key in keys for keys in at_workers.values())
 
     def _stop(self) -> Iterator[Message]:
         """Cancel all tasks, and wait a little for those that run."""

@@ -9,7 +9,6 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +18,12 @@ import pytest
 from distributed.system import MEMORY_LIMIT
 
 from studies import Access, GridLost, Limits, StudyError, own_workers
+from studies.execution import grid as grid_module
 from studies.execution.executor import Event, Finished, Function, Message, StopCheck, Waiting
-from studies.execution.forks import variables
+from studies.execution.forks import Fork, Forks, variables
 from studies.execution.grid import Grid
 from studies.execution.run import DEFAULT
+from studies.execution.watch import Ticket
 from studies.execution.workers import connect
 from tests.studies.chores import chatter, freeze, nap, need
 
@@ -279,6 +280,32 @@ def test_a_frozen_worker_is_replaced_and_others_are_not_blamed(two: Access) -> N
     assert not psutil.pid_exists(frozen[0])
 
 
+def test_a_frozen_worker_is_not_replaced_before_its_path_is_dropped(
+    two: Access, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Or another worker would take the path, and freeze too."""
+    drop, frozen = grid_module._drop, list[int]()
+
+    def later(ticket: Ticket) -> None:
+        threading.Timer(1.0, drop, [ticket]).start()
+
+    monkeypatch.setattr(grid_module, "_drop", later)
+
+    def hear(item: Any) -> None:
+        if isinstance(item, Message):
+            frozen.append(item.content["pid"])
+
+    with Grid(two) as grid:
+        run(grid, freeze, [("freeze", 0.0)], never, Limits(stall_seconds=2.0), hear=hear)
+        pids = {
+            item.content["pid"]
+            for item in run(grid, nap, [0.5] * 4, never, Limits(patience=10.0))
+            if isinstance(item, Message)
+        }
+    assert len(frozen) == 1 and frozen[0] not in pids
+    assert not psutil.pid_exists(frozen[0])
+
+
 def test_a_path_that_takes_too_long_is_ended_though_it_reports(two: Access) -> None:
     with Grid(two) as grid:
         limits = Limits(stall_seconds=5.0, path_seconds=1.0)
@@ -325,37 +352,32 @@ def test_no_worker_is_told_and_ends_by_a_setting(
     assert item.reason.startswith("no worker is connected to the scheduler: start one")
 
 
-@pytest.mark.xfail(strict=False, reason="in a whole run the killer may come too late")
 def test_workers_killed_on_sight_are_told_and_the_study_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("studies.execution.watch._QUIET", 4.0)
     monkeypatch.setattr("studies.execution.workers._ABSENT", 8.0)
-    spared = threading.Event()
+    hunted, start, forks = threading.Event(), Forks.start, list[Fork]()
 
-    def killer() -> None:
-        while not spared.wait(0.005):  # a fork computes 50 ms after its start
-            with suppress(psutil.Error):  # it has ended between two looks
-                for worker in workers():
-                    if worker.pid not in others:
-                        worker.kill()
+    def started(self: Forks, *given: Any, **more: Any) -> Fork:
+        forks.append(start(self, *given, **more))
+        if hunted.is_set():
+            forks[-1].kill()  # before it can take a task
+        return forks[-1]
 
-    others = {worker.pid for worker in workers()}
+    monkeypatch.setattr(Forks, "start", started)
     with own_workers(1) as access, Grid(access) as grid:
-        thread = threading.Thread(target=killer)
-        thread.start()
+        hunted.set()
+        for fork in forks:
+            fork.kill()
         items = []
-        try:
 
-            def hear(item: Any) -> None:
-                items.append(item)
-                if isinstance(item, Waiting) and item.reason:
-                    spared.set()
+        def hear(item: Any) -> None:
+            items.append(item)
+            if isinstance(item, Waiting) and item.reason:
+                hunted.clear()
 
-            run(grid, nap, [0.5, 0.5], never, Limits(patience=120.0), hear=hear)
-        finally:
-            spared.set()
-            thread.join()
+        run(grid, nap, [0.5, 0.5], never, Limits(patience=120.0), hear=hear)
     waits = [item.reason for item in items if isinstance(item, Waiting)]
     assert waits[0].startswith("no worker is connected to the scheduler")
     assert waits[-1] == ""

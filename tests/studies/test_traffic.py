@@ -130,7 +130,10 @@ def test_a_set_up_is_paid_once_in_a_process(store: Store, monkeypatch: pytest.Mo
 
     one, two = likely({"friction": [0.2]}), likely({"friction": [0.2, 0.3]})
     other = likely({"foundation": [21.0, 42.0]})
-    assert two - one < other - two
+    (path,) = study({"friction": [0.2]}).paths()
+    effort = SCENES["wheel_rail"].effort
+    assert effort is not None and two - one < other - two
+    assert 0.5 < effort(path.parameters, [1]).set_up < other - two
     monkeypatch.setattr("os.cpu_count", lambda: 2)
     assert likely({"friction": [0.2, 0.3]}) == pytest.approx(other, rel=1e-9)
     assert one < two < 2 * one

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -53,24 +54,28 @@ class Bar:
         """Whether the stress of the bar lies on an edge: softness then proves no limit."""
         return self.law.surface.has_corners
 
-    def solve(self) -> Solution:
-        """Pull the bar and let it go."""
+    def body(self, **how: Any) -> Body:
+        """Return the bar, with a load and what else is given."""
         cells = 3, 4
         mesh = grid(
             np.linspace(0, 1, cells[0] + 1),
             np.linspace(0, LENGTH, cells[1] + 1),
             "tri" if self.element.startswith("tri") else "quad",
         )
-        body = Body(
+        return Body(
             name="bar",
             mesh=crooked(mesh, self.perturb, cells, self.seed),
             material=self.law,
             kinematics="axisymmetric" if self.round else "plane_stress",
             element=self.element,
             supports={"left": "x", "bottom": "y"},
-            pressure={"top": -YIELD},
+            **how,
         )
-        return solve(Model(bodies=(body,)), load=self.load, control=CONTROL)
+
+    def solve(self) -> Solution:
+        """Pull the bar and let it go."""
+        model = Model(bodies=(self.body(pressure={"top": -YIELD}),))
+        return solve(model, load=self.load, control=CONTROL)
 
     def plastic_strain(self) -> float:
         """Return the plastic strain under load, from the curve of tension."""

@@ -28,7 +28,7 @@ from solver import (
 )
 from solver.mesh import grid
 from solver.model.rigid import Moved, line
-from tests.stability.closed import crooked, passed
+from tests.stability.closed import passed
 from tests.stability.kinds.laws import LENGTH, YIELD, Bar, random_bar
 from tests.stability.trial import Figure, Scene, tells
 
@@ -56,20 +56,9 @@ class Drawn:
 
     def solve(self) -> Solution:
         """Draw the bar in one stage."""
-        bar, cells = self.bar, (3, 4)
-        shape = "tri" if bar.element.startswith("tri") else "quad"
-        mesh = grid(np.linspace(0, 1, 4), np.linspace(0, LENGTH, 5), shape)
-        body = Body(
-            name="bar",
-            mesh=crooked(mesh, bar.perturb, cells, bar.seed),
-            material=bar.law,
-            kinematics="axisymmetric" if bar.round else "plane_stress",
-            element=bar.element,
-            strain="large",
-            supports={"left": "x", "bottom": "y"},
-            loads=(Displacement(boundary="top", y=LENGTH * np.expm1(self.strain)),),
-        )
-        return solve(Model(bodies=(body,)), stages=_LOADED)
+        drawn = Displacement(boundary="top", y=LENGTH * np.expm1(self.strain))
+        model = Model(bodies=(self.bar.body(strain="large", loads=(drawn,)),))
+        return solve(model, stages=_LOADED)
 
     @property
     def necks(self) -> bool:
