@@ -217,6 +217,7 @@ class Converged:
         n_points) [MPa]; None if nothing has flowed
     lost : difference between the beginning of this increment and the end of the previous one
     windows : for each part, the region of the window in which it was solved; None without
+    beside : the same increment of the neighbouring runs (`solver.derivatives`), if there are any
     """
 
     start: State
@@ -238,3 +239,4 @@ class Converged:
     missed: tuple[Array | None, ...] = ()
     lost: float = 0.0
     windows: tuple[Region | None, ...] = ()
+    beside: tuple[Converged, ...] = ()

@@ -18,10 +18,11 @@ from solver.contact.links import Links, links_of, surfaces_of_links
 from solver.contact.slave import with_slaves
 from solver.contact.state import BodyState, ContactState, Converged, State
 from solver.errors import ModelError
+from solver.fem.deformation import PartResponse
 from solver.fem.discretisation import Discretisation
 from solver.fem.fields import Sampler, recovery
 from solver.fem.large import LargeDiscretisation
-from solver.fem.operators import Operators, operators_of
+from solver.fem.operators import Operator, Operators, operators_of
 from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
 from solver.fem.substructure import Substructure
@@ -206,6 +207,33 @@ class System:
             inverses = made.inverses(self.operators[number].elastic, self._linear_solver)
             known = self._windows[number] = region.key, made, inverses
         return known[1]
+
+    def tangents(self, now: Converged) -> list[Operator]:
+        """Return the inverse tangent of each part at the end of an increment.
+
+        Parts that were solved in a window are factorised there.
+
+        Raises
+        ------
+        Singular
+            if a part has no stiffness
+        """
+        state, found = now.state, []
+        windows = now.windows or (None,) * len(self.parts)
+        for k, (part, u, region) in enumerate(zip(self.parts, state.u, windows, strict=True)):
+            if region is None:
+                law = now.responses[k]
+                if isinstance(part, Discretisation):
+                    here = PartResponse(law, part.kinematics.at(u), (u, state.time))
+                else:
+                    here = part.respond(u, now.start.plastic[k], state.time)
+                found.append(self.operators[k].tangent(here, 0.0))
+                continue
+            window, plastic = self.window(k, region), now.start.plastic[k]
+            response = window.respond(u[window.kept], plastic.at(window.inside), state.time)
+            tangent = self._windows[k][2].tangent(response, 0.0)
+            found.append(window.over_whole(tangent))
+        return found
 
     def during(self, start: State) -> System:
         """Return the system for an increment from ``start``; it locks motions of rigid bodies."""

@@ -27,7 +27,7 @@ from solver.fem.operators import Assembled, Operator, Restricted
 from solver.fem.softening import Softening
 from solver.fem.surface import Surface
 from solver.linear.schur import Eliminated, SchurComplement
-from solver.linear.solvers import Singular
+from solver.linear.solvers import Begun, Singular
 from solver.materials import PlasticState
 from solver.typing import Array, Bools, Ints
 
@@ -168,6 +168,18 @@ class Windowed(Discretisation):
         restricted = Restricted(elastic, self.kept, self.whole.n)
         return Assembled(self, np.flatnonzero(self._touches), linear_solver, restricted)
 
+    def over_whole(self, operator: Operator) -> Operator:
+        """Return the operator of the whole body, given that of the window."""
+        return _Extended(self, operator)
+
+    def numbered(self, dofs: Ints) -> Ints:
+        """Return the numbers in the window of unknowns of the whole body, -1 outside."""
+        return np.asarray(self._number[dofs])
+
+    def eliminated(self, force: Array) -> Eliminated:
+        """Return nodal forces (n,) of the whole body with the rest of the body eliminated."""
+        return self._schur.begin(force)
+
     def motion(self, surface: Surface, u: Array) -> Array:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
         at = self._number[surface.dofs]
@@ -224,3 +236,25 @@ class Windowed(Discretisation):
         """Values of the elastic stiffness on `pattern`."""
         rest = self._assembly.block_values(self._rest)
         return rest + self._assembly.values(slice(None), self.elastic_elements)
+
+
+class _Extended:
+    """The operator of a whole body by that of its window; contact forces act in the window."""
+
+    def __init__(self, window: Windowed, operator: Operator) -> None:
+        self._window, self._operator = window, operator
+
+    def begin(self, force: Array) -> Begun:
+        """See `Operator`."""
+        kept, outer = self._window.kept, self._window.eliminated(force)
+        begun = self._operator.begin(outer.condensed)
+        motion = np.zeros(len(force))
+        motion[kept] = begun.kept
+        return Begun(motion, lambda change: outer.finish(begun.finish(change[kept])))
+
+    def compliance(self, dofs: Ints, rows: Array) -> Array:
+        """See `Operator`; raises `Singular` if contact has left the window."""
+        at = self._window.numbered(dofs)
+        if rows[:, at < 0].any():
+            raise Singular("contact has left the window")
+        return self._operator.compliance(at[at >= 0], rows[:, at >= 0])

@@ -23,6 +23,7 @@ class Cycle:
     dissipated : plastic work and work of friction [N mm]; for a closed cycle the area of all loops
         of force over displacement
     before : largest plastic strain accumulated before the cycle
+    beside : the same cycle of the neighbouring runs, if there are any
     """
 
     points: Ints
@@ -30,6 +31,7 @@ class Cycle:
     net: Array
     dissipated: float
     before: float
+    beside: tuple[Cycle, ...] = ()
 
     @classmethod
     def between(cls, start: Converged, end: Converged) -> Self:
@@ -48,4 +50,5 @@ class Cycle:
             net=np.sqrt(2 / 3 * (flow[:, points] ** 2).sum(axis=0)),
             dissipated=plastic_after + friction_after - plastic - friction,
             before=max(float(old.accumulated.max(initial=0.0)) for old, _ in both),
+            beside=tuple(map(cls.between, start.beside, end.beside)),
         )

@@ -31,6 +31,7 @@ from solver.contact.ends import beyond_end
 from solver.contact.state import ContactState, Converged, State, Timing
 from solver.contact.system import System
 from solver.fem.deformation import PartResponse
+from solver.fem.operators import Operator
 from solver.fem.window import Windowed
 from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
@@ -164,6 +165,46 @@ class Increment:
         """Return the last iterate of the increment, or raise `IncrementFailed`."""
         with one_thread():
             return self._iterate()
+
+    def linearised(self, end: Converged, operators: Sequence[Operator]) -> Converged:
+        """Return the increment after one Newton step from the end of an almost equal increment.
+
+        Its error is of second order in the difference of the two.
+
+        Parameters
+        ----------
+        end : the other increment
+        operators : the inverse tangent of each part at its end
+
+        Raises
+        ------
+        IncrementFailed
+            if no contact forces balance the load
+        """
+        with one_thread():
+            contacts, links = end.state.contacts, end.state.links
+            u = self.system.moved(end.state, self.time).u
+            candidates = self._candidates(u, contacts, links)
+            residuals = self._residuals(u, self._respond(u))
+            step = newton_step(self.system, residuals, operators, candidates)
+            if step is None:
+                raise IncrementFailed("no contact forces were found that balance this load")
+            u = tuple(ui + du for ui, du in zip(u, step.u, strict=True))
+            contacts = candidates.states(contacts, step.forces, step.status)
+            links, responses = step.forces[candidates.linked], self._respond(u)
+            found = Balanced(
+                u=u,
+                contacts=contacts,
+                links=links,
+                responses=responses,
+                residuals=self._residuals(u, responses),
+                candidates=self._candidates(u, contacts, links),
+                scale=end.state.force_scale,
+                iterations=1,
+                pivoted=0,
+                blended=0,
+            )
+            return self._commit(found, end.timing)
 
     def _iterate(self) -> Balanced:
         tolerances = self.tolerances
@@ -424,7 +465,7 @@ class Increment:
 
     # -- 6: the converged state ----------------------------------------------------------------
 
-    def _commit(self, found: Balanced) -> Converged:
+    def _commit(self, found: Balanced, timing: Timing | None = None) -> Converged:
         u, responses, candidates = found.u, found.responses, found.candidates
         span = self.time - self.start.time
         contacts = candidates.kept(self.start.contacts, span, grows=not self.system.moves)
@@ -450,7 +491,7 @@ class Increment:
             pivoted=found.pivoted,
             blended=found.blended,
             beyond_end=beyond_end(self.system, u, candidates),
-            timing=self._timing(candidates),
+            timing=timing or self._timing(candidates),
             separated=not self.contact,
         )
 

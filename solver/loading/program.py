@@ -174,12 +174,15 @@ class Program:
     retraces : whether the program is one lap of two stages, loading and unloading: elastic bodies
         then need one increment, and return to their first state
     place : (time) -> text for this time in messages
+    beside : programs of the neighbouring runs (`solver.derivatives`), which have the same targets
+        at other times
     """
 
     laps: tuple[Lap, ...]
     cycle: int = 0
     retraces: bool = False
     place: Callable[[float], str] = field(default="load factor {:.6g}".format, compare=False)
+    beside: tuple[Program, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         if not self.laps or not all(lap.stages for lap in self.laps):
@@ -207,7 +210,21 @@ class Program:
             stages = (stage.refine(times) if stage.refined else stage for stage in lap.stages)
             return replace(lap, stages=tuple(stages))
 
-        return replace(self, laps=tuple(map(cut, self.laps)))
+        beside = tuple(program.refined(times) for program in self.beside)
+        return replace(self, laps=tuple(map(cut, self.laps)), beside=beside)
+
+    @property
+    def ways(self) -> list[tuple[tuple[float, float], ...]]:
+        """Times at both ends of each increment, of this program and of those beside it."""
+        each = zip(*(program._ways() for program in (self, *self.beside)), strict=True)
+        return list(each)
+
+    def _ways(self) -> list[tuple[float, float]]:
+        starts = [self.laps[0].start, *(target.time for target in self.targets)]
+        return [
+            (start if target.begins is None else target.begins, target.time)
+            for start, target in zip(starts, self.targets, strict=False)
+        ]
 
 
 def shared(one: Program, other: Program) -> int:

@@ -6,7 +6,7 @@ import math
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -49,6 +49,33 @@ _FURTHER = 4
 """Number of parts into which such a fraction may still be cut if it fails."""
 
 
+Way = tuple[float, float]
+"""Times between which a program has one increment."""
+
+
+class Followers(Protocol):
+    """Neighbouring runs, which follow a run (`Converged.beside`): see `solver.derivatives`."""
+
+    def between(self, ways: Sequence[Way]) -> None:
+        """Set the way on which the next increments are, for the run and each neighbour."""
+
+    def begun(
+        self, before: Converged | None, balanced: Converged | None, time: float
+    ) -> tuple[Converged, ...]:
+        """Return the first increments of a lap after the lap that ended with ``before``.
+
+        ``balanced`` is the increment that brings the initial stress into equilibrium.
+        """
+
+    def again(self, beside: Sequence[Converged], time: float) -> tuple[Converged, ...]:
+        """Return the neighbours with the time at which the next lap begins."""
+
+    def followed(
+        self, before: Converged, now: Converged, *, friction: bool = True
+    ) -> tuple[Converged, ...]:
+        """Return the increments that follow ``now``, after those beside ``before``."""
+
+
 class Stepper:
     """Advances a system from one time to another.
 
@@ -56,6 +83,7 @@ class Stepper:
     ----------
     report : called after every increment
     watch : (converged increment) -> value kept in `Point.history`
+    followers : neighbouring runs
 
     Attributes
     ----------
@@ -68,8 +96,9 @@ class Stepper:
         control: Control,
         report: Report | None = None,
         watch: Watch | None = None,
+        followers: Followers | None = None,
     ) -> None:
-        self.system = system
+        self.system, self.followers = system, followers
         self.control = control
         self.place: Callable[[float], str] = "load factor {:.6g}".format
         self._report = report or (lambda: None)
@@ -87,21 +116,31 @@ class Stepper:
         now = replace(at_rest, state=state, energy=Energy(stored=stored, scale=scale))
         return Point(now, (), tally or Tally(), self._watched((), now), _facing(state))
 
-    def begin(self, state: State, time: float, tally: Tally | None = None) -> Point:
+    def begin(
+        self,
+        state: State,
+        time: float,
+        tally: Tally | None = None,
+        before: Converged | None = None,
+    ) -> Point:
         """Return the first point of a lap: wheels are set down, overlapping bodies pushed apart.
+
+        ``before`` is the last increment of the lap before, if any.
 
         The initial stress of each body is brought to equilibrium first. No load acts yet, so that a
         failure is not mistaken for a limit load. Raises `PathEnded` if overlapping bodies have no
         equilibrium, and `ModelError` if an initial stress has none.
         """
-        state = self.system.set_down(self.balanced(state), time)
-        if self.system.overlaps(state):
-            state = parted(self.system, state)
-        point = self.rest(state, tally)
+        balanced = self._balance(state)
+        rest = state if balanced is None else self.system.at_rest(balanced.state)
+        point = self.rest(placed(self.system, rest, time), tally)
+        if self.followers:
+            beside = self.followers.begun(before, balanced, time)
+            point = replace(point, now=replace(point.now, beside=beside))
         if not self.system.overlaps(point.now.state):
             return point
         try:
-            pushed = self._pushed_apart(point.now.state, time)
+            pushed, friction = self._pushed_apart(point.now.state, time)
         except IncrementFailed as failure:
             error = NotConverged(
                 "the overlap of the bodies before loading could not be pushed apart: "
@@ -109,33 +148,37 @@ class Stepper:
             )
             raise PathEnded(error, replace(point, tally=self._timed(point.tally))) from failure
         pushed = replace(integrated(self.system, point.now, pushed), added=0.0)
-        return self._after(point, self._worked(point.now, pushed), ())
+        return self._after(point, self._worked(point.now, pushed), (), friction=friction)
 
-    def _pushed_apart(self, state: State, time: float) -> Converged:
-        """Return the increment that removes an overlap.
+    def _pushed_apart(self, state: State, time: float) -> tuple[Converged, bool]:
+        """Return the increment that removes an overlap, and whether it has friction.
 
         It has no friction, because its slip is not a history of loading, unless the load at the
         beginning has no equilibrium without friction.
         """
+        tolerances = self.control.tolerances
         try:
-            return Increment(
-                self.system, state, time, friction=False, tolerances=self.control.tolerances
-            ).solve()
+            smooth = Increment(self.system, state, time, friction=False, tolerances=tolerances)
+            return smooth.solve(), False
         except IncrementFailed:
-            return Increment(self.system, state, time, tolerances=self.control.tolerances).solve()
+            return Increment(self.system, state, time, tolerances=tolerances).solve(), True
 
     def balanced(self, state: State) -> State:
         """Return the state in which the initial stress of each body is in equilibrium."""
+        found = self._balance(state)
+        return state if found is None else self.system.at_rest(found.state)
+
+    def _balance(self, state: State) -> Converged | None:
+        """Return the increment that brings the initial stress into equilibrium, if there is any."""
         if not self.system.prestressed:
-            return state
+            return None
         try:
-            balanced = Increment(self.system, state, state.time, contact=False).solve()
+            return Increment(self.system, state, state.time, contact=False).solve()
         except IncrementFailed as failure:
             raise ModelError(
                 "initial_stress", f"that of {', '.join(self.system.prestressed)}",
                 f"must have an equilibrium within the strength of the material: {failure}",
             ) from failure  # fmt: skip
-        return self.system.at_rest(balanced.state)
 
     def again(self, point: Point, time: float) -> Point:
         """Return the first point of a later lap: wheels are set down, other bodies unchanged.
@@ -144,13 +187,15 @@ class Stepper:
         """
         state = point.now.state
         if self.system.rolls:
-            begun = self.begin(state, time, point.tally)
+            begun = self.begin(state, time, point.tally, point.now)
             history, met = (*point.history, *begun.history), point.met | begun.met
             timing = point.now.timing.then(begun.now.timing)
             # the wheels are set down apart: to begin adds no error
             now = replace(begun.now, timing=timing, missed=point.now.missed)
             return replace(begun, now=now, history=history, met=met)
         now = replace(point.now, state=replace(state, time=time), added=0.0)
+        if self.followers:
+            now = replace(now, beside=self.followers.again(now.beside, time))
         return replace(point, now=now, past=())
 
     def reach(self, point: Point, target: float, *, contact: bool = True) -> Point:
@@ -359,8 +404,18 @@ class Stepper:
         timing = before.timing.then(now.timing)
         return replace(now, energy=energy, lost=forgotten, timing=timing)
 
-    def _after(self, point: Point, converged: Converged, past: tuple[State, ...]) -> Point:
+    def _after(
+        self,
+        point: Point,
+        converged: Converged,
+        past: tuple[State, ...],
+        *,
+        friction: bool = True,
+    ) -> Point:
         """Return the point after one more increment."""
+        if self.followers:
+            beside = self.followers.followed(point.now, converged, friction=friction)
+            converged = replace(converged, beside=beside)
         history = self._watched(point.history, converged)
         met = point.met | _facing(converged.state)
         return Point(converged, past, self._timed(point.tally.plus(converged)), history, met)
@@ -385,6 +440,12 @@ class Stepper:
         now = clock.process_time()
         seconds, self._clock = tally.seconds + now - self._clock, now
         return replace(tally, seconds=seconds)
+
+
+def placed(system: System, state: State, time: float) -> State:
+    """Return the state in which a lap begins: wheels are set down, free bodies do not overlap."""
+    state = system.set_down(state, time)
+    return parted(system, state) if system.overlaps(state) else state
 
 
 class _StepSize:

@@ -23,7 +23,7 @@ from solver.loading.cycle import Cycle
 from solver.loading.freed import check_freed
 from solver.loading.outcome import Outcome, PathEnded, Point, Settled, Tally
 from solver.loading.program import HALVINGS, Program, StepRefinement, Target, shared
-from solver.loading.stepper import Report, Stepper, Watch, turned
+from solver.loading.stepper import Followers, Report, Stepper, Watch, turned
 
 Points = Mapping[str, Converged]
 
@@ -62,6 +62,7 @@ class Walker:
     until : (cycles of repeated stages so far) -> whether the other cycles may be left out
     watch : (converged increment) -> value kept in `Outcome.history`
     report : called after every increment
+    followers : neighbouring runs; a program has those of its neighbours `beside` it
     """
 
     def __init__(
@@ -74,11 +75,13 @@ class Walker:
         until: Callable[[Sequence[Cycle]], bool] | None = None,
         report: Report | None = None,
         watch: Watch | None = None,
+        followers: Followers | None = None,
     ) -> None:
         self._system, self._until = system, until
         self._trace = trace
         self._refinement = refinement
-        self._stepper = Stepper(system, control, report, watch)
+        self._followers = followers
+        self._stepper = Stepper(system, control, report, watch, followers)
 
     def walk(
         self, programs: Iterable[Program], largest: Program | None = None
@@ -160,6 +163,8 @@ class Walker:
 
     def _start(self, program: Program, tally: Tally | None = None) -> _Walk:
         """Return the walk at the beginning of a program."""
+        if self._followers:
+            self._followers.between(program.ways[0])
         try:
             point = self._stepper.begin(self._system.initial(), program.laps[0].start, tally)
         except PathEnded as ended:
@@ -175,6 +180,10 @@ class Walker:
         if not proportional or start is None or start.error is not None:
             return None
         stages = program.laps[0].stages
+        if self._followers:
+            ways, last = program.ways, [bool(t.keeps) for t in program.targets].index(True)
+            ends = zip(ways[0], ways[last], strict=True)
+            self._followers.between([(first[0], end[1]) for first, end in ends])
         reached = self._stepper.elastic(start.point, stages[0].target)
         if reached is None:
             return None
@@ -186,7 +195,7 @@ class Walker:
     def _along(self, walk: _Walk, program: Program, first: int, end: int) -> _Walk:
         """Return the walk over the targets of a program from number ``first`` to ``end``."""
         at = first
-        targets = program.targets
+        targets, ways = program.targets, program.ways if self._followers else []
         if walk.error is None:
             error = excess_shear(self._system, [target.time for target in targets[first:end]])
             walk = replace(walk, error=error)
@@ -196,6 +205,8 @@ class Walker:
                 walk = _repeated(walk, program.cycle)
                 at += next(k for k, t in enumerate(targets[at:], 1) if t.closes)
                 continue
+            if self._followers:
+                self._followers.between(ways[at])
             try:
                 walk = self._to(walk, targets[at])
             except PathEnded as ended:

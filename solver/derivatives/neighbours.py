@@ -1,0 +1,135 @@
+"""Neighbouring runs: the same run with one parameter slightly different, followed linearly.
+
+A neighbour follows the increments of the run. Each of its increments is one Newton step from the
+end of the run's increment, with the run's consistent tangent. With a difference of 1e-7 of the
+parameter the error of this step, of second order, is negligible, so that
+
+    (result of the neighbour - result of the run) / difference
+
+is the derivative of any result. The law of a material is evaluated at the neighbour's strain,
+internal variables and parameters: it needs no derivative of its own, nor do friction, loads and
+shapes of rigid bodies. Contact has one more solution of its own small problem, from the run's
+active sets, so that a neighbour changes them only if the run lies at their change.
+
+The first neighbour is the run itself, after the same Newton step: its difference from the others
+does not contain the out-of-balance forces that the run has left within its tolerance.
+
+P. Michaleris, D.A. Tortorelli, C.A. Vidal, Tangent operators and design sensitivity formulations
+for transient non-linear coupled problems, International Journal for Numerical Methods in
+Engineering 37 (1994) 2471-2499, direct differentiation of a history.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from solver.contact.state import Converged, State
+from solver.contact.system import System
+from solver.fem.operators import Operator
+from solver.loading.control import Control
+from solver.loading.energy import worked
+from solver.loading.increment import Increment
+from solver.loading.stepper import Stepper, Way, placed
+from solver.typing import Array
+
+
+class Neighbours:
+    """The neighbouring runs of the runs of a system.
+
+    Parameters
+    ----------
+    system : that of the run
+    systems : those of its neighbours, with equal unknowns and points
+    """
+
+    def __init__(self, system: System, systems: Sequence[System]) -> None:
+        self._system = system
+        self._steppers = [Stepper(each, Control()) for each in (system, *systems)]
+        self._ways: tuple[Way, ...] = ()
+
+    def between(self, ways: Sequence[Way]) -> None:
+        """See `solver.loading.stepper.Followers`."""
+        self._ways = (ways[0], *ways)
+
+    def _times(self, time: float) -> list[float]:
+        """Return the times of the neighbours that correspond to a time of the run."""
+        (start, end), *others = self._ways
+        share = (time - start) / (end - start) if end != start else 1.0
+        return [a + share * (b - a) if share != 1.0 else b for a, b in others]
+
+    def begun(
+        self, before: Converged | None, balanced: Converged | None, time: float
+    ) -> tuple[Converged, ...]:
+        """See `solver.loading.stepper.Followers`."""
+        operators = [] if balanced is None else self._system.tangents(balanced)
+        known = before.beside if before else (None,) * len(self._steppers)
+        out = []
+        for stepper, last, at in zip(self._steppers, known, self._times(time), strict=True):
+            system = stepper.system
+            state = last.state if last else system.initial()
+            if balanced is not None:
+                increment = Increment(system, state, state.time, contact=False)
+                state = system.at_rest(increment.linearised(balanced, operators).state)
+            out.append(stepper.rest(placed(system, state, at)).now)
+        return tuple(out)
+
+    def again(self, beside: Sequence[Converged], time: float) -> tuple[Converged, ...]:
+        """See `solver.loading.stepper.Followers`."""
+        both = zip(beside, self._times(time), strict=True)
+        return tuple(replace(each, state=replace(each.state, time=at)) for each, at in both)
+
+    def followed(
+        self, before: Converged, now: Converged, *, friction: bool = True
+    ) -> tuple[Converged, ...]:
+        """See `solver.loading.stepper.Followers`."""
+        operators = self._system.tangents(now)
+        each = zip(self._steppers, before.beside, self._times(now.state.time), strict=True)
+        return tuple(
+            _next(stepper.system, own, at, now, operators, friction=friction)
+            for stepper, own, at in each
+        )
+
+
+def _next(
+    system: System,
+    before: Converged,
+    time: float,
+    run: Converged,
+    operators: Sequence[Operator],
+    *,
+    friction: bool,
+) -> Converged:
+    """Return the next increment of a neighbour, given that of the run."""
+    increment = Increment(
+        system,
+        _started(system, before.state, run.start),
+        time,
+        contact=not run.separated,
+        friction=friction,
+    )
+    now = increment.linearised(run, operators)
+    return replace(now, energy=worked(system, before, now))
+
+
+def _started(system: System, own: State, run: State) -> State:
+    """Return the state in which an increment of a neighbour starts.
+
+    As in the run, pairs may have become finite, or present, and rates unknown.
+    """
+    contacts = []
+    for interface, mine, its in zip(system.interfaces, own.contacts, run.contacts, strict=True):
+        gap = mine.gap
+        if np.isfinite(its.gap).any() and not np.isfinite(gap).any():
+            gap = interface.pairing(own.u, run.time, finite=its.finite).gap
+        contacts.append(replace(
+            mine, finite=its.finite, touching=its.touching, status=its.status, gap=gap,
+            rates=_where(its.rates, mine.rates), earlier=_where(its.earlier, mine.earlier),
+        ))  # fmt: skip
+    return replace(own, contacts=tuple(contacts), force_scale=run.force_scale)
+
+
+def _where(known: Array, values: Array) -> Array:
+    return np.where(np.isnan(known), np.nan, values)
