@@ -77,6 +77,7 @@ class Tally:
     plastic_work : [N mm]
     dissipation : least plastic dissipation at a point in an increment [N mm/mm3]
     lost : largest loss of state between two increments (`history.lost`)
+    beside : plastic work of the neighbouring runs, if there are any [N mm]
     """
 
     iterations: tuple[int, ...] = ()
@@ -87,6 +88,7 @@ class Tally:
     plastic_work: float = 0.0
     dissipation: float = 0.0
     lost: float = 0.0
+    beside: tuple[float, ...] = ()
 
     def plus(self, converged: Converged) -> Tally:
         """Return the tally with one more increment."""
@@ -98,6 +100,10 @@ class Tally:
             plastic_work=self.plastic_work + converged.plastic_work,
             dissipation=float(np.minimum(self.dissipation, converged.dissipation)),
             lost=float(np.maximum(self.lost, converged.lost)),
+            beside=tuple(
+                each.plastic_work + (self.beside[k] if self.beside else 0.0)
+                for k, each in enumerate(converged.beside)
+            ),
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -32,6 +32,7 @@ class FinishedRun:
     notes : messages to the user about the computation
     singular : singular points, near which numbers depend on the mesh
     beside : function that returns the fields of further bodies at the same stages
+    derived : (run, outputs) -> derivatives of the numbers of the outputs, if they are asked for
     kept : what outputs have computed and need again
     """
 
@@ -44,6 +45,7 @@ class FinishedRun:
     notes: tuple[str, ...] = ()
     singular: tuple[SingularPoint, ...] = ()
     beside: Callable[[], MeshFields] | None = None
+    derived: Callable[[FinishedRun, Sequence[Output]], Values] | None = None
     kept: dict[Any, Any] = field(default_factory=dict)
 
     @property

@@ -13,6 +13,7 @@ from solver.audit.pairs import untouched
 from solver.audit.report import Audit, audit
 from solver.contact.system import System
 from solver.errors import LimitLoad, TooLong
+from solver.late import Late
 from solver.loading.control import Control
 from solver.loading.outcome import Outcome
 from solver.loading.program import Program, walked
@@ -26,6 +27,9 @@ from solver.results.run import FinishedRun, Output, Values
 from solver.results.samples import Samples
 from solver.results.singularity import singular_points
 from solver.scenes.scene import Monitor, Scene
+
+
+_Family = Late("solver.derivatives.family:Family")
 
 
 def record(scene: Scene, run: FinishedRun) -> Record:
@@ -42,6 +46,8 @@ def record(scene: Scene, run: FinishedRun) -> Record:
     own = scene.warnings(run) if scene.warnings else ()
     figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
     values = {**cost, **figures, **_merged(run, (singular_points, outlines, *scene.outputs))}
+    if run.derived is not None:
+        values |= run.derived(run, scene.outputs)
     if check.violations:
         status = Status.AUDIT_FAILED
     messages = run.doubts + check.violations + check.outside + run.notes + check.warnings + own
@@ -101,24 +107,28 @@ def by_increments(
     last = given[-1] if given is not None else largest
     system = System(scene.model(last))
     samples = Samples(system, scene.view(last))
+    family = _Family(scene.derivatives, scene, last, samples) if scene.derivatives else None
+    program = family.program if family else scene.program
+    of_samples = family.beside if family else lambda function: partial(function, samples)
     acting = acting_on(system, symmetric=samples.view.symmetric, axis=samples.view.axis)
     programs: Iterable[Program]
     if given is not None:
         runs, bound = given, None
-        programs = listed = [scene.program(run) for run in given]
+        programs = listed = [program(run) for run in given]
         report = _counted(listed, monitor)
     else:
         runs, asked = tee(runs)
-        bound, programs = scene.program(largest), map(scene.program, asked)
+        bound, programs = program(largest), map(program, asked)
         report = partial(monitor, 0.0)  # how much is still to be asked for is not known
     walker = Walker(
         system,
         Control(increment_error=scene.increment_error),
-        trace=partial(scene.trace, samples) if scene.trace else None,
+        trace=of_samples(scene.trace) if scene.trace else None,
         refinement=scene.refinement(last) if scene.refinement else None,
         until=partial(decided, laws=system.laws) if scene.until and scene.until(last) else None,
         report=report,
-        watch=partial(scene.watch, last, samples) if scene.watch else None,
+        watch=of_samples(partial(scene.watch, last)) if scene.watch else None,
+        followers=family.followers if family else None,
     )
     view = samples.view
     for outcome, run in zip(walker.walk(programs, bound), runs, strict=True):
@@ -140,6 +150,7 @@ def by_increments(
             singular=system.model.singular,
             doubts=system.model.doubts,
             notes=notes,
+            derived=family.values if family else None,
         )
 
 

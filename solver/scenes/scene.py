@@ -6,6 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Seq
 from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn
 
+from solver.derivatives.asked import Derivatives
 from solver.errors import NotConverged
 from solver.late import late
 from solver.loading.control import INCREMENT_ERROR
@@ -112,6 +113,7 @@ class Scene:
         thing that the user can do; or (parameters) -> such a table
     quantities : quantities that only this scene declares
     source : digest of the data it was made from, if any; it counts in the ids of runs
+    derivatives : what its runs derive by which parameters; none by default
     allow : what all its studies allow: with ``large_strain`` runs outside small-strain theory are
         ok
     """
@@ -139,6 +141,7 @@ class Scene:
     advice: Advice | Callable[[Any], Advice] = field(default_factory=dict, hash=False)
     quantities: tuple[Quantity, ...] = ()
     source: str = ""
+    derivatives: Derivatives | None = None
     allow: tuple[str, ...] = ()
 
     def path(self, parameters: Any, values: Sequence[float], monitor: Monitor) -> Iterator[Record]:
