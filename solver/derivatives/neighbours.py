@@ -29,11 +29,14 @@ import numpy as np
 from solver.contact.state import Converged, State
 from solver.contact.system import System
 from solver.fem.operators import Operator
+from solver.linear.solvers import Singular
+from solver.linear.threads import one_thread
 from solver.loading.control import Control
 from solver.loading.energy import worked
 from solver.loading.increment import Increment
+from solver.loading.outcome import IncrementFailed
 from solver.loading.stepper import Stepper, Way, placed
-from solver.typing import Array
+from solver.typing import Array, Ints
 
 
 class Neighbours:
@@ -85,12 +88,34 @@ class Neighbours:
         self, before: Converged, now: Converged, *, friction: bool = True
     ) -> tuple[Converged, ...]:
         """See `solver.loading.stepper.Followers`."""
-        operators = self._system.tangents(now)
-        each = zip(self._steppers, before.beside, self._times(now.state.time), strict=True)
-        return tuple(
-            _next(stepper.system, own, at, now, operators, friction=friction)
-            for stepper, own, at in each
-        )
+        each = zip(self._steppers, before.beside, self._times(now.state.time), strict=False)
+        try:
+            with one_thread():
+                operators = [_Shared(operator) for operator in self._system.tangents(now)]
+                return tuple(
+                    _next(stepper.system, own, at, now, operators, friction=friction)
+                    for stepper, own, at in each
+                )
+        except (IncrementFailed, Singular):
+            return ()
+
+
+class _Shared:
+    """An operator that keeps its last compliance: that of the neighbours is mostly the same."""
+
+    def __init__(self, operator: Operator) -> None:
+        self.begin = operator.begin
+        self._operator = operator
+        self._known: tuple[Ints, Array, Array] | None = None
+
+    def compliance(self, dofs: Ints, rows: Array) -> Array:
+        """See `Operator`."""
+        known = self._known
+        if known and np.array_equal(known[0], dofs) and np.array_equal(known[1], rows):
+            return known[2]
+        W = self._operator.compliance(dofs, rows)
+        self._known = dofs, rows, W
+        return W
 
 
 def _next(
@@ -111,7 +136,7 @@ def _next(
         friction=friction,
     )
     now = increment.linearised(run, operators)
-    return replace(now, energy=worked(system, before, now))
+    return replace(now, energy=worked(system, before, now, run.energy.scale))
 
 
 def _started(system: System, own: State, run: State) -> State:

@@ -22,8 +22,13 @@ from solver.fem.rigid import RigidPart
 from solver.materials.state import PlasticState, Response
 
 
-def worked(system: System, before: Converged, now: Converged) -> Energy:
-    """Return the work since the lap began, up to the end of the increment ``now``."""
+def worked(
+    system: System, before: Converged, now: Converged, least: float | None = None
+) -> Energy:
+    """Return the work since the lap began, up to the end of the increment ``now``.
+
+    ``least`` is the least scale, by default the rounding level of `System.least`.
+    """
     parts = system.parts
     moves = zip(before.state.u, now.state.u, before.forces, now.forces, strict=True)
     work = sum(float((f0 + f1) @ (u1 - u0)) / 2 for u0, u1, f0, f1 in moves)
@@ -38,7 +43,8 @@ def worked(system: System, before: Converged, now: Converged) -> Energy:
         "contact": so_far.contact + now.contact_work[1] + _released(system, before, now),
         "supplied": so_far.supplied + max(work, 0.0),
     }
-    scale = max(so_far.scale, system.least(now.state.time)[1], *map(abs, terms.values()))
+    least = system.least(now.state.time)[1] if least is None else least
+    scale = max(so_far.scale, least, *map(abs, terms.values()))
     return Energy(stored=so_far.stored, scale=scale, **terms)
 
 

@@ -140,7 +140,6 @@ class Increment:
         materials = [part.body.material for part in system.parts]
         self.patient = patient and all(m.elastic or m.hardens for m in materials)
         self.tolerances = tolerances or Tolerances()
-        self._least, _ = system.least(time)
         self._began: tuple[Vectors, Candidates] | None = None  # residuals, candidates
         self._pivoted, self._blended = 0, 0
         # corners of a yield surface have no tangent
@@ -347,7 +346,7 @@ class Increment:
             level += norm(residuals)
         if external == 0 and self.start.force_scale == 0:  # bodies without contact and force
             level += _ROUNDED * rounding(self.system, self.start.u) / self.tolerances.residual
-        scale = max(self.start.force_scale, level, self._least)
+        scale = max(self.start.force_scale, level, self.system.least(self.time)[0])
         if scale == 0:
             overlap = min(candidates.motion[: candidates.n].min(initial=0.0), candidates.beyond)
             off = overlap < -self.system.gap_tolerance or candidates.motion[candidates.linked].any()
