@@ -13,7 +13,7 @@ from solver.errors import ModelError
 from solver.parameters import is_number
 from solver.results.quantities import Quantity
 
-STEP = -1e-7
+STEP = -1e-6
 """Difference of a parameter of a neighbouring run over its value. It is negative: a load slightly
 above a whole number of increments would need one more."""
 

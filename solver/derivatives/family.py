@@ -21,6 +21,11 @@ from solver.results.run import FinishedRun, Output, Values
 from solver.results.samples import Samples
 
 
+_JUMP = 1e-3
+"""Change of a number over the number: a larger one, at a tiny change of a parameter, is a jump, as
+of the place of a maximum that two places share. It has no derivative."""
+
+
 class Family:
     """The neighbouring runs of a path of a scene.
 
@@ -70,8 +75,10 @@ class Family:
 
         def value(at: Any) -> Any:
             own = function(self._samples, at)
-            each = [function(samples, _neighbour(at, k)) for k, samples in enumerate(self._beside)]
-            self._own[id(own)] = own, each
+            self._own[id(own)] = own, [
+                function(samples, beside)
+                for samples, beside in zip(self._beside, _beside(at), strict=False)
+            ]
             return own
 
         return value
@@ -79,7 +86,7 @@ class Family:
     def finished(self, run: FinishedRun) -> list[FinishedRun]:
         """Return the neighbours of a finished run, first the run itself; none if one failed."""
         outcome = run.outcome
-        if not all(found.beside for found in outcome.points.values()):
+        if not _beside(outcome.points):
             return []
         parameters = [run.parameters, *self.runs(run.parameters)]
         return [
@@ -102,7 +109,7 @@ class Family:
             outcome,
             last=outcome.last.beside[k],
             tally=replace(outcome.tally, plastic_work=outcome.tally.beside[k]),
-            points=_neighbour(outcome.points, k),
+            points=_beside(outcome.points)[k],
             traces=tuple(self._own[id(each)][1][k] for each in outcome.traces),
             history=tuple(self._own[id(each)][1][k] for each in outcome.history),
             cycles=tuple(cycle.beside[k] for cycle in outcome.cycles),
@@ -122,7 +129,8 @@ class Family:
                 for quantity in wanted:
                     derivative = asked.quantity(quantity, name, type(run.parameters))
                     change = other.get(quantity, np.nan) - first[quantity]
-                    found[derivative] = change / step
+                    jumps = abs(change) > _JUMP * abs(first[quantity])
+                    found[derivative] = np.nan if jumps else change / step
         return found
 
 
@@ -130,11 +138,12 @@ def _is_number(quantity: Quantity) -> bool:
     return not (quantity.dims or quantity.count)
 
 
-def _neighbour(at: Any, k: int) -> Any:
-    """Return what a neighbour has of states: one of its increments, or several by name."""
-    if isinstance(at, Mapping):
-        return {name: found.beside[k] for name, found in at.items()}
-    return at.beside[k]
+def _beside(at: Any) -> list[Any]:
+    """Return what the neighbours have of states: an increment, or several by name; none failed."""
+    if not isinstance(at, Mapping):
+        return list(at.beside)
+    each = zip(*(found.beside for found in at.values()), strict=False)
+    return [dict(zip(at, found, strict=True)) for found in each]
 
 
 def _check_alike(name: str, system: System, other: System) -> None:

@@ -1,7 +1,7 @@
 """Neighbouring runs: the same run with one parameter slightly different, followed linearly.
 
 A neighbour follows the increments of the run. Each of its increments is one Newton step from the
-end of the run's increment, with the run's consistent tangent. With a difference of 1e-7 of the
+end of the run's increment, with the run's consistent tangent. With a difference of 1e-6 of the
 parameter the error of this step, of second order, is negligible, so that
 
     (result of the neighbour - result of the run) / difference

@@ -70,6 +70,9 @@ _LESS = 0.8
 line search. Close to a limit load the energy rises along many steps that approach the solution."""
 _SHORTEST = 1e-3
 """Least share of a step to which it is shortened until its forces are finite."""
+_CORRECTIONS, _CORRECTED, _NEGLIGIBLE = 6, 1e-4, 1e-13
+"""Most steps of `Increment.linearised`; size of the last one over that of the first, and over the
+displacements."""
 _UNBALANCED = 100.0
 _ROUNDED = 10.0
 """Force level of bodies without load, over the level at which rounding errors alone would exceed
@@ -166,9 +169,12 @@ class Increment:
             return self._iterate()
 
     def linearised(self, end: Converged, operators: Sequence[Operator]) -> Converged:
-        """Return the increment after one Newton step from the end of an almost equal increment.
+        """Return the increment after Newton steps from the end of an almost equal increment.
 
-        Its error is of second order in the difference of the two.
+        Where all tangents are exact, one step has an error of second order in the difference of the
+        two increments. Surfaces that slide far turn with the bodies, which the tangent does not
+        see, nor does that of a law see its unsymmetric part: there steps follow until they are
+        negligible.
 
         Parameters
         ----------
@@ -183,21 +189,29 @@ class Increment:
         with one_thread():
             contacts, links = end.state.contacts, end.state.links
             u = self.system.moved(end.state, self.time).u
-            candidates = self._candidates(u, contacts, links)
-            residuals = self._residuals(u, self._respond(u))
-            step = newton_step(self.system, residuals, operators, candidates)
-            if step is None:
-                raise IncrementFailed("no contact forces were found that balance this load")
-            u = tuple(ui + du for ui, du in zip(u, step.u, strict=True))
-            contacts = candidates.states(contacts, step.forces, step.status)
-            links, responses = step.forces[candidates.linked], self._respond(u)
+            exact = not any(contact.finite for contact in self.start.contacts)
+            exact &= all(part.body.law.symmetric for part in self.system.parts)
+            responses, candidates = self._respond(u), self._candidates(u, contacts, links)
+            residuals, first = self._residuals(u, responses), 0.0
+            for _ in range(1 if exact else _CORRECTIONS):
+                step = newton_step(self.system, residuals, operators, candidates)
+                if step is None:
+                    raise IncrementFailed("no contact forces were found that balance this load")
+                u = tuple(ui + du for ui, du in zip(u, step.u, strict=True))
+                contacts = candidates.states(contacts, step.forces, step.status)
+                links, responses = step.forces[candidates.linked], self._respond(u)
+                residuals = self._residuals(u, responses)
+                candidates = self._candidates(u, contacts, links)
+                first = first or norm(step.u)
+                if norm(step.u) <= max(_CORRECTED * first, _NEGLIGIBLE * norm(u)):
+                    break
             found = Balanced(
                 u=u,
                 contacts=contacts,
                 links=links,
                 responses=responses,
-                residuals=self._residuals(u, responses),
-                candidates=self._candidates(u, contacts, links),
+                residuals=residuals,
+                candidates=candidates,
                 scale=end.state.force_scale,
                 iterations=1,
                 pivoted=0,

@@ -106,14 +106,16 @@ class Stepper:
         self._predictor = Predictor(system)
         self._clock = clock.process_time()
 
-    def rest(self, state: State, tally: Tally | None = None) -> Point:
+    def rest(
+        self, state: State, tally: Tally | None = None, beside: tuple[Converged, ...] = ()
+    ) -> Point:
         """Return a state without contact forces as the first point of a lap."""
         at_rest = Increment(self.system, state, state.time, contact=False).solve()
         each = zip(self.system.parts, state.u, at_rest.responses, strict=True)
         stored = sum(elastic_energy(part, u, found, state.time) for part, u, found in each)
         stored += self.system.links.energy(state.links)
         scale = max(stored, self.system.least(state.time)[1])
-        now = replace(at_rest, state=state, energy=Energy(stored=stored, scale=scale))
+        now = replace(at_rest, state=state, energy=Energy(stored=stored, scale=scale), beside=beside)
         return Point(now, (), tally or Tally(), self._watched((), now), _facing(state))
 
     def begin(
@@ -133,10 +135,8 @@ class Stepper:
         """
         balanced = self._balance(state)
         rest = state if balanced is None else self.system.at_rest(balanced.state)
-        point = self.rest(placed(self.system, rest, time), tally)
-        if self.followers:
-            beside = self.followers.begun(before, balanced, time)
-            point = replace(point, now=replace(point.now, beside=beside))
+        beside = self.followers.begun(before, balanced, time) if self.followers else ()
+        point = self.rest(placed(self.system, rest, time), tally, beside)
         if not self.system.overlaps(point.now.state):
             return point
         try:
