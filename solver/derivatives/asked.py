@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import typing
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from annotated_types import Unit
 
 from solver.errors import ModelError
-from solver.parameters import is_number
 from solver.results.quantities import Quantity
 
 STEP = -1e-6
@@ -25,11 +24,45 @@ class Derivatives:
     Attributes
     ----------
     by : names of parameters
-    of : names of numbers; empty for all
+    of : names of numbers
     """
 
     by: tuple[str, ...]
-    of: tuple[str, ...] = ()
+    of: tuple[str, ...]
+
+    def quantities(self, kind: Any, known: Mapping[str, Quantity]) -> list[Quantity]:
+        """Return the declarations of the derivatives, ``d_<number>_d_<parameter>``.
+
+        Parameters
+        ----------
+        kind : class of the parameters
+        known : quantities of the runs, by name
+
+        Raises
+        ------
+        ModelError
+            for a parameter or a number that has no derivative
+        """
+        hints = typing.get_type_hints(kind, include_extras=True)
+        marks = {name: (hint, *_marks(hint)) for name, hint in hints.items()}
+        numbers = [name for name, each in known.items() if not (each.dims or each.count)]
+        real = [name for name, each in marks.items() if float in each]
+        for field, given, allowed in (("by", self.by, real), ("of", self.of, numbers)):
+            for k, name in enumerate(given):
+                if name not in allowed:
+                    what = "a parameter with decimals" if field == "by" else "one number a run"
+                    raise ModelError(f"{field}[{k}]", name, f"must be {what}")
+        return [
+            replace(
+                known[of],
+                name=named(of, by),
+                long_name=f"derivative of {known[of].long_name} by {by}",
+                units=_over(known[of].units, next(_units(marks[by]), "1")),
+                standard_name="",
+            )
+            for by in self.by
+            for of in self.of
+        ]
 
     def steps(self, parameters: Any) -> dict[str, float]:
         """Return the difference of each parameter.
@@ -37,46 +70,35 @@ class Derivatives:
         Raises
         ------
         ModelError
-            for a parameter that is unknown, a whole number, or zero
+            for a parameter that is zero
         """
-        hints = typing.get_type_hints(type(parameters), include_extras=True)
         found = {}
         for name in self.by:
-            if name not in hints or float not in (hints[name], *_marks(hints[name])):
-                known = [each for each, hint in hints.items() if float in (hint, *_marks(hint))]
-                raise ModelError("derivatives.by", name, f"must be among {', '.join(known)}")
-            value = getattr(parameters, name)
-            if not is_number(value) or value == 0:
+            value = float(getattr(parameters, name))
+            if value == 0:
                 raise ModelError(name, value, "must differ from 0: derivatives are taken by it")
+            found[name] = value * STEP
             try:
-                replace(parameters, **{name: value * (1 + STEP)})
-                found[name] = value * STEP
+                replace(parameters, **{name: value + found[name]})
             except ModelError:  # at the lower end of its range
-                found[name] = -value * STEP
+                found[name] *= -1
         return found
 
-    def wants(self, name: str) -> bool:
-        """Whether derivatives of a number are asked for."""
-        return not self.of or name in self.of
 
-    def quantity(self, of: Quantity, by: str, kind: Any) -> Quantity:
-        """Return the declaration of the derivative of a number by a parameter of a class."""
-        hint = typing.get_type_hints(kind, include_extras=True)[by]
-        below = next((mark.unit for mark in _marks(hint) if isinstance(mark, Unit)), "1")
-        return replace(
-            of,
-            name=f"d_{of.name}_d_{by}",
-            long_name=f"derivative of {of.long_name} by {by}",
-            units=_over(of.units, below),
-            standard_name="",
-        )
+def named(of: str, by: str) -> str:
+    """Return the name of the derivative of a number by a parameter."""
+    return f"d_{of}_d_{by}"
 
 
 def _marks(hint: Any) -> Iterator[Any]:
-    """Yield the marks of an annotation."""
+    """Yield the parts of an annotation, and their parts."""
     for part in typing.get_args(hint):
         yield part
         yield from _marks(part)
+
+
+def _units(marks: tuple[Any, ...]) -> Iterator[str]:
+    return (mark.unit for mark in marks if isinstance(mark, Unit))
 
 
 def _over(above: str, below: str) -> str:

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 
 from solver.contact.system import System
-from solver.derivatives.asked import Derivatives
+from solver.derivatives.asked import Derivatives, named
 from solver.derivatives.neighbours import Neighbours
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.loading.outcome import Outcome
 from solver.loading.program import Program
 from solver.results.acting import acting_on
-from solver.results.quantities import Quantity
 from solver.results.run import FinishedRun, Output, Values
 from solver.results.samples import Samples
 
@@ -44,6 +43,7 @@ class Family:
 
     def __init__(self, asked: Derivatives, scene: Any, run: Any, samples: Samples) -> None:
         self._asked, self._scene, self._samples = asked, scene, samples
+        self._declared = asked.quantities(type(run), scene.known_quantities)
         system, systems = samples.system, []
         for name, each in zip(asked.by, self.runs(run), strict=True):
             systems.append(System(scene.model(each)))
@@ -116,26 +116,28 @@ class Family:
         )
 
     def values(self, run: FinishedRun, outputs: Iterable[Output]) -> Values:
-        """Return the derivatives of numbers of a run, given its outputs."""
-        asked, found = self._asked, {}
-        steps, runs = asked.steps(run.parameters), self.finished(run)
-        for output in outputs:
-            first = output(runs[0] if runs else run)
-            wanted = [q for q, value in first.items() if _is_number(q) and asked.wants(q.name)]
+        """Return the derivatives of numbers of a run, given its outputs.
+
+        They are NaN where a neighbour failed or has no such number, and where the number jumps.
+        """
+        steps, found = self._asked.steps(run.parameters), dict[str, float]()
+        itself, *others = self.finished(run) or [None]
+        for output in outputs if itself else ():
+            first = _numbers(output(itself))
+            wanted = [name for name in self._asked.of if name in first]
             if not wanted:
                 continue
-            for k, (name, step) in enumerate(steps.items(), 1):
-                other = output(runs[k]) if runs else {}
-                for quantity in wanted:
-                    derivative = asked.quantity(quantity, name, type(run.parameters))
-                    change = other.get(quantity, np.nan) - first[quantity]
-                    jumps = abs(change) > _JUMP * abs(first[quantity])
-                    found[derivative] = np.nan if jumps else change / step
-        return found
+            for (by, step), other in zip(steps.items(), others, strict=True):
+                after = _numbers(output(other))
+                for of in wanted:
+                    change = after.get(of, np.nan) - first[of]
+                    jumps = abs(change) > _JUMP * abs(first[of])
+                    found[named(of, by)] = np.nan if jumps else change / step
+        return {quantity: found.get(quantity.name, np.nan) for quantity in self._declared}
 
 
-def _is_number(quantity: Quantity) -> bool:
-    return not (quantity.dims or quantity.count)
+def _numbers(values: Values) -> dict[str, Any]:
+    return {quantity.name: value for quantity, value in values.items()}
 
 
 def _beside(at: Any) -> list[Any]:

@@ -40,6 +40,7 @@ Kept = Callable[[str], Mapping[str, Any] | None]
 """Returns the content of a study that is known by its name or its id; None if there is none."""
 
 _assessed: Callable[[Scene, Any], Scene] = Late("studies.scenes.fatigue:assessed")
+_derived: Callable[[Scene, Any], Scene] = Late("studies.scenes.derivatives:derived")
 
 Count = Callable[[int, Scene, Any], None]
 """Accepts a number of runs of a scene, which keep what the entry ``keep`` says, or raises."""
@@ -100,6 +101,7 @@ class Study(StudyTable):
     allow : ``large_strain`` makes runs outside small-strain theory count as ok (see `taken`); it
         includes what the scene allows
     fatigue : criterion, limits and cycle, by which every run is assessed (see `assessed`)
+    derivatives : numbers of every run and parameters by which they are derived (see `derived`)
     """
 
     name: Text
@@ -115,6 +117,7 @@ class Study(StudyTable):
         default_factory=list
     )
     fatigue: dict[str, Any] | None = None
+    derivatives: dict[str, Any] | None = None
     _problem: Scene = PrivateAttr()
     _kind: Kind = PrivateAttr()
 
@@ -200,6 +203,8 @@ class Study(StudyTable):
             context.found = scene_named(given.get("scene"), scenes)
             if "fatigue" in given:
                 context.found = _assessed(context.found, given["fatigue"])
+            if "derivatives" in given:
+                context.found = _derived(context.found, given["derivatives"])
             given["scene"] = name_of(context.found)
         except SceneError:
             raise
@@ -300,7 +305,8 @@ class Study(StudyTable):
         rest = {key: each for key, each in content.items() if key not in (EXTENDS, *adds)}
         fixed = {key: value for key, value in base.parameters.items() if key not in owners(axes)}
         own = {"scene": base.scene, "parameters": fixed, "sweep": axes}
-        own |= {"fatigue": base.fatigue} if base.fatigue else {}
+        kept = {"fatigue": base.fatigue, "derivatives": base.derivatives}
+        own |= {key: table for key, table in kept.items() if table}
         return {**base.choice, **rest, **own}
 
     def checked(self) -> Self:

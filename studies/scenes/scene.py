@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, get_args
 from annotated_types import Interval, Unit
 
 from solver.contact.state import Converged
+from solver.derivatives.asked import Derivatives
 from solver.errors import ModelError
 from solver.loading.program import Program, walked
 from solver.model.model import Model
@@ -72,7 +73,8 @@ def _kept_bytes() -> int:
 
 
 def _scene_of(description: Description, scene: tables.SceneFile) -> FileScene:
-    return FileScene(
+    own = tuple(q for number in numbers_of(scene) for q in number.quantities)
+    made = FileScene(
         name=scene.name,
         summary=scene.summary or f"scene of the file {description.file}",
         parameters=_parameters(description, scene),
@@ -95,12 +97,21 @@ def _scene_of(description: Description, scene: tables.SceneFile) -> FileScene:
         advice={
             Status[key.upper()]: text for key, text in scene.advice.model_dump().items() if text
         },
-        quantities=tuple(q for number in numbers_of(scene) for q in number.quantities),
+        quantities=own,
         source=description.digest,
         allow=scene.allow,
         increment_error=scene.increment_error,
         description=description,
     )
+    if scene.derivatives is None:
+        return made
+    asked = Derivatives(**scene.derivatives.model_dump())
+    try:
+        more = asked.quantities(made.parameters, made.known_quantities)
+    except ModelError as error:
+        mistake = StudyError(f"derivatives.{error.field}", error.value, error.allowed)
+        raise SceneError(description.file, [mistake]) from None
+    return replace(made, derivatives=asked, quantities=(*own, *more))
 
 
 def shipped_scene(path: Path) -> FileScene:

@@ -368,6 +368,13 @@ class FatigueTable(SceneTable):
     bodies: tuple[Label, ...] = ()
 
 
+class DerivativesTable(SceneTable):
+    """Derivatives of numbers of every run by parameters."""
+
+    by: Annotated[tuple[Label, ...], Field(min_length=1)]
+    of: Annotated[tuple[Label, ...], Field(min_length=1)]
+
+
 class LoadingTable(SceneTable):
     """Loads that grow together to ``factor``, in steps of ``step``, and are then removed.
 
@@ -642,6 +649,7 @@ class SceneFile(SceneTable):
     repeat: RepeatTable | None = None
     loading: LoadingTable | None = None
     fatigue: FatigueTable | None = None
+    derivatives: DerivativesTable | None = None
     results: ResultsTable = ResultsTable()
     outputs: dict[Label, OutputTable] = Field(default_factory=dict)
     advice: AdviceTable = AdviceTable()
