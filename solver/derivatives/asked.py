@@ -105,5 +105,7 @@ def _over(above: str, below: str) -> str:
     """Return the quotient of two units, in the notation of the CF conventions."""
     if below in ("", "1"):
         return above
+    if above == below:
+        return "1"
     inverse = f"({below})-1" if " " in below or below[-1].isdigit() else f"{below}-1"
     return inverse if above == "1" else f"{above} {inverse}"

@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.contact.system import System
 from solver.derivatives.asked import Derivatives, named
-from solver.derivatives.neighbours import Neighbours
+from solver.derivatives.neighbours import NeighbouringRuns
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.loading.outcome import Outcome
@@ -18,7 +18,6 @@ from solver.loading.program import Program
 from solver.results.acting import acting_on
 from solver.results.run import FinishedRun, Output, Values
 from solver.results.samples import Samples
-
 
 _JUMP = 1e-3
 """Change of a number over the number: a larger one, at a tiny change of a parameter, is a jump, as
@@ -33,7 +32,7 @@ class Family:
     asked : the derivatives
     scene : the scene, with ``model``, ``program`` and ``view``
     run : parameters of the last run of the path
-    samples : those of the run
+    system, samples : those of the run
 
     Raises
     ------
@@ -41,16 +40,22 @@ class Family:
         naming a parameter by which no derivative exists
     """
 
-    def __init__(self, asked: Derivatives, scene: Any, run: Any, samples: Samples) -> None:
+    def __init__(
+        self, asked: Derivatives, scene: Any, run: Any, system: System, samples: Samples
+    ) -> None:
         self._asked, self._scene, self._samples = asked, scene, samples
         self._declared = asked.quantities(type(run), scene.known_quantities)
-        system, systems = samples.system, []
+        systems = []
         for name, each in zip(asked.by, self.runs(run), strict=True):
             systems.append(System(scene.model(each)))
             _check_alike(name, system, systems[-1])
-        self.followers = Neighbours(system, systems)
+        self.followers = NeighbouringRuns(system, systems)
         views = [scene.view(each) for each in self.runs(run)]
         self._beside = [samples, *map(Samples, systems, views)]
+        self._acting = [
+            acting_on(each, symmetric=own.view.symmetric, axis=own.view.axis)
+            for each, own in zip((system, *systems), self._beside, strict=True)
+        ]
         self._own: dict[int, tuple[Any, list[Any]]] = {}
 
     def runs(self, run: Any) -> list[Any]:
@@ -75,10 +80,13 @@ class Family:
 
         def value(at: Any) -> Any:
             own = function(self._samples, at)
-            self._own[id(own)] = own, [
-                function(samples, beside)
-                for samples, beside in zip(self._beside, _beside(at), strict=False)
-            ]
+            self._own[id(own)] = (
+                own,
+                [
+                    function(samples, beside)
+                    for samples, beside in zip(self._beside, _beside(at), strict=False)
+                ],
+            )
             return own
 
         return value
@@ -94,9 +102,7 @@ class Family:
                 run,
                 parameters=each,
                 samples=samples,
-                acting=acting_on(
-                    samples.system, symmetric=samples.view.symmetric, axis=samples.view.axis
-                ),
+                acting=self._acting[k],
                 outcome=self._outcome(outcome, k),
                 kept={},
             )
@@ -121,13 +127,13 @@ class Family:
         They are NaN where a neighbour failed or has no such number, and where the number jumps.
         """
         steps, found = self._asked.steps(run.parameters), dict[str, float]()
-        itself, *others = self.finished(run) or [None]
-        for output in outputs if itself else ():
-            first = _numbers(output(itself))
+        runs = self.finished(run)
+        for output in outputs if runs else ():
+            first = _numbers(output(runs[0]))
             wanted = [name for name in self._asked.of if name in first]
             if not wanted:
                 continue
-            for (by, step), other in zip(steps.items(), others, strict=True):
+            for (by, step), other in zip(steps.items(), runs[1:], strict=True):
                 after = _numbers(output(other))
                 for of in wanted:
                     change = after.get(of, np.nan) - first[of]

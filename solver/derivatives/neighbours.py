@@ -39,7 +39,7 @@ from solver.loading.stepper import Stepper, Way, placed
 from solver.typing import Array, Ints
 
 
-class Neighbours:
+class NeighbouringRuns:
     """The neighbouring runs of the runs of a system.
 
     Parameters

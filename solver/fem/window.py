@@ -170,7 +170,7 @@ class Windowed(Discretisation):
 
     def over_whole(self, operator: Operator) -> Operator:
         """Return the operator of the whole body, given that of the window."""
-        return _Extended(self, operator)
+        return _WholeOperator(self, operator)
 
     def numbered(self, dofs: Ints) -> Ints:
         """Return the numbers in the window of unknowns of the whole body, -1 outside."""
@@ -238,7 +238,7 @@ class Windowed(Discretisation):
         return rest + self._assembly.values(slice(None), self.elastic_elements)
 
 
-class _Extended:
+class _WholeOperator:
     """The operator of a whole body by that of its window; contact forces act in the window."""
 
     def __init__(self, window: Windowed, operator: Operator) -> None:

@@ -22,9 +22,7 @@ from solver.fem.rigid import RigidPart
 from solver.materials.state import PlasticState, Response
 
 
-def worked(
-    system: System, before: Converged, now: Converged, least: float | None = None
-) -> Energy:
+def worked(system: System, before: Converged, now: Converged, least: float | None = None) -> Energy:
     """Return the work since the lap began, up to the end of the increment ``now``.
 
     ``least`` is the least scale, by default the rounding level of `System.least`.

@@ -70,7 +70,7 @@ _LESS = 0.8
 line search. Close to a limit load the energy rises along many steps that approach the solution."""
 _SHORTEST = 1e-3
 """Least share of a step to which it is shortened until its forces are finite."""
-_CORRECTIONS, _CORRECTED, _NEGLIGIBLE = 6, 1e-4, 1e-13
+_CORRECTIONS, _CORRECTED, _NEGLIGIBLE = 12, 1e-7, 1e-13
 """Most steps of `Increment.linearised`; size of the last one over that of the first, and over the
 displacements."""
 _UNBALANCED = 100.0
@@ -172,9 +172,9 @@ class Increment:
         """Return the increment after Newton steps from the end of an almost equal increment.
 
         Where all tangents are exact, one step has an error of second order in the difference of the
-        two increments. Surfaces that slide far turn with the bodies, which the tangent does not
-        see, nor does that of a law see its unsymmetric part: there steps follow until they are
-        negligible.
+        two increments. The tangent has no terms for surfaces that slide far and turn with the
+        bodies, none for the unsymmetric part of a law, and none at the corners of a yield surface:
+        there steps follow until they are negligible.
 
         Parameters
         ----------
@@ -190,7 +190,8 @@ class Increment:
             contacts, links = end.state.contacts, end.state.links
             u = self.system.moved(end.state, self.time).u
             exact = not any(contact.finite for contact in self.start.contacts)
-            exact &= all(part.body.law.symmetric for part in self.system.parts)
+            laws = [part.body.law for part in self.system.parts]
+            exact &= all(law.symmetric and not law.surface.has_corners for law in laws)
             responses, candidates = self._respond(u), self._candidates(u, contacts, links)
             residuals, first = self._residuals(u, responses), 0.0
             for _ in range(1 if exact else _CORRECTIONS):

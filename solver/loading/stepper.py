@@ -115,7 +115,9 @@ class Stepper:
         stored = sum(elastic_energy(part, u, found, state.time) for part, u, found in each)
         stored += self.system.links.energy(state.links)
         scale = max(stored, self.system.least(state.time)[1])
-        now = replace(at_rest, state=state, energy=Energy(stored=stored, scale=scale), beside=beside)
+        now = replace(
+            at_rest, state=state, energy=Energy(stored=stored, scale=scale), beside=beside
+        )
         return Point(now, (), tally or Tally(), self._watched((), now), _facing(state))
 
     def begin(

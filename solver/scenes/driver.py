@@ -8,6 +8,8 @@ from functools import partial
 from itertools import tee
 from typing import Any
 
+import numpy as np
+
 from solver.audit.figures import AUDIT
 from solver.audit.pairs import untouched
 from solver.audit.report import Audit, audit
@@ -28,7 +30,6 @@ from solver.results.samples import Samples
 from solver.results.singularity import singular_points
 from solver.scenes.scene import Monitor, Scene
 
-
 _Family = Late("solver.derivatives.family:Family")
 
 
@@ -47,7 +48,10 @@ def record(scene: Scene, run: FinishedRun) -> Record:
     figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
     values = {**cost, **figures, **_merged(run, (singular_points, outlines, *scene.outputs))}
     if run.derived is not None:
-        values |= run.derived(run, scene.outputs)
+        derived = run.derived(run, scene.outputs)
+        values |= derived
+        if lacks := [q.name for q, value in derived.items() if np.isnan(value)]:
+            own = (*own, f"no derivative was found for {', '.join(lacks)}")
     if check.violations:
         status = Status.AUDIT_FAILED
     messages = run.doubts + check.violations + check.outside + run.notes + check.warnings + own
@@ -107,7 +111,7 @@ def by_increments(
     last = given[-1] if given is not None else largest
     system = System(scene.model(last))
     samples = Samples(system, scene.view(last))
-    family = _Family(scene.derivatives, scene, last, samples) if scene.derivatives else None
+    family = _Family(scene.derivatives, scene, last, system, samples) if scene.derivatives else None
     program = family.program if family else scene.program
     of_samples = family.beside if family else lambda function: partial(function, samples)
     acting = acting_on(system, symmetric=samples.view.symmetric, axis=samples.view.axis)

@@ -48,6 +48,4 @@ def derived(scene: Scene, table: Any) -> Scene:
     except ModelError as error:
         raise StudyError(f"derivatives.{error.field}", error.value, error.allowed) from None
     source = scene.source + json.dumps(checked.model_dump(mode="json"), sort_keys=True)
-    return replace(
-        scene, derivatives=asked, quantities=(*scene.quantities, *own), source=source
-    )
+    return replace(scene, derivatives=asked, quantities=(*scene.quantities, *own), source=source)

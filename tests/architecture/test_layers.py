@@ -18,7 +18,8 @@ LAYERS = {
         "version", "late", "typing", "errors", "files", "parameters", "parts", "memory",
         "tensors", "fatigue", "linear", "mesh", "materials", "model", "fem", "contact",
         "fracture", "loading",
-        "results.quantities", "audit", "results", "scenes", "rolling", "shipped",
+        "results.quantities", "audit", "results", "derivatives", "scenes", "rolling",
+        "shipped",
     ),
     "studies": (
         "units", "numbers", "errors", "toml", "materials", "scratch", "scenes", "definition",
