@@ -19,6 +19,7 @@ _HOMES = {
     "Body": "model.body",
     "ContactPair": "model.contact_pair",
     "Coulomb": "model.friction",
+    "derive": "derivatives.of_models",
     "Displacement": "model.loads",
     "InitialStress": "model.loads",
     "LimitLoad": "errors",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -12,8 +12,7 @@ from solver.contact.system import System
 from solver.derivatives.asked import Derivatives, named
 from solver.derivatives.neighbours import NeighbouringRuns
 from solver.errors import ModelError
-from solver.fem.discretisation import Discretisation
-from solver.loading.outcome import Outcome
+from solver.loading.outcome import Outcome, beside_of
 from solver.loading.program import Program
 from solver.results.acting import acting_on
 from solver.results.run import FinishedRun, Output, Values
@@ -45,11 +44,14 @@ class Family:
     ) -> None:
         self._asked, self._scene, self._samples = asked, scene, samples
         self._declared = asked.quantities(type(run), scene.known_quantities)
-        systems = []
+        self._moving: set[str] = set()
+        own = [body.mesh.p for body in scene.model(run).bodies]
         for name, each in zip(asked.by, self.runs(run), strict=True):
-            systems.append(System(scene.model(each)))
-            _check_alike(name, system, systems[-1])
-        self.followers = NeighbouringRuns(system, systems)
+            moved = zip(own, scene.model(each).bodies, strict=True)
+            if not all(np.array_equal(p, body.mesh.p) for p, body in moved):
+                self._moving.add(name)
+        systems = [System(scene.model(each)) for each in self.runs(run)]
+        self.followers = NeighbouringRuns(system, dict(zip(asked.by, systems, strict=True)))
         views = [scene.view(each) for each in self.runs(run)]
         self._beside = [samples, *map(Samples, systems, views)]
         self._acting = [
@@ -60,8 +62,11 @@ class Family:
 
     def runs(self, run: Any) -> list[Any]:
         """Return the parameters of the neighbours of a run."""
-        steps = self._asked.steps(run)
+        steps = self._steps(run)
         return [replace(run, **{name: getattr(run, name) + steps[name]}) for name in steps]
+
+    def _steps(self, run: Any) -> dict[str, float]:
+        return self._asked.steps(run, self._moving)
 
     def program(self, run: Any) -> Program:
         """Return the program of a run, with those of its neighbours beside it."""
@@ -69,7 +74,8 @@ class Family:
         own: Program = self._scene.program(run)
         for name, other in zip(self._asked.by, beside, strict=True):
             if len(other.targets) != len(own.targets):
-                raise _unlike(name, getattr(run, name), "the increments")
+                allowed = "must not change the number of increments: derivatives are taken by it"
+                raise ModelError(name, getattr(run, name), allowed)
         return replace(own, beside=beside)
 
     def beside(self, function: Callable[..., Any]) -> Callable[[Any], Any]:
@@ -84,7 +90,7 @@ class Family:
                 own,
                 [
                     function(samples, beside)
-                    for samples, beside in zip(self._beside, _beside(at), strict=False)
+                    for samples, beside in zip(self._beside, beside_of(at), strict=False)
                 ],
             )
             return own
@@ -93,9 +99,6 @@ class Family:
 
     def finished(self, run: FinishedRun) -> list[FinishedRun]:
         """Return the neighbours of a finished run, first the run itself; none if one failed."""
-        outcome = run.outcome
-        if not _beside(outcome.points):
-            return []
         parameters = [run.parameters, *self.runs(run.parameters)]
         return [
             replace(
@@ -103,30 +106,26 @@ class Family:
                 parameters=each,
                 samples=samples,
                 acting=self._acting[k],
-                outcome=self._outcome(outcome, k),
+                outcome=self._complete(outcome, run.outcome, k),
                 kept={},
             )
-            for k, (each, samples) in enumerate(zip(parameters, self._beside, strict=True))
+            for k, (outcome, each, samples) in enumerate(
+                zip(run.outcome.beside, parameters, self._beside, strict=False)
+            )
         ]
 
-    def _outcome(self, outcome: Outcome, k: int) -> Outcome:
-        """Return the outcome of a neighbour."""
-        return replace(
-            outcome,
-            last=outcome.last.beside[k],
-            tally=replace(outcome.tally, plastic_work=outcome.tally.beside[k]),
-            points=_beside(outcome.points)[k],
-            traces=tuple(self._own[id(each)][1][k] for each in outcome.traces),
-            history=tuple(self._own[id(each)][1][k] for each in outcome.history),
-            cycles=tuple(cycle.beside[k] for cycle in outcome.cycles),
-        )
+    def _complete(self, outcome: Outcome, run: Outcome, k: int) -> Outcome:
+        """Return the outcome of a neighbour, with what `beside` has recorded."""
+        traces = tuple(self._own[id(each)][1][k] for each in run.traces)
+        history = tuple(self._own[id(each)][1][k] for each in run.history)
+        return replace(outcome, traces=traces, history=history)
 
     def values(self, run: FinishedRun, outputs: Iterable[Output]) -> Values:
         """Return the derivatives of numbers of a run, given its outputs.
 
         They are NaN where a neighbour failed or has no such number, and where the number jumps.
         """
-        steps, found = self._asked.steps(run.parameters), dict[str, float]()
+        steps, found = self._steps(run.parameters), dict[str, float]()
         runs = self.finished(run)
         for output in outputs if runs else ():
             first = _numbers(output(runs[0]))
@@ -144,28 +143,3 @@ class Family:
 
 def _numbers(values: Values) -> dict[str, Any]:
     return {quantity.name: value for quantity, value in values.items()}
-
-
-def _beside(at: Any) -> list[Any]:
-    """Return what the neighbours have of states: an increment, or several by name; none failed."""
-    if not isinstance(at, Mapping):
-        return list(at.beside)
-    each = zip(*(found.beside for found in at.values()), strict=False)
-    return [dict(zip(at, found, strict=True)) for found in each]
-
-
-def _check_alike(name: str, system: System, other: System) -> None:
-    """Raise `ModelError` unless two systems have the same elements, points and unknowns."""
-    for one, two in zip(system.parts, other.parts, strict=True):
-        same = type(one) is type(two) and one.n == two.n and np.array_equal(one.active, two.active)
-        if same and isinstance(one, Discretisation) and isinstance(two, Discretisation):
-            same = np.array_equal(one.dofs, two.dofs)
-        if not same:
-            raise _unlike(name, one.body.name, "the mesh")
-    pairs = zip(system.interfaces, other.interfaces, strict=True)
-    if any((a.slave, a.master) != (b.slave, b.master) for a, b in pairs):
-        raise _unlike(name, "contact", "the slave of a pair")
-
-
-def _unlike(name: str, value: Any, what: str) -> ModelError:
-    return ModelError("derivatives.by", name, f"must not change {what} ({value})")

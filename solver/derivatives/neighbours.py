@@ -21,14 +21,17 @@ Engineering 37 (1994) 2471-2499, direct differentiation of a history.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from solver.contact.state import Converged, State
 from solver.contact.system import System
+from solver.errors import ModelError
+from solver.fem.discretisation import Discretisation
 from solver.fem.operators import Operator
+from solver.fem.substructure import Substructure
 from solver.linear.solvers import Singular
 from solver.linear.threads import one_thread
 from solver.loading.control import Control
@@ -45,12 +48,22 @@ class NeighbouringRuns:
     Parameters
     ----------
     system : that of the run
-    systems : those of its neighbours, with equal unknowns and points
+    systems : those of its neighbours, by names of parameters
+
+    Raises
+    ------
+    ModelError
+        for a parameter that changes the elements, or the slave of a pair
     """
 
-    def __init__(self, system: System, systems: Sequence[System]) -> None:
+    def __init__(self, system: System, systems: Mapping[str, System]) -> None:
+        for name, other in systems.items():
+            _check_alike(name, system, other)
+            for part, own in zip(system.parts, other.parts, strict=True):
+                if isinstance(part, Substructure) and isinstance(own, Substructure):
+                    own.follow(part)
         self._system = system
-        self._steppers = [Stepper(each, Control()) for each in (system, *systems)]
+        self._steppers = [Stepper(each, Control()) for each in (system, *systems.values())]
         self._ways: tuple[Way, ...] = ()
 
     def between(self, ways: Sequence[Way]) -> None:
@@ -98,6 +111,20 @@ class NeighbouringRuns:
                 )
         except (IncrementFailed, Singular):
             return ()
+
+
+def _check_alike(name: str, system: System, other: System) -> None:
+    """Raise `ModelError` unless two systems have the same elements, unknowns and slaves."""
+    what = ""
+    for one, two in zip(system.parts, other.parts, strict=True):
+        same = type(one) is type(two) and one.n == two.n and np.array_equal(one.active, two.active)
+        if same and isinstance(one, Discretisation) and isinstance(two, Discretisation):
+            same = np.array_equal(one.dofs, two.dofs)
+        what = what if same else f"the elements of {one.body.name}"
+    for a, b in zip(system.interfaces, other.interfaces, strict=True):
+        what = what if (a.slave, a.master) == (b.slave, b.master) else "the slave of a contact"
+    if what:
+        raise ModelError(name, what, "must not change: derivatives are taken by this parameter")
 
 
 class _Shared:

@@ -7,6 +7,7 @@ needs no special treatment.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from hashlib import sha256
@@ -38,6 +39,22 @@ class _CondensedBody:
         stiffness = K[kept][:, kept].toarray()
         stiffness[np.ix_(at, at)] -= self._schur.taken
         self.stiffness = _without_motions(stiffness, part.rigid[kept])
+
+    def close_to(
+        self, other: _CondensedBody, change: sparse.csr_array, rigid: Array
+    ) -> _CondensedBody:
+        """Return the body with its stiffness as that of an almost equal body and a small change.
+
+        With the displacements u of the other body for those of the kept nodes, the change of its
+        condensed stiffness is ``u' change u``, up to the second order, for the ``change`` (n, n) of
+        the whole stiffness. Two eliminations would differ by more, their rounding errors.
+        """
+        size = len(self.stiffness)
+        moved = other.begin(np.zeros((change.shape[0], size))).finish(np.eye(size))
+        close = copy(self)
+        stiffness = other.stiffness + moved.T @ (change @ moved)
+        close.stiffness = _without_motions(stiffness, rigid)
+        return close
 
     def begin(self, force: Array) -> Eliminated:
         """Eliminate the inner unknowns of forces (n,)."""
@@ -84,6 +101,12 @@ class Substructure(Part):
     @cached_property
     def _condensed(self) -> _CondensedBody:
         return _condense(self.whole, self._kept, self._linear_solver)
+
+    def follow(self, other: Substructure) -> None:
+        """Take the condensed stiffness from an almost equal part: see `_CondensedBody.close_to`."""
+        change = self.whole.elastic_matrix() - other.whole.elastic_matrix()
+        if abs(change).max() > 0:
+            self._condensed = self._condensed.close_to(other._condensed, change, self.rigid)
 
     @cached_property
     def loads(self) -> Superposed:

@@ -171,3 +171,27 @@ class Outcome:
     history: tuple[Any, ...] = ()
     error: NotConverged | None = None
     settled: Settled = field(default_factory=Settled)
+
+    @property
+    def beside(self) -> list[Outcome]:
+        """The outcomes of the neighbouring runs, without traces and history; none if one failed."""
+        return [
+            replace(
+                self,
+                tally=replace(self.tally, plastic_work=self.tally.beside[k]),
+                last=self.last.beside[k],
+                points=points,
+                cycles=tuple(cycle.beside[k] for cycle in self.cycles),
+                traces=(),
+                history=(),
+            )
+            for k, points in enumerate(beside_of(self.points))
+        ]
+
+
+def beside_of(at: Any) -> list[Any]:
+    """Return what the neighbouring runs have of states: an increment, or several by name."""
+    if not isinstance(at, Mapping):
+        return list(at.beside)
+    each = zip(*(found.beside for found in at.values()), strict=False)
+    return [dict(zip(at, found, strict=True)) for found in each]

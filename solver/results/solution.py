@@ -19,6 +19,7 @@ from solver.contact.system import System
 from solver.errors import ModelError
 from solver.fem.dofs import vectors
 from solver.fem.frame import RigidMotion
+from solver.late import Late
 from solver.loading.control import Control, PathControl
 from solver.loading.cycle import Cycle
 from solver.loading.outcome import Tally
@@ -43,6 +44,7 @@ from solver.results.view import Places
 from solver.tensors import to_tensor
 from solver.typing import Array
 
+_NeighbouringRuns = Late("solver.derivatives.neighbours:NeighbouringRuns")
 _LOG = logging.getLogger("solver")
 _STAGES = tuple[Stage, ...]
 _UNTIL = Literal["shaken_down"]
@@ -59,6 +61,7 @@ class Solution:
     tally : cost of the run
     history : a few numbers of the initial state and of every increment
     cycles : cycles of repeated stages
+    beside : solutions of the models that were solved beside it, first of itself
     """
 
     system: System
@@ -66,6 +69,7 @@ class Solution:
     tally: Tally
     history: tuple[Observed, ...] = ()
     cycles: tuple[Cycle, ...] = ()
+    beside: tuple[Solution, ...] = ()
     _fields: SystemFields = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -251,6 +255,7 @@ def solve(
     control: PathControl | None = None,
     linear_solver: str = "auto",
     progress: Callable[[float], None] | None = None,
+    beside: Mapping[str, Model] | None = None,
 ) -> Solution:
     """Load a model to a multiple of its loads, unload and separate the bodies; return both states.
 
@@ -269,6 +274,7 @@ def solve(
     linear_solver : ``auto``, ``pardiso`` or ``superlu``
     progress : function that is called after each increment with the completed fraction of the
         increments, at most 1; an exception that it raises stops the computation
+    beside : almost equal models by name, which follow the model linearly: see `solver.derive`
 
     Raises
     ------
@@ -306,19 +312,26 @@ def solve(
         _LOG.warning("%s", doubt)
     system = System(model, linear_solver)
     follow = _IncrementCount(program, progress)
+    systems = {name: System(each, linear_solver) for name, each in (beside or {}).items()}
+    program = replace(program, beside=(program,) * len(systems))
+    followers = _NeighbouringRuns(system, systems) if systems else None
     ends = partial(decided, laws=system.laws) if until else None
     watch = partial(observe, system)
-    walker = Walker(system, control, watch=watch, report=follow, until=ends)
+    walker = Walker(system, control, watch=watch, report=follow, until=ends, followers=followers)
     (outcome,) = walker.walk([program])
     if outcome.error is not None:
         raise outcome.error
-    return Solution(
+    solution = Solution(
         system=system,
         stages=outcome.points,
         tally=outcome.tally,
         history=outcome.history,
         cycles=outcome.cycles,
     )
+    each = zip((system, *systems.values()), outcome.beside, strict=False)
+    found = (Solution(system=own, stages=at.points, tally=at.tally, cycles=at.cycles)
+             for own, at in each)  # fmt: skip
+    return replace(solution, beside=tuple(found))
 
 
 def _check_ends(model: Model, times: Sequence[float]) -> None:

@@ -1,0 +1,188 @@
+"""Derivatives through flow, contact and friction: closed forms, laws of scale, and differences."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver import Body, ContactPair, Model, ModelError, PathControl, Solution, derive, solve
+from solver.derivatives.asked import Derivatives
+from solver.materials import ArmstrongFrederick, Chaboche, Elasticity, TrescaMaterial, Voce
+from solver.mesh import grid
+from solver.scenes import Scene
+from solver.shipped import SCENES
+from studies.scenes.registry import scene_named
+from studies.scenes.scene import read_scene
+from tests.marks import HERE as TESTS
+
+HERE = TESTS.parent
+
+STEEL = Elasticity(youngs_modulus=210e3, poisson_ratio=0.3)
+CONTROL = PathControl(load_step=0.1)
+
+
+def tube(strength: float, pressure: float) -> Model:
+    """A thick tube, radii 100 and 200 mm, that yields by Tresca's condition."""
+    curve = Voce(yield_stress=strength * 2 / np.sqrt(3))
+    body = Body(
+        name="tube",
+        mesh=grid(np.linspace(100, 200, 61), np.linspace(0, 5, 2)),
+        material=TrescaMaterial(elasticity=STEEL, curve=curve),
+        kinematics="axisymmetric",
+        supports={"bottom": "y", "top": "y"},
+        pressure={"left": pressure},
+    )
+    return Model(bodies=(body,))
+
+
+def at_the_bore(solution: Solution) -> float:
+    """Return the residual hoop stress at the bore."""
+    inner = np.argmin(solution.nodes("tube")[0])
+    return float(solution.stress("tube")[2, inner])
+
+
+def test_residual_stress_of_a_thick_tube_has_the_derivatives_of_the_closed_form() -> None:
+    """Hoop stress 2 k - p b^2 terms: by strength 2 / sqrt(3), by pressure -8/3 (b = 2 a)."""
+    found = derive(tube, {"strength": 240.0, "pressure": 180.0}, at_the_bore, control=CONTROL)
+    assert found["strength"] == pytest.approx(2 / np.sqrt(3), rel=1e-4)
+    assert found["pressure"] == pytest.approx(-8 / 3, rel=1e-4)
+    for name, value in {"strength": 240.0, "pressure": 180.0}.items():
+        at = {"strength": 240.0, "pressure": 180.0}
+        more, less = (
+            at_the_bore(solve(tube(**{**at, name: value * share}), control=CONTROL))
+            for share in (1 + 1e-4, 1 - 1e-4)
+        )
+        assert found[name] == pytest.approx((more - less) / (2e-4 * value), rel=1e-5)
+
+
+def pads(friction: float, modulus: float, pressure: float) -> Model:
+    """Two pads pressed together, the upper one wider on top, of a law with back stress."""
+    curve = Voce(yield_stress=200.0)
+    law = Chaboche(
+        elasticity=Elasticity(youngs_modulus=2e5, poisson_ratio=0.3),
+        curve=curve,
+        back_stresses=(ArmstrongFrederick(modulus=modulus, recall=100.0),),
+    )
+    upper = Body(
+        name="upper", mesh=grid(np.linspace(0, 5, 6), np.linspace(0, 4, 4)), material=law,
+        supports={"left": "x"}, pressure={"top": pressure},
+    )  # fmt: skip
+    lower = Body(
+        name="lower", mesh=grid(np.linspace(0, 10, 11), np.linspace(-8, 0, 5)), material=law,
+        supports={"left": "x", "bottom": "y"},
+    )  # fmt: skip
+    pair = ContactPair(slave=("upper", "bottom"), master=("lower", "top"), friction=friction)
+    return Model(bodies=(upper, lower), contacts=(pair,))
+
+
+def fields(solution: Solution) -> np.ndarray:
+    """Return residual stress at all nodes, and pressure and shear under load."""
+    contact = solution.contact()
+    own = [solution.stress(name).ravel() for name in ("upper", "lower")]
+    return np.concatenate([*own, contact.pressure, contact.shear])
+
+
+def test_whole_fields_equal_differences_of_runs() -> None:
+    at, control = (
+        {"friction": 0.2, "modulus": 2e4, "pressure": 320.0},
+        PathControl(load_step=0.25, unload_steps=2),
+    )
+    found = derive(pads, at, fields, control=control)
+    for name, value in at.items():
+        more, less = (
+            fields(solve(pads(**{**at, name: value * share}), control=control))
+            for share in (1 + 1e-5, 1 - 1e-5)
+        )
+        expected = (more - less) / 2e-5
+        size = np.abs(expected).max()
+        assert size > 1.0
+        assert np.abs(value * found[name] - expected).max() < 1e-5 * size
+
+
+def numbers(scene: Scene, parameters: Any, by: tuple[str, ...], of: tuple[str, ...]) -> Any:
+    """Return a run of a scene: its record."""
+    with_them = replace(scene, derivatives=Derivatives(by=by, of=of))
+    values = [getattr(parameters, scene.branch)] if scene.branch else [0.0]
+    (record,) = with_them.path(parameters, values, lambda share: None)
+    return record
+
+
+def shares(record: Any, of: str, by: tuple[str, ...]) -> list[float]:
+    """Return the elasticities of a number: its relative change by that of each parameter."""
+    values = record.scalars
+    each = ((values[f"d_{of}_d_{name}"], getattr(record.parameters, name)) for name in by)
+    return [slope * value / values[of] for slope, value in each]
+
+
+def test_a_punch_obeys_the_laws_of_scale() -> None:
+    """Stress is of degree one in yield stress and modulus together, and of zero in the size."""
+    scene, by = SCENES["punch"], ("yield_stress", "youngs_modulus", "half_width")
+    of = ("residual_x_half_plane", "residual_x_punch", "peak_residual_tension", "plastic_work")
+    record = numbers(
+        scene, scene.parameters(accuracy="draft", load_ratio=0.7, friction=0.3), by, of
+    )
+    assert record.message == ""
+    for name in of:
+        degrees = [2.0, -1.0, 2.0] if name == "plastic_work" else [1.0, 0.0, 0.0]
+        assert shares(record, name, by) == pytest.approx(degrees, abs=1e-4), name
+
+
+def test_a_ball_obeys_the_laws_of_scale() -> None:
+    """Surfaces that turn: lengths are of degree one in the radius, and of zero in the stress."""
+    scene, by = scene_named("ball"), ("yield_stress", "youngs_modulus", "radius")
+    parameters = scene.parameters(accuracy="draft", load_ratio=2.0)
+    record = numbers(scene, parameters, by, ("approach", "crater_depth", "max_plastic_strain"))
+    for name, size in (("approach", 1.0), ("crater_depth", 1.0), ("max_plastic_strain", 0.0)):
+        strength, modulus, radius = shares(record, name, by)
+        assert strength + modulus == pytest.approx(0.0, abs=1e-4)
+        assert radius == pytest.approx(size, abs=1e-4)
+
+
+def test_peak_pressure_of_a_roller_grows_with_the_root_of_its_force() -> None:
+    """Hertz: p0 ~ sqrt(P), so that dp0 / dP = p0 / (2 P)."""
+    scene = read_scene(HERE / "data/scenes/roller.toml")
+    record = numbers(scene, scene.parameters(), ("load",), ("peak_pressure",))
+    assert shares(record, "peak_pressure", ("load",)) == pytest.approx([0.5], abs=5e-3)
+
+
+def test_what_jumps_has_no_derivative_and_the_message_says_so() -> None:
+    scene = read_scene(HERE / "data/scenes/bending.toml")
+    record = numbers(scene, scene.parameters(), ("ratio",), ("residual", "residual_x"))
+    assert record.scalars["d_residual_d_ratio"] == pytest.approx(300.0, rel=1e-6)
+    assert np.isnan(record.scalars["d_residual_x_d_ratio"])  # two places share the maximum
+    assert "no derivative was found for d_residual_x_d_ratio" in record.message
+
+
+@pytest.mark.parametrize(
+    ("by", "given", "field", "allowed"),
+    [
+        ("friction", {"friction": 0.0}, "friction", "must differ from 0"),
+        ("unload_steps", {}, "by[0]", "must be a parameter with decimals"),
+        ("hardening", {}, "by[0]", "must be a parameter with decimals"),
+    ],
+)
+def test_what_cannot_be_derived_by_is_refused(
+    by: str, given: dict[str, float], field: str, allowed: str
+) -> None:
+    scene = SCENES["punch"]
+    parameters = scene.parameters(accuracy="draft", **given)
+    with pytest.raises(ModelError) as caught:
+        numbers(scene, parameters, (by,), ("plastic_work",))
+    assert caught.value.field == field and allowed in caught.value.allowed
+
+
+def test_a_number_that_changes_the_elements_is_refused() -> None:
+    def plate(size: float) -> Model:
+        parts = 3 if size < 1 else 4
+        body = Body(
+            name="plate", mesh=grid(np.linspace(0, 1, parts), np.linspace(0, 1, 3)),
+            material=TrescaMaterial(elasticity=STEEL, curve=Voce(yield_stress=200.0)),
+            supports={"left": "x", "bottom": "y"}, pressure={"right": 10.0},
+        )  # fmt: skip
+        return Model(bodies=(body,))
+
+    with pytest.raises(ModelError, match=r"size = 'the elements of plate': must not change"):
+        derive(plate, {"size": 1.0}, lambda solution: 0.0)
