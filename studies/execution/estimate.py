@@ -242,7 +242,8 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
                 more = effort.seconds / _TOLD, effort.seconds, effort.seconds * _TOLD
                 basis = f"what passes of {scene.name} took elsewhere"
             if scene.derivatives is not None:
-                more = tuple(scene.derivatives.cost * each for each in more)
+                low, usual_time, high = (scene.derivatives.cost * each for each in more)
+                more = low, usual_time, high
             seconds = [sum(both) for both in zip(seconds, more, strict=True)]
             if bounds:
                 bounds.check_so_far(unknowns, longest, share * seconds[1])
