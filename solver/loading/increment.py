@@ -70,13 +70,18 @@ _LESS = 0.8
 line search. Close to a limit load the energy rises along many steps that approach the solution."""
 _SHORTEST = 1e-3
 """Least share of a step to which it is shortened until its forces are finite."""
-_CORRECTIONS, _CORRECTED, _NEGLIGIBLE = 12, 1e-7, 1e-13
-"""Most steps of `Increment.linearised`; size of the last one over that of the first, and over the
-displacements."""
+_CORRECTIONS, _BALANCED, _CORRECTED, _NEGLIGIBLE = 12, 1e-6, 1e-6, 1e-13
+"""Most steps of `Increment.linearised`; out-of-balance forces after the last one over those before
+the first; size of the last one over that of the first, and over the displacements."""
 _UNBALANCED = 100.0
 _ROUNDED = 10.0
 """Force level of bodies without load, over the level at which rounding errors alone would exceed
 the tolerance."""
+
+
+def _small(sizes: Sequence[float], ratio: float, least: float) -> bool:
+    """Whether the last of the sizes of corrections is negligible."""
+    return sizes[-1] <= max(ratio * sizes[0], least)
 
 
 def _finite(forces: Vectors) -> bool:
@@ -171,10 +176,10 @@ class Increment:
     def linearised(self, end: Converged, operators: Sequence[Operator]) -> Converged:
         """Return the increment after Newton steps from the end of an almost equal increment.
 
-        Where all tangents are exact, one step has an error of second order in the difference of the
-        two increments. The tangent has no terms for surfaces that slide far and turn with the
-        bodies, none for the unsymmetric part of a law, and none at the corners of a yield surface:
-        there steps follow until they are negligible.
+        One step suffices where all tangents are exact and no point begins to flow or ceases to
+        flow. The tangent has no terms for surfaces that slide far and turn with the bodies, none
+        for the unsymmetric part of a law, and none at the corners of a yield surface. Steps follow
+        until the corrections are negligible.
 
         Parameters
         ----------
@@ -193,8 +198,11 @@ class Increment:
             laws = [part.body.law for part in self.system.parts]
             exact &= all(law.symmetric and not law.surface.has_corners for law in laws)
             responses, candidates = self._respond(u), self._candidates(u, contacts, links)
-            residuals, first = self._residuals(u, responses), 0.0
-            for _ in range(1 if exact else _CORRECTIONS):
+            residuals, steps, outs = self._residuals(u, responses), list[float](), list[float]()
+            for _ in range(_CORRECTIONS):
+                outs.append(self._unbalanced(residuals, candidates, candidates.forces))
+                if steps and exact and _small(outs, _BALANCED, rounding(self.system, u)):
+                    break
                 step = newton_step(self.system, residuals, operators, candidates)
                 if step is None:
                     raise IncrementFailed("no contact forces were found that balance this load")
@@ -203,8 +211,8 @@ class Increment:
                 links, responses = step.forces[candidates.linked], self._respond(u)
                 residuals = self._residuals(u, responses)
                 candidates = self._candidates(u, contacts, links)
-                first = first or norm(step.u)
-                if norm(step.u) <= max(_CORRECTED * first, _NEGLIGIBLE * norm(u)):
+                steps.append(norm(step.u))
+                if not exact and _small(steps, _CORRECTED, _NEGLIGIBLE * norm(u)):
                     break
             found = Balanced(
                 u=u,
