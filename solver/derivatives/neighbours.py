@@ -80,6 +80,8 @@ class NeighbouringRuns:
         self, before: Converged | None, balanced: Converged | None, time: float
     ) -> tuple[Converged, ...]:
         """See `solver.loading.stepper.Followers`."""
+        if before and not before.beside:  # one has failed
+            return ()
         operators = [] if balanced is None else self._system.tangents(balanced)
         known = before.beside if before else (None,) * len(self._steppers)
         out = []
@@ -94,7 +96,7 @@ class NeighbouringRuns:
 
     def again(self, beside: Sequence[Converged], time: float) -> tuple[Converged, ...]:
         """See `solver.loading.stepper.Followers`."""
-        both = zip(beside, self._times(time), strict=True)
+        both = zip(beside, self._times(time), strict=False)
         return tuple(replace(each, state=replace(each.state, time=at)) for each, at in both)
 
     def followed(

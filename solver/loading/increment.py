@@ -70,9 +70,10 @@ _LESS = 0.8
 line search. Close to a limit load the energy rises along many steps that approach the solution."""
 _SHORTEST = 1e-3
 """Least share of a step to which it is shortened until its forces are finite."""
-_CORRECTIONS, _BALANCED, _CORRECTED, _NEGLIGIBLE = 12, 1e-6, 1e-6, 1e-13
+_CORRECTIONS, _BALANCED, _CORRECTED, _NEGLIGIBLE, _SLOW = 12, 1e-6, 1e-6, 1e-12, 0.1
 """Most steps of `Increment.linearised`; out-of-balance forces after the last one over those before
-the first; size of the last one over that of the first, and over the displacements."""
+the first; size of the last one over that of the first; both over the level of forces and of
+displacements; and the forces after a step over those before, above which other tangents follow."""
 _UNBALANCED = 100.0
 _ROUNDED = 10.0
 """Force level of bodies without load, over the level at which rounding errors alone would exceed
@@ -176,10 +177,12 @@ class Increment:
     def linearised(self, end: Converged, operators: Sequence[Operator]) -> Converged:
         """Return the increment after Newton steps from the end of an almost equal increment.
 
-        One step suffices where all tangents are exact and no point begins to flow or ceases to
-        flow. The tangent has no terms for surfaces that slide far and turn with the bodies, none
-        for the unsymmetric part of a law, and none at the corners of a yield surface. Steps follow
-        until the corrections are negligible.
+        The first step begins where the difference between the starts of the two leads. It suffices
+        where no point begins or ceases to flow on the way, and the tangent is exact: it has no
+        terms for surfaces that slide far and turn with the bodies, none for the unsymmetric part of
+        a law, and none at the corners of a yield surface. Else steps follow until forces balance,
+        and on such surfaces until the steps are negligible; if they become so slowly, with the
+        tangents of this increment.
 
         Parameters
         ----------
@@ -189,20 +192,26 @@ class Increment:
         Raises
         ------
         IncrementFailed
-            if no contact forces balance the load
+            if no contact forces balance the load, or the steps do not end
         """
         with one_thread():
             contacts, links = end.state.contacts, end.state.links
-            u = self.system.moved(end.state, self.time).u
-            exact = not any(contact.finite for contact in self.start.contacts)
-            laws = [part.body.law for part in self.system.parts]
-            exact &= all(law.symmetric and not law.surface.has_corners for law in laws)
+            each = zip(end.state.u, self.start.u, end.start.u, strict=True)
+            ahead = replace(end.state, u=tuple(ui + own - its for ui, own, its in each))
+            u = self.system.moved(ahead, self.time).u
+            turns = any(contact.finite for contact in self.start.contacts)
             responses, candidates = self._respond(u), self._candidates(u, contacts, links)
             residuals, steps, outs = self._residuals(u, responses), list[float](), list[float]()
             for _ in range(_CORRECTIONS):
                 outs.append(self._unbalanced(residuals, candidates, candidates.forces))
-                if steps and exact and _small(outs, _BALANCED, rounding(self.system, u)):
-                    break
+                least = max(_NEGLIGIBLE * end.state.force_scale, rounding(self.system, u))
+                balanced = _small(outs, _BALANCED, least)
+                if steps and balanced:
+                    if not turns or _small(steps, _CORRECTED, _NEGLIGIBLE * norm(u)):
+                        break
+                elif len(outs) > 2 and outs[-1] > _SLOW * outs[-2]:
+                    both = zip(self.system.operators, responses, strict=True)
+                    operators = [own.tangent(response, 0.0) for own, response in both]
                 step = newton_step(self.system, residuals, operators, candidates)
                 if step is None:
                     raise IncrementFailed("no contact forces were found that balance this load")
@@ -212,8 +221,8 @@ class Increment:
                 residuals = self._residuals(u, responses)
                 candidates = self._candidates(u, contacts, links)
                 steps.append(norm(step.u))
-                if not exact and _small(steps, _CORRECTED, _NEGLIGIBLE * norm(u)):
-                    break
+            else:
+                raise IncrementFailed(f"{_CORRECTIONS} steps did not lead to the increment")
             found = Balanced(
                 u=u,
                 contacts=contacts,

@@ -185,13 +185,9 @@ class Outcome:
                 traces=(),
                 history=(),
             )
-            for k, points in enumerate(beside_of(self.points))
+            for k, points in enumerate(self._points_beside())
         ]
 
-
-def beside_of(at: Any) -> list[Any]:
-    """Return what the neighbouring runs have of states: an increment, or several by name."""
-    if not isinstance(at, Mapping):
-        return list(at.beside)
-    each = zip(*(found.beside for found in at.values()), strict=False)
-    return [dict(zip(at, found, strict=True)) for found in each]
+    def _points_beside(self) -> list[dict[str, Any]]:
+        each = zip(*(found.beside for found in self.points.values()), strict=False)
+        return [dict(zip(self.points, found, strict=True)) for found in each]

@@ -113,7 +113,9 @@ def by_increments(
     samples = Samples(system, scene.view(last))
     family = _Family(scene.derivatives, scene, last, system, samples) if scene.derivatives else None
     program = family.program if family else scene.program
-    of_samples = family.beside if family else lambda function: partial(function, samples)
+    watch = partial(scene.watch, last, samples) if scene.watch else None
+    if watch and family:
+        watch = partial(family.watched, scene.watch)
     acting = acting_on(system, symmetric=samples.view.symmetric, axis=samples.view.axis)
     programs: Iterable[Program]
     if given is not None:
@@ -127,15 +129,19 @@ def by_increments(
     walker = Walker(
         system,
         Control(increment_error=scene.increment_error),
-        trace=of_samples(scene.trace) if scene.trace else None,
+        trace=partial(scene.trace, samples) if scene.trace else None,
         refinement=scene.refinement(last) if scene.refinement else None,
         until=partial(decided, laws=system.laws) if scene.until and scene.until(last) else None,
         report=report,
-        watch=of_samples(partial(scene.watch, last)) if scene.watch else None,
+        watch=watch,
         followers=family.followers if family else None,
     )
     view = samples.view
-    for outcome, run in zip(walker.walk(programs, bound), runs, strict=True):
+    for walked_to, run in zip(walker.walk(programs, bound), runs, strict=True):
+        outcome, derived = walked_to, None
+        if family:
+            derived = partial(family.values, outcome.history)
+            outcome = replace(outcome, history=tuple(own[0] for own in outcome.history))
 
         def check(outcome: Outcome = outcome) -> Audit:
             loaded, unloaded = outcome.points[view.loaded], outcome.points.get(view.unloaded)
@@ -154,7 +160,7 @@ def by_increments(
             singular=system.model.singular,
             doubts=system.model.doubts,
             notes=notes,
-            derived=family.values if family else None,
+            derived=derived,
         )
 
 

@@ -241,10 +241,8 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
             else:
                 more = effort.seconds / _TOLD, effort.seconds, effort.seconds * _TOLD
                 basis = f"what passes of {scene.name} took elsewhere"
-            if scene.derivatives is not None:
-                low, usual_time, high = (scene.derivatives.cost * each for each in more)
-                more = low, usual_time, high
-            seconds = [sum(both) for both in zip(seconds, more, strict=True)]
+            cost = 1.0 if scene.derivatives is None else scene.derivatives.cost
+            seconds = [each + cost * one for each, one in zip(seconds, more, strict=True)]
             if bounds:
                 bounds.check_so_far(unknowns, longest, share * seconds[1])
         results += len(missing) * _of(_PER_RUN, elements)
