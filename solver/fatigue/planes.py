@@ -162,7 +162,8 @@ def _critical(given: Array, circles: Ints, search: Value, value: Value) -> Criti
     order = np.lexsort((np.where(equal, value(on), -np.inf), points))
     chosen = order[np.flatnonzero(np.diff(points[order], append=len(found)))]
     normal = (axes @ normal[chosen, :, None])[:, :, 0]
-    normal *= np.where(normal[:, 2:] < 0, -1.0, 1.0)
+    last = 2 - (np.abs(normal[:, ::-1]) > _SAME).argmax(axis=1)  # the last component not zero
+    normal *= np.sign(normal[np.arange(len(normal)), last])[:, None]
     return Critical(normal, OnPlanes(*(own[chosen] if own.size else own for own in on)))
 
 
