@@ -1,11 +1,17 @@
 """The critical plane: where a function of what acts on planes is largest.
 
-1. A scan of planes over the hemisphere, the same for all points, on simplified paths.
-2. Newton's method from the best of those that are better than their neighbours
+1. A scan of planes over the hemisphere, the same for all points, on simplified paths, gives bounds.
+   Normal components and the amplitude of shear fall from a maximum no faster than cos(2 angle):
+   along a great circle a normal component is such a wave, and the amplitude of shear R satisfies
+   R'' >= -4 R. So the plane of a scan next to the largest maximum is smaller by a known share at
+   most, and all others are dropped.
+2. Newton's method from those that are better than their neighbours
    (`solver.fatigue.kernels.climb`). Amplitude and maximum are the largest of functions that are
    smooth in the normal, so that a maximum over planes is one of a smooth function. The criterion is
    taken as quadratic in what acts on a plane, and again at the plane found if it is not.
 3. The best of these planes; of planes with equal values the one with the largest second value.
+
+A criterion must not fall where a value of what acts on a plane rises.
 """
 
 from __future__ import annotations
@@ -17,7 +23,8 @@ import numpy as np
 
 from solver.fatigue.paths import Paths
 from solver.late import late
-from solver.typing import Array, Ints
+from solver.tensors import _PLACES
+from solver.typing import Array, Bools, Ints
 
 _simplified, _scan, _resolve, _climb = late(
     "fatigue.kernels", "simplified", "scan", "resolve", "climb"
@@ -25,11 +32,11 @@ _simplified, _scan, _resolve, _climb = late(
 
 _PLANES = 216
 """Number of planes in a scan; neighbours are 9 degrees apart."""
-_NEIGHBOURS, _WORSE = 3, 0.2
-"""Newton's method starts at planes that are better than so many neighbours, and by at most this
-share worse than the best: the scan may be wrong by as much (`scan`, and `_SIMPLE`)."""
-_MISSED = 0.02
-"""Share by which a maximum may exceed the planes nearest to it."""
+_NEIGHBOURS = 3
+"""Newton's method starts at planes that are better than so many neighbours."""
+_FALLS = 2 * np.sin(0.132) ** 2
+"""Share by which a wave falls from its largest value within the largest angle from a plane of the
+scan."""
 _SIMPLE = 0.02
 """Distance of instants that the scan leaves out, over the size of the path."""
 _DIFFERENCE = 1e-3
@@ -40,6 +47,8 @@ _ROUNDS, _EXACT = 5, 1e-11
 from it at which it is."""
 _SAME = 1e-9
 """Relative difference of values that are equal."""
+_FULL = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
+"""Components of a tensor as a matrix."""
 _AT_ONCE = 1000
 """Number of points that are scanned together."""
 
@@ -89,44 +98,114 @@ _AROUND = np.argsort(-np.abs(_NORMALS @ _NORMALS.T), axis=1)[:, :_NEIGHBOURS]
 
 
 def critical_planes(paths: Paths, search: Value, value: Value | None = None) -> Critical:
-    """Return the planes on which ``search`` is largest; of equal ones those of ``value``."""
-    each = [
-        _critical(paths.at(slice(k, k + _AT_ONCE)).turned, search, value or search)
-        for k in range(0, len(paths), _AT_ONCE)
-    ]
+    """Return the planes on which ``search`` is largest; of equal ones those of ``value``.
+
+    Amplitudes of shear that neither of the two reads are not computed: they are 0.
+    """
+    value = value or search
+    kinds = [own for own in (paths.stress, paths.strain) if own is not None]
+    used = _used(kinds, search) | _used(kinds, value)
+    kinds, circles = kinds[: 1 + used[1:].any()], used[:, 0].astype(np.int64)
+    each = []
+    for k in range(0, len(paths), _AT_ONCE):
+        some = np.stack([own[k : k + _AT_ONCE] for own in kinds], axis=1).swapaxes(2, 3)
+        each.append(_critical(np.ascontiguousarray(some), circles[: len(kinds)], search, value))
     normals, ons = zip(*each, strict=True)
     return Critical(np.concatenate(normals), OnPlanes(*map(np.concatenate, zip(*ons, strict=True))))
 
 
-def _critical(paths: Array, search: Value, value: Value) -> Critical:
-    kinds = range(paths.shape[1])
-    simple = (_simplified(np.ascontiguousarray(paths[:, k]), _SIMPLE) for k in kinds)
-    found = search(OnPlanes(*(each for own in simple for each in _scan(*own, _NORMALS))))
-    least = found.max(axis=1, keepdims=True)
-    least = least - _WORSE * np.abs(least)
-    tried = (found >= found[:, _AROUND].max(axis=2)) & (found >= least)
-    points, starts = map(np.ascontiguousarray, np.nonzero(tried))
-    top = np.full(len(found), -np.inf)
-    values = _resolve(paths, points, _NORMALS[starts])
+def _axes(paths: Array) -> Array:
+    """Return axes (n, 3, 3), in columns, that turn with the path of stress.
+
+    They are the principal axes of the sum of its squares; signs follow from its mean in time.
+    """
+    full = paths[:, 0][:, _FULL]
+    flat = full.reshape(len(full), 3, -1)
+    _, axes = np.linalg.eigh(flat @ flat.swapaxes(1, 2))
+    late = axes.swapaxes(1, 2) @ (full @ np.arange(1.0, full.shape[3] + 1)) @ axes
+    axes[:, :, 1:] *= np.where(late[:, :1, 1:] < 0, -1.0, 1.0)
+    return np.asarray(axes)
+
+
+def _critical(given: Array, circles: Ints, search: Value, value: Value) -> Critical:
+    axes = _axes(given)
+    i, j = np.array(_PLACES).T
+    first, second = axes[:, i].swapaxes(1, 2), axes[:, j].swapaxes(1, 2)  # (n, axis, component)
+    turn = first[:, i] * second[:, j] + np.where(i == j, 0.0, 1.0) * second[:, i] * first[:, j]
+    paths = np.ascontiguousarray(turn[:, None] @ given)
+    every = np.arange(len(paths))
+    low, high, sizes = _bounds(paths, circles)
+    found, most = search(OnPlanes(*low)), search(OnPlanes(*high))
+    top = found.argmax(axis=1)
+    values = _resolve(paths, every, _NORMALS[top], circles)
+    weights, curves = _derivatives(search, values)
+    falls = (weights + np.einsum("nkm,mn->nk", curves, sizes) / 2).T * sizes
+    falls = _FALLS * falls.sum(axis=0)
+    least = search(OnPlanes(*values)) - falls
+    points, starts = map(np.ascontiguousarray, np.nonzero(most >= least[:, None]))
+    values = _resolve(paths, points, _NORMALS[starts], circles)
     exact = search(OnPlanes(*values))
-    np.maximum.at(top, points, exact)
-    near = np.flatnonzero(exact >= (top - _MISSED * np.abs(top))[points])
+    found[:] = -np.inf
+    found[points, starts] = exact
+    least = found.max(axis=1) - falls
+    near = found >= np.maximum(found[:, _AROUND].max(axis=2), least[:, None])
+    near = np.flatnonzero(near[points, starts])
     near = near[np.lexsort((-exact[near], points[near]))]
     points = points[near]
-    normal, on = _climbed(paths, points, search, _NORMALS[starts[near]], values[:, near])
+    normal, values = _climbed(
+        paths, points, search, circles, _NORMALS[starts[near]], values[:, near], falls[points]
+    )
+    on, top = OnPlanes(*values), np.full(len(found), -np.inf)
     best = search(on)
-    top = np.full(len(found), -np.inf)
     np.maximum.at(top, points, best)
     equal = best >= (top - _SAME * np.abs(top))[points]
     order = np.lexsort((np.where(equal, value(on), -np.inf), points))
     chosen = order[np.flatnonzero(np.diff(points[order], append=len(found)))]
-    normal = normal[chosen] * np.where(normal[chosen, 2] < 0, -1.0, 1.0)[:, None]
+    normal = (axes @ normal[chosen, :, None])[:, :, 0]
+    last = 2 - (np.abs(normal[:, ::-1]) > _SAME).argmax(axis=1)  # the last component not zero
+    normal *= np.sign(normal[np.arange(len(normal)), last])[:, None]
     return Critical(normal, OnPlanes(*(own[chosen] if own.size else own for own in on)))
 
 
+def _used(kinds: list[Array], search: Value) -> Bools:
+    """Return which values on planes (n_kinds, 3) a criterion reads."""
+    size = np.repeat([max(own.max(), -own.min()) for own in kinds], 3)
+    values = np.array([1.0, -1.0, 0.1, 10.0]) * size[:, None] + 1e-300
+    before, used = search(OnPlanes(*values)), np.empty(len(size), dtype=bool)
+    for k in range(len(size)):
+        moved = values.copy()
+        moved[k] += size[k]
+        used[k] = (search(OnPlanes(*moved)) != before).any()
+    return used.reshape(-1, 3)
+
+
+def _bounds(paths: Array, circles: Ints) -> tuple[list[Array], list[Array], Array]:
+    """Return bounds (m, n, n_planes) of what acts on the planes of the scan; and sizes (m, n).
+
+    A size is the largest difference of a value from its mean over a great circle of planes.
+    """
+    low: list[Array] = []
+    high: list[Array] = []
+    sizes: list[Array] = []
+    for k, circle in enumerate(circles):
+        simple = _simplified(np.ascontiguousarray(paths[:, k]), _SIMPLE)
+        shear, normal, half = _scan(*simple, _NORMALS, circle)
+        low += [shear[0], normal, half]
+        high += [shear[1], normal, half]
+        most, widest = normal.max(axis=1), half.max(axis=1)
+        sizes += [shear[0].max(axis=1), most / 2 - (normal / 2 - half).min(axis=1), widest]
+    return low, high, np.stack(sizes)
+
+
 def _climbed(
-    paths: Array, points: Ints, search: Value, normal: Array, values: Array
-) -> tuple[Array, OnPlanes]:
+    paths: Array,
+    points: Ints,
+    search: Value,
+    circles: Ints,
+    normal: Array,
+    values: Array,
+    falls: Array,
+) -> tuple[Array, Array]:
     """Return the planes (n, 3) of the maxima near some planes at points (n,), and what acts.
 
     ``values`` (m, n) are what acts on those planes; the arrays given are overwritten.
@@ -137,7 +216,7 @@ def _climbed(
         was = search(OnPlanes(*before))
         weights, curves = _derivatives(search, before)
         normal[active], values[:, active] = _climb(
-            paths, points[active], normal[active], was, weights, curves
+            paths, points[active], normal[active], circles, was, falls[active], weights, curves
         )
         change = (values[:, active] - before).T
         rise = ((weights + np.einsum("nkm,nm->nk", curves, change) / 2) * change).sum(axis=1)
@@ -145,7 +224,7 @@ def _climbed(
         active = active[np.abs(now - was - rise) > _EXACT * np.abs(now)]
         if not active.size:
             break
-    return normal, OnPlanes(*values)
+    return normal, values
 
 
 def _derivatives(search: Value, values: Array) -> tuple[Array, Array]:

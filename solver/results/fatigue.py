@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from solver.fatigue.paths import Paths
 from solver.results.quantities import along_axes, declare, declare_along, placed
 from solver.results.run import FinishedRun, Values
 from solver.results.shakedown import CLOSED, QUIET
+from solver.results.stress_cycle import Passed, StressCycle
 from solver.results.view import Places
 from solver.tensors import AXES, to_tensor
 from solver.typing import Array, Bools
@@ -70,30 +71,6 @@ APPLIES = declare("fatigue_applies", "whether the fatigue criterion applies", fl
 
 _SAME = 1e-9
 """Values with this relative difference are equal; the place is then that nearest to the middle."""
-
-
-class StressCycle(NamedTuple):
-    """What a cycle does at the n points of a body.
-
-    Attributes
-    ----------
-    stress, strain : (n, n_instants, n_components), tensor components; NaN where not known
-    grown : (n,) plastic strain that the cycle accumulates
-    net : (n,) equivalent of the signed plastic strain that it leaves
-    """
-
-    stress: Array
-    strain: Array
-    grown: Array
-    net: Array
-
-
-@runtime_checkable
-class Passed(Protocol):
-    """A body of which one state under the load is a whole cycle."""
-
-    def cycle(self, loaded: Any) -> StressCycle:
-        """Return the cycle of a pass."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,15 +149,16 @@ class Fatigue:
         path: dict[Any, Any] = {}
         if isinstance(self.criterion, DangVan):
             p, shear = (
-                own[0] * hidden
-                for own in self.criterion.path(Paths(of_body[worst].stress[k : k + 1]))
+                own[0] * hidden for own in self.criterion.path(Paths(of_body[worst].stress_at(k)))
             )
             allowed = self.criterion.limit - self.criterion.factor * p
             path = {INSTANT: np.arange(len(p)), **dict(zip(PATH, (p, shear, allowed), strict=True))}
         return {
             **path,
             APPLIES: Applies(int(applies)),
-            STRAIN: max(float(np.nanmax(each.grown, initial=0.0)) for each in of_body.values()),
+            STRAIN: max(
+                float(np.nanmax(each.cycle.grown, initial=0.0)) for each in of_body.values()
+            ),
             UTILISATION: float(found.utilisation[k]) * hidden,
             SAFETY: float(found.safety_factor[k]) * hidden,
             **along_axes(PLACE, (X[:, k] * hidden).tolist()),
@@ -200,7 +178,8 @@ class Fatigue:
         if asked.any():
             found = self.criterion.assess(Paths(cycle.stress[asked], cycle.strain[asked]))
             value[asked], used[asked], plane[asked] = found
-        return _OfBody(Assessment(value, used, plane), void, cycle.grown, cycle.stress)
+        of = cycle.of
+        return _OfBody(Assessment(value[of], used[of], plane[of]), void[of], cycle)
 
     def _cycle(self, run: FinishedRun, name: str) -> StressCycle:
         """Return the cycle at the points of a body; without residual stress if that is asked."""
@@ -218,22 +197,28 @@ class Fatigue:
                 np.stack([to_tensor(getattr(state, what)).T for state in each], axis=1)
                 for what in ("stress", "strain")
             )
-            cycle = StressCycle(stress, strain, grown, np.sqrt(2 / 3 * (left**2).sum(axis=0)))
+            net = np.sqrt(2 / 3 * (left**2).sum(axis=0))
+            cycle = StressCycle(stress, strain, grown, net, np.arange(len(grown)))
         if self.residual:
             return cycle
         if not run.view.unloaded:
             raise ModelError("residual", False, "needs a last stage that releases the bodies")
         after = system.state(name, run.unloaded)
+        _, first = np.unique(cycle.of, return_index=True)  # all points of a cycle keep the same
         return cycle._replace(
-            stress=cycle.stress - to_tensor(after.stress).T[:, None],
-            strain=cycle.strain - to_tensor(after.strain).T[:, None],
+            stress=cycle.stress - to_tensor(after.stress[:, first]).T[:, None],
+            strain=cycle.strain - to_tensor(after.strain[:, first]).T[:, None],
         )
 
 
 class _OfBody(NamedTuple):
-    """What the criterion finds at points of a body, where it is void, plastic strain and stress."""
+    """What the criterion finds at points of a body, where it is void, and their cycles."""
 
     found: Assessment
     void: Bools
-    grown: Array
-    stress: Array
+    cycle: StressCycle
+
+    def stress_at(self, point: int) -> Array:
+        """Return the cycle of stress (1, n_instants, n_components) at a point."""
+        k = self.cycle.of[point]
+        return self.cycle.stress[k : k + 1]

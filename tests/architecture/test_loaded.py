@@ -14,7 +14,9 @@ from tests.architecture.sources import ROOT
 
 NEVER = {"dask.array", "dask.dataframe", "matplotlib", "meshio", "numba", "pandas", "xarray"}
 """Each takes a tenth of a second to load, or much more, and memory of each worker."""
-ROLLING = (
+UNASKED = (
+    "solver.fatigue",
+    "solver.results.fatigue",
     "solver.rolling.passing",
     "solver.rolling.rail.track",
     "solver.rolling.scenes.rolling_setup",
@@ -52,7 +54,7 @@ def test_a_worker_loads_what_a_run_needs_before_it_is_forked_and_nothing_else(
     status, before, after = json.loads(done.stdout.splitlines()[-1])
     assert status == "ok"
     assert not NEVER & set(after)
-    assert not [name for name in after if name.startswith(ROLLING)]
+    assert not [name for name in after if name.startswith(UNASKED)]
     first, last = ({name.partition(".")[0] for name in names} for names in (before, after))
     assert last - first <= sys.stdlib_module_names
 

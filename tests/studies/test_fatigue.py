@@ -63,6 +63,22 @@ def test_residual_stress_counts_unless_it_is_left_out() -> None:
 
 
 @pytest.mark.solves
+def test_a_pass_is_assessed_once_for_each_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The points of a row of an endless track have one cycle."""
+    sizes: list[int] = []
+
+    def counted(self: Any, paths: Paths) -> Any:
+        sizes.append(len(paths))
+        return found(self, paths)
+
+    found = DangVan.found
+    monkeypatch.setattr(DangVan, "found", counted)
+    record = record_of(rolled(DANG_VAN | {"residual": False}, load_ratio=0.8))
+    assert record.scalars["fatigue_safety_factor"] > 1.0
+    assert 10 < sum(sizes) < 200
+
+
+@pytest.mark.solves
 def test_a_cycle_that_strains_plastically_has_no_safety_factor() -> None:
     record = record_of(rolled(DANG_VAN, load_ratio=2.0, passes=1))
     assert record.scalars["fatigue_applies"] == Applies.NOT_APPLICABLE

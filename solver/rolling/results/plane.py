@@ -13,7 +13,7 @@ from solver.fem.fields import Sampler, recovery
 from solver.fem.frame import RigidMotion
 from solver.results.acting import Acting
 from solver.results.contact_result import contact_patches
-from solver.results.fatigue import StressCycle
+from solver.results.stress_cycle import StressCycle
 from solver.rolling.passing import Pass
 from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.track import Track, of_layers, under_load
@@ -101,7 +101,7 @@ class TrackBody(SteadyBody):
         grown = np.ptp(state.plastic.accumulated[every], axis=1)
         left = to_mandel(np.moveaxis(flow[:, -1] - flow[:, 0], 1, 0))
         net = np.sqrt(2 / 3 * (left**2).sum(axis=0))
-        return StressCycle(stress[row], strain[row], grown[row], net[row])
+        return StressCycle(stress, strain, grown, net, row)
 
     def _seen(self, state: BodyState) -> BodyState:
         """Return a state of the track in the fixed frame."""

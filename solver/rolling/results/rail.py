@@ -21,8 +21,8 @@ from solver.materials.state import PlasticState
 from solver.memory import kept
 from solver.model.body import Body
 from solver.results.acting import Acting
-from solver.results.fatigue import StressCycle
 from solver.results.mesh_fields import MeshFields, counterclockwise
+from solver.results.stress_cycle import StressCycle
 from solver.rolling.body import LOADED, RELEASED
 from solver.rolling.passing import Pass
 from solver.rolling.rail.flow import PrismState
@@ -120,7 +120,8 @@ class PrismBody(SteadyBody):
         whole = [np.full((n, *values.shape[1:]), np.nan) for values in each]
         for values, own in zip(whole, each, strict=True):
             values[points] = own
-        return StressCycle(*whole)
+        stress, strain, grown, net = whole
+        return StressCycle(stress, strain, grown, net, np.arange(n))
 
     def left_by(self, found: Pass[PrismState]) -> PassStage:
         """Return the state after a pass, in the whole section."""
