@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import pickle
 import subprocess
 import sys
@@ -23,8 +22,11 @@ from studies.definition.sweep import MAXIMUM_RUNS
 from studies.scenes.shipped import SHIPPED
 from tests.counted import Calls, counted
 from tests.studies.conftest import fake_study
+from tests.studies.mistakes import MISTAKES
 
 ROOT = Path(__file__).parents[2]
+
+
 GOOD: dict[str, Any] = {
     "name": "fake",
     "scene": "fake",
@@ -40,41 +42,7 @@ def with_(**changes: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("content", "field", "allowed"),
     [
-        (with_(scene="fak"), "scene", "did you mean fake?"),
-        (with_(scene=None), "scene", "one of"),
-        (with_(scene=["fake"]), "scene", "one of"),
-        (with_(swep={}), "swep", "did you mean sweep?"),
-        (with_(name=".hidden"), "name", "not beginning with a dot"),
-        (with_(name="a/b"), "name", "1 to 80"),
-        (with_(name="a" * 81), "name", "1 to 80"),
-        (with_(name="a\n"), "name", "1 to 80"),
-        (with_(name=3), "name", "1 to 80"),
-        (with_(parameters={"frictoin": 0.1}), "parameters.frictoin", "did you mean friction?"),
-        (with_(sweep={"frictoin": [0.1]}), "sweep.frictoin", "did you mean friction?"),
-        (with_(parameters={"half_width": -1}), "parameters.half_width", "> 0 [mm]"),
-        (with_(parameters={"half_width": math.inf}), "parameters.half_width", "finite"),
-        (with_(parameters={"half_width": 10**400}), "parameters.half_width", "finite"),
-        (with_(parameters={"half_width": "20"}), "parameters.half_width", "a finite number"),
-        (with_(parameters={"half_width": True}), "parameters.half_width", "a finite number"),
-        (with_(parameters={"half_width": None}), "parameters.half_width", "a finite number"),
-        (with_(parameters={"half_width": {}}), "parameters.half_width", "a finite number"),
-        (with_(parameters={"points": 2.5}), "parameters.points", "an integer >= 2 and <= 400"),
-        (with_(parameters={"hardening": "soft"}), "parameters.hardening", "none, isotropic"),
-        (
-            with_(scene="punch", parameters={"curve": [[0.0, 350.0], [0.002]]}),
-            "parameters.curve",
-            "a list of [a finite number, a finite number]",
-        ),
-        (with_(parameters={"friction": 0.1}), "parameters.friction", "swept too"),
-        (with_(parameters=[1]), "parameters", "a table"),
-        (with_(sweep={"friction": [0.1, -0.1]}), "sweep.friction[1]", ">= 0 and <= 1"),
-        (with_(sweep={"friction": [0.1, math.nan]}), "sweep.friction[1]", "finite"),
-        (with_(sweep={"friction": [0, 0.1, 0.0]}), "sweep.friction[2]", "already at position 0"),
-        (with_(sweep={"friction": [0, -0.0]}), "sweep.friction[1]", "already at position 0"),
-        (with_(sweep={"friction": []}), "sweep.friction", "one value or more"),
-        (with_(sweep={"friction": 0.1}), "sweep.friction", "one value or more"),
-        (with_(sweep={"friction": "0.1"}), "sweep.friction", "one value or more"),
-        (with_(sweep="friction"), "sweep", "a table"),
+        *MISTAKES,
         (
             with_(sweep={"friction": [0.5, 1.0]}, parameters={"state": "plane_strain"}),
             "sweep.friction[1]",
@@ -85,7 +53,6 @@ def with_(**changes: Any) -> dict[str, Any]:
             "parameters.friction",
             "at most 0.9 in plane strain",
         ),
-        (["fake"], "study", "a table"),
     ],
 )
 def test_bad_input_names_field_value_and_what_is_allowed(
