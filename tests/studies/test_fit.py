@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -402,20 +401,6 @@ def test_deviations_that_are_not_told_are_those_of_the_differences() -> None:
         covariances.append(certainty(one, answer).covariance)
     count = len(told.values)
     assert covariances[1] == pytest.approx(covariances[0] * 25.0 * count / (count - 2))
-
-
-def write_lines(folder: Path, lines: list[dict[str, Any]]) -> list[str]:
-    """Write measured lines as tables; return the names of the files."""
-    names = []
-    for line in lines:
-        names.append(f"{line['of']}.csv")
-        with (folder / names[-1]).open("w", newline="") as file:
-            table = csv.writer(file)
-            table.writerow([f"{line['over']} [mm]", line["of"], "sigma"])
-            table.writerows(
-                (x, y, line["sigma"]) for x, y in zip(line["places"], line["values"], strict=True)
-            )
-    return names
 
 
 FAKE_FIT = """name = "fit"
