@@ -9,7 +9,7 @@ import numpy as np
 from studies import Store, open_study, run_study
 
 COARSE = {
-    "accuracy": "draft", "smallest_element": 0.02, "growth": 2.0, "load_step": 0.25,
+    "accuracy": "draft", "smallest_element": 0.05, "growth": 2.5, "load_step": 0.25,
     "unload_steps": 1, "hardening": "isotropic",
 }  # fmt: skip
 

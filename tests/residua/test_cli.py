@@ -53,8 +53,8 @@ def test_run_prints_a_table_and_writes_data_and_picture(
     assert [path.suffix for path in written] == [".nc", ".txt", ".png"]
     assert written[2].read_bytes().startswith(PNG)
     assert "\r" not in printed.err, "no bar where nobody watches"
-    begun, *each = printed.err.splitlines()
-    assert begun == "fake: 4 runs to compute" and len(each) == 4
+    begun, *each = printed.err.splitlines()  # on a busy machine with lines without a run
+    assert begun == "fake: 4 runs to compute" and sum("ok  " in line for line in each) == 4
 
 
 @pytest.mark.processes

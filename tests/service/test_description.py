@@ -30,7 +30,7 @@ def explore(
 ) -> subprocess.CompletedProcess[str]:
     """Let schemathesis go through its phases: examples, coverage, fuzzing, stateful.
 
-    Only a ``whole`` exploration posts a study in each of its thousand forms of coverage.
+    Only a ``whole`` exploration makes all the forms of coverage of what is posted and drawn.
     """
     configuration = server.home / CONFIGURATION.name
     always, _ = CONFIGURATION.read_text().split(IN_THE_SUITE)

@@ -69,7 +69,7 @@ def integrated(law: Chaboche, path: list[np.ndarray]) -> np.ndarray:
     return y[:4]
 
 
-@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("path", ["tension", "tension, then cyclic shear"])
 @pytest.mark.parametrize("name", OWN)
 def test_a_rule_of_ones_own_follows_its_rates(name: str, path: str) -> None:
     law = chaboche(name)
@@ -150,7 +150,7 @@ def test_burlet_and_cailletauds_rule_is_armstrong_and_fredericks_on_a_straight_p
 @pytest.mark.parametrize("name", OWN)
 def test_tension_follows_the_strength_up_to_the_limit(name: str) -> None:
     law = chaboche(name, "none")
-    stress = stepped(law, [0.01 * TENSION], 200)
+    stress = stepped(law, [0.01 * TENSION], 100)
     p = 0.01 - (stress[0] - stress[1]) / (2 * G) / 1.5
     state = replace(law.initial(1, 4), accumulated=np.array([p]))
     assert stress[0] - stress[1] == pytest.approx(law.strength(state)[0], rel=1e-3)

@@ -25,10 +25,6 @@ def square(element="quad8", **fields):
 # -- loads and operators -----------------------------------------------------------------------
 
 
-LEFT = grid(np.arange(-1.0, 2.0), np.arange(3.0))
-"""A square across the axis."""
-
-
 @pytest.mark.parametrize("element", known_elements(2))
 def test_pressure_has_its_resultant(element):
     """100 MPa on a top 2 long and 3 thick pushes down with 600 N."""

@@ -22,7 +22,7 @@ from solver.scenes.punch import PUNCH, PunchParameters
 PRESSED = PunchParameters(accuracy="draft", friction=0.3, load_ratio=0.6)
 ROLLED = RollingParameters(
     track=12.0, element_size=3.0, advance_step=3.0, growth=1.8, press_steps=2, unload_steps=1,
-    traction=0.5, passes=2,
+    traction=0.5, passes=1,
 )  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +15,7 @@ from scipy.stats import chi2
 from residua.cli import main
 from solver.errors import ModelError
 from solver.results.record import Record, Status
-from studies import Store, Study, StudyError, estimate, fit, open_study, run_study
+from studies import Store, Study, StudyError, estimate, fit, open_study
 from studies.definition.identity import solver_hash
 from studies.definition.quantity import Line
 from studies.definition.schema import Context, parsed
@@ -30,7 +29,7 @@ from studies.kinds.fit.measured import MeasuredLine, pieces
 from studies.views.picking import run_file
 from tests.studies.conftest import write_study
 from tests.studies.fakes import FAKE, Canned
-from tests.studies.killed import runs_before_a_kill
+from tests.studies.killed import see_it_taken_up
 
 X = np.linspace(0.0, 2.0, 21)
 TRUTH = {"yield_stress": 380.0, "slope": 30.0}
@@ -404,20 +403,6 @@ def test_deviations_that_are_not_told_are_those_of_the_differences() -> None:
     assert covariances[1] == pytest.approx(covariances[0] * 25.0 * count / (count - 2))
 
 
-def write_lines(folder: Path, lines: list[dict[str, Any]]) -> list[str]:
-    """Write measured lines as tables; return the names of the files."""
-    names = []
-    for line in lines:
-        names.append(f"{line['of']}.csv")
-        with (folder / names[-1]).open("w", newline="") as file:
-            table = csv.writer(file)
-            table.writerow([f"{line['over']} [mm]", line["of"], "sigma"])
-            table.writerows(
-                (x, y, line["sigma"]) for x, y in zip(line["places"], line["values"], strict=True)
-            )
-    return names
-
-
 FAKE_FIT = """name = "fit"
 scene = "fake"
 [parameters]
@@ -505,10 +490,4 @@ def test_a_killed_fit_is_taken_up_and_computes_no_run_twice(tmp_path: Path) -> N
     (tmp_path / "p.csv").write_text(PRESSURE)
     file.write_text(FAKE_FIT.format(seconds=0.1, mark=marks) + LINES)
     asked = Study.from_toml(file)
-    before = runs_before_a_kill(asked, out, 4)
-    outcome = run_study(asked, Store(out), workers=0)
-    assert outcome.ok
-    assert outcome.computed
-    assert not before & set(outcome.computed)
-    with open_study(out) as dataset:
-        assert set(dataset["tried_run"].to_numpy()) == before | set(outcome.computed)
+    see_it_taken_up(asked, out, 4)

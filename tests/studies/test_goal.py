@@ -29,7 +29,7 @@ from studies.execution.task import PathTask, walk
 from studies.kinds.goal.search import Goal, Search
 from tests.studies.conftest import fake_study
 from tests.studies.fakes import FAKE, Canned, FakeParameters, Followed, numbers
-from tests.studies.killed import runs_before_a_kill
+from tests.studies.killed import see_it_taken_up
 
 PRESSURE = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}
 """Of the fake scene the pressure is 100 load_ratio (1 + friction) + half_width."""
@@ -596,11 +596,4 @@ def test_a_killed_search_is_taken_up_and_computes_no_run_twice(tmp_path: Path, s
         '[goal]\nof = "peak_contact_pressure"\nat = 120\nbetween = [0.1, 4.0]\n'
     )
     asked = Study.from_toml(file)
-    before = runs_before_a_kill(asked, out, 6)
-    outcome = run_study(asked, Store(out), workers=0)
-    assert outcome.ok
-    assert outcome.computed
-    assert not before & set(outcome.computed)
-    with open_study(out) as dataset:
-        behind = {each for each in dataset["tried_run"].to_numpy().flat if each}
-        assert behind == before | set(outcome.computed)
+    see_it_taken_up(asked, out, 6)

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import psutil
 import pytest
 
 from studies import Limits, Store, Study, StudyEvent, open_netcdf, run_study
+from tests.service.servers import wait_until
 from tests.studies.conftest import fake_study
 
 pytestmark = pytest.mark.processes
@@ -36,13 +36,6 @@ def start(study: Study, out: Path, directory: Path) -> subprocess.Popen[str]:
         [sys.executable, *command],
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
-
-
-def wait_until(condition: Callable[[], bool], seconds: float = 30.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
 
 
 @pytest.fixture

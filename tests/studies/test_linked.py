@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -314,8 +315,7 @@ def test_run_show_and_plot_speak_of_labels(
         'A = { friction = 0.4, passes = 2 }\nB = { hardening = "isotropic" }\n'
     )
     assert main(["run", str(file), "--out", str(out), "--workers", "1"]) == 0
-    _, *told = capsys.readouterr().err.splitlines()
-    names = [line.split("ok  ")[1].split("  ")[0] for line in told]  # then the time left
+    names = re.findall(r"ok  (.*?)(?:  |\n)", capsys.readouterr().err)  # then the time left
     assert sorted(names) == ["case = A", "case = B"]
     assert main(["show", str(out)]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]

@@ -60,7 +60,7 @@ HELD = (
     .replace("swift_exponent = 0.3", 'hosford_exponent = "$rule"')
     .replace('kind = "pressure"', 'kind = "displacement"')
     .replace("value = -420.0", "x = 0.08")
-    .replace("step = 0.01", "step = 0.1")
+    .replace("step = 0.05", "step = 0.1")
     .replace('of = "plastic_strain"', 'of = "stress.xx"')
 )
 """The bar held across its plane and stretched by 2 %: it flows in pure shear at last."""
@@ -155,10 +155,9 @@ print(type(PunchParameters(yield_condition="hosford").material()).__name__)
 print(unmet(PunchParameters(), "hosford_exponent"))
 print(bool(unmet(PunchParameters(yield_condition="hosford"), "hosford_exponent")))
 p = RollingParameters(
-    element_size=4.0, growth=2.0, load="hertz", passes=2, yield_condition="hosford",
-    direction="back_and_forth",
+    element_size=4.0, growth=2.0, load="hertz", passes=1, yield_condition="hosford"
 )
-(record,) = SCENES["rolling"].path(p, [2], lambda share: None)
+(record,) = SCENES["rolling"].path(p, [1], lambda share: None)
 print(record.status.solved, record.scalars["max_plastic_strain"] > 1e-3)
 print(max(record.scalars[f"audit_{each}"] for each in ("law", "history", "yield")) < 1e-9)
 content = {"name": "a", "scene": "punch", "parameters": {"yield_condition": "hosford"}}

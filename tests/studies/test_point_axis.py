@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -321,8 +322,8 @@ def test_run_show_and_plot_speak_of_points(
     assert main([*run, "--dry-run"]) == 0
     assert "2 in all, 2 to compute" in capsys.readouterr().out
     assert main([*run, "--workers", "1"]) == 0
-    _, *told = capsys.readouterr().err.splitlines()
-    assert sorted(line.split("ok  ")[1].split("  ")[0] for line in told) == [
+    # then the time left; on a busy machine there are lines without a run
+    assert sorted(re.findall(r"ok  (.*?)(?:  |\n)", capsys.readouterr().err)) == [
         "point = 0: T1, load_ratio = 0.3, friction = 0.1",
         "point = 1: T2, load_ratio = 0.6, friction = 0.2",
     ]

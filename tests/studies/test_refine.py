@@ -22,14 +22,13 @@ from studies import (
     estimate,
     open_study,
     predict,
-    run_study,
 )
 from studies.execution.asking import Asking
 from studies.kinds.refine.around import between
 from studies.kinds.refine.cells import weights
 from studies.kinds.refine.refinement import Refine, Refinement, Wanted
 from tests.studies.fakes import FAKE, Canned, FakeParameters, bare, record
-from tests.studies.killed import runs_before_a_kill
+from tests.studies.killed import see_it_taken_up
 from tests.studies.test_goal import search_here
 
 OF = "peak_residual_tension"
@@ -450,11 +449,6 @@ def test_a_killed_refinement_is_taken_up_and_computes_no_run_twice(tmp_path: Pat
         '[refine]\nof = ["peak_contact_pressure"]\n'
     )
     asked = Study.from_toml(file)
-    before = runs_before_a_kill(asked, out, 4)
-    outcome = run_study(asked, Store(out), workers=0)
-    assert outcome.ok
-    assert outcome.computed
-    assert not before & set(outcome.computed)
+    see_it_taken_up(asked, out, 4, "run")
     with open_study(out) as dataset:
-        assert set(dataset["run"].to_numpy()) == before | set(outcome.computed)
         assert dataset.sizes["point"] == 9

@@ -185,14 +185,6 @@ def instead(target: Any, name: str, make: Callable[[Any], Any]) -> Fault:
     return fault
 
 
-def all_of(*faults: Fault) -> Fault:
-    def fault(patch: Patch) -> None:
-        for each in faults:
-            each(patch)
-
-    return fault
-
-
 def times(target: Any, name: str, factor: float) -> Fault:
     """Return the fault of a function whose value is multiplied."""
     return instead(target, name, lambda old: lambda *a, **k: factor * old(*a, **k))

@@ -268,7 +268,7 @@ WORDS = {
 )
 def test_every_word_rolls_and_its_audit_agrees(word, load):
     p = RollingParameters(
-        element_size=3.0, growth=1.5, traction=0.2, load=load, passes=2, yield_stress=YIELD,
+        element_size=4.0, growth=2.0, traction=0.2, load=load, passes=2, yield_stress=YIELD,
         direction="back_and_forth", **WORDS[word],
     )  # fmt: skip
     (record,) = SCENES["rolling"].path(p, [2], lambda share: None)

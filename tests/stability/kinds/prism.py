@@ -21,7 +21,7 @@ from tests.stability.trial import Scene, tells
 Given = dict[str, Any]
 Parameters = WheelRailParameters | RacewayParameters
 
-COUNT = 8
+COUNT = 5
 SEED = 1985
 RULES = ("none", "isotropic", "kinematic", "mixed", "voce", "table", "chaboche", "layered")
 GROWING = ("none", "isotropic", "voce", "table")
