@@ -15,6 +15,7 @@ from solver.results.mesh_fields import MeshFields
 from solver.results.quantities import Quantity
 from solver.results.samples import Samples
 from solver.results.view import View
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +33,7 @@ class FinishedRun:
     notes : messages to the user about the computation
     singular : singular points, near which numbers depend on the mesh
     beside : function that returns the fields of further bodies at the same stages
+    state : function that returns arrays from which a longer run goes on; empty if none can
     kept : what outputs have computed and need again
     """
 
@@ -44,6 +46,7 @@ class FinishedRun:
     notes: tuple[str, ...] = ()
     singular: tuple[SingularPoint, ...] = ()
     beside: Callable[[], MeshFields] | None = None
+    state: Callable[[], Mapping[str, Array]] = dict
     kept: dict[Any, Any] = field(default_factory=dict)
 
     @property

@@ -48,6 +48,7 @@ def record(scene: Scene, run: FinishedRun) -> Record:
     return replace(
         _labelled(scene, run, status, messages, values),
         mesh=partial(run.samples.fields.on_mesh, states, run.beside),
+        state=run.state,
     )
 
 

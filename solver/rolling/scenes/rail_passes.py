@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any
 
@@ -20,10 +20,10 @@ from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.audit.rail import audit_prism
 from solver.rolling.passing import Pass, SolveBudget
 from solver.rolling.rail.flow import PrismState
-from solver.rolling.rail.patch_contact import AppliedPatch, PatchContact, PatchLoad
+from solver.rolling.rail.patch_contact import AppliedPatch, PatchContact, PatchLoad, PatchStart
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.results.rail import PrismBody, of_patch, zone_fields
-from solver.rolling.scenes.pass_runner import Passes
+from solver.rolling.scenes.pass_runner import BegunPasses, Passes
 from solver.rolling.scenes.passes import PassTrace
 from solver.rolling.search import search
 from solver.tensors import to_tensor
@@ -40,6 +40,9 @@ class RailTrace(PassTrace):
     """The state after a pass over a prism; ``lowest`` (6,) is the least residual stress [MPa]."""
 
     lowest: Array
+
+
+_TRACED = tuple(each.name for each in fields(RailTrace))
 
 
 class RolledPrism(ABC):
@@ -96,6 +99,8 @@ class RailPasses(Passes):
         z, y = self._track.points
         self.extent = f"{np.ptp(z):.3g} mm wide and {np.ptp(y):.3g} mm deep"
         self.beside = partial(zone_fields, body, view.loaded, view.unloaded)
+        self._guess: Array | None = None
+        self._start: PatchStart | None = None
 
     def found(self, budget: SolveBudget) -> Iterator[Pass[PrismState]]:
         """See `Passes`.
@@ -104,21 +109,20 @@ class RailPasses(Passes):
         are nearly the same, it begins with the strain of the last pass; while passes still yield,
         that guess is worse, and after another load it does not converge.
         """
-        track, law = self._track, self.law
-        before = track.virgin(law)
-        found: Pass[PrismState] | None = None
-        last: PatchLoad | None = None
-        for number in range(self.parameters.passes):
-            load, guess, start = self._rolled.load(track, number), None, None
-            if found is not None:
-                start = found.loading.start
-                guess = found.strain if load is last and found.steps <= _SETTLED else None
+        track, law, begun = self._track, self.law, self.begun
+        before, guess = begun.left if begun else track.virgin(law), self._guess
+        start, first = self._start, len(begun.traces) if begun else 0
+        last = self._rolled.load(track, first - 1) if begun else None
+        for number in range(first, self.parameters.passes):
+            load = self._rolled.load(track, number)
             with one_thread():
                 found = search(
-                    track, law, load, before, guess, start=start, budget=budget, wider=False
-                )
+                    track, law, load, before, guess if load is last else None,
+                    start=start, budget=budget, wider=False,
+                )  # fmt: skip
             budget.renew()
-            before, last = found.after, load
+            before, start, last = found.after, found.loading.start, load
+            guess = found.strain if found.steps <= _SETTLED else None
             yield found
 
     def shown(self, number: int) -> tuple[Samples, Callable[[Any], Acting]]:
@@ -138,11 +142,33 @@ class RailPasses(Passes):
             lowest=to_tensor(stress).min(axis=1),
         )
 
-    def audit(
-        self, found: Pass[PrismState], previous: Pass[PrismState] | None, number: int
-    ) -> Audit:
+    def audit(self, found: Pass[PrismState], left: PrismState | None, number: int) -> Audit:
         """See `Passes`."""
-        return audit_prism(self._track, self.law, found, previous, _plain(self._track))
+        return audit_prism(self._track, self.law, found, left, _plain(self._track))
+
+    def state(self, found: Pass[PrismState], traces: Sequence[RailTrace]) -> Mapping[str, Array]:
+        """See `Passes`."""
+        after, contact = found.after, contact_of(found)
+        kept = {
+            "internal": after.state.packed,
+            "strain": after.strain,
+            "displacement": after.displacement,
+            "traction": contact.traction,
+            "motion": np.array([contact.height, contact.creepage, contact.lateral_creepage]),
+            **{name: np.stack([getattr(t, name) for t in traces]) for name in _TRACED},
+        }
+        return {**kept, "guess": found.strain} if found.steps <= _SETTLED else kept
+
+    def begin(self, state: Mapping[str, Array]) -> None:
+        """See `Passes`."""
+        virgin = self._track.virgin(self.law)
+        left = PrismState(
+            virgin.state.unpacked(state["internal"]), state["strain"], state["displacement"]
+        )
+        each = zip(*(state[name] for name in _TRACED), strict=True)
+        traces = [RailTrace(**dict(zip(_TRACED, values, strict=True))) for values in each]
+        self.begun, self._guess = BegunPasses(traces, left), state.get("guess")
+        self._start = PatchStart(state["traction"], *state["motion"].tolist())
 
 
 @kept
