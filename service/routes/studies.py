@@ -68,7 +68,7 @@ EXAMPLE: dict[str, Any] = {
     "sweep": {"load_ratio": [0.5714, 0.8571], "friction": [0.0, 0.3]},
 }
 
-PREDICTED, INDICES = Late("service.reading:predicted"), Late("service.reading:indices")
+PREDICTED, INDICES = Late("service.analysing:predicted"), Late("service.analysing:indices")
 FITTED, DRAWN = Late("service.reading:fitted"), Late("service.drawing:draw_study")
 
 
