@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NoReturn
 
-from solver.errors import NotConverged
+from solver.errors import NotConverged, TooLong
 from solver.late import late
 from solver.loading.control import INCREMENT_ERROR
 from solver.loading.program import Program, StepRefinement
@@ -203,6 +203,19 @@ class Scene:
         runs = (replace(parameters, **{self.branch: kind(value)}) for value in values)
         for run in _by_increments(self, runs, monitor, last):
             yield self.record(run)
+
+    def remedy(
+        self, parameters: Any, error: NotConverged | None, status: Status = Status.NOT_CONVERGED
+    ) -> str:
+        """Return what the user can do about an outcome; empty if nothing is known.
+
+        `TooLong` has its own advice, opposite to a finer mesh.
+        """
+        if isinstance(error, TooLong):
+            return ""
+        table = self.advice(parameters) if callable(self.advice) else self.advice
+        reasons: tuple[Any, ...] = (*type(error).__mro__, status)
+        return next((table[each] for each in reasons if each in table), "")
 
     def record(self, run: Any) -> Record:
         """Return the record of a `FinishedRun`."""

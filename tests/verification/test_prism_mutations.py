@@ -18,7 +18,7 @@ from solver.mesh import grid, within
 from solver.model.friction import BoundLines
 from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.audit.rail import audit_prism
-from solver.rolling.passing import Pass, passing
+from solver.rolling.passing import passing
 from solver.rolling.rail import far_field as far_fields
 from solver.rolling.rail import flow as flows
 from solver.rolling.rail import patch as patches

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from solver.audit.report import Audit
+from solver.errors import NotConverged
 from solver.linear.threads import one_thread
 from solver.memory import kept
 from solver.results.acting import Acting
+from solver.results.run import FinishedRun
 from solver.results.samples import Samples
 from solver.results.view import View
 from solver.rolling.audit.plain_rail import PlainPrism
@@ -23,9 +25,11 @@ from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.patch_contact import AppliedPatch, PatchContact, PatchLoad, PatchStart
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.results.rail import PrismBody, of_patch, zone_fields
-from solver.rolling.scenes.pass_runner import BegunPasses, Passes
+from solver.rolling.scenes.pass_runner import BegunPasses, Passes, by_passes
 from solver.rolling.scenes.passes import PassTrace
+from solver.rolling.scenes.rail_outputs import FINER, finer
 from solver.rolling.search import search
+from solver.scenes.scene import Monitor, Scene
 from solver.tensors import to_tensor
 from solver.typing import Array
 
@@ -43,6 +47,32 @@ class RailTrace(PassTrace):
 
 
 _TRACED = tuple(each.name for each in fields(RailTrace))
+
+
+def by_rail_passes(
+    scene: Scene,
+    runs: Sequence[Any],
+    monitor: Monitor,
+    *,
+    rolled: Callable[[Any], RolledPrism],
+    begun: Mapping[str, Array] | None = None,
+) -> Iterator[FinishedRun]:
+    """Compute pass after pass, see `by_passes`; with smaller elements if that is the remedy.
+
+    Such runs have a note, and no state: a longer run begins with the usual elements too.
+    """
+    computed = partial(by_passes, window=partial(RailPasses, rolled), reaches=REACHES)
+
+    def otherwise(remaining: Sequence[Any], error: NotConverged) -> Iterator[FinishedRun] | None:
+        last = remaining[-1]
+        if not finer(last) or scene.remedy(last, error) != finer(last):
+            return None
+        own = FINER[last.accuracy]
+        note = f"{error}: computed with accuracy = {own} instead"
+        others = computed(scene, [replace(run, accuracy=own) for run in remaining], monitor)
+        return (replace(run, notes=(*run.notes, note), state=dict) for run in others)
+
+    return computed(scene, runs, monitor, otherwise=otherwise, begun=begun)
 
 
 class RolledPrism(ABC):
