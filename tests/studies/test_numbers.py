@@ -87,6 +87,13 @@ def test_a_mistake_is_told(
     assert told in capsys.readouterr().err
 
 
+def test_a_state_is_written_as_its_word() -> None:
+    """A shakedown state; it is stored as a number, whose name is in the flags."""
+    column = column_of("shakedown_state", np.array([1.0, np.nan, 0.0]), "result")
+    text = b"".join(FORMS["csv"].write([column], np.arange(3))).decode()
+    assert text.split() == ["shakedown_state", "elastic_shakedown", '""', "elastic"]
+
+
 def test_a_run_without_a_number_has_none(computed: tuple[Study, Store]) -> None:
     with open_study(computed[1].directory) as dataset:
         failed = dataset.load().copy()
