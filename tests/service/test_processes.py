@@ -1,4 +1,4 @@
-"""Answers of the service come before what it computes."""
+"""Processes of the service: how urgent they are, and where they find its results."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ import asyncio
 import os
 from pathlib import Path
 
+import pytest
+
 from service.processes import Starter
+from service.settings import Settings
+from service.view import ViewedFolder
 from studies.execution.forks import Forks
 
 
@@ -27,3 +31,13 @@ def test_a_process_that_computes_is_less_urgent_than_the_service(tmp_path: Path)
             return line
 
     assert int(asyncio.run(said())) > os.nice(0)
+
+
+def test_a_folder_is_the_same_for_processes_that_work_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in `residua serve --data out` and `residua view out`: no reader works where they began."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out" / "aside").mkdir(parents=True)
+    assert Settings(data=Path("out")).data == tmp_path / "out"
+    assert ViewedFolder(Path("out"), Path("out/aside")).store.directory == tmp_path / "out"
