@@ -223,7 +223,8 @@ def table(options: argparse.Namespace) -> int:
         at = at[found.meeting(condition)[at]]
     if options.where and not at.size:
         raise StudyError("where", ", ".join(options.where), "no run meets this")
-    columns = [found.column(name) for name in dict.fromkeys(options.columns or found.columns)]
+    names = [each for given in options.columns or () for each in given.split(",") if each]
+    columns = [found.column(name) for name in dict.fromkeys(names or found.columns)]
     pieces = FORMS["json" if options.json else "csv"].write(columns, at)
     if options.out is None:
         for piece in pieces:
