@@ -24,12 +24,13 @@ def read_study(
 ) -> dict[str, Any]:
     """Return the tables of a study file.
 
-    ``[points] file = "tests.csv"``, or ``points = "tests.csv"``, names a table beside the study, and
-    so does an axis of the sweep with an entry ``file``: see `read_table`. A value of a parameter that
-    ends in ``.csv`` or ``.txt`` names the points of a curve, one with the ending of a mesh file
-    (`FORMATS`) the mesh of a section, and ``steels.toml#40Cr`` a material. Entries of kinds of study
-    name files too, see `Kind.with_files`. The study that this one ``extends`` may be a file. What is
-    in the files takes their place, so that the content of a study needs no other file.
+    ``[points] file = "tests.csv"``, or ``points = "tests.csv"``, names a table beside the
+    study, and so does an axis of the sweep with an entry ``file``: see `read_table`. A value of
+    a parameter that ends in ``.csv`` or ``.txt`` names the points of a curve, one with the
+    ending of a mesh file (`FORMATS`) the mesh of a section, and ``steels.toml#40Cr`` a
+    material. Entries of kinds of study name files too, see `Kind.with_files`. The study that
+    this one ``extends`` may be a file. What is in the files takes their place, so that the
+    content of a study needs no other file.
 
     Parameters
     ----------
