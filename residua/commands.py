@@ -223,7 +223,8 @@ def table(options: argparse.Namespace) -> int:
         at = at[found.meeting(condition)[at]]
     if options.where and not at.size:
         raise StudyError("where", ", ".join(options.where), "no run meets this")
-    columns = [found.column(name) for name in dict.fromkeys(options.columns or found.columns)]
+    names = [each for given in options.columns or () for each in given.split(",") if each]
+    columns = [found.column(name) for name in dict.fromkeys(names or found.columns)]
     pieces = FORMS["json" if options.json else "csv"].write(columns, at)
     if options.out is None:
         for piece in pieces:
@@ -236,7 +237,7 @@ def table(options: argparse.Namespace) -> int:
 
 
 def diff(options: argparse.Namespace) -> int:
-    """Tell what differs between two studies, also of two versions of the solver."""
+    """Show what differs between two studies, also of two versions of the solver."""
     from studies.views.differing import diff, difference_table
     from studies.views.reading import open_study
 
@@ -252,7 +253,7 @@ def diff(options: argparse.Namespace) -> int:
 
 
 def predict(options: argparse.Namespace) -> int:
-    """Tell a number between the runs of a study, with its error."""
+    """Predict a number between the runs of a study, with its error."""
     from studies.execution.task import compute_here
     from studies.numbers import number_text
     from studies.views.picking import study_of
@@ -280,7 +281,7 @@ def predict(options: argparse.Namespace) -> int:
 
 
 def sensitivity(options: argparse.Namespace) -> int:
-    """Tell which parameter of a sample matters for a number of its runs, and draw it."""
+    """Rank the parameters of a sample by their effect on a number of its runs, and draw it."""
     from studies.views import sensitivity as indices
     from studies.views.reading import open_study
 

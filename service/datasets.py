@@ -181,7 +181,7 @@ class Datasets:
             if self.folder is None:
                 self.folder = self.folders.enter_context(scratch())
             target = self.folder / f"{study_id}-{made.number + 1}.nc"
-            given = content, self.store.directory.resolve(), self.store.aside, target
+            given = content, self.store.directory, self.store.aside, target
             try:
                 await turn.apart(COMBINED, *given, field="data set", name=study_id, seconds=SECONDS)
             except StoreFull:  # not the data directory

@@ -52,7 +52,7 @@ class Examiner:
     """
 
     def __init__(self, settings: Settings) -> None:
-        self.directory, self.bounds = settings.data.resolve(), settings.bounds
+        self.directory, self.bounds = settings.data, settings.bounds
 
     async def examine(self, content: Mapping[str, Any], share: Share) -> Examined:
         """Return the study that ``content`` describes.

@@ -79,7 +79,7 @@ class Pool:
     async def _start(self, study: dict[str, Any]) -> dict[str, Any]:
         order = {
             "study": study,
-            "data": str(self.settings.data.resolve()),
+            "data": str(self.settings.data),
             "workers": self.settings.workers,
             "memory": self.settings.worker_memory,
             "access": self.settings.outside_access,

@@ -40,6 +40,10 @@ LOADED = ("service.child", "service.pool", "studies.storage.combine")
 
 STDIN, STDOUT = 0, 1
 
+_BEHIND = 5
+"""By how much computing is less urgent than answers: with it a processor that both want is mostly
+for the answer."""
+
 _SET_NAME = 15
 """Option of ``prctl``."""
 _ARENA_MAX, _ARENAS = -8, 2
@@ -149,6 +153,7 @@ def _begin(stdin: Connection, stdout: Connection, lock: Connection, module: str)
     stdin.close()
     stdout.close()
     name_process(module)
+    os.nice(_BEHIND)
     import_module(module).main()
 
 

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from service.octets import octets
-from service.schemas import Prediction, PredictQuery
 from solver.results.export import vtu_of
 from studies.definition.study import Study
 from studies.errors import StudyError
@@ -23,15 +22,9 @@ from studies.storage.combine import combine
 from studies.storage.runfile import verify
 from studies.storage.store import Store
 from studies.views.picking import sweep_axes
-from studies.views.predict import answer
 from studies.views.reading import open_netcdf
-from studies.views.sensitivity import sensitivity
-from studies.views.sensitivity import told as told_indices
 from studies.views.shown import outline, shown
 from studies.views.solution import read
-
-MOST_FITTED = 1000
-"""Largest number of runs to which a request may fit polynomials, which takes seconds."""
 
 
 def outlined(path: Path) -> dict[str, list[dict[str, Any]]]:
@@ -73,29 +66,6 @@ def nodal_fields(path: Path, stage: str | None) -> bytes:
     if stage is not None and stage not in fields.stages:
         raise StudyError("stage", stage, f"must be one of {', '.join(fields.stages)}")
     return vtu_of(fields, stage or list(fields.stages)[-1])
-
-
-def predicted(
-    path: Path, content: dict[str, Any], directory: Path, aside: Path | None, query: PredictQuery
-) -> Prediction:
-    """Return what `predict` tells; called in a process."""
-    asked, store = query.model_dump(), Store(directory, aside=aside)
-    at = {name: asked.pop(name) for name in query.model_extra or {}}
-    study = Study.known(content, store.scene)
-    with open_netcdf(path) as runs:
-        found = answer(runs, study, store, at=at, **asked)
-    add = None if found.enough else found.run.to_dict()
-    told = {name: getattr(found, name) for name in Prediction.model_fields.keys() - {"add"}}
-    return Prediction(**told, add=add)
-
-
-def indices(path: Path, of: str) -> dict[str, Any]:
-    """Return what `tell_sensitivity` tells; called in a process."""
-    with open_netcdf(path) as runs:
-        if (size := runs["status"].size) > MOST_FITTED:
-            allowed = f"at most {MOST_FITTED} are fitted here: fetch the data set, and fit it there"
-            raise StudyError("runs", size, allowed)
-        return told_indices(sensitivity(runs, of))
 
 
 def fitted(path: Path) -> dict[str, Any]:

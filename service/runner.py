@@ -231,7 +231,7 @@ class Runner:
         order = {
             "id": job.id,
             "study": study,
-            "data": str(self.settings.data.resolve()),
+            "data": str(self.settings.data),
             "access": await self.pool.access(study),
             "limits": asdict(self.settings.limits),
             "priority": job.priority,
@@ -242,7 +242,7 @@ class Runner:
 
     def _plain(self, text: str) -> str:
         """Return a message about a study without folders of this machine."""
-        data = str(self.settings.data.resolve())
+        data = str(self.settings.data)
         inside = text.replace(f"{data}/", "/")
         return without_folders(
             re.sub(rf"{re.escape(data)}(?![\w.-])", "the data directory", inside)

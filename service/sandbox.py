@@ -36,7 +36,7 @@ from solver.files import read_file
 from studies.execution.forks import Forks
 from studies.storage.room import FULL
 
-READERS = Forks(("service.sandbox", "service.examiner"))
+READERS = Forks(("service.sandbox", "service.examiner", "service.reading"))
 """The processes; what a call needs besides is loaded for it and all that follow."""
 
 _LIBC = ctypes.CDLL(None, use_errno=True)

@@ -16,7 +16,7 @@ from studies.execution.access import Access
 from studies.execution.estimate import Bounds
 from studies.execution.limits import Limits
 from studies.scenes.refusals import mistakes_of
-from studies.storage.blobs import directory_of, is_address
+from studies.storage.blobs import directory_of
 
 
 def _words(given: Any) -> Any:
@@ -25,8 +25,8 @@ def _words(given: Any) -> Any:
 
 
 def _folder(given: Any) -> Any:
-    """Return the folder of what is at an address; anything else as it is."""
-    return directory_of(given) if is_address(given) else given
+    """Return the whole path of a folder, since other processes work elsewhere, or of an address."""
+    return directory_of(given).resolve() if isinstance(given, str | Path) else given
 
 
 class Settings(BaseSettings):
@@ -38,6 +38,7 @@ class Settings(BaseSettings):
 
     data: Annotated[Path, BeforeValidator(_folder)] = Field(
         default=Path("out"),
+        validate_default=True,
         description="directory of runs, studies and the queue; or an address, such as s3://bucket/x",
     )
     host: str = Field(default="127.0.0.1", description="where to listen")

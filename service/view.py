@@ -61,7 +61,7 @@ class ViewedFolder:
     """
 
     def __init__(self, directory: Path, aside: Path) -> None:
-        self.store = Store(directory, held=True, aside=aside)
+        self.store = Store(directory.resolve(), held=True, aside=aside)
         with (
             suppress(FileNotFoundError, NoFile),  # a torn copy is found damaged, and made again
             opened(directory / "catalogue.sqlite") as found,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+ROUNDED = 1e-9
+"""Ratio of a number to the largest of its unit in a table; below it, it is shown as 0."""
 _TIMES = ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"), (1.0, "seconds"))
 
 

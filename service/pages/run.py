@@ -11,6 +11,7 @@ from solver.audit.figures import LIMITS
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
+from studies.numbers import ROUNDED
 from studies.storage.dataset import attributes_of
 from studies.views.columns import unit_text
 from studies.views.figures import group_of, meter
@@ -64,7 +65,10 @@ def audited(run: Mapping[str, Any], scene: Scene | None) -> dict[str, list[Figur
 
 
 def numbers_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str, Any]]:
-    """Return name, meaning, unit and value of the numbers of a run that are not of the audit."""
+    """Return name, meaning, unit and value of the numbers of a run that are not of the audit.
+
+    As in tables, a number is zero where it is rounding of the largest one of its unit.
+    """
     found = []
     for name, value in run["scalars"].items():
         if group_of(name) == "audit":
@@ -73,6 +77,13 @@ def numbers_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str,
         word = meanings(int(value)).name.lower() if meanings and value is not None else value
         each = {"name": name, "words": words_of(name, scene), "unit": unit_of(name, scene)}
         found.append(each | {"value": word})
+    levels: dict[str, float] = {}
+    sized = [each for each in found if each["unit"] and isinstance(each["value"], float)]
+    for each in sized:
+        levels[each["unit"]] = max(levels.get(each["unit"], 0.0), abs(each["value"]))
+    for each in sized:
+        if abs(each["value"]) < ROUNDED * levels[each["unit"]]:
+            each["value"] = 0.0
     return sorted(found, key=lambda each: rank(each["name"]))
 
 

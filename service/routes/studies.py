@@ -68,7 +68,7 @@ EXAMPLE: dict[str, Any] = {
     "sweep": {"load_ratio": [0.5714, 0.8571], "friction": [0.0, 0.3]},
 }
 
-PREDICTED, INDICES = Late("service.reading:predicted"), Late("service.reading:indices")
+PREDICTED, INDICES = Late("service.analysing:predicted"), Late("service.analysing:indices")
 FITTED, DRAWN = Late("service.reading:fitted"), Late("service.drawing:draw_study")
 
 
@@ -220,7 +220,7 @@ async def predict(
     reading: TheReading,
     computing: TheComputing,
 ) -> Prediction:
-    """Tell a number between the runs of a study, with its error.
+    """Predict a number between the runs of a study, with its error.
 
     Beside the queries named below, every parameter that the study varies is one:
     `?of=peak_residual_tension&load_ratio=0.62&friction=0.21`. A place outside of the runs, or
@@ -236,7 +236,7 @@ async def predict(
 async def tell_sensitivity(
     job: TheJob, datasets: TheDatasets, reading: TheReading, computing: TheComputing, of: str
 ) -> dict[str, Any]:
-    """Tell which parameter matters for a number of the runs: indices of sensitivity.
+    """Rank parameters by their effect on a number of the runs: indices of sensitivity.
 
     Of `parameters` each has `first` and `total`, the share of the variance of `of` that it makes
     alone, and with others, and how well they are known. A sample that does not bear it is refused

@@ -42,6 +42,8 @@ class Record:
     symmetric : whether the bodies are one half of a model symmetric about x = 0
     mesh : function that returns the fields at the nodes of a complete run; call it before the next
         run is computed
+    state : function that returns the arrays from which a run with a larger value of the branch
+        parameter goes on, empty if none can; call it before the next run is computed
     """
 
     parameters: object
@@ -52,6 +54,7 @@ class Record:
     scalars: Mapping[str, float] = field(default_factory=dict)
     symmetric: bool = False
     mesh: Callable[[], MeshFields] | None = field(default=None, compare=False)
+    state: Callable[[], Mapping[str, np.ndarray]] = field(default=dict, compare=False)
 
     def with_one_mesh(self) -> Record:
         """Return the record with fields at the nodes computed only once."""

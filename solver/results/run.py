@@ -15,6 +15,7 @@ from solver.results.mesh_fields import MeshFields
 from solver.results.quantities import Quantity
 from solver.results.samples import Samples
 from solver.results.view import View
+from solver.typing import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +34,7 @@ class FinishedRun:
     singular : singular points, near which numbers depend on the mesh
     beside : function that returns the fields of further bodies at the same stages
     derived : (run, outputs) -> derivatives of the numbers of the outputs, if they are asked for
+    state : function that returns arrays from which a longer run goes on; empty if none can
     kept : what outputs have computed and need again
     """
 
@@ -46,6 +48,7 @@ class FinishedRun:
     singular: tuple[SingularPoint, ...] = ()
     beside: Callable[[], MeshFields] | None = None
     derived: Callable[[FinishedRun, Sequence[Output]], Values] | None = None
+    state: Callable[[], Mapping[str, Array]] = dict
     kept: dict[Any, Any] = field(default_factory=dict)
 
     @property

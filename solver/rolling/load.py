@@ -85,7 +85,7 @@ class AppliedLoad:
     moment: float = 0.0
 
     @property
-    def start(self) -> Self:
+    def start(self) -> Any:
         """The first guess for the contact of another pass."""
         return self
 

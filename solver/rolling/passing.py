@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -140,7 +140,7 @@ def passing(
     before: S,
     guess: Array | None = None,
     *,
-    start: AppliedLoad | None = None,
+    start: Any = None,
     parts: int | None = None,
     tolerance: float = TOLERANCE,
     budget: SolveBudget | None = None,

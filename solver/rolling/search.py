@@ -23,7 +23,7 @@ from solver.errors import LimitLoad, NoContact, NotConverged, Spins, TooLong, Wi
 from solver.materials.law import Law
 from solver.materials.material import Material
 from solver.rolling.body import PassedBody, S
-from solver.rolling.load import AppliedLoad, PassingLoad, RollingLoad, spinning
+from solver.rolling.load import PassingLoad, RollingLoad, spinning
 from solver.rolling.passing import TOLERANCE, Pass, SolveBudget, passing
 from solver.typing import Array
 
@@ -51,7 +51,7 @@ def search(
     before: S,
     guess: Array | None = None,
     *,
-    start: AppliedLoad | None = None,
+    start: Any = None,
     parts: int | None = None,
     tolerance: float = TOLERANCE,
     budget: SolveBudget | None = None,

@@ -14,7 +14,7 @@ from solver.audit.figures import AUDIT
 from solver.audit.pairs import untouched
 from solver.audit.report import Audit, audit
 from solver.contact.system import System
-from solver.errors import LimitLoad, TooLong
+from solver.errors import LimitLoad
 from solver.late import Late
 from solver.loading.control import Control
 from solver.loading.outcome import Outcome
@@ -58,16 +58,13 @@ def record(scene: Scene, run: FinishedRun) -> Record:
     return replace(
         _labelled(scene, run, status, messages, values),
         mesh=partial(run.samples.fields.on_mesh, states, run.beside),
+        state=run.state,
     )
 
 
 def _message(scene: Scene, run: FinishedRun, status: Status, messages: tuple[str, ...]) -> str:
-    """Return the message of a run; `TooLong` has its own advice, opposite to a finer mesh."""
-    if status is Status.OK or isinstance(run.outcome.error, TooLong):
-        return "; ".join(messages)
-    table = scene.advice(run.parameters) if callable(scene.advice) else scene.advice
-    reasons: tuple[Any, ...] = (*type(run.outcome.error).__mro__, status)
-    advice = next((table[each] for each in reasons if each in table), None)
+    """Return the message of a run, with what the user can do."""
+    advice = "" if status is Status.OK else scene.remedy(run.parameters, run.outcome.error, status)
     return "; ".join((*messages, advice) if advice else messages)
 
 

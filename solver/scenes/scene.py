@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, NoReturn
 
 from solver.derivatives.asked import Derivatives
-from solver.errors import NotConverged
+from solver.errors import NotConverged, TooLong
 from solver.late import late
 from solver.loading.control import INCREMENT_ERROR
 from solver.loading.program import Program, StepRefinement
@@ -50,6 +51,16 @@ class Effort:
         if not self.memory:
             object.__setattr__(self, "memory", _FIRST + _PER_UNKNOWN * self.unknowns**_EXPONENT)
 
+    def without(self, other: Effort) -> Effort:
+        """Return the work of a path that begins where another one has ended."""
+        known = None if self.seconds is None else self.seconds - (other.seconds or 0.0)
+        return replace(
+            self,
+            increments=self.increments - other.increments,
+            most_increments=self.most_increments - other.increments,
+            seconds=known,
+        )
+
 
 Monitor = Callable[[float], None]
 """Called after every increment with the fraction of the work done (0-1).
@@ -58,9 +69,9 @@ An exception it raises stops the work and reaches the caller unchanged."""
 Advice = Mapping[Status | type[NotConverged], str]
 """What the user can do, by status or by error."""
 
-Method = Callable[["Scene", Any, Monitor], Iterator[Any]]
-"""Computes the `FinishedRun`s of a scene from their parameters, in the order of the branch
-parameter."""
+Method = Callable[..., Iterator[Any]]
+"""(scene, parameters of the runs, monitor) -> their `FinishedRun`s, in the order of the branch
+parameter; with ``begun`` of `Scene.path` too, if they have a ``state``."""
 
 Output = Callable[[Any], Mapping[Quantity, Any]]
 """Computes some quantities of a `FinishedRun`."""
@@ -144,17 +155,25 @@ class Scene:
     derivatives: Derivatives | None = None
     allow: tuple[str, ...] = ()
 
-    def path(self, parameters: Any, values: Sequence[float], monitor: Monitor) -> Iterator[Record]:
+    def path(
+        self, parameters: Any, values: Sequence[float], monitor: Monitor,
+        begun: Mapping[str, Any] | None = None,
+    ) -> Iterator[Record]:  # fmt: skip
         """Yield one record for each value of the branch parameter, in increasing order.
 
         Each is yielded as soon as it is known, also that of a failed run. A scene without a branch
         parameter yields one record.
+
+        Parameters
+        ----------
+        begun : `Record.state` of a run with a smaller value than all of these, to go on from
         """
         runs = [parameters]
         if self.branch:
             kind = type(getattr(self.parameters(), self.branch))
             runs = [replace(parameters, **{self.branch: kind(value)}) for value in sorted(values)]
         method: Method = self.method(runs[-1]) if self.method else _by_increments
+        method = partial(method, begun=begun) if begun else method
         for each, run in zip(runs, method(self, runs, monitor), strict=True):
             yield replace(self.record(run), parameters=each)
         monitor(1.0)
@@ -187,6 +206,19 @@ class Scene:
         runs = (replace(parameters, **{self.branch: kind(value)}) for value in values)
         for run in _by_increments(self, runs, monitor, last):
             yield self.record(run)
+
+    def remedy(
+        self, parameters: Any, error: NotConverged | None, status: Status = Status.NOT_CONVERGED
+    ) -> str:
+        """Return what the user can do about an outcome; empty if nothing is known.
+
+        `TooLong` has its own advice, opposite to a finer mesh.
+        """
+        if isinstance(error, TooLong):
+            return ""
+        table = self.advice(parameters) if callable(self.advice) else self.advice
+        reasons: tuple[Any, ...] = (*type(error).__mro__, status)
+        return next((table[each] for each in reasons if each in table), "")
 
     def record(self, run: Any) -> Record:
         """Return the record of a `FinishedRun`."""

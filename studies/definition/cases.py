@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from solver.scenes import Scene
+from studies.definition.identity import Namer, written
 from studies.definition.parameters import build
 
 USUAL_AXES = ("load_ratio", "friction", "hardening")
@@ -34,6 +35,17 @@ class Case:
     def parameters(self) -> Any:
         """The scene's parameter object, built when requested."""
         return build(self.scene, self.values)
+
+    @property
+    def shorter(self) -> dict[str, int]:
+        """Ids of the runs with a smaller whole value of the branch parameter, and their values."""
+        branch = self.scene.branch
+        value = self.values.get(branch)
+        if not isinstance(value, int):
+            return {}
+        namer = Namer("run", self.scene.name, self.values, written(self.scene))
+        at = namer.places([branch])
+        return {namer.id_of([(at, [Namer.entry(branch, n)])]): n for n in range(1, value)}
 
 
 @dataclass(frozen=True, slots=True)

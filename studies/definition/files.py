@@ -24,12 +24,13 @@ def read_study(
 ) -> dict[str, Any]:
     """Return the tables of a study file.
 
-    ``[points] file = "tests.csv"`` names a table beside the study, and so does an axis of the sweep
-    that has this entry: see `read_table`. A value of a parameter that ends in ``.csv`` or ``.txt``
-    names the points of a curve, one with the ending of a mesh file (`FORMATS`) the mesh of a
-    section, and ``steels.toml#40Cr`` a material. Entries of kinds of study name files too, see
-    `Kind.with_files`. The study that this one ``extends`` may be a file. What is in the files takes
-    their place, so that the content of a study needs no other file.
+    ``[points] file = "tests.csv"``, or ``points = "tests.csv"``, names a table beside the
+    study, and so does an axis of the sweep with an entry ``file``: see `read_table`. A value of
+    a parameter that ends in ``.csv`` or ``.txt`` names the points of a curve, one with the
+    ending of a mesh file (`FORMATS`) the mesh of a section, and ``steels.toml#40Cr`` a
+    material. Entries of kinds of study name files too, see `Kind.with_files`. The study that
+    this one ``extends`` may be a file. What is in the files takes their place, so that the
+    content of a study needs no other file.
 
     Parameters
     ----------
@@ -50,7 +51,9 @@ def read_study(
         allowed = f'is a scene file, not a study: a study has the line scene = "{name}"'
         raise StudyError("file", str(path), allowed)
     if "points" in tables:
-        tables["points"] = _with_table(tables["points"], "points", folder)
+        given = tables["points"]
+        given = {"file": given} if isinstance(given, str) else given
+        tables["points"] = _with_table(given, "points", folder)
     if isinstance(sweep := tables.get("sweep"), dict):
         for name in sweep:
             sweep[name] = _with_table(sweep[name], f"sweep.{name}", folder)

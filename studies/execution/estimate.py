@@ -11,7 +11,7 @@ import contextlib
 import itertools
 import math
 import os
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -68,6 +68,8 @@ class Estimate:
     memory : most bytes of a worker process: libraries, the path that needs most, and what is kept
         of paths before
     basis : on which data the estimate is based, as text
+    going_on : number of paths that go on from a stored run
+    from_start : number of paths of which shorter runs are stored, without the state to go on from
 
     A number that cannot be estimated is None.
     """
@@ -84,6 +86,8 @@ class Estimate:
     bytes: int
     memory: int | None
     basis: str
+    going_on: int = 0
+    from_start: int = 0
 
     @property
     def time(self) -> str:
@@ -100,9 +104,15 @@ class Estimate:
         most = f"about {self.usual_runs}, at most {self.runs}; some of them may be there"
         lacking = f"{self.to_compute} to compute" if self.to_compute else "all are stored"
         times = f"{self.increments} in all, at most {self.longest} on a path"
+        walks = f"{self.paths} to walk"
+        if self.going_on:
+            walks += f", {self.going_on} of them on from the end of a stored run"
+        if self.from_start:
+            walks += f", {self.from_start} of them from the start: shorter runs are stored without "
+            walks += 'their state, which keep = "fields" keeps for rails and raceways'
         return {
             "runs": most if chooses else f"{self.runs} in all, {lacking}",
-            "loading paths": f"{self.paths} to walk",
+            "loading paths": walks,
             "unknowns": unknown if self.unknowns is None else f"at most {self.unknowns} a run",
             "increments": unknown if self.increments is None else times,
             "processor time": self.time or unknown,
@@ -219,14 +229,16 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
     usual = study.usual_runs
     share, seconds = usual / max(study.size, 1), [0.0, 0.0, 0.0]
     refused: list[StudyError] = []
-    for path, missing in _missing(study, store):
+    begun: list[int] = []
+    for path, missing, own in _missing(study, store):
+        begun += own
         to_compute += len(missing)
         paths += 1
         elements = 0
         set_up = 0.0
         if scene.effort is not None:
             try:
-                effort = scene.effort(path.parameters, missing)
+                effort = _effort(scene.effort, path, missing, own)
             except ModelError as error:
                 refused.append(study.expansion.located(error, path.cases[0].index))
                 results += len(missing) * _of(_PER_RUN, 0)
@@ -270,10 +282,31 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
         bytes=round(to_compute * _file_size(scene.name, study.keep, store, unknowns) * _COMBINED),
         memory=memory if known else None,
         basis=basis if known else f"{scene.name} does not estimate the work of its paths",
+        going_on=sum(map(bool, begun)),
+        from_start=begun.count(0),
     )
     if bounds:
         bounds.check(found)
     return found
+
+
+def _effort(
+    of: Callable[[Any, Sequence[Any]], Effort],
+    path: LoadingPath,
+    values: list[Any],
+    begun: list[int],
+) -> Effort:
+    """Return the work of a path, without that of the stored run that it goes on from."""
+    own = of(path.parameters, values)
+    return own.without(of(path.parameters, begun)) if any(begun) else own
+
+
+def _begun(path: LoadingPath, missing: Sequence[Any], store: Store) -> list[int]:
+    """Return the first value of `Store.begun` for the first run that a path lacks, or none."""
+    branch = path.cases[0].scene.branch
+    first = next(case for case in path.cases if case.values.get(branch) in missing)
+    found = store.begun(first)
+    return [found[0]] if found else []
 
 
 def _of(seconds: tuple[float, float], elements: int) -> float:
@@ -306,12 +339,13 @@ def _shared(each: list[list[float]]) -> float:
     return sum(max(own) * min(processes, -(-len(own) // most)) for own in each)
 
 
-def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any]]]:
-    """Yield each path that lacks runs, and the values of its branch parameter that it lacks."""
+def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any], list[int]]]:
+    """Yield each path that lacks runs, the values of its branch parameter, and where it begins."""
     branch = study.problem.branch
     if study.kind.chooses:
-        yield from _longest(study)
+        yield from ((*each, []) for each in _longest(study))
         return
+    any_stored = bool(store.catalogue.counts())
     paths = study.paths()
     # the catalogue of an address may lack runs of other machines until something is computed here
     stored = store.stored_runs() if isinstance(store.address, str) else set()
@@ -322,7 +356,7 @@ def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any
         done |= there - store.catalogue.rows(there).keys()
         for path in batch:
             if missing := [case.values.get(branch) for case in path.cases if case.id not in done]:
-                yield path, missing
+                yield path, missing, _begun(path, missing, store) if any_stored else []
 
 
 def _asked(study: Study) -> Iterator[tuple[LoadingPath, list[Any]]]:

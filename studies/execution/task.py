@@ -200,7 +200,9 @@ def _walk(
     try:
         if owed:
             monitor(0.0)
-            for record in task.scene.path(path.parameters, list(owed), monitor):
+            _, state = store.begun(next(iter(owed.values()))) or (0, {})
+            begun = (state,) if state else ()  # a scene of its own kind need not know it
+            for record in task.scene.path(path.parameters, list(owed), monitor, *begun):
                 value = getattr(record.parameters, branch, None)
                 row = _written(store, task, owed[value], record)
                 del owed[value]

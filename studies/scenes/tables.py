@@ -619,9 +619,9 @@ _ACCURACY = ParameterTable(
 class AdviceTable(SceneTable):
     """Advice for the user if a run fails, by its status."""
 
-    limit_load: str = ""
+    limit_load: str = "lower the load"
     not_converged: str = ""
-    audit_failed: str = ""
+    audit_failed: str = "use smaller elements"
 
 
 class SceneFile(SceneTable):

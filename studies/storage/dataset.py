@@ -79,7 +79,7 @@ def run_content(scene: Scene, case: Case, outcome: Record | str, keep: str = "")
     """Return the content of the file of a run: its record, or the reason why there is none.
 
     It does not depend on the study, except for ``keep``: with it a complete run has the fields at
-    the nodes.
+    the nodes, and the state from which a longer one goes on.
     """
     sweep, attrs = usual_dimensions(scene), dict[str, Any]()
     record = None if isinstance(outcome, str) else outcome
@@ -94,7 +94,7 @@ def run_content(scene: Scene, case: Case, outcome: Record | str, keep: str = "")
         every |= _results(scene, record, sweep)
         attrs[SYMMETRIC] = int(record.symmetric)
         if keep and record.mesh is not None:
-            every |= ugrid.variables(record.mesh())
+            every |= ugrid.variables(record.mesh()) | ugrid.states(record.state())
             attrs[KEEP] = keep
     title = f"{scene.name}: {scene.summary}"
     known = provenance(title, scene, completed(scene, case.values))

@@ -128,6 +128,9 @@ def _expected(
         yield name, _Required(sweep, np.full(ones, number, dtype=float), _words(name, case.scene))
     if keep and record.mesh is not None:
         yield from _expected_mesh(record.mesh())
+        for name, array in record.state().items():
+            dims = tuple(f"mesh_state_{name}_{k}" for k in range(array.ndim))
+            yield f"mesh_state_{name}", _Required(dims, array)
 
 
 def _words(name: str, scene: Scene) -> dict[str, Any]:

@@ -41,7 +41,7 @@ from studies.errors import CatalogueDamaged, FileDamaged, StoreFull, StudyError,
 from studies.scenes.file_scene import FileScene
 from studies.scenes.registry import known_names
 from studies.storage import dataset as layout
-from studies.storage import runfile, seal, shelf
+from studies.storage import runfile, seal, shelf, ugrid
 from studies.storage.blobs import blobs_at
 from studies.storage.catalogue import BATCH, Catalogue, Row
 from studies.storage.readback import verified
@@ -361,6 +361,19 @@ class Store:
         except FileDamaged as error:
             self.set_aside(error, "the run will be computed again")
             return None
+
+    def begun(self, case: Case) -> tuple[int, dict[str, Any]] | None:
+        """Return the branch value and the state of the longest stored run that a run goes on from.
+
+        They are 0 and empty if none keeps its state, None if no shorter run is stored.
+        """
+        values = case.shorter
+        stored = sorted(self.modified(values), key=values.__getitem__, reverse=True)
+        for run_id in stored:
+            with suppress(FileDamaged), runfile.opened(self.run_path(run_id)) as run:
+                if state := ugrid.state_of(run):
+                    return values[run_id], state
+        return (0, {}) if stored else None
 
     def run(self, run_id: str) -> Row | None:
         """Return the row of a run whose file is valid; the catalogue is updated to the file."""

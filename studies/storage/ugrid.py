@@ -10,7 +10,7 @@ https://ugrid-conventions.github.io/ugrid-conventions/, version 1.0.
 from __future__ import annotations
 
 import json
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from solver.tensors import AXES
 
 MESH = "mesh"
 TIME, NODE, _FACE, _CELL = "time", "mesh_node", "mesh_face", "mesh_cell"
+_STATE = "mesh_state_"
 
 
 def variables(fields: MeshFields) -> dict[str, Any]:
@@ -82,9 +83,28 @@ def variables(fields: MeshFields) -> dict[str, Any]:
     return out
 
 
+def states(arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """Return the variables of the state from which a longer run goes on, by name of array."""
+    words = "state after the run, from which a longer one goes on"
+    return {
+        f"{_STATE}{name}": (
+            tuple(f"{_STATE}{name}_{k}" for k in range(values.ndim)),
+            values,
+            {"long_name": f"{name}: {words}"},
+        )
+        for name, values in arrays.items()
+    }
+
+
+def state_of(run: Any) -> dict[str, np.ndarray]:
+    """Return the arrays of the state that an open file of a run has; empty if it has none."""
+    names = (name for name in run if name.startswith(_STATE) and not run[name].is_scale)
+    return {name.removeprefix(_STATE): run[name][...] for name in names}
+
+
 def owns(name: str, dims: Iterable[Hashable]) -> bool:
-    """Whether a variable of a run's file belongs to the mesh: studies do not combine these."""
-    return name == MESH or not {TIME, NODE, _FACE, _CELL}.isdisjoint(dims)
+    """Whether a variable belongs to mesh or state of a run: studies do not combine these."""
+    return name == MESH or any(d == TIME or str(d).startswith("mesh_") for d in dims)
 
 
 def _whole(values: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from solver.results.quantities import QUANTITIES
 from solver.tensors import AXES
 from studies.errors import StudyError
 from studies.views.best import column_over
@@ -159,6 +160,7 @@ def _map(
         "signed": signed,
         "high": high or 1.0,
         "note": "" if minus is not None else drawn.note,
+        "smooth": drawn.smooth,
         "edge": edge if edge > 0.0 and across == "x" else None,
     }
     return Shown(head, values.transpose(up, across), (across, up))
@@ -198,9 +200,11 @@ def _described(run: xr.Dataset, name: str) -> dict[str, Any]:
     }
 
 
-def _axis(run: xr.Dataset | xr.DataArray, name: Hashable) -> dict[str, str]:
+def _axis(run: xr.Dataset | xr.DataArray, name: Hashable) -> dict[str, Any]:
     words = str(name) if name in AXES else str(run[name].attrs.get("long_name", name))
-    return {"name": str(name), "words": words, "unit": _unit(run[name])}
+    quantity = QUANTITIES.get(str(name))
+    whole = quantity is not None and quantity.count
+    return {"name": str(name), "words": words, "unit": _unit(run[name]), "whole": whole}
 
 
 def _labels(values: xr.Dataset | xr.DataArray, name: Hashable) -> dict[str, Any]:

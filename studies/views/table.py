@@ -81,7 +81,7 @@ class Column:
     def whole(self) -> bool:
         """Whether its numbers are counts."""
         quantity = QUANTITIES.get(self.name)
-        return quantity is not None and quantity.count
+        return quantity is not None and quantity.count and not self.flags
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

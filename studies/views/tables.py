@@ -21,6 +21,7 @@ from studies.definition.vocabulary import LABEL_ATTRIBUTES, MISSING, OK
 from studies.errors import StudyError
 from studies.execution.run import StudyOutcome
 from studies.kinds.kind import Kind
+from studies.numbers import ROUNDED
 from studies.scenes.registry import scene_of
 from studies.storage.ugrid import owns
 from studies.views.columns import aligned, in_blocks, or_none, stacked, unit_text, value_text
@@ -42,9 +43,6 @@ FOOTNOTE = (
     f"\n{_MARK} taken at a singular point, where strain is unbounded: the number depends on the "
     "mesh and need not\n  converge as the mesh is refined\n"
 )
-
-_ROUNDED = 1e-9
-"""Ratio of a number to the largest of its unit in a table; below it, it is printed as 0."""
 
 
 class RunCells(NamedTuple):
@@ -117,7 +115,7 @@ def _clean(values: xr.DataArray, levels: Mapping[str, float]) -> xr.DataArray:
     """Return numbers with zero for what is rounding beside others of their unit."""
     if values.dtype.kind != "f" or not (unit := _unit(values)):
         return values
-    return values.where(~(abs(values) < _ROUNDED * levels.get(unit, 0.0)), 0.0)
+    return values.where(~(abs(values) < ROUNDED * levels.get(unit, 0.0)), 0.0)
 
 
 def _cells(values: xr.DataArray, spoiled: xr.DataArray) -> np.ndarray:

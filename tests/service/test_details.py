@@ -15,6 +15,7 @@ from service.errors import NotFound
 from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.overview import KEPT, Detail, Details
+from service.pages.run import numbers_shown
 from service.schemas import StudyDetail, Window
 from service.turns import Share, Turns
 from studies import Store
@@ -138,3 +139,13 @@ def test_nothing_is_kept_of_a_study_that_does_not_exist(details: Counted) -> Non
 
     asyncio.run(unknown())
     assert list(details.kept) == [("a", 100, 0)]
+
+
+def test_a_number_that_is_rounding_is_shown_as_zero() -> None:
+    """Beside others of its unit, as in tables of the command; a ratio has no level."""
+    scalars = {
+        "peak_patch_pressure": 2863.0, "peak_residual_tension": 4.5e-12, "lateral_force": 2.8e-9,
+        "longitudinal_force": 6.1, "max_plastic_strain": 1e-12,
+    }  # fmt: skip
+    shown = {each["name"]: each["value"] for each in numbers_shown({"scalars": scalars}, None)}
+    assert shown == scalars | {"peak_residual_tension": 0.0, "lateral_force": 0.0}

@@ -87,6 +87,22 @@ def test_a_mistake_is_told(
     assert told in capsys.readouterr().err
 
 
+def test_columns_are_named_apart_or_with_commas(
+    computed: tuple[Study, Store], capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = ["table", str(computed[1].directory), "--columns"]
+    assert main([*given, "friction,status"]) == main([*given, "friction", "status"]) == 0
+    one, other = capsys.readouterr().out.split("friction,status\n")[1:]
+    assert one == other
+
+
+def test_a_state_is_written_as_its_word() -> None:
+    """A shakedown state; it is stored as a number, whose name is in the flags."""
+    column = column_of("shakedown_state", np.array([1.0, np.nan, 0.0]), "result")
+    text = b"".join(FORMS["csv"].write([column], np.arange(3))).decode()
+    assert text.split() == ["shakedown_state", "elastic_shakedown", '""', "elastic"]
+
+
 def test_a_run_without_a_number_has_none(computed: tuple[Study, Store]) -> None:
     with open_study(computed[1].directory) as dataset:
         failed = dataset.load().copy()

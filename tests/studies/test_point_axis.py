@@ -78,6 +78,7 @@ def test_what_a_point_leaves_out_is_the_default_however_it_is_written(tmp_path: 
     ids = {study.id, named.id, stored.id, from_file(tmp_path, table).id}
     decimal = table.replace(", ", ";").replace(",", ";").replace(".", ",").replace(";,1", ";0,1")
     assert ids == {from_file(tmp_path, decimal).id}
+    assert ids == {from_file(tmp_path, table, 'points = "tests.csv"\n').id}
     assert with_points(TESTS[::-1]).id != study.id
 
 

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
+from solver.rolling.scenes import rail_passes
 from solver.shipped import SCENES
 from studies import Store, Study, open_study
 from studies.definition.parameters import scene_schema
@@ -137,3 +139,37 @@ def test_a_set_up_is_paid_once_in_a_process(store: Store, monkeypatch: pytest.Mo
     monkeypatch.setattr("os.cpu_count", lambda: 2)
     assert likely({"friction": [0.2, 0.3]}) == pytest.approx(other, rel=1e-9)
     assert one < two < 2 * one
+
+
+@pytest.mark.solves
+def test_passes_go_on_from_a_stored_run(
+    store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exactly as if they were computed from the start, and only where the state is stored."""
+
+    def mixed(passes: list[int], keep: dict[str, str]) -> Study:
+        content = {
+            "name": "mixed", "scene": "wheel_rail", "sweep": {"passes": passes}, **keep,
+            "parameters": {"accuracy": "draft", "load": 130e3, "load_spread": 0.1, "seed": 3,
+                           "sequence": ENTRIES, "hardening": "kinematic"},
+        }  # fmt: skip
+        return Study.from_dict(json.loads(json.dumps(content)))
+
+    scene, given = SCENES["wheel_rail"], {"keep": "fields"}
+    whole, passed = Store(tmp_path / "whole"), []
+    compute_here(mixed([2, 5], {}), whole, scene)
+    compute_here(mixed([2], given), store, scene)
+    own = rail_passes.search
+    monkeypatch.setattr(
+        rail_passes, "search", lambda *args, **more: passed.append(1) or own(*args, **more)
+    )
+    compute_here(mixed([5], {}), store, scene)
+    assert len(passed) == 3
+    (case,) = mixed([5], {}).cases()
+    one, other = (xr.load_dataset(each.run_path(case.id)) for each in (whole, store))
+    xr.testing.assert_equal(one.drop_vars("cpu_seconds"), other.drop_vars("cpu_seconds"))
+    longer = {each: estimate(mixed([8], {}), each) for each in (store, whole)}
+    assert [each.increments for each in longer.values()] == [6, 8]
+    words = [each.costs(chooses=False)["loading paths"] for each in longer.values()]
+    assert "on from the end of a stored run" in words[0]
+    assert "from the start" in words[1]

@@ -18,7 +18,7 @@ from solver.mesh import grid, within
 from solver.model.friction import BoundLines
 from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.audit.rail import audit_prism
-from solver.rolling.passing import Pass, passing
+from solver.rolling.passing import passing
 from solver.rolling.rail import far_field as far_fields
 from solver.rolling.rail import flow as flows
 from solver.rolling.rail import patch as patches
@@ -56,13 +56,13 @@ def audits(track: PrismTrack, law: Material = HARDENS, count: int = 1) -> list[A
     """Audits of passes of a braked wheel."""
     state, guess, plain = track.virgin(law), None, PlainPrism(track)
     load: Any = wheel(track, 0.3, 0.75)
-    previous: Pass[PrismState] | None = None
+    left: PrismState | None = None
     found = []
     with one_thread():
         for _ in range(count):
             given = passing(track, law, load, state, guess)
-            found.append(audit_prism(track, law, given, previous, plain))
-            previous, state, guess = given, given.after, given.strain
+            found.append(audit_prism(track, law, given, left, plain))
+            left, state, guess = given.left, given.after, given.strain
     return found
 
 
@@ -81,7 +81,7 @@ def test_a_given_pressure_passes_where_it_begins_with_the_state_of_the_pass_befo
     each = audit_prism(track, PERFECT, found, None)
     assert each.passed, each.violations
     assert "audit_slip" not in each.figures
-    (told,) = audit_prism(track, PERFECT, found, found).violations
+    (told,) = audit_prism(track, PERFECT, found, found.left).violations
     assert told.startswith("audit_history")
     assert not each.outside
     state = found.after.state

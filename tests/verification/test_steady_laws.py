@@ -316,8 +316,8 @@ def _with_back(layers, back):
 )
 def test_the_audit_finds_what_is_wrong_with_internal_variables(broken, figure):
     track, law, first, second = _two()
-    assert audit_pass(track, law, second, first, -1).violations == ()
-    violations = audit_pass(track, law, broken(second), first, -1).violations
+    assert audit_pass(track, law, second, first.left, -1).violations == ()
+    violations = audit_pass(track, law, broken(second), first.left, -1).violations
     assert any(text.startswith(figure) for text in violations), violations
 
 

@@ -202,7 +202,7 @@ def test_the_zone_is_at_the_contact() -> None:
 
 
 def test_a_zone_that_is_too_small_is_begun_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("solver.rolling.scenes.wheel_rail_setup.REACHES", (0.6, 1.0))
+    monkeypatch.setattr("solver.rolling.scenes.rail_passes.REACHES", (0.6, 1.0))
     again = SCENE.path(SCENE.parameters(**PUBLISHED), [1], lambda share: None)
     (record,) = again
     assert record.status is Status.OK

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,9 +13,10 @@ from solver import ModelError, Record
 from solver.errors import NoContact, NotConverged, Runaway, WindowTooSmall
 from solver.results.record import Status
 from solver.rolling import search
+from solver.rolling.scenes import rail_outputs
 from solver.rolling.scenes import rail_passes as prism_passes
 from solver.rolling.scenes.rail_outputs import remedies
-from solver.rolling.scenes.wheel_rail import WheelRailParameters
+from solver.rolling.scenes.wheel_rail import ELEMENT_SIZE, WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
 from solver.rolling.scenes.wheel_rail_track import geometry
 from solver.shipped import SCENES
@@ -88,7 +89,7 @@ def test_easier_passes_lead_to_one_that_newtons_method_does_not_find(
 @pytest.mark.parametrize(
     ("error", "friction", "remedy"),
     [
-        (NoContact("no contact forces were found"), 0.17, "choose a finer accuracy"),
+        (NoContact("no contact forces were found"), 0.17, "lower load or traction"),
         (NoContact("no contact forces were found"), 0.4, "of 290 MPa: set shear_limit = 1"),
         (Runaway("plastic strain grows"), 0.4, "lower load or traction"),
         (WindowTooSmall("too small"), 0.4, "lower the load"),
@@ -103,6 +104,7 @@ def test_a_pass_that_is_not_found_names_the_one_remedy_of_its_reason(
         raise error
 
     monkeypatch.setattr(search, "passing", lost)
+    monkeypatch.setattr(rail_outputs, "FINER", {})
     parameters = SCENE.parameters(**{**DRAFT, "friction": friction})
     (record,) = SCENE.path(parameters, [1], lambda share: None)
     assert record.status is Status.NOT_CONVERGED
@@ -110,12 +112,38 @@ def test_a_pass_that_is_not_found_names_the_one_remedy_of_its_reason(
     assert record.message.endswith(remedy) and record.message.count("; ") == 1
 
 
+def test_smaller_elements_are_tried_where_they_are_the_remedy(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Under two contacts draft elements often have no contact forces where smaller ones have."""
+    own, tried = search.passing, list[int]()
+
+    def coarse(track: Any, *given: Any, **settings: Any) -> Any:
+        tried.append(len(track.points[0]))
+        if tried[-1] == tried[0]:
+            raise NoContact("no contact forces were found")
+        return own(track, *given, **settings)
+
+    monkeypatch.setattr(search, "passing", coarse)
+    monkeypatch.setitem(
+        cast("dict[str, float]", ELEMENT_SIZE), "standard", 2.6
+    )  # cheap; any other size than that of draft
+    record = rolled(friction=0.17)
+    assert record.message == (
+        "no contact forces were found: computed with accuracy = standard instead"
+    )
+    assert getattr(record.parameters, "accuracy", "") == "draft"
+    assert not record.state()  # passes go on with elements of draft, or with none
+
+
 def test_shear_beyond_yield_is_named_with_coulombs_law_alone() -> None:
     """Another law need not have this coefficient, nor `shear_limit`."""
     usual = SCENE.parameters(**{**DRAFT, "friction": 0.4})
-    other = SimpleNamespace(material=usual.material, friction=0.4, friction_law="tanh")
+    other = SimpleNamespace(
+        material=usual.material, friction=0.4, friction_law="tanh", accuracy="draft"
+    )
     assert "set shear_limit = 1" in remedies(usual, 1e3)[NoContact]
-    assert remedies(other, 1e3)[NoContact] == "choose a finer accuracy"
+    assert remedies(other, 1e3)[NoContact] == "choose accuracy = standard"
 
 
 def test_a_lateral_force_that_no_contact_at_this_position_has_is_told_with_the_least() -> None:

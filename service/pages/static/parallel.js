@@ -103,7 +103,8 @@ function axesDrawn(at) {
     at.textAlign = "left";
     at.fillStyle = colour("ink");
     for (const [share, said] of ticks(axis)) {
-      const [from, wide] = [x + 6, at.measureText(said).width];
+      const wide = at.measureText(said).width, beyond = x + 6 + wide > size()[0];
+      const from = beyond ? x - 6 - wide : x + 6; // a long word stays on the canvas
       at.fillStyle = colour("card");
       at.globalAlpha = 0.9;
       at.fillRect(from - 1, up(share) - 8, wide + 3, 15);

@@ -18,6 +18,7 @@ export class Pictures {
     this.run = run;
     this.high = null;
     this.asked = {};
+    this.shown = {};
   }
 
   async show(run, fields = null) {
@@ -48,7 +49,10 @@ export class Pictures {
     const known = part === "map" ? this.fields.maps : this.fields.lines.filter(({ pictures }) => pictures.includes(part));
     chart.closest("figure").hidden = !known.length;
     if (!known.length) return;
-    const field = known.find((each) => each.name === state.get(part)) ?? known.find(({ usual }) => usual?.includes(part)) ?? known[0];
+    const others = part === "line" ? PARTS.slice(0, -1).map((each) => this.shown[each]) : []; // no picture twice
+    const free = known.filter(({ name }) => !others.includes(name));
+    const field = known.find((each) => each.name === state.get(part)) ?? free.find(({ usual }) => usual?.includes(part)) ?? free[0] ?? known[0];
+    this.shown[part] = field.name;
     const components = field.components ?? [];
     const component = components.includes(state.get(`${part}.component`)) ? state.get(`${part}.component`) : components[0];
     const stages = (part === "map" && field.stages) || [];
@@ -109,7 +113,7 @@ export function drawMap(chart, { head, arrays }, high) {
   };
   return draw(chart, () => ({
     traces: [{
-      type: "heatmap", x, y, z, zmin: head.signed ? -high : 0, zmax: high, hoverongaps: false,
+      type: "heatmap", zsmooth: head.smooth && "best", x, y, z, zmin: head.signed ? -high : 0, zmax: high, hoverongaps: false,
       colorscale: head.signed ? SIGNED : SEQUENTIAL, colorbar: { ...bar(named(unit ? "" : head.words, unit).trim()), lenmode: "pixels", len: tall() + 20 },
       hovertemplate: `${across.name} %{x:.4~g} ${plain(across.unit)}, ${up.name} %{y:.4~g} ${plain(up.unit)}<br><b>%{z:.4~g} ${plain(unit)}</b><extra></extra>`,
     }, ...(head.edge ? [{
@@ -129,6 +133,7 @@ export function drawMap(chart, { head, arrays }, high) {
 export function drawLines(chart, found, names = [], label = null) {
   const { head } = found[0];
   const { along, over } = head;
+  const counted = along.whole && found[0].arrays[along.name].values.at(-1) <= 10;
   return draw(chart, () => {
     const traces = [];
     const keys = KEYS();
@@ -151,13 +156,19 @@ export function drawLines(chart, found, names = [], label = null) {
     return {
       traces,
       layout: {
-        xaxis: { title: titled(chart, along.words, along.unit), zeroline: false, showgrid: false },
-        yaxis: { title: { text: head.unit ? named("", head.unit).trim() : "" } },
+        xaxis: { title: titled(chart, along.words, along.unit), zeroline: false, showgrid: false, ...(counted && { dtick: 1 }) },
+        yaxis: { title: { text: head.unit ? named("", head.unit).trim() : "" }, rangemode: constant(traces) ? "tozero" : "normal" },
         showlegend: traces.length > 1,
         legend: { title: { text: names.length ? "" : over.filter(({ labels }) => labels.length > 1).map(({ name }) => words(name)).join(", ") + "&nbsp;" } },
       },
     };
   });
+}
+
+// Whether all values are one: the axis would then reach from one below it to one above it.
+function constant(traces) {
+  const all = traces.flatMap(({ y }) => Array.from(y)).filter(Number.isFinite);
+  return Math.max(...all) - Math.min(...all) <= 1e-9 * Math.max(...all.map(Math.abs));
 }
 
 export function combinations(over) {

@@ -18,18 +18,18 @@ _LIMITS = {"audit_inflow": INFLOW, "audit_steadiness": STEADINESS}
 
 
 def audit_pass(
-    track: Track, material: Law, found: Pass[Layers], previous: Pass[Layers] | None, direction: int
+    track: Track, material: Law, found: Pass[Layers], left: Layers | None, direction: int
 ) -> Audit:
     """Check a steady pass: the state under load, the state behind it, and the flow of material.
 
     Parameters
     ----------
-    previous : the pass before it, None for the first one
+    left : state that the pass before it left, in the coordinates of the track; None for the first
     direction : declared direction of the pass, 1 along +x, -1 along -x
     """
     plain, n = PlainBody(track.part), track.part.weights.size
-    loaded, left = under_load(track, found), of_layers(track, material, found.after)
-    stress, residual = loaded.stress[:, :n], left.stress[:, :n]
+    loaded, behind = under_load(track, found), of_layers(track, material, found.after)
+    stress, residual = loaded.stress[:, :n], behind.stress[:, :n]
     load = found.loading.force.reshape(-1, 2)
     held = np.ones_like(load, dtype=bool)
     held.ravel()[track.part.free] = False
@@ -44,7 +44,7 @@ def audit_pass(
         / material.yield_stress,
         "audit_yield": flow.beyond() / material.yield_stress,
         "audit_dissipation": flow.dissipation(),
-        "audit_history": _lost(material, found, previous, direction),
+        "audit_history": _lost(material, found, left, direction),
         "audit_inflow": flow.inflow(),
         "audit_outflow": flow.outflow(),
         "audit_steadiness": (
@@ -82,20 +82,19 @@ def _released(track: Track, material: Law, found: Pass[Layers]) -> float:
     return max(across, difference(material, found.after.state, left.state))
 
 
-def _lost(material: Law, found: Pass[Layers], previous: Pass[Layers] | None, way: int) -> float:
+def _lost(material: Law, found: Pass[Layers], left: Layers | None, way: int) -> float:
     """Return the difference between the state before the pass and that behind the last one.
 
     The largest difference of internal variables counts, as stress over the yield stress. In the
     opposite direction shear has the opposite sign.
     """
     before = found.before.whole.state
-    if previous is None:
-        left = material.initial(len(before.accumulated), 4)
+    if left is None:
+        state = material.initial(len(before.accumulated), 4)
     else:
-        left = previous.after.whole.state
-        left = left if previous.direction == way else left.mirrored
+        state = (left if way == 1 else left.mirrored).whole.state
     return max(
-        float(found.direction != way), difference(material, before, left) / material.yield_stress
+        float(found.direction != way), difference(material, before, state) / material.yield_stress
     )
 
 

@@ -200,7 +200,7 @@ def audit_prism(
     track: PrismTrack,
     law: Law,
     found: Pass[PrismState],
-    previous: Pass[PrismState] | None,
+    left: PrismState | None,
     plain: PlainPrism | None = None,
 ) -> Audit:
     """Check a steady pass over a prism: the state under load, that behind it, and the flow.
@@ -208,7 +208,7 @@ def audit_prism(
     Parameters
     ----------
     law : the declared law of the prism
-    previous : the pass before it, None for the first one
+    left : state that the pass before it left, in the coordinates of the prism; None for the first
     plain : second evaluation of the track, which passes over it share
 
     Returns
@@ -255,7 +255,7 @@ def audit_prism(
         / law.yield_stress,
         "audit_dissipation": flow.dissipation(),
         "audit_history": max(
-            _lost(track, law, found, previous),
+            _lost(track, law, found, left),
             _unsettled(track, plain) / law.yield_stress,
             _apart(after.displacement, left_surface),
         ),
@@ -322,9 +322,7 @@ def _unsettled(track: PrismTrack, plain: PlainPrism) -> float:
     return float(np.abs(own - stress).max())
 
 
-def _lost(
-    track: PrismTrack, law: Law, found: Pass[PrismState], previous: Pass[PrismState] | None
-) -> float:
+def _lost(track: PrismTrack, law: Law, found: Pass[PrismState], left: PrismState | None) -> float:
     """Return the difference between the state before the pass and that behind the last one.
 
     It is the largest difference of internal variables and strain, as stress over the yield stress,
@@ -332,11 +330,11 @@ def _lost(
     state. The first one begins with the initial stress.
     """
     before, displacement = found.before, np.zeros_like(found.before.displacement)
-    if previous is None:
+    if left is None:
         state = law.initial(len(before.strain), 6)
         strain = track.initial_strain[track.modes.points]
     else:
-        left = previous.left if found.direction == 1 else previous.left.mirrored
+        left = left if found.direction == 1 else left.mirrored
         state, strain, displacement = left.state, left.strain, left.displacement
     off = 2 * law.elasticity.shear_modulus * float(np.abs(before.strain - strain).max())
     off = max(difference(law, before.state, state), off) / law.yield_stress

@@ -18,7 +18,6 @@ J.J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), section
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
@@ -39,7 +38,7 @@ from solver.rolling.rail.friction_cone import (
     solve_cone,
 )
 from solver.rolling.rail.half_space import half_space
-from solver.rolling.rail.patch_contact import PatchContact, PatchLoad
+from solver.rolling.rail.patch_contact import PatchContact, PatchLoad, PatchStart
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.rolling.rail.profiled_wheel import ProfiledWheel
 from solver.typing import Array, Ints
@@ -130,7 +129,7 @@ class RollingPatch(PatchLoad):
         load = self.load
         return np.array([0.0, load.creepage, load.lateral_creepage, load.spin])
 
-    def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
+    def solve(self, u: Array, start: PatchStart | None = None) -> PatchContact:
         """See `PatchLoad`.
 
         Raises
@@ -147,31 +146,28 @@ class RollingPatch(PatchLoad):
         status = found.status
         _check_rim(status)
 
-        def of(
-            values: Array, free: Array, near: Callable[[Array], PatchContact] | None
-        ) -> PatchContact:
-            height, creepage, lateral, spin = self._moved(free)
-            return PatchContact(
-                grid=self.grid,
-                traction=self._global(values),
-                gap=found.effects[..., NORMAL],
-                slip=found.effects[..., TANGENTS],
-                status=status,
-                along=lambda change: self._global(found.along(self._offset(change))[0]),
-                near=near,
-                height=height,
-                creepage=creepage,
-                lateral_creepage=lateral,
-                spin=spin,
-                moment=float(np.tensordot(self._sums[1], values, 3)),
-                steps=found.steps,
+        def near(other: Array) -> PatchStart:
+            values, free = found.along(self._offset(other - u))
+            return PatchStart(
+                self._global(found.values + values), *self._moved(found.rigid + free)[:3]
             )
 
-        def near(other: Array) -> PatchContact:
-            values, free = found.along(self._offset(other - u))
-            return of(found.values + values, found.rigid + free, None)
-
-        return of(found.values, found.rigid, near)
+        height, creepage, lateral, spin = self._moved(found.rigid)
+        return PatchContact(
+            grid=self.grid,
+            traction=self._global(found.values),
+            gap=found.effects[..., NORMAL],
+            slip=found.effects[..., TANGENTS],
+            status=status,
+            along=lambda change: self._global(found.along(self._offset(change))[0]),
+            near=near,
+            height=height,
+            creepage=creepage,
+            lateral_creepage=lateral,
+            spin=spin,
+            moment=float(np.tensordot(self._sums[1], found.values, 3)),
+            steps=found.steps,
+        )
 
     def _moved(self, free: Array) -> list[float]:
         """Return height, creepages and spin, from the rigid motions (k,) that are free."""
@@ -179,7 +175,7 @@ class RollingPatch(PatchLoad):
         rigid[self._free] = free
         return rigid.tolist()
 
-    def _solve(self, u: Array, start: PatchContact | None) -> ConeSolution:
+    def _solve(self, u: Array, start: PatchStart | None) -> ConeSolution:
         """Solve the frictional problem of a surface with these displacements (n, m, 3)."""
         problem = self._problem(u)
         if start is not None:
@@ -257,7 +253,7 @@ class RollingPatch(PatchLoad):
             resultants=resultants[free],
         )
 
-    def _known(self, start: PatchContact) -> tuple[Array, Array]:
+    def _known(self, start: PatchStart) -> tuple[Array, Array]:
         """Return values (n, m, 3) and free rigid motions of a contact."""
         values = np.einsum("jab,cjb->cja", self._axes, start.traction) * _MIRROR
         motions = (start.height, start.creepage, start.lateral_creepage)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +16,16 @@ from solver.rolling.rail.friction_cone import NORMAL, OPEN, SLIP, TANGENTS
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.rolling.rail.track import PrismField
 from solver.typing import Array, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class PatchStart:
+    """The tractions (n, m, 3) [MPa] and motions of a contact, with which another pass begins."""
+
+    traction: Array
+    height: float
+    creepage: float
+    lateral_creepage: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -33,7 +43,7 @@ class PatchContact:
     along : (change (n, m, 3) of the surface's displacement without tractions) -> change of
         ``traction``
     near : (displacement (n, m, 3) of the surface without tractions) -> the contact with it to first
-        order: tractions and motions; None for a given load
+        order; None for a given load
     height : displacement of the wheel along y [mm]
     creepage, lateral_creepage, spin : as in `ProfiledWheel.rolling` [1, 1, 1/mm]
     moment : moment on the axle over the radius of the wheel, positive when braking [N]
@@ -46,7 +56,7 @@ class PatchContact:
     slip: Array
     status: Ints
     along: Callable[[Array], Array]
-    near: Callable[[Array], PatchContact] | None = None
+    near: Callable[[Array], PatchStart] | None = None
     height: float = 0.0
     creepage: float = 0.0
     lateral_creepage: float = 0.0
@@ -95,9 +105,14 @@ class AppliedPatch(AppliedLoad):
     load: PatchLoad
 
     @property
-    def start(self) -> AppliedPatch:
-        """The same load without functions that hold much memory, as another pass begins with it."""
-        return replace(self, contact=replace(self.contact, near=None))
+    def start(self) -> PatchStart:
+        """See `AppliedLoad`; without the functions of the contact, which hold much memory."""
+        own = self.contact
+        return PatchStart(own.traction, own.height, own.creepage, own.lateral_creepage)
+
+    def near(self, moved: Array) -> PatchStart:
+        """Return the contact with another displacement of the surface, to first order if known."""
+        return self.contact.near(moved) if self.contact.near else self.start
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,24 +120,23 @@ class PatchLoad(PassingLoad):
     """A load that passes over the surface of a prism along +x."""
 
     @abstractmethod
-    def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
+    def solve(self, u: Array, start: PatchStart | None = None) -> PatchContact:
         """Return the contact.
 
         Parameters
         ----------
         u : (n, m, 3) displacements of the surface without tractions, means under the hats [mm]
-        start : contact to begin with, of the same grid
+        start : what to begin with, of the same grid
         """
 
     def on(
-        self, u: PrismField, before: PrismState, start: AppliedPatch | None = None
+        self, u: PrismField, before: PrismState, start: AppliedPatch | PatchStart | None = None
     ) -> AppliedPatch:
         """See `PassingLoad`."""
         moved = u.displacement + before.displacement
-        contact = None if start is None else start.contact
-        if contact is not None and contact.near is not None:
-            contact = contact.near(moved)
-        found = self.solve(moved, contact)
+        if isinstance(start, AppliedPatch):
+            start = start.near(moved)
+        found = self.solve(moved, start)
 
         def along(change: PrismField) -> PrismField:
             return change.loaded(found.along(change.displacement))
@@ -175,7 +189,7 @@ class EllipticPatch(PatchLoad):
         if self.a > min(x[0], -x[-1]) - self.grid.spacing / 2 or beside > 0:
             raise WindowTooSmall("the ellipse reaches the outermost stations or vertices")
 
-    def solve(self, u: Array, start: PatchContact | None = None) -> PatchContact:
+    def solve(self, u: Array, start: PatchStart | None = None) -> PatchContact:
         """See `PatchLoad`; the tractions depend on neither ``u`` nor ``start``."""
         grid = self.grid
         ends = grid.ahead + grid.spacing * (0.5 - np.arange(grid.stations + 1))

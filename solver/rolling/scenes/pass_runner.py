@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, cast
 
@@ -23,6 +24,15 @@ from solver.results.view import View
 from solver.rolling.passing import Pass, SolveBudget
 from solver.rolling.results.stage import SteadyBody
 from solver.scenes.scene import Monitor, Scene
+from solver.typing import Array
+
+
+@dataclass(frozen=True, slots=True)
+class BegunPasses:
+    """Passes that are found: what is kept of each, and the state that the last one left."""
+
+    traces: list[Any]
+    left: Any
 
 
 class Passes(ABC):
@@ -36,16 +46,18 @@ class Passes(ABC):
     law : law of the material
     extent : size of the window in words, for the error if the largest window is too small
     beside : (pass) -> fields of a further body, None without
+    begun : passes found in another process, which this one goes on from; None without
     """
 
     parameters: Any
     law: Law
     extent = ""
     beside: Callable[[Pass[Any]], MeshFields] | None = None
+    begun: BegunPasses | None = None
 
     @abstractmethod
     def found(self, budget: SolveBudget) -> Iterator[Pass[Any]]:
-        """Yield the passes in their order; ``budget`` counts the solves of each."""
+        """Yield the passes behind those begun; ``budget`` counts the solves of each."""
 
     @abstractmethod
     def shown(self, number: int) -> tuple[Samples, Callable[[Any], Acting]]:
@@ -56,8 +68,16 @@ class Passes(ABC):
         """Return the data of a pass that are kept."""
 
     @abstractmethod
-    def audit(self, found: Pass[Any], previous: Pass[Any] | None, number: int) -> Audit:
-        """Return the audit of a pass, counted from 0, and the one before it."""
+    def audit(self, found: Pass[Any], left: Any, number: int) -> Audit:
+        """Return the audit of a pass, counted from 0; ``left`` is the state before, or None."""
+
+    def state(self, found: Pass[Any], traces: Sequence[Any]) -> Mapping[str, Array]:
+        """Return what `begin` needs after a pass; empty where other passes cannot go on from it."""
+        return {}
+
+    def begin(self, state: Mapping[str, Array]) -> None:
+        """Go on from a `state` of passes over the same body."""
+        raise NotImplementedError
 
     def decided(self, traces: Sequence[Any]) -> bool:
         """Return whether the passes so far are enough for all runs."""
@@ -78,6 +98,7 @@ def by_passes(
     window: Window,
     reaches: Sequence[float],
     otherwise: Otherwise = lambda remaining, error: None,
+    begun: Mapping[str, Array] | None = None,
 ) -> Iterator[FinishedRun]:
     """Compute pass after pass; yield the runs, which differ in the number of passes.
 
@@ -86,10 +107,11 @@ def by_passes(
     Parameters
     ----------
     reaches : ratios of the size of the window to the usual size, tried in turn
+    begun : `FinishedRun.state` of a run with fewer passes, to go on from
     """
     remaining = list(runs)
-    path = _Path(scene, runs[-1], window)
-    for reach in reaches:
+    path = _Path(scene, runs[-1], window, begun)
+    for reach in (each for each in reaches if begun is None or each >= begun["reach"].item()):
         for run in path.runs(remaining, monitor, reach):
             remaining.pop(0)
             yield run
@@ -107,18 +129,27 @@ class _Path:
     error : error that ended the passes, or None
     """
 
-    def __init__(self, scene: Scene, last: Any, window: Window) -> None:
+    def __init__(
+        self, scene: Scene, last: Any, window: Window, state: Mapping[str, Array] | None
+    ) -> None:
         self._last, self._window, self._view = last, window, scene.view(last)
-        self._started, self._elsewhere = time.process_time(), 0.0
+        self._state = state
+        self._started = time.process_time() - (state["seconds"].item() if state else 0.0)
+        self._elsewhere = 0.0
         self._budget = SolveBudget()
         self.error: NotConverged | None = None
 
     def _begin(self, reach: float) -> None:
-        self._passes = self._window(self._last, self._view, reach)
+        self._reach, self._passes = reach, self._window(self._last, self._view, reach)
         self._steps: list[int] = []
         self._traces: list[Any] = []
         self._found: Pass[Any] | None = None
-        self._previous: Pass[Any] | None = None
+        self._left: Any = None
+        if self._state and reach == self._state["reach"].item():
+            self._passes.begin(self._state)
+            self._steps = self._state["steps"].astype(int).tolist()
+        if begun := self._passes.begun:
+            self._traces, self._left = begun.traces.copy(), begun.left
 
     def runs(self, runs: Sequence[Any], monitor: Monitor, reach: float) -> Iterator[FinishedRun]:
         """Yield the runs whose passes are found; ``error`` is the reason if others are not.
@@ -134,8 +165,10 @@ class _Path:
             return  # this window has no room: keep the error of the smaller one
         self.error = None
         try:
-            for number, found in enumerate(self._passes.found(self._budget), start=1):
-                self._previous, self._found = self._found, found
+            first = len(self._steps) + 1
+            for number, found in enumerate(self._passes.found(self._budget), start=first):
+                self._left = self._found.left if self._found else self._left
+                self._found = found
                 self._steps.append(max(found.steps, 1))
                 self._traces.append(self._passes.trace(found))
                 monitor(min(number / self._last.passes, 0.99))
@@ -152,7 +185,7 @@ class _Path:
 
     def finished(self, run: Any) -> FinishedRun:
         """Return a run with the results of the last pass found."""
-        passes, found, previous = self._passes, self._found, self._previous
+        passes, found, before = self._passes, self._found, self._left
         number = max(len(self._steps) - 1, 0)
         (samples, acting), points, beside = passes.shown(number), {}, None
         view, body = samples.view, cast("SteadyBody", samples.system)
@@ -165,7 +198,12 @@ class _Path:
 
         def check() -> Audit:
             assert found is not None
-            return passes.audit(found, previous, number)
+            return passes.audit(found, before, number)
+
+        def state() -> Mapping[str, Array]:
+            own = passes.state(found, self._traces) if found and self.error is None else {}
+            kept = {"reach": [self._reach], "seconds": [seconds], "steps": self._steps}
+            return own and {**own, **{k: np.array(v, dtype=float) for k, v in kept.items()}}
 
         return FinishedRun(
             parameters=run,
@@ -181,6 +219,7 @@ class _Path:
             check=check,
             doubts=doubts({view.profile_body: passes.law}),
             beside=beside,
+            state=state,
         )
 
     def _reported(self) -> NotConverged | None:

@@ -28,10 +28,9 @@ from solver.rolling.rail.profiles.wheel_profile import crowned
 from solver.rolling.rail.profiles.zone import Zone, raceway_mesh
 from solver.rolling.rail.section import Section
 from solver.rolling.rail.track import PrismTrack
-from solver.rolling.scenes.pass_runner import by_passes
 from solver.rolling.scenes.raceway import BESIDE, RacewayParameters
 from solver.rolling.scenes.rail_outputs import remedies, sketched
-from solver.rolling.scenes.rail_passes import REACHES, RailPasses, RolledPrism
+from solver.rolling.scenes.rail_passes import RolledPrism, by_rail_passes
 from solver.rolling.scenes.rail_window import PrismGeometry, split_rows, whole
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
 from solver.scenes.scene import Advice, Effort, Method
@@ -176,7 +175,7 @@ _PIXELS = 24
 
 def method(parameters: RacewayParameters) -> Method:
     """Return the method of the passes."""
-    return partial(by_passes, window=partial(RailPasses, RolledRaceway), reaches=REACHES)
+    return partial(by_rail_passes, rolled=RolledRaceway)
 
 
 def view(parameters: RacewayParameters) -> View:

@@ -174,6 +174,16 @@ def section(run: FinishedRun) -> Values:
     }
 
 
+FINER = {"draft": "standard", "standard": "fine"}
+"""The next finer accuracy."""
+
+
+def finer(parameters: PrismParameters) -> str:
+    """Return the advice to choose the next finer accuracy; empty if there is none."""
+    own = FINER.get(parameters.accuracy, "")
+    return f"choose accuracy = {own}" if own else ""
+
+
 def remedies(parameters: PrismParameters, pressure: float) -> Advice:
     """Return what the user can do, given the peak pressure of the elastic contact [MPa].
 
@@ -185,7 +195,7 @@ def remedies(parameters: PrismParameters, pressure: float) -> Advice:
     unlimited = coulomb and not getattr(parameters, "shear_limit", 0.0)
     beyond = unlimited and friction * pressure > strength
     shear = f"friction would carry {friction * pressure:.0f} MPa, more than the shear yield stress"
-    accuracy = "choose a finer accuracy"
+    accuracy = finer(parameters) or "lower load or traction"
     return {
         Status.LIMIT_LOAD: "lower load or traction, or let the material harden",
         Runaway: "lower load or traction",

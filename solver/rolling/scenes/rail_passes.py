@@ -3,29 +3,33 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from solver.audit.report import Audit
+from solver.errors import NotConverged
 from solver.linear.threads import one_thread
 from solver.memory import kept
 from solver.results.acting import Acting
+from solver.results.run import FinishedRun
 from solver.results.samples import Samples
 from solver.results.view import View
 from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.audit.rail import audit_prism
 from solver.rolling.passing import Pass, SolveBudget
 from solver.rolling.rail.flow import PrismState
-from solver.rolling.rail.patch_contact import AppliedPatch, PatchContact, PatchLoad
+from solver.rolling.rail.patch_contact import AppliedPatch, PatchContact, PatchLoad, PatchStart
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.results.rail import PrismBody, of_patch, zone_fields
-from solver.rolling.scenes.pass_runner import Passes
+from solver.rolling.scenes.pass_runner import BegunPasses, Passes, by_passes
 from solver.rolling.scenes.passes import PassTrace
+from solver.rolling.scenes.rail_outputs import FINER, finer
 from solver.rolling.search import search
+from solver.scenes.scene import Monitor, Scene
 from solver.tensors import to_tensor
 from solver.typing import Array
 
@@ -40,6 +44,35 @@ class RailTrace(PassTrace):
     """The state after a pass over a prism; ``lowest`` (6,) is the least residual stress [MPa]."""
 
     lowest: Array
+
+
+_TRACED = tuple(each.name for each in fields(RailTrace))
+
+
+def by_rail_passes(
+    scene: Scene,
+    runs: Sequence[Any],
+    monitor: Monitor,
+    *,
+    rolled: Callable[[Any], RolledPrism],
+    begun: Mapping[str, Array] | None = None,
+) -> Iterator[FinishedRun]:
+    """Compute pass after pass, see `by_passes`; with smaller elements if that is the remedy.
+
+    Such runs have a note, and no state: a longer run begins with the usual elements too.
+    """
+    computed = partial(by_passes, window=partial(RailPasses, rolled), reaches=REACHES)
+
+    def otherwise(remaining: Sequence[Any], error: NotConverged) -> Iterator[FinishedRun] | None:
+        last = remaining[-1]
+        if not finer(last) or scene.remedy(last, error) != finer(last):
+            return None
+        own = FINER[last.accuracy]
+        note = f"{error}: computed with accuracy = {own} instead"
+        others = computed(scene, [replace(run, accuracy=own) for run in remaining], monitor)
+        return (replace(run, notes=(*run.notes, note), state=dict) for run in others)
+
+    return computed(scene, runs, monitor, otherwise=otherwise, begun=begun)
 
 
 class RolledPrism(ABC):
@@ -96,6 +129,8 @@ class RailPasses(Passes):
         z, y = self._track.points
         self.extent = f"{np.ptp(z):.3g} mm wide and {np.ptp(y):.3g} mm deep"
         self.beside = partial(zone_fields, body, view.loaded, view.unloaded)
+        self._guess: Array | None = None
+        self._start: PatchStart | None = None
 
     def found(self, budget: SolveBudget) -> Iterator[Pass[PrismState]]:
         """See `Passes`.
@@ -104,21 +139,20 @@ class RailPasses(Passes):
         are nearly the same, it begins with the strain of the last pass; while passes still yield,
         that guess is worse, and after another load it does not converge.
         """
-        track, law = self._track, self.law
-        before = track.virgin(law)
-        found: Pass[PrismState] | None = None
-        last: PatchLoad | None = None
-        for number in range(self.parameters.passes):
-            load, guess, start = self._rolled.load(track, number), None, None
-            if found is not None:
-                start = found.loading.start
-                guess = found.strain if load is last and found.steps <= _SETTLED else None
+        track, law, begun = self._track, self.law, self.begun
+        before, guess = begun.left if begun else track.virgin(law), self._guess
+        start, first = self._start, len(begun.traces) if begun else 0
+        last = self._rolled.load(track, first - 1) if begun else None
+        for number in range(first, self.parameters.passes):
+            load = self._rolled.load(track, number)
             with one_thread():
                 found = search(
-                    track, law, load, before, guess, start=start, budget=budget, wider=False
-                )
+                    track, law, load, before, guess if load is last else None,
+                    start=start, budget=budget, wider=False,
+                )  # fmt: skip
             budget.renew()
-            before, last = found.after, load
+            before, start, last = found.after, found.loading.start, load
+            guess = found.strain if found.steps <= _SETTLED else None
             yield found
 
     def shown(self, number: int) -> tuple[Samples, Callable[[Any], Acting]]:
@@ -138,11 +172,33 @@ class RailPasses(Passes):
             lowest=to_tensor(stress).min(axis=1),
         )
 
-    def audit(
-        self, found: Pass[PrismState], previous: Pass[PrismState] | None, number: int
-    ) -> Audit:
+    def audit(self, found: Pass[PrismState], left: PrismState | None, number: int) -> Audit:
         """See `Passes`."""
-        return audit_prism(self._track, self.law, found, previous, _plain(self._track))
+        return audit_prism(self._track, self.law, found, left, _plain(self._track))
+
+    def state(self, found: Pass[PrismState], traces: Sequence[RailTrace]) -> Mapping[str, Array]:
+        """See `Passes`."""
+        after, contact = found.after, contact_of(found)
+        kept = {
+            "internal": after.state.packed,
+            "strain": after.strain,
+            "displacement": after.displacement,
+            "traction": contact.traction,
+            "motion": np.array([contact.height, contact.creepage, contact.lateral_creepage]),
+            **{name: np.stack([getattr(t, name) for t in traces]) for name in _TRACED},
+        }
+        return {**kept, "guess": found.strain} if found.steps <= _SETTLED else kept
+
+    def begin(self, state: Mapping[str, Array]) -> None:
+        """See `Passes`."""
+        virgin = self._track.virgin(self.law)
+        left = PrismState(
+            virgin.state.unpacked(state["internal"]), state["strain"], state["displacement"]
+        )
+        each = zip(*(state[name] for name in _TRACED), strict=True)
+        traces = [RailTrace(**dict(zip(_TRACED, values, strict=True))) for values in each]
+        self.begun, self._guess = BegunPasses(traces, left), state.get("guess")
+        self._start = PatchStart(state["traction"], *state["motion"].tolist())
 
 
 @kept

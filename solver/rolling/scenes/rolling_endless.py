@@ -251,9 +251,9 @@ class TrackPasses(Passes):
         self._by_depth[way] = samples.along_depth(nodal)[:, 0].T
         return self._by_depth[way]
 
-    def audit(self, found: Pass[Layers], previous: Pass[Layers] | None, number: int) -> Audit:
+    def audit(self, found: Pass[Layers], left: Layers | None, number: int) -> Audit:
         """See `Passes`."""
-        return audit_pass(self._track, self.law, found, previous, self._ways[number])
+        return audit_pass(self._track, self.law, found, left, self._ways[number])
 
     def decided(self, traces: Sequence[Trace]) -> bool:
         """Return whether the passes so far decide the shakedown state, if they end then."""

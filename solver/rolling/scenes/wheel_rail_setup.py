@@ -14,9 +14,8 @@ from solver.results.view import ACROSS_TRACK, View
 from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.track import PrismTrack
-from solver.rolling.scenes.pass_runner import by_passes
 from solver.rolling.scenes.rail_outputs import cycles, remedies, sketched
-from solver.rolling.scenes.rail_passes import REACHES, RailPasses, RolledPrism
+from solver.rolling.scenes.rail_passes import RolledPrism, by_rail_passes
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
 from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
@@ -69,7 +68,7 @@ class RolledRail(RolledPrism):
 
 def method(parameters: WheelRailParameters) -> Method:
     """Return the method of the passes."""
-    return partial(by_passes, window=partial(RailPasses, RolledRail), reaches=REACHES)
+    return partial(by_rail_passes, rolled=RolledRail)
 
 
 def view(parameters: WheelRailParameters) -> View:

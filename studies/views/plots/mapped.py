@@ -55,12 +55,14 @@ class Mapped:
     signed : whether zero is in the middle of the colours; else they begin at zero
     high : value at which the colours end
     note : which values lie beyond the colours, as a sentence; empty if none
+    smooth : whether values are continuous, as within one body: drawn between points, not in cells
     """
 
     values: xr.DataArray
     signed: bool
     high: float
     note: str
+    smooth: bool
 
 
 def mapped(
@@ -99,7 +101,9 @@ def mapped(
     known = np.isfinite(values.to_numpy())
     there, area = values.to_numpy()[known], _areas(values)[known]
     high, note = limit(there, area, signed, values)
-    return Mapped(values=values, signed=signed, high=high, note=note)
+    words = "flag_meanings" in values.attrs
+    smooth = not (words or is_patch(values, run) or run.sizes.get("body", 1) > 1)
+    return Mapped(values=values, signed=signed, high=high, note=note, smooth=smooth)
 
 
 def _at_stage(values: xr.DataArray, stage: str | None) -> xr.DataArray:

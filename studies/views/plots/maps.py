@@ -223,8 +223,7 @@ def _on_grid(run: xr.Dataset, drawn: Mapped) -> Figure:
     sheet, axes = _sheet(run, values, *(float(np.ptp(each.to_numpy())) for each in (x, y)))
     curves = [] if patch else outlines_of(run, across, up)
     shown = reaching(values, curves) if curves else values
-    cells = patch or "flag_meanings" in values.attrs or run.sizes.get("body", 1) > 1
-    shading: Any = "nearest" if cells else "gouraud"  # within one body values are continuous
+    shading: Any = "gouraud" if drawn.smooth else "nearest"
     mesh = axes.pcolormesh(x, y, shown, shading=shading, rasterized=True, **_colours(drawn))
     box = (*axes.get_xlim(), *axes.get_ylim())
     if curves:

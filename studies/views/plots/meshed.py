@@ -128,8 +128,8 @@ def on_mesh(
         values=xr.DataArray(numbers, dims=_NODE, name=field, attrs=values.attrs).assign_coords(
             {name: each for name, each in values.coords.items() if not each.ndim}
         ),
-        signed=signed, high=most, note=note, X=X, triangles=triangles[shown], edges=edges,
-        tensor=tensor, box=box, deformed=deformed,
+        signed=signed, high=most, note=note, smooth=True, X=X, triangles=triangles[shown],
+        edges=edges, tensor=tensor, box=box, deformed=deformed,
     )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from residua.cli import main
 from service.app import create_app
 from service.settings import Settings
 from solver import SCENES, ModelError, Record, Status, System
+from solver.errors import LimitLoad
 from solver.mesh.elements import ELEMENTS, ElementType
 from solver.results.export import write_vtu
 from solver.scenes.punch import PUNCH, PunchParameters
@@ -65,6 +66,14 @@ def test_a_block_under_pressure_has_the_stress_of_the_pressure(scene: FileScene)
     assert reaction[1] == pytest.approx([0.0, 300.0, 600.0], abs=1e-6)
     assert record.fields["increment_time"][1] == pytest.approx([0.0, 0.5, 1.0])
     assert stress.shape == (1, 1, 4, 11)
+
+
+@pytest.mark.parametrize("own", [{}, {"limit_load": "press less"}])
+def test_a_run_that_fails_says_what_to_do_also_without_advice_in_the_file(own: Any) -> None:
+    scene = built({**blocks(), "advice": own})
+    said = scene.remedy(scene.parameters(), LimitLoad("no equilibrium"), Status.LIMIT_LOAD)
+    assert said == own.get("limit_load", "lower the load")
+    assert scene.remedy(scene.parameters(), None, Status.AUDIT_FAILED) == "use smaller elements"
 
 
 @pytest.mark.solves
