@@ -154,13 +154,15 @@ class LargeDiscretisation(Discretisation):
             "there larger, or reduce the load"
         )
 
-    def during(self, time: float, u: Array) -> LargeDiscretisation:
-        """Return the body for an increment from displacements u: its rotation is about its place.
+    def turned(self, u: Array) -> LargeDiscretisation:
+        """Return the body at displacements u: its rotation is about its place.
 
-        Unknowns and pins stay the same. The free motions of a body that is held somewhere are those
-        before loading: supports fix points of it, about which it cannot be said to turn.
+        Forces within a body have no moment about its place, but one about its place before loading,
+        which contact would have to hold. Unknowns and pins stay the same. The free motions of a
+        body that is held somewhere are those before loading: supports fix points of it, about which
+        it cannot be said to turn.
         """
-        if self._held.any() or self.rigid.shape[1] < 2 or not u.any():
+        if self._held.any() or self.rigid.shape[1] < 2:
             return self
         here = copy(self)
         here.rigid = self._motions(self.X + vectors(u, self.dim))

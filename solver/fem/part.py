@@ -94,6 +94,10 @@ class Part(ABC):
         """Return the part for an increment from a time and unknowns u (n,)."""
         return self
 
+    def turned(self, u: Array) -> Self:
+        """Return the part with its rigid motions at unknowns u (n,)."""
+        return self
+
     def surface(self, surface: Surface) -> Surface:
         """Return a surface of the whole body in this part's numbering."""
         return surface

@@ -174,6 +174,7 @@ class Increment:
         best, since_best = np.inf, 0
         series, begun, crawled = Series(), 0.0, 0
         for iteration in range(tolerances.iterations + 1):
+            self.system = self.system.turned(u)
             candidates = self._candidates(u, contacts, links)
             self._began = self._began or (residuals, candidates)
             scale, error, violation = self._errors(residuals, candidates)
