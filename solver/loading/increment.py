@@ -246,8 +246,10 @@ class Increment:
     def _slide(self, *places: tuple[Vectors, Candidates]) -> Slide | None:
         """Return the slide of a body in one of the iterates ``places``, or in the first one.
 
-        The first iterate is examined because a later one may have lost the contacts of the body.
+        The first iterate is examined because a later one may have lost the contacts of the body. A
+        body of large strain may have turned in a later one.
         """
+        places = () if self.system.model.large else places
         places = (*places, self._began) if self._began else places
         found = (slide(self.system, residuals, candidates) for residuals, candidates in places)
         return next((each for each in found if each is not None), None)
@@ -371,7 +373,7 @@ class Increment:
                     o.tangent(response, blend)
                     for o, response in zip(self.system.operators, responses, strict=True)
                 ]
-                step = newton_step(self.system, residuals, operators, candidates)
+                step = newton_step(self.system, residuals, operators, candidates, self.time)
             except Singular:
                 continue
             if step and not blend and is_singular(self.system.parts, self.time, step.u, responses):
