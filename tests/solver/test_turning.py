@@ -8,7 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver import Body, ContactPair, Material, Model, Stage, Traction, solve
+from solver import (
+    Body,
+    ContactPair,
+    Material,
+    Model,
+    Pushed,
+    RigidBody,
+    Stage,
+    Traction,
+    solve,
+)
 from solver.contact.geometry import Pairing, pair
 from solver.contact.state import ContactState
 from solver.contact.system import System
@@ -16,6 +26,7 @@ from solver.contact.turning import turning
 from solver.errors import NotConverged
 from solver.fem.frame import MovingFrame
 from solver.mesh import grid
+from solver.model.rigid import line
 from solver.typing import Array
 
 
@@ -88,3 +99,20 @@ def test_a_block_that_tips_over_is_no_limit_load() -> None:
         solve(standing(40.0), stages=(Stage(name="loaded", target=1.0, steps=10),))
     assert type(error.value) is NotConverged
     assert 0.85 < error.value.reached < 0.92
+
+
+@pytest.mark.solves
+def test_a_rigid_body_that_rests_on_large_strain_converges_quadratically() -> None:
+    """Its force acts high above the contact, so that its arm turns with it."""
+    law = Material(youngs_modulus=1e3, poisson_ratio=0.3)
+    base = Body(name="base", mesh=grid(np.linspace(-2, 2, 17), np.linspace(-2, 0, 9)), material=law,
+                kinematics="plane_strain", strain="large", element="quad4",
+                supports={"bottom": "xy"})  # fmt: skip
+    plate = RigidBody(name="plate", surfaces={"face": line((-3.0, 0.0), (3.0, 0.0))},
+                      centre=(0.0, 4.0), x=Pushed(value=6.0), y=Pushed(value=-120.0),
+                      rotation=Pushed(value=8.0))  # fmt: skip
+    pair = ContactPair(slave=("base", "top"), master=("plate", "face"), friction=0.4)
+    model = Model(bodies=(base,), rigid=(plate,), contacts=(pair,))
+    found = solve(model, stages=(Stage(name="loaded", target=1.0, steps=6),))
+    assert max(found.tally.iterations) <= 3
+    assert found.motion("plate", "loaded").rotation == pytest.approx(-0.04043 / 5.0, rel=1e-3)
