@@ -40,7 +40,8 @@ _LOADED = (Stage(name="loaded", target=1.0, steps=20),)
 _RELEASED = (*_LOADED, Stage(name="released", target=0.0, steps=20))
 _SAME = 1e-3
 """Difference of turned and unturned results, over the largest. Both are solved to 1e-8, which grows
-in blocks that barrel and hardly harden: to 3e-4 in one of thirty."""
+to 6e-7 in blocks that barrel and hardly harden; to 4e-4 if only one of the two halves an
+increment."""
 _FREE = 1e-6
 """Force of a plate that has left the block, over the largest one."""
 _COARSE = frozenset({"audit_energy"})
