@@ -5,7 +5,7 @@ The conditions of links follow after the gaps and slips; they hold at any time.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 
@@ -16,6 +16,7 @@ from solver.contact.links import Links
 from solver.contact.problem import OPEN, ContactRows, OnParts, joined
 from solver.contact.state import ContactState, State
 from solver.contact.system import System
+from solver.contact.turning import Turning, turning_of
 from solver.fem.operators import Operator
 from solver.model.friction import BoundLines
 from solver.typing import Array, Ints
@@ -56,6 +57,7 @@ class Candidates(OnParts):
     pushes : for each part, the nodal forces (n_dofs,) of pairs that are being removed [N]
     holds : for each part, whether a contact pair may hold its rigid motions
     links : the conditions of links
+    turning : how the contact forces turn with bodies of large strain; None without these, or forces
     """
 
     vertices: tuple[Ints, ...]
@@ -75,6 +77,7 @@ class Candidates(OnParts):
     pushes: tuple[Array, ...]
     holds: tuple[bool, ...]
     links: Links
+    turning: Callable[[], Turning] | None = None
 
     @property
     def frictional(self) -> bool:
@@ -292,11 +295,10 @@ def find_candidates(
     n = sum(len(v) for v in vertices)
     frictional = any(interface.rough for interface in system.interfaces)
     m = (2 * n if frictional else n) + len(system.links)
-    motion, uncounted, beyond = np.zeros(m), np.zeros(n), np.inf
+    motion, uncounted, unsure, beyond = np.zeros(m), np.zeros(n), np.zeros(n), np.inf
     last = slice(m - len(system.links), m)
     motion[last] = system.links.off(u, links)
     lines: list[BoundLines] = []
-    unsure = np.zeros(n)
     pieces = [_below(m, rows) for rows in system.links.rows]
     slips: list[Array] = []
     turned = [np.zeros((n, part.rigid.shape[1])) for part in system.parts]
@@ -338,6 +340,7 @@ def find_candidates(
         values = [getattr(c, name)[v] for c, v in zip(contacts, vertices, strict=True)]
         return np.concatenate([np.zeros(0), *values])
 
+    acting = tuple(joined(p) for p in pieces)
     forces = [gather("normal"), *([gather("tangential")] if frictional else []), links]
     return Candidates(
         vertices=tuple(vertices),
@@ -347,7 +350,7 @@ def find_candidates(
         forces=np.concatenate(forces),
         status=gather("status").astype(np.int64),
         unsure=unsure,
-        rows=tuple(joined(p) for p in pieces),
+        rows=acting,
         turned=tuple(turned),
         covered=tuple(p.covered[v] for p, v in zip(pairings, vertices, strict=True)),
         gaps=tuple(p.gap for p in pairings),
@@ -357,7 +360,23 @@ def find_candidates(
         pushes=pushes,
         holds=system.holds(start.time, time),
         links=system.links,
+        turning=_turning(system, u, acting, pairings, contacts, vertices),
     )
+
+
+def _turning(
+    system: System,
+    u: tuple[Array, ...],
+    rows: Sequence[ContactRows | None],
+    pairings: Sequence[Pairing],
+    contacts: Sequence[ContactState],
+    vertices: Sequence[Ints],
+) -> Callable[[], Turning] | None:
+    """Return what finds how contact forces turn; None if no body has large strain, or none act."""
+    if not system.model.large or not any(contact.normal.any() for contact in contacts):
+        return None
+    each = (system.interfaces, pairings, contacts, vertices, _places(vertices))
+    return lambda: turning_of(system.parts, u, rows, list(zip(*each, strict=True)))
 
 
 def _below(m: int, rows: ContactRows | None) -> list[ContactRows]:

@@ -110,6 +110,7 @@ def _forces(
     S[:size, :size] = problem.W[rows] @ P
     S[:size, size:] = problem.turned[rows]
     S[size:, :size] = problem.A.T @ P
+    S[size:, size:] = 0.0 if problem.D is None else problem.D
     rhs = -np.concatenate([problem.offset[rows], problem.balance])
     rhs -= np.concatenate([problem.W[rows] @ known, problem.A.T @ known])
     # forces and motions differ in magnitude by the compliance: scale the rows
@@ -273,7 +274,7 @@ def _holds(problem: ContactProblem, F: Array, q: Array) -> bool:
     n, (force, length) = problem.n, problem.scales
     motion = problem.moved(F, q)
     N, met = F[:n], np.minimum(F[:n] / force, motion[:n] / length)
-    off = np.concatenate([met, (problem.A.T @ F + problem.balance) / force])
+    off = np.concatenate([met, problem.unbalanced(F, q) / force])
     if problem.frictional:
         bound = problem.lines.least(N) / force
         T, slip = F[n:] / force, motion[n:] / length

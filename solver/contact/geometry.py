@@ -35,6 +35,30 @@ _MIN_COVERED = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
+class Points:
+    """The integration points of a pairing.
+
+    Attributes
+    ----------
+    x : positions (2, n_nodes) of the nodes of slave and master [mm]
+    edge, partner : (n,) their edges of the slave and of the master
+    xi, eta : (n,) their places on these edges
+    normal : (2, n) normals of the slave
+    distance : (n,) distance of the surfaces along them [mm]
+    shares : (n, 2) weights in the means under the hats of the two vertices of the edge
+    """
+
+    x: tuple[Array, Array]
+    edge: Ints
+    partner: Ints
+    xi: Array
+    eta: Array
+    normal: Array
+    distance: Array
+    shares: Array
+
+
+@dataclass(frozen=True, slots=True)
 class Pairing:
     """Contact kinematics at given positions, one row per slave vertex.
 
@@ -54,6 +78,7 @@ class Pairing:
     closing : the derivatives of the gap, rows as ``normal`` along the master's normals. The two
         differ where the hat of a curved body is wider than the contact: a round body that rotates
         changes its gaps
+    points : the points that these are integrals over
     """
 
     area: Array
@@ -65,6 +90,7 @@ class Pairing:
     normal: tuple[Array, Array]
     tangent: tuple[Array, Array]
     closing: tuple[Array, Array]
+    points: Points
 
     @property
     def shrunk(self) -> Array:
@@ -248,12 +274,15 @@ def pair(
         weight * _area_per_xi(slave, powers[..., each], at)
         for powers in (_powers(slave.X, slave), own)
     ]
-    return _integrate(slave, master, edge, partner, at, eta, ways, distance, weight, areas)
+    return _integrate(
+        slave, master, (xs, xm), edge, partner, at, eta, ways, distance, weight, areas
+    )
 
 
 def _integrate(
     slave: Surface,
     master: Surface,
+    x: tuple[Array, Array],
     edge: Ints,
     partner: Ints,
     xi: Array,
@@ -305,6 +334,16 @@ def _integrate(
         normal=(sides[0][0], sides[1][0]),
         tangent=(sides[0][1], sides[1][1]),
         closing=(sides[0][-1], sides[1][-1]),
+        points=Points(
+            x=x,
+            edge=np.repeat(edge, points[1]),
+            partner=np.repeat(partner, points[1]),
+            xi=xi.ravel(),
+            eta=eta.ravel(),
+            normal=ways[0].reshape(2, -1),
+            distance=distance.ravel(),
+            shares=means.transpose(1, 2, 0).reshape(-1, 2),
+        ),
     )
 
 

@@ -45,7 +45,8 @@ def given_bound(problem: ContactProblem, bound: Array) -> tuple[Array, Array] | 
         held = linalg.qr(A[: n + m].T, mode="r", pivoting=True)[1][:k]
         if len(held) < k or np.linalg.matrix_rank(A[held]) < k:
             return None  # the points are too few, or too close, to hold the floating bodies
-        eliminated = _eliminate(M, r, A, columns, balance, held)
+        D = np.zeros((k, k)) if problem.D is None else problem.D * (length / (force * shape**2))
+        eliminated = _eliminate(M, r, A, columns, balance, D, held)
         if eliminated is None:
             return None
         whole, (M, r) = (M[held], r[held]), eliminated
@@ -69,6 +70,7 @@ def _eliminate(
     A: Array,
     columns: Array,
     balance: Array,
+    D: Array,
     held: Ints,
 ) -> tuple[Array, Array] | None:
     """Exchange the normal forces ``held`` with their gaps, and eliminate the rigid motions."""
@@ -78,6 +80,7 @@ def _eliminate(
     block[:k, :k] = M[np.ix_(held, held)]
     block[:k, k:] = A[held]
     block[k:, :k] = columns[:, held]
+    block[k:, k:] = D
     known = np.zeros((2 * k, N + 1))  # of (gap at held, other z, 1)
     known[np.arange(k), held] = 1.0
     known[:k, rest] = -M[np.ix_(held, rest)]

@@ -3,14 +3,14 @@
 Unknowns are the normal forces N >= 0 and tangential forces T at n points and the free rigid
 motions q of bodies held by contact alone. With ``F = (N, T)`` (without friction ``F = N``)::
 
-    (gap, slip) = offset + W F + G q        0 = balance + A' F
+    (gap, slip) = offset + W F + G q        0 = balance + A' F + D q
     N >= 0, gap >= 0, N gap = 0
     |T| <= s,  slip = 0 where |T| < s,  T = -s sign(slip) where |T| = s
     s = min_k (slope_k N + level_k),  the lines of a friction law (`solver.model.friction`)
 
 G equals A unless the normals of the two surfaces differ under a hat: forces act along the slave's
 normals, gaps change along the master's. With A a ring that rests on two vertices could turn without
-opening either.
+opening either. D is zero unless forces on a floating body of large strain do not turn with it.
 """
 
 from __future__ import annotations
@@ -33,12 +33,13 @@ class ContactProblem:
     Attributes
     ----------
     W : (m, m) compliance of the contact points [mm/N], m = 2n with friction, n without; symmetric
-        unless links hold a body whose G differs from A
+        unless links hold a body whose G differs from A, or contact forces turn with surfaces
     offset : (m,) gap and slip at zero force [mm]
     lines : friction bound at each point, the least of lines of tangential over normal force [N]
     A : (m, k) motion of the points along the forces, per free rigid motion
     balance : (k,) resultants of all other forces on the rigid motions [N]
     G : (m, k) gap and slip per free rigid motion; by default A
+    D : (k, k) change of the resultants by the rigid motions [N/mm]; by default zero
     """
 
     W: Array
@@ -47,6 +48,7 @@ class ContactProblem:
     A: Array
     balance: Array
     G: Array | None = None
+    D: Array | None = None
 
     @property
     def turned(self) -> Array:
@@ -56,6 +58,11 @@ class ContactProblem:
     def moved(self, F: Array, q: Array) -> Array:
         """Return gap and slip (m,) with forces F (m,) and rigid motions q (k,) [mm]."""
         return self.offset + self.W @ F + self.turned @ q
+
+    def unbalanced(self, F: Array, q: Array) -> Array:
+        """Return the resultants (k,) of all forces with contact forces F and motions q [N]."""
+        own = self.balance + self.A.T @ F
+        return own if self.D is None else own + self.D @ q
 
     @property
     def n(self) -> int:

@@ -238,9 +238,12 @@ class System:
     def during(self, start: State) -> System:
         """Return the system for an increment from ``start``; it locks motions of rigid bodies."""
         each = zip(self.parts, start.u, strict=True)
-        parts = tuple(part.during(start.time, u) for part, u in each)
-        unchanged = all(one is other for one, other in zip(parts, self.parts, strict=True))
-        return self if unchanged else self.within(parts)
+        return self.within(tuple(part.during(start.time, u) for part, u in each))
+
+    def turned(self, u: tuple[Array, ...]) -> System:
+        """Return the system with the rigid motions of its parts at displacements ``u``."""
+        each = zip(self.parts, u, strict=True)
+        return self.within(tuple(part.turned(own) for part, own in each))
 
     def holds(self, before: float, time: float) -> tuple[bool, ...]:
         """Return for each part whether a pair may hold its rigid motions between two times.
@@ -257,6 +260,8 @@ class System:
 
     def within(self, parts: tuple[Part, ...]) -> System:
         """Return the system with other ``parts``; windowed ones use the operators of `window`."""
+        if all(one is other for one, other in zip(parts, self.parts, strict=True)):
+            return self
         small = copy(self)
         small.parts = parts
         small.operators = tuple(

@@ -67,3 +67,8 @@ class MovingFrame:
         """
         shifts = np.tile(np.eye(2), (passing.shape[1], 1))
         return np.asarray(block @ np.column_stack([shifts, (self.turned(q) @ passing).T.ravel()]))
+
+    def swinging(self, q: Array, X: Array) -> Array:
+        """Return the second derivative (2 n,) of places X (2, n) by the arc [1/mm]."""
+        turned = self.turned(q) @ (self.centre[:, None] - X)
+        return np.asarray(turned.T.ravel() / self.radius**2)

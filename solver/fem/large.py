@@ -73,7 +73,11 @@ class _Follower:
 
     def change(self, u: Array, time: float) -> Array:
         """Return the change of the nodal forces (n,) by the displacements at a time [N]."""
-        each = self.load.factor(time) * (self._forces(self._X + u[self.dofs]) - self.before)
+        return self.nodal(self._forces(self._X + u[self.dofs]) - self.before, time)
+
+    def nodal(self, forces: Array, time: float) -> Array:
+        """Return the nodal forces (n,) for forces (n_edges, m) at load factor 1 [N]."""
+        each = self.load.factor(time) * forces
         return np.asarray(np.bincount(self.dofs.ravel(), each.ravel(), self._part.n))
 
     def add_stiffness(self, elements: Array, u: Array, time: float) -> None:
@@ -94,6 +98,9 @@ class _Follower:
 
 class LargeDiscretisation(Discretisation):
     """Unknowns, quadrature and operators of a body of large strain."""
+
+    _unit: float
+    """Angle [rad] of the last of its rigid motions, if it is a rotation."""
 
     @cached_property
     def _following(self) -> list[_Follower]:
@@ -154,14 +161,28 @@ class LargeDiscretisation(Discretisation):
             "there larger, or reduce the load"
         )
 
-    def during(self, time: float, u: Array) -> LargeDiscretisation:
-        """Return the body for an increment from displacements u: its rotation is about its place.
+    def turned(self, u: Array) -> LargeDiscretisation:
+        """Return the body at displacements u: its rotation is about its place.
 
-        Unknowns and pins stay the same. The free motions of a body that is held somewhere are those
-        before loading: supports fix points of it, about which it cannot be said to turn.
+        Forces within a body have no moment about its place, but one about its place before loading,
+        which contact would have to hold. Unknowns and pins stay the same. The free motions of a
+        body that is held somewhere are those before loading: supports fix points of it, about which
+        it cannot be said to turn.
         """
-        if self._held.any() or self.rigid.shape[1] < 2 or not u.any():
+        if self._held.any() or self.rigid.shape[1] < 2 or not np.isfinite(u).all():
             return self
-        here = copy(self)
-        here.rigid = self._motions(self.X + vectors(u, self.dim))
+        here, x = copy(self), self.X + vectors(u, self.dim)
+        here.rigid = self._motions(x)
+        here._unit = np.ptp(vectors(here.rigid[:, -1], 2)[0]) / np.ptp(x[1])
         return here
+
+    def turned_forces(self, time: float, contact: Array) -> Array | None:
+        """See `Part`: forces within the body turn with it, and so do loads that follow it."""
+        if self.rigid.shape[1] < 3:
+            return None
+        forces = self.external(time) + contact
+        for each in self._following:
+            forces -= each.nodal(each.before, time)
+        turned = np.zeros_like(self.rigid)
+        turned[:, 2] = self._unit * (vectors(forces, 2)[::-1] * [[-1], [1]]).T.ravel()
+        return turned

@@ -178,7 +178,8 @@ class LogDeformation(Deformation):
     def _geometric(self, stress: Array) -> Array:
         """Return the derivative (5, 5, n_elements, n_points) of forces by gradients, B constant."""
         T, Q = self._conjugate(stress), self.stretch.by_gradient()
-        K = np.einsum("vi...,vw...,wj...->ij...", Q, self.stretch.curvature(T), Q, optimize=True)
+        half = np.einsum("vw...,wj...->vj...", self.stretch.curvature(T), Q)
+        K = np.einsum("vi...,vj...->ij...", Q, half)
         xx, yy, xy = self.stretch.material_stress(T)
         for row in (0, 2):
             K[row, row] += xx
@@ -202,8 +203,8 @@ class LogDeformation(Deformation):
     def geometric_energy(self, step: Array, stress: Array) -> float:
         """See `Deformation`."""
         H = _at_points(self.gradients, step[self.dofs])
-        K = self._geometric(stress)
-        return float(np.einsum("iep,ijep,jep,ep", H, K, H, self.weights, optimize=True))
+        force = np.einsum("ijep,jep->iep", self._geometric(stress), H)
+        return float(((H * force).sum(axis=0) * self.weights).sum())
 
     def cauchy(self, stress: Array, across: Array) -> Array:
         """See `Deformation`."""

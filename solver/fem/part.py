@@ -94,6 +94,17 @@ class Part(ABC):
         """Return the part for an increment from a time and unknowns u (n,)."""
         return self
 
+    def turned(self, u: Array) -> Self:
+        """Return the part with its rigid motions at unknowns u (n,)."""
+        return self
+
+    def turned_forces(self, time: float, contact: Array) -> Array | None:
+        """Return the stiffness times the rigid motions (n, n_rigid) [N/mm]; None where it is zero.
+
+        ``contact`` (n,) are the contact forces, which balance forces within the part and loads.
+        """
+        return None
+
     def surface(self, surface: Surface) -> Surface:
         """Return a surface of the whole body in this part's numbering."""
         return surface

@@ -1,9 +1,10 @@
 """Anderson acceleration of Newton's method, for iterations with an incomplete tangent.
 
-The tangent lacks the derivatives of contact normals and of the friction bound along a surface, and
-may be blended with the elastic stiffness. Newton's method then converges like a geometric series,
-sometimes with a ratio of 0.9. Anderson's mixing combines the last iterates so that the remaining
-step is smallest. If the missing part of the tangent is constant, this restores Newton's method.
+The tangent lacks derivatives of the friction bound along a surface, with small strain also those
+of contact normals, and may be blended with the elastic stiffness. Newton's method then converges
+like a geometric series, sometimes with a ratio of 0.9. Anderson's mixing combines the last iterates
+so that the remaining step is smallest. If the missing part of the tangent is constant, this
+restores Newton's method.
 
 D.G. Anderson, J. ACM 12 (1965) 547-560; H.F. Walker, P. Ni, SIAM J. Numer. Anal. 49 (2011)
 1715-1735, algorithm 2.

@@ -200,6 +200,7 @@ class Increment:
             ahead = replace(end.state, u=tuple(ui + own - its for ui, own, its in each))
             u = self.system.moved(ahead, self.time).u
             turns = any(contact.finite for contact in self.start.contacts)
+            self.system = self.system.turned(u)
             responses, candidates = self._respond(u), self._candidates(u, contacts, links)
             residuals, steps, outs = self._residuals(u, responses), list[float](), list[float]()
             for _ in range(_CORRECTIONS):
@@ -212,10 +213,11 @@ class Increment:
                 elif len(outs) > 2 and outs[-1] > _SLOW * outs[-2]:
                     both = zip(self.system.operators, responses, strict=True)
                     operators = [own.tangent(response, 0.0) for own, response in both]
-                step = newton_step(self.system, residuals, operators, candidates)
+                step = newton_step(self.system, residuals, operators, candidates, self.time)
                 if step is None:
                     raise IncrementFailed("no contact forces were found that balance this load")
                 u = tuple(ui + du for ui, du in zip(u, step.u, strict=True))
+                self.system = self.system.turned(u)
                 contacts = candidates.states(contacts, step.forces, step.status)
                 links, responses = step.forces[candidates.linked], self._respond(u)
                 residuals = self._residuals(u, responses)
@@ -246,6 +248,7 @@ class Increment:
         best, since_best = np.inf, 0
         series, begun, crawled = Series(), 0.0, 0
         for iteration in range(tolerances.iterations + 1):
+            self.system = self.system.turned(u)
             candidates = self._candidates(u, contacts, links)
             self._began = self._began or (residuals, candidates)
             scale, error, violation = self._errors(residuals, candidates)
@@ -317,8 +320,10 @@ class Increment:
     def _slide(self, *places: tuple[Vectors, Candidates]) -> Slide | None:
         """Return the slide of a body in one of the iterates ``places``, or in the first one.
 
-        The first iterate is examined because a later one may have lost the contacts of the body.
+        The first iterate is examined because a later one may have lost the contacts of the body. A
+        body of large strain may have turned in a later one.
         """
+        places = () if self.system.model.large else places
         places = (*places, self._began) if self._began else places
         found = (slide(self.system, residuals, candidates) for residuals, candidates in places)
         return next((each for each in found if each is not None), None)
@@ -442,7 +447,7 @@ class Increment:
                     o.tangent(response, blend)
                     for o, response in zip(self.system.operators, responses, strict=True)
                 ]
-                step = newton_step(self.system, residuals, operators, candidates)
+                step = newton_step(self.system, residuals, operators, candidates, self.time)
             except Singular:
                 continue
             if step and not blend and is_singular(self.system.parts, self.time, step.u, responses):

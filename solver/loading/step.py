@@ -9,10 +9,12 @@ import numpy as np
 
 from solver.contact.candidates import Candidates
 from solver.contact.links import solve_linked
-from solver.contact.problem import ContactProblem
+from solver.contact.problem import ContactProblem, ContactSolution
 from solver.contact.system import System
 from solver.fem.operators import Operator
 from solver.fem.part import Part
+from solver.linear.solvers import Begun
+from solver.loading.turned import turned_problem
 from solver.typing import Array, Ints
 
 Vectors = tuple[Array, ...]
@@ -69,6 +71,7 @@ def newton_step(
     residuals: Vectors,
     operators: Sequence[Operator],
     candidates: Candidates,
+    time: float = 0.0,
 ) -> NewtonStep | None:
     """Return the step for given tangents; None if no contact forces balance the load.
 
@@ -78,46 +81,75 @@ def newton_step(
     ----------
     residuals : external minus internal forces of each part, without contact forces [N]
     operators : inverse tangent of each part
+    time : the time, if contact forces turn
     """
     # sum the large forces before solving: their sum is small, and the rounding of the factor, about
     # 1e-16 (size of the body / smallest element)^2, is relative to it
     balanced = out_of_balance(system, residuals, candidates, candidates.forces)
-    W = candidates.compliance(operators)
-    motion = candidates.motion - W @ candidates.forces
     begun = [operator.begin(r) for operator, r in zip(operators, balanced, strict=True)]
-    for i, part in enumerate(begun):
-        motion += candidates.of_part(i, part.kept)
     each = zip(system.parts, candidates.stays, strict=True)
     floating = [part.rigid[:, :0] if stays else part.rigid for part, stays in each]
-    links, last = len(candidates.links), np.arange(len(W))[candidates.linked]
-    W[last, last] += candidates.links.compliance
-    motion[last] -= candidates.links.compliance * candidates.forces[last]
+    pushed = [r + p for r, p in zip(residuals, candidates.pushes, strict=True)]
+    touched = np.repeat(candidates.holds, [R.shape[1] for R in floating])
+
+    def solved(problem: ContactProblem) -> ContactSolution | None:
+        links, last = len(candidates.links), np.arange(len(problem.W))[candidates.linked]
+        problem.W[last, last] += candidates.links.compliance
+        problem.offset[last] -= candidates.links.compliance * candidates.forces[last]
+        return solve_linked(problem, links, touched, candidates.status)
+
+    solution = None
+    if candidates.turning is not None:
+        forces = on_parts(system, candidates, candidates.forces)
+        rigid = [
+            (R, part.turned_forces(time, own) if R.size else None)
+            for part, R, own in zip(system.parts, floating, forces, strict=True)
+        ]
+        problem, moved = turned_problem(
+            candidates, candidates.turning(), operators, begun, rigid, pushed
+        )
+        solution = solved(problem)
+    if solution is None:  # the forces that turn are those of contacts that may open
+        problem, moved = _plain_problem(system, candidates, operators, begun, floating, pushed)
+        solution = solved(problem)
+    if solution is None:
+        return None
+    u = moved(solution.forces, solution.rigid)
+    if not all(np.isfinite(du).all() for du in u):
+        return None
+    return NewtonStep(u, solution.forces, solution.status, solution.pivoted)
+
+
+def _plain_problem(
+    system: System,
+    candidates: Candidates,
+    operators: Sequence[Operator],
+    begun: Sequence[Begun],
+    floating: Sequence[Array],
+    residuals: Sequence[Array],
+) -> tuple[ContactProblem, Callable[[Array, Array], Vectors]]:
+    """Return the contact problem, and a function of its forces and motions to displacements."""
+    W = candidates.compliance(operators)
+    motion = candidates.motion - W @ candidates.forces
+    for i, part in enumerate(begun):
+        motion += candidates.of_part(i, part.kept)
     problem = ContactProblem(
         W=W,
         offset=motion,
         lines=candidates.lines,
         A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
         G=np.hstack([candidates.motions(i, R) for i, R in enumerate(floating)]),
-        balance=np.concatenate(
-            [
-                R.T @ (r + pushed)
-                for R, r, pushed in zip(floating, residuals, candidates.pushes, strict=True)
-            ]
-        ),
+        balance=np.concatenate([R.T @ r for R, r in zip(floating, residuals, strict=True)]),
     )
-    touched = np.repeat(candidates.holds, [R.shape[1] for R in floating])
-    solution = solve_linked(problem, links, touched, candidates.status)
-    if solution is None:
-        return None
-    more = solution.forces - candidates.forces
-    change = [candidates.on_part(i, more, part.n) for i, part in enumerate(system.parts)]
-    rigid = np.split(solution.rigid, np.cumsum([R.shape[1] for R in floating])[:-1])
-    u = tuple(
-        part.finish(c) + R @ q for part, c, R, q in zip(begun, change, floating, rigid, strict=True)
-    )
-    if not all(np.isfinite(du).all() for du in u):
-        return None
-    return NewtonStep(u, solution.forces, solution.status, solution.pivoted)
+
+    def moved(forces: Array, q: Array) -> Vectors:
+        more = forces - candidates.forces
+        change = [candidates.on_part(i, more, part.n) for i, part in enumerate(system.parts)]
+        rigid = np.split(q, np.cumsum([R.shape[1] for R in floating])[:-1])
+        each = zip(begun, change, floating, rigid, strict=True)
+        return tuple(part.finish(c) + R @ own for part, c, R, own in each)
+
+    return problem, moved
 
 
 def norm(vectors: Sequence[Array]) -> float:

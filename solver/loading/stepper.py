@@ -434,7 +434,12 @@ class Stepper:
         if why.limit and growing:
             return LimitLoad(f"no equilibrium {way}: {why}", reached, attempted)
         hint = spent(self.system, point.now.state)
-        hint += "".join(f"; {each}" for each in self.system.distorted(point.now.state))
+        distorted = self.system.distorted(point.now.state)
+        hint += "".join(f"; {each}" for each in distorted)
+        if self.system.model.large and growing and not distorted:
+            hint += (
+                "; bodies of large strain may buckle, tip over or neck under this load: " + _MOVE
+            )
         return NotConverged(f"the increment {way} failed: {failure}{hint}", reached, attempted)
 
     def _timed(self, tally: Tally) -> Tally:
@@ -442,6 +447,9 @@ class Stepper:
         now = clock.process_time()
         seconds, self._clock = tally.seconds + now - self._clock, now
         return replace(tally, seconds=seconds)
+
+
+_MOVE = "prescribe a motion instead of the force, or reduce the load"
 
 
 def placed(system: System, state: State, time: float) -> State:

@@ -234,8 +234,7 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
         begun += own
         to_compute += len(missing)
         paths += 1
-        elements = 0
-        set_up = 0.0
+        elements, set_up = 0, 0.0
         if scene.effort is not None:
             try:
                 effort = _effort(scene.effort, path, missing, own)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -230,6 +231,33 @@ def test_a_pressed_block_that_plates_turn_keeps_its_stress() -> None:
     assert after[2] == pytest.approx(before[2], abs=1e-12 * 2e5)
     flows = [found.stages[stage].state.plastic[0].accumulated for stage in found.stages]
     assert flows[0].max() > 0.3 and flows[1] == pytest.approx(flows[0], abs=1e-12)
+
+
+def test_a_block_springs_free_of_the_plates_that_pressed_it() -> None:
+    """At last no force acts on it, and its internal forces have no moment about its place."""
+    hardens = Material(youngs_modulus=E, poisson_ratio=0.3, yield_stress=300.0,
+                       hardening_ratio=0.005)  # fmt: skip
+    turn = np.array([[0.0283, -0.9996], [0.9996, 0.0283]])
+    pressed = block((0.0, 1.9), (0.0, 1.0), (4, 4), name="block", material=hardens,
+                    kinematics="plane_strain", element="quad9")  # fmt: skip
+    pressed = replace(pressed, mesh=replace(pressed.mesh, doflocs=turn @ pressed.mesh.doflocs))
+    x, y = turn @ [0.0, -0.18]
+    ends = [turn @ [[-3.0, 5.0], [height, height]] for height in (1.0, 0.0)]
+    plates = (
+        RigidBody(name="top", surfaces={"face": line(*map(tuple, ends[0].T))},
+                  x=Moved(value=float(x)), y=Moved(value=float(y))),
+        RigidBody(name="bottom", surfaces={"face": line(*map(tuple, ends[1].T[::-1]))}),
+    )  # fmt: skip
+    model = Model(bodies=(pressed,), rigid=plates, contacts=tuple(
+        ContactPair(slave=("block", side), master=(side, "face"), friction=0.05)
+        for side in ("top", "bottom")
+    ))  # fmt: skip
+    stages = (Stage(name="loaded", target=1.0, steps=10), Stage(name="free", target=0.0, steps=10))
+    found = solve(model, stages=stages)
+    assert found.audit("free").passed
+    forces = [np.abs(found.reaction("top", stage)).max() for stage in ("loaded", "free")]
+    assert forces[0] > 500.0 and forces[1] < 1e-6 * forces[0]
+    assert np.abs(found.stress("block", "free")).max() > 10.0
 
 
 @pytest.mark.parametrize("turns", [False, True])
