@@ -503,7 +503,7 @@ def _newton(
     The curvature is that of the first plane.
 
     `work` (6, 3) then has the tangents b and c of the last step, the gradient, and the directions
-    and sizes of its curvatures: see `_gain`.
+    and sizes of its curvatures.
     """
     cosine, sine, most, least, floor, step = 1.0, 0.0, 0.0, 0.0, 1e-300, 0.0
     b, c, g, one, other, trial = work[0], work[1], work[2], work[3], work[4], work[5]
@@ -576,7 +576,7 @@ def _rivals(
     The function is a sum of parts: each is the value of one instant, of the normal component or at
     the side of one of the support of a circle, whose radius is the mean of their distances from the
     centre. Near the maximum another instant takes a part if its deficit (the difference of the
-    part at the maximum) is less than the difference of slopes gains. `near` (n, 4) receives part,
+    part at the maximum) is less than the difference of slopes gains. `near` (n, 5) receives part,
     deficit, and the difference of slopes by the principal directions of curvature, `work`, over the
     roots of the curvatures.
     """

@@ -39,6 +39,8 @@ _FALLS = 2 * np.sin(0.132) ** 2
 scan."""
 _SIMPLE = 0.02
 """Distance of instants that the scan leaves out, over the size of the path."""
+_ROUNDED = 1e-6
+"""Rounding of the scan in single precision, over the largest stress."""
 _DIFFERENCE = 1e-3
 """Relative change for the derivatives of a criterion by what acts on a plane: those of a product of
 two are exact, and rounding matters little."""
@@ -142,6 +144,7 @@ def _critical(given: Array, circles: Ints, search: Value, value: Value) -> Criti
     falls = (weights + np.einsum("nkm,mn->nk", curves, sizes) / 2).T * sizes
     falls = _FALLS * falls.sum(axis=0)
     least = search(OnPlanes(*values)) - falls
+    most[every, top] = np.inf  # single precision may round by more than the maximum falls
     points, starts = map(np.ascontiguousarray, np.nonzero(most >= least[:, None]))
     values = _resolve(paths, points, _NORMALS[starts], circles)
     exact = search(OnPlanes(*values))
@@ -169,8 +172,8 @@ def _critical(given: Array, circles: Ints, search: Value, value: Value) -> Criti
 
 def _used(kinds: list[Array], search: Value) -> Bools:
     """Return which values on planes (n_kinds, 3) a criterion reads."""
-    size = np.repeat([max(own.max(), -own.min()) for own in kinds], 3)
-    values = np.array([1.0, -1.0, 0.1, 10.0]) * size[:, None] + 1e-300
+    size = np.repeat([max(own.max(), -own.min(), 1e-100) for own in kinds], 3)
+    values = np.array([1.0, -1.0, 0.1, 10.0]) * size[:, None]
     before, used = search(OnPlanes(*values)), np.empty(len(size), dtype=bool)
     for k in range(len(size)):
         moved = values.copy()
@@ -190,8 +193,13 @@ def _bounds(paths: Array, circles: Ints) -> tuple[list[Array], list[Array], Arra
     for k, circle in enumerate(circles):
         simple = _simplified(np.ascontiguousarray(paths[:, k]), _SIMPLE)
         shear, normal, half = _scan(*simple, _NORMALS, circle)
+        # instants that were left out, and single precision
+        full = paths[:, k][:, _FULL]
+        apart = np.linalg.norm(full - full[..., :1], axis=(1, 2)).max(axis=1)
+        largest = np.linalg.norm(full, axis=(1, 2)).max(axis=1)
+        apart = (_SIMPLE * apart + _ROUNDED * largest)[:, None]
         low += [shear[0], normal, half]
-        high += [shear[1], normal, half]
+        high += [shear[1] + circle * apart, normal + apart, half + apart]
         most, widest = normal.max(axis=1), half.max(axis=1)
         sizes += [shear[0].max(axis=1), most / 2 - (normal / 2 - half).min(axis=1), widest]
     return low, high, np.stack(sizes)
@@ -230,7 +238,7 @@ def _climbed(
 def _derivatives(search: Value, values: Array) -> tuple[Array, Array]:
     """Return first and second derivatives (n, m), (n, m, m) of a criterion by values (m, n)."""
     count = len(values)
-    h = _DIFFERENCE * np.abs(values) + 1e-6 * np.abs(values).max(axis=0) + 1e-300
+    h = _DIFFERENCE * np.abs(values) + 1e-6 * np.abs(values).max(axis=0) + 1e-100
     each = np.zeros((count, count, 4, values.shape[1]))
     for k in range(count):
         for m in range(k + 1):

@@ -61,11 +61,16 @@ def _shape(q: Array, s: Array, J: Array) -> tuple[Array, Array, Array]:
 class _Stretch:
     """The logarithmic strain of points, as functions of F and of the hoop stretch, shape (...).
 
+    ``wider`` and ``grown`` are the hoop stretch and det F less 1: of small strains their logarithms
+    would keep only the digits that 1 leaves.
+
     Points that are inverted, det F <= 0, have NaN: C does not distinguish them.
     """
 
     F: Array
     hoop: Array
+    wider: Array
+    grown: Array
     s: Array
     d: Array
     o: Array
@@ -80,17 +85,19 @@ class _Stretch:
         xx, xy, yx, yy, hoop = H
         a, b = 2 * xx + xx**2 + yx**2, 2 * yy + yy**2 + xy**2
         s, d, o = 1 + (a + b) / 2, (a - b) / 2, xy + yx + xx * xy + yx * yy
-        J = 1 + xx + yy + xx * yy - xy * yx
-        J = np.where((J > 0) & (hoop > -1), J, np.nan)
+        grown = xx + yy + xx * yy - xy * yx
+        grown = np.where((grown > -1) & (hoop > -1), grown, np.nan)
+        J = 1 + grown
         h, h1, h2 = _shape((d**2 + o**2) / s**2, s, J)
         F = np.array([1 + xx, xy, yx, 1 + yy])
-        return cls(F, 1 + hoop, s, d, o, J, h / (2 * s), h1 / (2 * s**3), h2 / (2 * s**5))
+        phi = h / (2 * s), h1 / (2 * s**3), h2 / (2 * s**5)
+        return cls(F, 1 + hoop, hoop, grown, s, d, o, J, *phi)
 
     def strain(self) -> Array:
         """Return the Mandel strain (4, ...)."""
-        m, phi = np.log(self.J) / 2, self.phi
+        m, phi = np.log1p(self.grown) / 2, self.phi
         dev = phi * self.d
-        return np.array([m + dev, m - dev, np.log(self.hoop), SQRT2 * phi * self.o])
+        return np.array([m + dev, m - dev, np.log1p(self.wider), SQRT2 * phi * self.o])
 
     def by_functions(self) -> Array:
         """Return P = dE/dv (4, 4, ...), Mandel components first."""

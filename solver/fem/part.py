@@ -99,8 +99,9 @@ class Part(ABC):
         return self
 
     def turned_forces(self, time: float, contact: Array) -> Array | None:
-        """Return the stiffness times the rigid motions (n, n_rigid) [N/mm]; None where it is zero.
+        """Return the stiffness times the rigid motions (n, n_rigid) [N/mm], or None.
 
+        None where it is zero, or left out: for bodies that can move in one or two ways only.
         ``contact`` (n,) are the contact forces, which balance forces within the part and loads.
         """
         return None

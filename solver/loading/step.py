@@ -99,7 +99,7 @@ def newton_step(
         return solve_linked(problem, links, touched, candidates.status)
 
     solution = None
-    if candidates.turning is not None:
+    if candidates.turning is not None and not len(candidates.links):
         forces = on_parts(system, candidates, candidates.forces)
         rigid = [
             (R, part.turned_forces(time, own) if R.size else None)

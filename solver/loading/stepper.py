@@ -437,9 +437,7 @@ class Stepper:
         distorted = self.system.distorted(point.now.state)
         hint += "".join(f"; {each}" for each in distorted)
         if self.system.model.large and growing and not distorted:
-            hint += (
-                "; bodies of large strain may buckle, tip over or neck under this load: " + _MOVE
-            )
+            hint += f"; bodies of large strain may buckle, tip over or neck: {_MOVE}"
         return NotConverged(f"the increment {way} failed: {failure}{hint}", reached, attempted)
 
     def _timed(self, tally: Tally) -> Tally:
@@ -449,7 +447,7 @@ class Stepper:
         return replace(tally, seconds=seconds)
 
 
-_MOVE = "prescribe a motion instead of the force, or reduce the load"
+_MOVE = "prescribe a motion where a force acts, or reduce the load"
 
 
 def placed(system: System, state: State, time: float) -> State:

@@ -23,7 +23,7 @@ from solver.scenes import Effort, Scene
 from studies.definition.cases import LoadingPath
 from studies.definition.parameters import build
 from studies.definition.study import Study
-from studies.definition.vocabulary import OK, SOLVED
+from studies.definition.vocabulary import FIELDS, OK, SOLVED
 from studies.errors import StudyError
 from studies.execution.bundles import most_together, setup_of
 from studies.execution.limits import LOADED
@@ -69,7 +69,6 @@ class Estimate:
         of paths before
     basis : on which data the estimate is based, as text
     going_on : number of paths that go on from a stored run
-    from_start : number of paths of which shorter runs are stored, without the state to go on from
 
     A number that cannot be estimated is None.
     """
@@ -87,7 +86,6 @@ class Estimate:
     memory: int | None
     basis: str
     going_on: int = 0
-    from_start: int = 0
 
     @property
     def time(self) -> str:
@@ -107,9 +105,6 @@ class Estimate:
         walks = f"{self.paths} to walk"
         if self.going_on:
             walks += f", {self.going_on} of them on from the end of a stored run"
-        if self.from_start:
-            walks += f", {self.from_start} of them from the start: shorter runs are stored without "
-            walks += 'their state, which keep = "fields" keeps for rails and raceways'
         return {
             "runs": most if chooses else f"{self.runs} in all, {lacking}",
             "loading paths": walks,
@@ -281,8 +276,7 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
         bytes=round(to_compute * _file_size(scene.name, study.keep, store, unknowns) * _COMBINED),
         memory=memory if known else None,
         basis=basis if known else f"{scene.name} does not estimate the work of its paths",
-        going_on=sum(map(bool, begun)),
-        from_start=begun.count(0),
+        going_on=len(begun),
     )
     if bounds:
         bounds.check(found)
@@ -297,14 +291,16 @@ def _effort(
 ) -> Effort:
     """Return the work of a path, without that of the stored run that it goes on from."""
     own = of(path.parameters, values)
-    return own.without(of(path.parameters, begun)) if any(begun) else own
+    return own.without(of(path.parameters, begun)) if begun else own
 
 
 def _begun(path: LoadingPath, missing: Sequence[Any], store: Store) -> list[int]:
     """Return the first value of `Store.begun` for the first run that a path lacks, or none."""
     branch = path.cases[0].scene.branch
     first = next(case for case in path.cases if case.values.get(branch) in missing)
-    found = store.begun(first)
+    # the catalogue knows at once that no shorter run keeps its state
+    kept = first.shorter and store.catalogue.having(SOLVED, list(first.shorter), FIELDS)
+    found = store.begun(first) if kept else None
     return [found[0]] if found else []
 
 

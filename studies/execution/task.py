@@ -200,8 +200,8 @@ def _walk(
     try:
         if owed:
             monitor(0.0)
-            _, state = store.begun(next(iter(owed.values()))) or (0, {})
-            begun = (state,) if state else ()  # a scene of its own kind need not know it
+            known = store.begun(next(iter(owed.values())))
+            begun = known[1:] if known else ()  # a scene of its own kind need not know it
             for record in task.scene.path(path.parameters, list(owed), monitor, *begun):
                 value = getattr(record.parameters, branch, None)
                 row = _written(store, task, owed[value], record)

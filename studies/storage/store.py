@@ -365,15 +365,15 @@ class Store:
     def begun(self, case: Case) -> tuple[int, dict[str, Any]] | None:
         """Return the branch value and the state of the longest stored run that a run goes on from.
 
-        They are 0 and empty if none keeps its state, None if no shorter run is stored.
+        None if no shorter run is stored with its state.
         """
         values = case.shorter
-        stored = sorted(self.modified(values), key=values.__getitem__, reverse=True)
-        for run_id in stored:
-            with suppress(FileDamaged), runfile.opened(self.run_path(run_id)) as run:
+        for run_id in sorted(self.modified(values), key=values.__getitem__, reverse=True):
+            # without it the run begins at the start
+            with suppress(FileDamaged, OSError), runfile.opened(self.run_path(run_id)) as run:
                 if state := ugrid.state_of(run):
                     return values[run_id], state
-        return (0, {}) if stored else None
+        return None
 
     def run(self, run_id: str) -> Row | None:
         """Return the row of a run whose file is valid; the catalogue is updated to the file."""

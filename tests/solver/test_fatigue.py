@@ -236,6 +236,21 @@ def test_a_triangle_of_shear_is_as_bad_as_its_circle(turn: float) -> None:
     assert found.on.shear == pytest.approx([1.09]) and found.normal[0, 2] == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("share", [0.0, 1e-6, 1e-3])
+def test_points_without_stress_or_nearly_hydrostatic_have_their_plane(share: float) -> None:
+    """The first point has no stress, the others a pressure that cycles and little besides."""
+    rng = np.random.default_rng(4)
+    pressure = 100 * (1 + np.sin(np.linspace(0, 2 * np.pi, 12)))[:, None] * [1, 1, 1, 0, 0, 0]
+    stress = pressure + 100 * share * rng.normal(size=(5, 12, 6))
+    stress[0] = 0
+    criterion = Findley(torsion=300.0, sensitivity=0.3)
+    together = criterion.assess(Paths(stress)).value
+    assert together.shape == (5,) and together[0] == pytest.approx(0.0, abs=1e-9)
+    each = [criterion.assess(Paths(own[None])).value[0] for own in stress[1:]]
+    assert together[1:] == pytest.approx(each, rel=1e-9)
+    assert (together[1:] >= 0.3 * 200 * (1 - 0.1)).all()
+
+
 def test_a_path_has_two_instants_or_more() -> None:
     with pytest.raises(ModelError, match="2 instants or more"):
         Paths(cycle((300, 0, 0, 0, 0, 0)))

@@ -11,6 +11,7 @@ import pytest
 from solver import (
     Body,
     ContactPair,
+    Link,
     Material,
     Model,
     Pushed,
@@ -116,3 +117,16 @@ def test_a_rigid_body_that_rests_on_large_strain_converges_quadratically() -> No
     found = solve(model, stages=(Stage(name="loaded", target=1.0, steps=6),))
     assert max(found.tally.iterations) <= 3
     assert found.motion("plate", "loaded").rotation == pytest.approx(-0.04043 / 5.0, rel=1e-3)
+
+
+@pytest.mark.solves
+def test_tied_blocks_that_stand_on_a_base_converge() -> None:
+    """Links hold the upper block, and contact the lower one."""
+    model = standing(10.0)
+    block, base = model.bodies
+    lower = replace(block, mesh=grid(np.linspace(-1, 1, 7), np.linspace(0, 2, 7)), loads=())
+    upper = replace(block, name="upper", mesh=grid(np.linspace(-1, 1, 6), np.linspace(2, 4, 7)))
+    tie = Link(slave=("upper", "bottom"), master=("block", "top"))
+    tied = replace(model, bodies=(lower, upper, base), links=(tie,))
+    found = solve(tied, stages=(Stage(name="loaded", target=1.0, steps=4),))
+    assert found.contact().normal_force == pytest.approx(20.0, rel=1e-3)

@@ -172,4 +172,4 @@ def test_passes_go_on_from_a_stored_run(
     assert [each.increments for each in longer.values()] == [6, 8]
     words = [each.costs(chooses=False)["loading paths"] for each in longer.values()]
     assert "on from the end of a stored run" in words[0]
-    assert "from the start" in words[1]
+    assert "on from" not in words[1]

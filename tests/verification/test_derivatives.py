@@ -212,6 +212,15 @@ def test_a_ball_obeys_the_laws_of_scale() -> None:
         assert radius == pytest.approx(size, abs=1e-4)
 
 
+def test_a_punch_of_large_strain_obeys_the_laws_of_scale() -> None:
+    scene, by = SCENES["punch"], ("yield_stress", "youngs_modulus")
+    parameters = scene.parameters(
+        accuracy="draft", load_ratio=0.5, friction=0.3, strain="large", element="quad4"
+    )
+    record = numbers(scene, parameters, by, ("residual_x_half_plane",))
+    assert sum(shares(record, "residual_x_half_plane", by)) == pytest.approx(1.0, abs=1e-4)
+
+
 def test_peak_pressure_of_a_roller_grows_with_the_root_of_its_force() -> None:
     """Hertz: p0 ~ sqrt(P), so that dp0 / dP = p0 / (2 P)."""
     scene = read_scene(HERE / "data/scenes/roller.toml")

@@ -136,6 +136,14 @@ def test_smaller_elements_are_tried_where_they_are_the_remedy(
     assert not record.state()  # passes go on with elements of draft, or with none
 
 
+def test_a_limit_load_is_not_tried_with_smaller_elements() -> None:
+    given = {"lateral_control": "force", "given_lateral_force": -1e5}
+    parameters = SCENE.parameters(**DRAFT | given)
+    (record,) = SCENE.path(parameters, [1], lambda share: None)
+    assert record.status is Status.LIMIT_LOAD
+    assert "with accuracy" not in record.message
+
+
 def test_shear_beyond_yield_is_named_with_coulombs_law_alone() -> None:
     """Another law need not have this coefficient, nor `shear_limit`."""
     usual = SCENE.parameters(**{**DRAFT, "friction": 0.4})

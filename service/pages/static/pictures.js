@@ -167,8 +167,9 @@ export function drawLines(chart, found, names = [], label = null) {
 
 // Whether all values are one: the axis would then reach from one below it to one above it.
 function constant(traces) {
-  const all = traces.flatMap(({ y }) => Array.from(y)).filter(Number.isFinite);
-  return Math.max(...all) - Math.min(...all) <= 1e-9 * Math.max(...all.map(Math.abs));
+  let low = Infinity, high = -Infinity;
+  for (const { y } of traces) for (const each of y) if (Number.isFinite(each)) { low = Math.min(low, each); high = Math.max(high, each); }
+  return high - low <= 1e-9 * Math.max(Math.abs(low), Math.abs(high));
 }
 
 export function combinations(over) {

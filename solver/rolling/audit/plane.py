@@ -92,7 +92,8 @@ def _lost(material: Law, found: Pass[Layers], left: Layers | None, way: int) -> 
     if left is None:
         state = material.initial(len(before.accumulated), 4)
     else:
-        state = (left if way == 1 else left.mirrored).whole.state
+        state = left.whole.state
+        state = state if way == 1 else state.mirrored
     return max(
         float(found.direction != way), difference(material, before, state) / material.yield_stress
     )

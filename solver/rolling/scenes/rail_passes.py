@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from solver.audit.report import Audit
-from solver.errors import NotConverged
+from solver.errors import LimitLoad, NotConverged
 from solver.linear.threads import one_thread
 from solver.memory import kept
 from solver.results.acting import Acting
@@ -65,14 +65,22 @@ def by_rail_passes(
 
     def otherwise(remaining: Sequence[Any], error: NotConverged) -> Iterator[FinishedRun] | None:
         last = remaining[-1]
-        if not finer(last) or scene.remedy(last, error) != finer(last):
+        # finer ones than standard need too much memory to be tried unasked
+        if isinstance(error, LimitLoad) or last.accuracy != "draft":
+            return None
+        if scene.remedy(last, error) != finer(last):
             return None
         own = FINER[last.accuracy]
-        note = f"{error}: computed with accuracy = {own} instead"
         others = computed(scene, [replace(run, accuracy=own) for run in remaining], monitor)
-        return (replace(run, notes=(*run.notes, note), state=dict) for run in others)
+        return (_noted(run, f"{error}: {{}} with accuracy = {own} instead") for run in others)
 
     return computed(scene, runs, monitor, otherwise=otherwise, begun=begun)
+
+
+def _noted(run: FinishedRun, note: str) -> FinishedRun:
+    """Return a run of another accuracy with a note, and without a state."""
+    note = note.format("computed" if run.complete else "tried")
+    return replace(run, notes=(*run.notes, note), state=dict)
 
 
 class RolledPrism(ABC):
