@@ -129,4 +129,6 @@ def test_tied_blocks_that_stand_on_a_base_converge() -> None:
     tie = Link(slave=("upper", "bottom"), master=("block", "top"))
     tied = replace(model, bodies=(lower, upper, base), links=(tie,))
     found = solve(tied, stages=(Stage(name="loaded", target=1.0, steps=4),))
-    assert found.contact().normal_force == pytest.approx(20.0, rel=1e-3)
+    contact = found.contact()
+    assert contact.pressure @ contact.area == pytest.approx(20.0, rel=2e-3)
+    assert max(found.tally.iterations) <= 12
