@@ -1,8 +1,9 @@
 """Neighbouring runs: the same run with one parameter slightly different, followed linearly.
 
-A neighbour follows the increments of the run. Each of its increments is one Newton step from the
-end of the run's increment, with the run's consistent tangent. With a difference of 1e-6 of the
-parameter the error of this step, of second order, is negligible, so that
+A neighbour follows the increments of the run. Each of its increments is one Newton step from near
+the end of the run's increment, with the run's consistent tangent; more where that is not exact (see
+`Increment.linearised`). With a difference of 1e-6 of the parameter its error, of second order, is
+negligible, so that
 
     (result of the neighbour - result of the run) / difference
 
@@ -15,8 +16,9 @@ The first neighbour is the run itself, after the same Newton step: its differenc
 does not contain the out-of-balance forces that the run has left within its tolerance.
 
 P. Michaleris, D.A. Tortorelli, C.A. Vidal, Tangent operators and design sensitivity formulations
-for transient non-linear coupled problems, International Journal for Numerical Methods in
-Engineering 37 (1994) 2471-2499, direct differentiation of a history.
+for transient non-linear coupled problems with applications to elastoplasticity, International
+Journal for Numerical Methods in Engineering 37 (1994) 2471-2499, direct differentiation of a
+history.
 """
 
 from __future__ import annotations
