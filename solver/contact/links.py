@@ -142,8 +142,6 @@ def eliminated(
     S[:links, :links] = W[m:, m:]
     S[:links, links:] = A[m:] @ held
     S[links:, :links] = S[:links, links:].T
-    D = problem.D  # its part between motions that links hold and loose ones is left out
-    S[links:, links:] = 0.0 if D is None else held.T @ D @ held
     by_force = np.vstack([W[m:, :m], (A[:m] @ held).T])
     alone = np.concatenate([offset[m:], held.T @ problem.balance])
     try:
@@ -159,7 +157,6 @@ def eliminated(
         A=A[:m] @ loose,
         G=problem.turned[:m] @ loose,
         balance=loose.T @ problem.balance,
-        D=None if D is None else loose.T @ D @ loose,
     )
 
     def whole(found: ContactSolution) -> ContactSolution:

@@ -42,22 +42,24 @@ class Family:
     def __init__(
         self, asked: Derivatives, scene: Any, run: Any, system: System, samples: Samples
     ) -> None:
-        self._asked, self._scene, self._samples = asked, scene, samples
+        self._asked, self._scene, self._moving = asked, scene, set[str]()
         self._declared = asked.quantities(type(run), scene.known_quantities)
-        self._moving: set[str] = set()
-        own = [body.mesh.p for body in scene.model(run).bodies]
-        for name, each in zip(self._steps(run), self.runs(run), strict=True):
-            moved = zip(own, scene.model(each).bodies, strict=True)
-            if not all(np.array_equal(p, body.mesh.p) for p, body in moved):
+        models = dict(zip(self._steps(run), map(scene.model, self.runs(run)), strict=True))
+        for name, model in models.items():
+            both = zip(system.model.bodies, model.bodies, strict=True)
+            if not all(np.array_equal(one.mesh.p, two.mesh.p) for one, two in both):
                 self._moving.add(name)
-        beside = self.runs(run)
-        systems = [System(scene.model(each)) for each in beside]
-        self.followers = NeighbouringRuns(system, dict(zip(self._steps(run), systems, strict=True)))
-        self._parameters = [run, *beside]
-        self._beside = [samples, *map(Samples, systems, map(scene.view, beside))]
+        self._parameters = [run, *self.runs(run)]
+        for name, parameters in zip(models, self._parameters[1:], strict=True):
+            if name in self._moving:  # its difference is wider
+                models[name] = scene.model(parameters)
+        systems = {name: System(model) for name, model in models.items()}
+        self.followers = NeighbouringRuns(system, systems)
+        views = map(scene.view, self._parameters[1:])
+        self._beside = [samples, *map(Samples, systems.values(), views)]
         self._acting = [
             acting_on(each, symmetric=own.view.symmetric, axis=own.view.axis)
-            for each, own in zip((system, *systems), self._beside, strict=True)
+            for each, own in zip((system, *systems.values()), self._beside, strict=True)
         ]
 
     def runs(self, run: Any) -> list[Any]:
@@ -80,9 +82,9 @@ class Family:
 
     def watched(self, watch: Callable[[Any, Samples, Converged], Any], now: Converged) -> list[Any]:
         """Return what a scene watches in an increment: of the run, then of its neighbours."""
-        samples, parameters = (self._samples, *self._beside), self._parameters
-        each = zip((parameters[0], *parameters), samples, (now, *now.beside), strict=False)
-        return [watch(*own) for own in each]
+        known = list(zip(self._parameters, self._beside, strict=True))
+        each = zip((known[0], *known), (now, *now.beside), strict=False)
+        return [watch(*own, at) for own, at in each]
 
     def finished(self, run: FinishedRun, watched: Sequence[Sequence[Any]]) -> list[FinishedRun]:
         """Return the neighbours of a finished run, first the run itself; none if one failed.

@@ -170,15 +170,7 @@ class Windowed(Discretisation):
 
     def over_whole(self, operator: Operator) -> Operator:
         """Return the operator of the whole body, given that of the window."""
-        return _WholeOperator(self, operator)
-
-    def numbered(self, dofs: Ints) -> Ints:
-        """Return the numbers in the window of unknowns of the whole body, -1 outside."""
-        return np.asarray(self._number[dofs])
-
-    def eliminated(self, force: Array) -> Eliminated:
-        """Return nodal forces (n,) of the whole body with the rest of the body eliminated."""
-        return self._schur.begin(force)
+        return _WholeOperator(self.kept, self._number, self._schur, operator)
 
     def motion(self, surface: Surface, u: Array) -> Array:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
@@ -241,12 +233,14 @@ class Windowed(Discretisation):
 class _WholeOperator:
     """The operator of a whole body by that of its window; contact forces act in the window."""
 
-    def __init__(self, window: Windowed, operator: Operator) -> None:
-        self._window, self._operator = window, operator
+    def __init__(
+        self, kept: Ints, number: Ints, schur: SchurComplement, operator: Operator
+    ) -> None:
+        self._kept, self._number, self._schur, self._operator = kept, number, schur, operator
 
     def begin(self, force: Array) -> Begun:
         """See `Operator`."""
-        kept, outer = self._window.kept, self._window.eliminated(force)
+        kept, outer = self._kept, self._schur.begin(force)
         begun = self._operator.begin(outer.condensed)
         motion = np.zeros(len(force))
         motion[kept] = begun.kept
@@ -254,7 +248,7 @@ class _WholeOperator:
 
     def compliance(self, dofs: Ints, rows: Array) -> Array:
         """See `Operator`; raises `Singular` if contact has left the window."""
-        at = self._window.numbered(dofs)
+        at = self._number[dofs]
         if rows[:, at < 0].any():
             raise Singular("contact has left the window")
         return self._operator.compliance(at[at >= 0], rows[:, at >= 0])
