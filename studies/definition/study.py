@@ -39,8 +39,8 @@ from studies.scenes.registry import Find, beside, name_of, nothing, scene_named
 Kept = Callable[[str], Mapping[str, Any] | None]
 """Returns the content of a study that is known by its name or its id; None if there is none."""
 
-_assessed: Callable[[Scene, Any], Scene] = Late("studies.scenes.fatigue:assessed")
-_derived: Callable[[Scene, Any], Scene] = Late("studies.scenes.derivatives:derived")
+_assessed: Callable[[Scene, Any], Scene] = Late("studies.scenes.entries:assessed")
+_derived: Callable[[Scene, Any], Scene] = Late("studies.scenes.entries:derived")
 
 Count = Callable[[int, Scene, Any], None]
 """Accepts a number of runs of a scene, which keep what the entry ``keep`` says, or raises."""

@@ -10,7 +10,7 @@ import pytest
 from solver.fatigue import DangVan, Findley, Paths
 from solver.results.fatigue import Applies
 from studies import Study, StudyError, to_dataframe
-from studies.scenes.fatigue import assessed
+from studies.scenes.entries import assessed
 from tests.studies.scenes.conftest import blocks, built
 
 DANG_VAN = {"criterion": "dang_van", "limits": {"torsion": 200.0, "sensitivity": 0.3}}

@@ -14,7 +14,7 @@ from solver import Record
 from solver.results.quantities import IN_SPACE, QUANTITIES
 from studies import Store, Study, open_study, run_study
 from studies.definition.vocabulary import LABEL_ATTRIBUTES
-from studies.scenes.fatigue import assessed
+from studies.scenes.entries import assessed
 from studies.scenes.registry import built_in, scene_named
 from studies.scenes.scene import read_scene
 from studies.views.tables import runs_table
