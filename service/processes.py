@@ -40,7 +40,7 @@ LOADED = ("service.child", "service.pool", "studies.storage.combine")
 
 STDIN, STDOUT = 0, 1
 
-_BEHIND = 5
+BEHIND = 5
 """By how much computing is less urgent than answers: with it a processor that both want is mostly
 for the answer."""
 
@@ -153,7 +153,7 @@ def _begin(stdin: Connection, stdout: Connection, lock: Connection, module: str)
     stdin.close()
     stdout.close()
     name_process(module)
-    os.nice(_BEHIND)
+    os.nice(BEHIND)
     import_module(module).main()
 
 

@@ -12,6 +12,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import xarray as xr
+
 from service.octets import octets
 from solver.results.export import vtu_of
 from studies.definition.study import Study
@@ -25,6 +27,10 @@ from studies.views.picking import sweep_axes
 from studies.views.reading import open_netcdf
 from studies.views.shown import outline, shown
 from studies.views.solution import read
+
+# xarray looks for array libraries and readers of files at its first use: else each fork would.
+xr.Dataset({"first": ("first", ["use"])})
+xr.backends.list_engines()
 
 
 def outlined(path: Path) -> dict[str, list[dict[str, Any]]]:

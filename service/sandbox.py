@@ -36,7 +36,7 @@ from solver.files import read_file
 from studies.execution.forks import Forks
 from studies.storage.room import FULL
 
-READERS = Forks(("service.sandbox", "service.examiner", "service.reading"))
+READERS = Forks(("netCDF4", "service.sandbox", "service.examiner", "service.reading"))
 """The processes; what a call needs besides is loaded for it and all that follow."""
 
 _LIBC = ctypes.CDLL(None, use_errno=True)
@@ -101,13 +101,14 @@ class Answer:
 
 
 async def call(
-    function: Callable[..., Any], *given: object, seconds: float
+    function: Callable[..., Any], *given: object, seconds: float, nice: int
 ) -> tuple[Any, Exception | None, float]:
     """Return what a function gives, or the error that it raises, and its processor time [s].
 
-    All must be picklable. Raise `TimeoutError` after ``seconds``, `Ended` without an answer.
+    All must be picklable. Raise `TimeoutError` after ``seconds``, `Ended` without an answer. A
+    process with a larger niceness ``nice`` waits for others.
     """
-    content, _ = await _called(_answer, function, given, seconds)
+    content, _ = await _called(_answer, function, (*given, nice), seconds)
     if not content:
         raise Ended
     found: tuple[Any, Exception | None, float] = pickle.loads(content)
@@ -115,7 +116,12 @@ async def call(
 
 
 async def call_shut_in(
-    function: Callable[..., str], *given: object, folder: Path, cpu: float, seconds: float
+    function: Callable[..., str],
+    *given: object,
+    folder: Path,
+    cpu: float,
+    seconds: float,
+    nice: int,
 ) -> Answer:
     """Return what a function gives that has no network, and one folder to write in.
 
@@ -125,8 +131,10 @@ async def call_shut_in(
     ----------
     cpu : its processor time, in whole seconds
     seconds : its time; `TimeoutError` is raised after it
+    nice : as of `call`
     """
-    content, status = await _called(_answer_shut_in, function, (*given, folder, cpu), seconds)
+    told = *given, folder, cpu, nice
+    content, status = await _called(_answer_shut_in, function, told, seconds)
     left, _, text = content.decode(errors="replace").partition("\n")
     if status in (-signal.SIGXCPU, -signal.SIGKILL):
         return Answer("", errno.ETIME, left)
@@ -158,8 +166,8 @@ def _all(pipe: Connection) -> bytes:
         return b"".join(iter(lambda: os.read(pipe.fileno(), 1 << 20), b""))
 
 
-def _limit(into: Connection) -> None:
-    """Limit the memory of this process, and keep it from all but a pipe and the log."""
+def _limit(into: Connection, nice: int) -> None:
+    """Limit memory and urgency of this process, and keep it from all but a pipe and the log."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the service's to handle
     nothing = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1):
@@ -168,19 +176,21 @@ def _limit(into: Connection) -> None:
     for number, following in pairwise([*kept, os.sysconf("SC_OPEN_MAX")]):
         os.closerange(number + 1, following)
     resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
+    os.nice(nice)
     threadpool_limits(1)
 
 
-def _answer(into: Connection, function: Callable[..., Any], given: tuple[object, ...]) -> None:
+def _answer(into: Connection, function: Callable[..., Any], given: tuple[Any, ...]) -> None:
     """Write a pickle of what a function returns, the error that it raises, and its time [s].
 
     An error is pickled by its own rule. That of `tblib`, which Dask sets for all errors, adds what
     the error came from; in the errors of pydantic that has no end.
     """
-    _limit(into)
+    *own, nice = given
+    _limit(into, nice)
     found, failed = None, None
     try:
-        found = function(*given)
+        found = function(*own)
     except Exception as error:
         failed = error
     out = BytesIO()
@@ -199,9 +209,9 @@ def _answer_shut_in(
 ) -> NoReturn:
     """Write what this system does not let this process give up, and the answer of a function."""
     status = FAILED
-    *own, folder, seconds = given
+    *own, folder, seconds, nice = given
     try:
-        _limit(into)
+        _limit(into, nice)
         most = max(int(seconds), 1)
         resource.setrlimit(resource.RLIMIT_CPU, (most, most + 1))
         tempfile.tempdir = str(folder)

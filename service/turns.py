@@ -27,6 +27,7 @@ from anyio import CapacityLimiter, to_thread
 
 from service import sandbox
 from service.errors import Busy, TooMany
+from service.processes import BEHIND
 from service.sandbox import BYTES, Answer
 from studies.errors import StudyError
 
@@ -97,7 +98,8 @@ class Turns:
                 if patient:
                     await self._refilled(caller)
                 async with self.slots:
-                    turn = Turn(inf if patient else self.remaining(caller))
+                    remaining = inf if patient else self.remaining(caller)
+                    turn = Turn(remaining, min(int(self.used(caller)), BEHIND))
                     try:
                         yield turn
                     finally:
@@ -123,13 +125,17 @@ class Turns:
         """
         if self.seconds is None:
             return inf
-        until = max(self.refilled.get(caller, 0.0) - time.monotonic(), 0.0)
-        remaining, least = self.seconds * (1.0 - until / MINUTE), min(1.0, self.seconds / 2)
+        remaining, least = self.seconds - self.used(caller), min(1.0, self.seconds / 2)
         if remaining < least:
             used = f"{self.seconds:g} s of processor time in a minute are used"
             later = ceil((least - remaining) / self.seconds * MINUTE)
             raise TooMany(f"{used}: ask later", later)
         return remaining
+
+    def used(self, caller: str) -> float:
+        """Return the processor time of its budget that a caller has used [s]; 0 without budgets."""
+        until = max(self.refilled.get(caller, 0.0) - time.monotonic(), 0.0)
+        return until / MINUTE * (self.seconds or 0.0)
 
     def charge(self, caller: str, seconds: float) -> None:
         """Take time from the budget of a caller."""
@@ -147,10 +153,13 @@ class Turn:
     Attributes
     ----------
     remaining : processor time that the caller may take [s]
+    nice : niceness of a process: who has used a second of a minute waits for who has not, and who
+        has used five as studies do
     spent : processor time that the turn has taken [s]
     """
 
     remaining: float
+    nice: int = 0
     spent: float = 0.0
 
     async def here(self, function: Callable[..., Found], *given: object) -> Found:
@@ -190,7 +199,9 @@ class Turn:
             if the process was killed
         """
         with self._refused(field, name, seconds, advice):
-            found, failed, spent = await sandbox.call(function, *given, seconds=seconds)
+            found, failed, spent = await sandbox.call(
+                function, *given, seconds=seconds, nice=self.nice
+            )
         self.spent += spent
         if isinstance(failed, MemoryError):
             raise beyond(field, name, seconds, advice)
@@ -205,7 +216,7 @@ class Turn:
         begun = time.monotonic()
         with self._refused("scene", "scene.toml", seconds):
             answer = await sandbox.call_shut_in(
-                function, *given, folder=folder, cpu=cpu, seconds=seconds
+                function, *given, folder=folder, cpu=cpu, seconds=seconds, nice=self.nice
             )
         self.spent += cpu if answer.failed == errno.ETIME else time.monotonic() - begun
         return answer

@@ -232,7 +232,7 @@ def _serve(pipe: Connection, other: Connection | None, modules: Sequence[str]) -
     solver_hash()
     gc.freeze()
     context: Any = multiprocessing.get_context(_FORKS)
-    forks: dict[Any, tuple[BaseProcess, Connection]] = {}
+    forks: dict[int, tuple[BaseProcess, Connection]] = {}
     with suppress(EOFError, OSError):
         pipe.send(None)
         while True:
@@ -240,14 +240,23 @@ def _serve(pipe: Connection, other: Connection | None, modules: Sequence[str]) -
             for each in forks.keys() & set(ready):
                 fork, end = forks.pop(each)
                 fork.join()
+                os.close(each)
                 with end, suppress(OSError):
                     end.send(fork.exitcode)
             if pipe in ready:
                 fork, end = _begun(pipe, context)
-                forks[fork.sentinel] = fork, end
+                forks[_watched(fork)] = fork, end
     for fork, _ in forks.values():
         fork.kill()
     os._exit(0)
+
+
+def _watched(fork: BaseProcess) -> int:
+    """Return a file that can be read when a process has ended.
+
+    That of `multiprocessing` can be read too when the process has closed its files.
+    """
+    return os.pidfd_open(fork.pid or 0) if sys.platform == "linux" else os.dup(fork.sentinel)
 
 
 def _begun(pipe: Connection, context: Any) -> tuple[BaseProcess, Connection]:
@@ -275,7 +284,7 @@ def _call(others: Sequence[Connection], content: bytes, pipes: Sequence[Connecti
         other.close()
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
-    os.setsid()
+    os.setpgid(0, 0)  # not a session: Linux shares processors among sessions, however nice
     function, given = pickle.loads(content)
     try:
         function(*pipes, *given)

@@ -150,9 +150,7 @@ def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[st
     values : its variables that have one value
     """
     scalars = {
-        name: _plain(name, value)
-        for name, value in values.items()
-        if name not in {"status", "message"}
+        name: _plain(value) for name, value in values.items() if name not in {"status", "message"}
     }
     return {
         "id": attributes["id"],
@@ -169,17 +167,13 @@ def summary(attributes: Mapping[str, Any], values: Mapping[str, Any]) -> dict[st
     }
 
 
-def _is_count(name: str) -> bool:
-    return name in QUANTITIES and QUANTITIES[name].count
-
-
 def _scalar(name: str, number: float) -> np.ndarray:
-    if _is_count(name):
+    if name in QUANTITIES and QUANTITIES[name].count:
         return np.asarray(number if np.isfinite(number) else INTEGER_FILL, dtype=np.int32)
     return np.asarray(number, dtype=float)
 
 
-def _plain(name: str, number: float) -> float | None:
-    """Return a number as a JSON value: None for one that is absent."""
-    absent = number == INTEGER_FILL if _is_count(name) else not np.isfinite(number)
+def _plain(number: float) -> float | None:
+    """Return a number as a JSON value: None for one that is absent. Counts are integers."""
+    absent = number == INTEGER_FILL if isinstance(number, int) else not np.isfinite(number)
     return None if absent else number

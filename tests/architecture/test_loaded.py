@@ -44,6 +44,19 @@ print(json.dumps([row["status"], sorted(before), sorted(sys.modules)]))
 """
 
 
+AGAIN = """
+import sys
+from pathlib import Path
+import service.app
+from studies import Store
+store = Store(Path(sys.argv[1]))
+store.catalogue.remove([row["id"] for row in store.catalogue.runs()[0]])
+store.reconcile()
+assert [row["status"] for row in store.catalogue.runs()[0]] == ["ok"]
+print(*{name.partition(".")[0] for name in sys.modules})
+"""
+
+
 @pytest.mark.processes
 @pytest.mark.solves
 def test_a_worker_loads_what_a_run_needs_before_it_is_forked_and_nothing_else(
@@ -57,6 +70,11 @@ def test_a_worker_loads_what_a_run_needs_before_it_is_forked_and_nothing_else(
     assert not [name for name in after if name.startswith(UNASKED)]
     first, last = ({name.partition(".")[0] for name in names} for names in (before, after))
     assert last - first <= sys.stdlib_module_names
+    command = [sys.executable, "-c", AGAIN, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    loaded = set(done.stdout.split())
+    assert "h5py" in loaded
+    assert not {"netCDF4", "scipy", "skfem", "xarray"} & loaded, "the service finds runs again"
 
 
 @pytest.mark.processes

@@ -178,7 +178,7 @@ def test_a_process_that_cannot_be_forked_is_an_error_of_the_system(tmp_path: Pat
 ECHO = """
 import os, sys
 def main():
-    told = os.getsid(0), os.getcwd(), os.environ["FOR_IT"]
+    told = os.getpgid(0), os.getcwd(), os.environ["FOR_IT"]
     os.write(1, " ".join(map(str, told)).encode() + b"\\n")
     os.write(1, os.read(0, 100))
     while os.read(0, 1):
@@ -223,7 +223,7 @@ def test_a_process_starts_with_its_order_and_tells_its_end(tmp_path: Path) -> No
         timeout=120,
     )
     told, order, running, pid, code, killed = json.loads(done.stdout)
-    assert told == [str(pid), "/", "told"], "a session of its own, and no folder of the service"
+    assert told == [str(pid), "/", "told"], "a group of its own, and no folder of the service"
     assert order == {"id": "a"}
     assert (running, code, killed) == (None, 3, -signal.SIGKILL)
 

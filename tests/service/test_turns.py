@@ -169,6 +169,47 @@ def test_a_call_is_charged_the_time_that_it_takes_wherever_it_runs() -> None:
     asyncio.run(calls())
 
 
+def told_by(path: Path) -> int:
+    """Return what another process writes into a file."""
+    while not path.exists() or not path.read_text():
+        time.sleep(0.01)
+    return int(path.read_text())
+
+
+def test_a_call_does_not_wait_for_the_end_of_another(tmp_path: Path) -> None:
+    async def calls() -> None:
+        limits = {"field": "file", "name": "a", "seconds": 30.0}
+        path, turns = tmp_path / "word", Turns(2, 60.0)
+        first = asyncio.create_task(Share(turns, "anna").apart(told_by, path, **limits))
+        while not turns.slots.borrowed_tokens:
+            await asyncio.sleep(0.01)
+        await asyncio.sleep(0.2)  # it has begun
+        await Share(turns, "bert").apart(path.write_text, "7", **limits)
+        assert await first == 7
+
+    asyncio.run(calls())
+
+
+def urgency() -> tuple[int, int]:
+    """Return the niceness of this process, and its session."""
+    return os.nice(0), os.getsid(0)
+
+
+def test_who_has_used_much_time_waits_for_who_has_not() -> None:
+    """Of processes of several sessions, Linux would not ask how nice they are."""
+
+    async def calls() -> None:
+        own = os.nice(0)
+        for used, more in ((0.5, 0), (3.5, 3), (20.0, 5)):
+            turns = Turns(1, 60.0)
+            turns.charge("anna", used)
+            for caller, nice in (("anna", own + more), ("bert", own)):
+                told = await Share(turns, caller).apart(urgency, field="file", name="a")
+                assert told == (min(nice, 19), os.getsid(0))
+
+    asyncio.run(calls())
+
+
 def test_simultaneous_posts_of_a_caller_share_its_budget(monkeypatch: pytest.MonkeyPatch) -> None:
     given: list[float] = []
     inspector, turns = Inspector(10.0), Turns(2, 10.0)
@@ -248,7 +289,7 @@ def trying(elsewhere: str, own: str) -> str:
 
 def alone(function: Callable[..., str], *given: object, folder: Path, seconds: float) -> Answer:
     """Return what a function gives that is shut in."""
-    call = call_shut_in(function, *given, folder=folder, cpu=seconds, seconds=60.0)
+    call = call_shut_in(function, *given, folder=folder, cpu=seconds, seconds=60.0, nice=0)
     return asyncio.run(call)
 
 
