@@ -13,7 +13,7 @@ from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.numbers import ROUNDED
 from studies.storage.dataset import attributes_of
-from studies.views.columns import unit_text
+from studies.views.columns import COMPUTED, computed_text, unit_text
 from studies.views.figures import group_of, meter
 
 
@@ -90,12 +90,13 @@ def numbers_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str,
 def parameters_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str, Any]]:
     """Return name, meaning, unit and value of each parameter; whether it is the scene's default."""
     known = parameters_of(scene) if scene else {}
+    words = {each["name"]: str(each["value"]) for each in numbers_shown(run, scene)}
     return [
         {
             "name": name,
             "words": known[name].description if name in known else "",
             "unit": unit if (unit := known[name].unit if name in known else "") != "1" else "",
-            "value": value,
+            "value": computed_text(value, words.get(f"{COMPUTED}{name}", "")),
             "usual": name in known and known[name].default == value,
         }
         for name, value in run["parameters"].items()

@@ -31,6 +31,15 @@ def value_text(value: Any) -> str:
     return "-" if value is None else counted(value)
 
 
+COMPUTED = "computed_"
+"""Begins the name of a variable that holds what a run was computed with, before its parameter."""
+
+
+def computed_text(value: Any, own: str) -> Any:
+    """Return a parameter as given, with what the run was computed with if that is another."""
+    return f"{value}, computed with {own}" if own and own != value else value
+
+
 def or_none(value: Any) -> Any:
     """Return a value as JSON has it: None for NaN and infinity."""
     value = value.item() if isinstance(value, np.generic) else value

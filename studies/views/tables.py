@@ -24,7 +24,16 @@ from studies.kinds.kind import Kind
 from studies.numbers import ROUNDED
 from studies.scenes.registry import scene_of
 from studies.storage.ugrid import owns
-from studies.views.columns import aligned, in_blocks, or_none, stacked, unit_text, value_text
+from studies.views.columns import (
+    COMPUTED,
+    aligned,
+    computed_text,
+    in_blocks,
+    or_none,
+    stacked,
+    unit_text,
+    value_text,
+)
 from studies.views.figures import FIGURES, worst
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.reading import open_study
@@ -230,6 +239,8 @@ def run_details(dataset: xr.Dataset) -> str:
     for name, value in (_parameters(dataset) | swept).items():
         own = left_out.get(name)
         text = value_text(value) if own is None else f"{own} {BY_ACCURACY}".lstrip()
+        if (computed := f"{COMPUTED}{name}") in dataset:
+            text = computed_text(text, _figure(dataset[computed]))
         lines.append([name, text])
     lines.append(["status", _figure(dataset["status"])])
     if message := str(dataset["message"].item()):

@@ -133,7 +133,8 @@ _FORMULAS = """
     fatigue_plane_y fatigue_plane_z fatigue_plastic_strain fatigue_applies
     instant fatigue_path_hydrostatic fatigue_path_shear fatigue_path_limit
     tip tip_x tip_y tip_z K_I K_II K_I_faces K_II_faces
-    spin_moment wheel_surface pass_load pass_lateral_position pass_traction outline_z
+    computed_accuracy spin_moment wheel_surface pass_load pass_lateral_position pass_traction
+    outline_z
 """
 FORMULAS = _FORMULAS.split()
 """Quantities that a formula makes of fields, history or cost of a run."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -15,7 +16,7 @@ from solver.results.record import Status
 from solver.rolling import search
 from solver.rolling.scenes import rail_outputs
 from solver.rolling.scenes import rail_passes as prism_passes
-from solver.rolling.scenes.rail_outputs import remedies
+from solver.rolling.scenes.rail_outputs import ComputedAccuracy, remedies
 from solver.rolling.scenes.wheel_rail import ELEMENT_SIZE, WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
 from solver.rolling.scenes.wheel_rail_track import geometry
@@ -116,11 +117,15 @@ def test_smaller_elements_are_tried_where_they_are_the_remedy(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Under two contacts draft elements often have no contact forces where smaller ones have."""
-    own, tried = search.passing, list[int]()
+    own, tried, lost = search.passing, list[int](), list[float]()
 
     def coarse(track: Any, *given: Any, **settings: Any) -> Any:
         tried.append(len(track.points[0]))
         if tried[-1] == tried[0]:
+            began = time.process_time()
+            while time.process_time() < began + 0.02:
+                pass
+            lost.append(time.process_time() - began)
             raise NoContact("no contact forces were found")
         return own(track, *given, **settings)
 
@@ -128,12 +133,27 @@ def test_smaller_elements_are_tried_where_they_are_the_remedy(
     monkeypatch.setitem(
         cast("dict[str, float]", ELEMENT_SIZE), "standard", 2.6
     )  # cheap; any other size than that of draft
+    began = time.process_time()
     record = rolled(friction=0.17)
     assert record.message == (
         "no contact forces were found: computed with accuracy = standard instead"
     )
+    assert record.scalars["computed_accuracy"] == ComputedAccuracy.STANDARD
+    assert sum(lost) < record.scalars["cpu_seconds"] < time.process_time() - began
     assert getattr(record.parameters, "accuracy", "") == "draft"
     assert not record.state()  # passes go on with elements of draft, or with none
+
+
+def test_bounds_know_the_elements_that_may_be_tried() -> None:
+    """A draft of which a run is lost needs the unknowns and the memory of standard elements."""
+    efforts = {
+        accuracy: SCENE.effort(SCENE.parameters(**{**DRAFT, "accuracy": accuracy}), [1])
+        for accuracy in ("draft", "standard", "fine")
+    }
+    draft, standard, fine = efforts.values()
+    assert draft.unknowns == standard.unknowns < fine.unknowns
+    assert draft.memory == standard.memory
+    assert draft.seconds < standard.seconds
 
 
 def test_a_limit_load_is_not_tried_with_smaller_elements() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, cast
 
@@ -118,7 +118,13 @@ def by_passes(
         if not isinstance(path.error, WindowTooSmall):
             break
     others = otherwise(remaining, path.error) if path.error and remaining else None
-    yield from map(path.finished, remaining) if others is None else others
+    if others is None:
+        yield from map(path.finished, remaining)
+        return
+    spent = path.seconds
+    for run in others:
+        tally = replace(run.outcome.tally, seconds=spent + run.outcome.tally.seconds)
+        yield replace(run, outcome=replace(run.outcome, tally=tally))
 
 
 class _Path:
@@ -138,6 +144,11 @@ class _Path:
         self._elsewhere = 0.0
         self._budget = SolveBudget()
         self.error: NotConverged | None = None
+
+    @property
+    def seconds(self) -> float:
+        """Processor time so far."""
+        return time.process_time() - self._started - self._elsewhere
 
     def _begin(self, reach: float) -> None:
         self._reach, self._passes = reach, self._window(self._last, self._view, reach)
@@ -194,7 +205,7 @@ class _Path:
             points = {name: left if name == view.unloaded else loaded for name in view.stages}
             if (fields := passes.beside) is not None:
                 beside = partial(fields, found)
-        seconds = time.process_time() - self._started - self._elsewhere
+        seconds = self.seconds
 
         def check() -> Audit:
             assert found is not None

@@ -30,7 +30,7 @@ from solver.rolling.rail.section import Section
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.raceway import BESIDE, RacewayParameters
 from solver.rolling.scenes.rail_outputs import remedies, sketched
-from solver.rolling.scenes.rail_passes import RolledPrism, by_rail_passes
+from solver.rolling.scenes.rail_passes import RolledPrism, by_rail_passes, effort_of
 from solver.rolling.scenes.rail_window import PrismGeometry, split_rows, whole
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
 from solver.scenes.scene import Advice, Effort, Method
@@ -230,8 +230,12 @@ def elastic(run: FinishedRun) -> Values:
 
 def effort(parameters: RacewayParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
-    own = geometry(parameters)
-    return own.effort(section_of(own), passes)
+
+    def work(p: RacewayParameters) -> Effort:
+        own = geometry(p)
+        return own.effort(section_of(own), passes)
+
+    return effort_of(work, parameters)
 
 
 def advice(parameters: RacewayParameters) -> Advice:

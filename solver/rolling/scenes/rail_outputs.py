@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -91,6 +92,21 @@ MEAN_NET_INCREMENT = declare(
     "mean_net_increment",
     "largest equivalent of the signed plastic strain left by a pass, mean over the last passes",
 )
+
+
+class ComputedAccuracy(IntEnum):
+    """The accuracy with which a run was computed, with its stored value."""
+
+    DRAFT = 0
+    STANDARD = 1
+    FINE = 2
+
+
+COMPUTED_ACCURACY = declare(
+    "computed_accuracy",
+    "accuracy of the elements with which the run was computed",
+    flags=ComputedAccuracy,
+)
 _AVERAGED = 100
 """Largest number of passes in a mean over the last passes; it is at most half of all."""
 _YIELDED = 1e-6
@@ -101,6 +117,11 @@ def sketched(name: str, section: Section, law: Law, curves: Mapping[str, Array])
     """Return the section of a prism of a law, and curves (2, n) of what rolls on it, in z and y."""
     body = replace(section.plane.body, name=name, material=law)
     return Sketch((body,), springs={body.name: [*section.springs]}, curves=curves)
+
+
+def accuracy(run: FinishedRun) -> Values:
+    """Return the accuracy that was computed: another than asked for where that one was lost."""
+    return {COMPUTED_ACCURACY: ComputedAccuracy[run.parameters.accuracy.upper()]}
 
 
 def patch(run: FinishedRun) -> Values:

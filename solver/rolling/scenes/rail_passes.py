@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from solver.audit.report import Audit
-from solver.errors import LimitLoad, NotConverged
+from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.linear.threads import one_thread
 from solver.memory import kept
 from solver.results.acting import Acting
@@ -27,14 +28,17 @@ from solver.rolling.rail.track import PrismTrack
 from solver.rolling.results.rail import PrismBody, of_patch, zone_fields
 from solver.rolling.scenes.pass_runner import BegunPasses, Passes, by_passes
 from solver.rolling.scenes.passes import PassTrace
-from solver.rolling.scenes.rail_outputs import FINER, finer
+from solver.rolling.scenes.rail_outputs import finer
 from solver.rolling.search import search
-from solver.scenes.scene import Monitor, Scene
+from solver.scenes.scene import Effort, Monitor, Scene
 from solver.tensors import to_tensor
 from solver.typing import Array
 
 REACHES = (1.0, 1.4, 2.0)
 """Ratios of the size of zone and window to the usual size, tried in turn."""
+_TRIED = {"draft": "standard"}
+"""The accuracy that is tried where another one is lost; finer ones than these need too much memory
+to be tried unasked."""
 _SETTLED = 1
 """Largest number of Newton steps of a pass after which the next pass begins with its strain."""
 
@@ -65,16 +69,29 @@ def by_rail_passes(
 
     def otherwise(remaining: Sequence[Any], error: NotConverged) -> Iterator[FinishedRun] | None:
         last = remaining[-1]
-        # finer ones than standard need too much memory to be tried unasked
-        if isinstance(error, LimitLoad) or last.accuracy != "draft":
+        own = _TRIED.get(last.accuracy)
+        if own is None or isinstance(error, LimitLoad) or scene.remedy(last, error) != finer(last):
             return None
-        if scene.remedy(last, error) != finer(last):
-            return None
-        own = FINER[last.accuracy]
         others = computed(scene, [replace(run, accuracy=own) for run in remaining], monitor)
         return (_noted(run, f"{error}: {{}} with accuracy = {own} instead") for run in others)
 
     return computed(scene, runs, monitor, otherwise=otherwise, begun=begun)
+
+
+def effort_of(work: Callable[[Any], Effort], parameters: Any) -> Effort:
+    """Return the work of passes; unknowns and memory are those of what is tried, if more.
+
+    Parameters
+    ----------
+    work : (parameters) -> the work of passes with their accuracy
+    """
+    own, other = work(parameters), _TRIED.get(parameters.accuracy)
+    if other is not None:
+        with suppress(ModelError):  # it has no room for the zone, and will not be tried
+            most = work(replace(parameters, accuracy=other))
+            unknowns, memory = max(own.unknowns, most.unknowns), max(own.memory, most.memory)
+            return replace(own, unknowns=unknowns, memory=memory)
+    return own
 
 
 def _noted(run: FinishedRun, note: str) -> FinishedRun:

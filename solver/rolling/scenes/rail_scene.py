@@ -88,7 +88,10 @@ def rail_scene(
             *late("rolling.scenes.rail_outputs", "patch", "section"),
             *outputs,
         ),
-        costs=late("results.figures", "cost"),
+        costs=(
+            *late("results.figures", "cost"),
+            *late("rolling.scenes.rail_outputs", "accuracy"),
+        ),
         warnings=late("rolling.scenes.rail_outputs", "undecided")[0],
         effort=effort,
         setup=geometry,

@@ -15,7 +15,7 @@ from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.rail_outputs import cycles, remedies, sketched
-from solver.rolling.scenes.rail_passes import RolledPrism, by_rail_passes
+from solver.rolling.scenes.rail_passes import RolledPrism, by_rail_passes, effort_of
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
 from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
@@ -136,8 +136,12 @@ def _at_first_touch(p: WheelRailParameters, z: Array) -> Array:
 
 def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
     """Return the work of so many passes; the section is meshed for it."""
-    own, turns = geometry(parameters), len({id(each) for each in parameters.block})
-    return own.effort(meshed(parameters, own), passes, turns, scattered=parameters.scattered)
+
+    def work(p: WheelRailParameters) -> Effort:
+        own, turns = geometry(p), len({id(each) for each in p.block})
+        return own.effort(meshed(p, own), passes, turns, scattered=p.scattered)
+
+    return effort_of(work, parameters)
 
 
 def advice(parameters: WheelRailParameters) -> Advice:

@@ -16,8 +16,9 @@ from studies.definition.parameters import build, defaults, parameters_of, plain
 from studies.numbers import number_text
 from studies.scenes.registry import scene_of
 from studies.storage.frame import FRACTION
-from studies.views.columns import counted
+from studies.views.columns import COMPUTED, computed_text, counted
 from studies.views.columns import plain as in_words
+from studies.views.picking import flags
 
 _STAY = "\N{NO-BREAK SPACE}"
 
@@ -105,20 +106,23 @@ def setting(run: xr.Dataset) -> str:
     known = parameters_of(scene_of(run.attrs))
     given: Mapping[str, Any] = json.loads(run.attrs["parameters"])
     usual = _usual(run, given)
+    own = {name: computed_text(value, _computed(run, name)) for name, value in given.items()}
     idle = _idle(run, given)
     plane = given.get("state")
     state = [words(plane)] if isinstance(plane, str) and "state" not in run.coords else []
     place = [
         named(
             str(name),
-            plain(each.item(), known[name].default) if name in known else each.item(),
+            computed_text(plain(each.item(), known[name].default), _computed(run, str(name)))
+            if name in known
+            else each.item(),
             each.attrs.get("units", ""),
         )
         for name, each in run.coords.items()
         if each.ndim == 0 and not str(name).endswith(FRACTION) and name not in idle
     ]
     others = [
-        named(name, value, known[name].unit)
+        named(name, own[name], known[name].unit)
         for name, value in given.items()
         if name in known
         and name not in {*run.coords, *idle}
@@ -127,6 +131,12 @@ def setting(run: xr.Dataset) -> str:
     ]
     parts = [scene, *state, *place, *others]
     return f"{_STAY}· ".join(part.replace(" ", _STAY) for part in parts)
+
+
+def _computed(run: xr.Dataset, name: str) -> str:
+    """Return the word of what a run was computed with, if it holds one for this parameter."""
+    variable = run.get(f"{COMPUTED}{name}")
+    return "" if variable is None or variable.ndim else flags(variable).get(variable.item(), "")
 
 
 def _idle(run: xr.Dataset, given: Mapping[str, Any]) -> set[str]:

@@ -23,6 +23,7 @@ from solver.results.invariants import PRINCIPAL, principal_of
 from solver.tensors import AXES
 from studies.errors import StudyError
 from studies.numbers import number_text
+from studies.views.columns import COMPUTED
 from studies.views.picking import one_run
 from studies.views.plots.captions import capitalised, label, setting, symbol, wrapped
 from studies.views.plots.fields import (
@@ -403,6 +404,7 @@ def entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> 
     """Set the title, and below it what distinguishes the run, in lines of `width` inches."""
     quantity = values.attrs.get("long_name", str(values.name))
     shown = values.drop_vars("component", errors="ignore").to_dataset(name="values")
+    shown = shown.assign({n: each for n, each in run.items() if str(n).startswith(COMPUTED)})
     below = axes.set_title(
         wrapped(setting(shown.assign_attrs(run.attrs)), width, 8),
         loc="left", fontsize=8, color="0.3", pad=_ABOVE,
