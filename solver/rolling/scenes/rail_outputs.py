@@ -216,13 +216,15 @@ def remedies(parameters: PrismParameters, pressure: float) -> Advice:
     unlimited = coulomb and not getattr(parameters, "shear_limit", 0.0)
     beyond = unlimited and friction * pressure > strength
     shear = f"friction would carry {friction * pressure:.0f} MPa, more than the shear yield stress"
+    limited = f"{shear} of {strength:.0f} MPa: set shear_limit = 1"
     accuracy = finer(parameters) or "lower load or traction"
     return {
         Status.LIMIT_LOAD: "lower load or traction, or let the material harden",
         Runaway: "lower load or traction",
         WindowTooSmall: "lower the load",
-        NoContact: f"{shear} of {strength:.0f} MPa: set shear_limit = 1" if beyond else accuracy,
+        NoContact: limited if beyond else accuracy,
         Status.NOT_CONVERGED: accuracy,
+        Status.AUDIT_FAILED: limited if beyond else accuracy,
     }
 
 

@@ -100,6 +100,8 @@ def draw_wheel(axes: Axes, values: xr.DataArray, run: xr.Dataset) -> None:
 
 
 Array = np.ndarray
+_NEXT = 1.5
+"""Distance of neighbouring places in steps of the map, at most, also diagonally."""
 _ON_LINE = 1e-9
 """Ratio of a position to the size of the bodies; below it a point is on the line of symmetry."""
 
@@ -140,7 +142,8 @@ def clip_of(curves: list[Array]) -> Path:
 def reaching(values: xr.DataArray, curves: list[Array]) -> xr.DataArray:
     """Return a map in which places outside of the bodies have the value of the nearest place.
 
-    So it reaches their outlines. What is unknown inside of them stays unknown.
+    So it reaches their outlines, also between an outline and the edges of elements, which are
+    chords. What is unknown inside of them stays unknown.
     """
     across, up = map_axes(values)
     whole = values.transpose(up, across)
@@ -150,13 +153,13 @@ def reaching(values: xr.DataArray, curves: list[Array]) -> xr.DataArray:
         way = np.sign(curve[0] @ np.roll(curve[1], -1) - curve[1] @ np.roll(curve[0], -1))
         turns += int(way) * Path(curve.T).contains_points(places)
     there = whole.notnull().to_numpy()
-    outside = (turns <= 0).reshape(there.shape) & ~there
+    beyond = (turns <= 0).reshape(there.shape)
     if not there.any():
         return values
-    nearest = scipy.ndimage.distance_transform_edt(
-        ~there, return_distances=False, return_indices=True
-    )
-    filled = np.where(outside, whole.to_numpy()[tuple(nearest)], whole.to_numpy())
+    steps, nearest = scipy.ndimage.distance_transform_edt(~there, return_indices=True)
+    rim = scipy.ndimage.binary_dilation(beyond) & (steps < _NEXT)
+    values_at = whole.to_numpy()
+    filled = np.where((beyond | rim) & ~there, values_at[tuple(nearest)], values_at)
     return whole.copy(data=filled)
 
 

@@ -120,6 +120,20 @@ def test_between_the_halves_of_a_map_that_begins_away_from_their_line_nothing_is
     assert near["x"].to_numpy().tolist() == [-2.5, -1.5, -0.5, 0.5, 1.5, 2.5]
 
 
+def test_a_map_reaches_its_outline_where_the_edges_of_elements_are_chords() -> None:
+    """Places between the chord y = 0 and the outline y = 0.3 belong to no element."""
+    outline = np.array([[-9.0, 9.0, 9.0, -9.0, -9.0], [-9.0, -9.0, 0.3, 0.3, -9.0]])
+    run = grid_map(np.arange(6.0), np.arange(-3.0, 1.5) + 0.25)
+    run = run.assign(outline_x=("outline", outline[0]), outline_y=("outline", outline[1]))
+    unknown = (run["x"] > 2.0) & (run["y"] < -1.0)  # inside of the body
+    chord = (run["y"] > 0.0) & (run["y"] < 0.3)
+    beyond = run["y"] > 0.3
+    run["quantity"] = run["quantity"].where(~(unknown | chord | beyond))
+    drawn = mesh_of(map_figure(run, "quantity"))[1].get_array().filled(np.nan)
+    np.testing.assert_array_equal(np.isnan(drawn), unknown.transpose("y", "x"))
+    np.testing.assert_array_equal(drawn[3], run["quantity"][2])
+
+
 def test_a_map_ends_at_the_outlines_of_the_bodies() -> None:
     """A square with a hole, on a grid that meets neither its sides nor those of the hole."""
     square = np.array([[0.0, 4.2, 4.2, 0.0, 0.0], [-4.2, -4.2, 0.0, 0.0, -4.2]])
