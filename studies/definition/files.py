@@ -72,6 +72,13 @@ def read_study(
             if str(theirs.get("scene", "")).endswith(".toml"):
                 theirs["scene"] = str(Path(before).parent / theirs["scene"])
             theirs = theirs.get("extends")
+    for table in ("parameters", "sweep"):
+        own = tables.get(table)
+        given = own.get("points") if isinstance(own, dict) else None
+        if isinstance(given, str):
+            allowed = f"is no {'parameter' if table == 'parameters' else 'axis'}: "
+            allowed += f'write points = "{given}" above all tables, outside of [{table}]'
+            raise StudyError(f"{table}.points", given, allowed)
     for table in _MAY_NAME_FILES:
         if table in tables:
             tables[table] = _with_files(tables[table], table, folder)
@@ -111,4 +118,7 @@ def _with_files(value: Any, field: str, folder: Path) -> Any:
 
         return MeshFile(value, read_given(folder / value, field)).section()
     except ModelError as error:
-        raise StudyError(field, value, f"{error.field} {error.allowed}") from None
+        wrong = f"{error.field} {error.allowed}"
+        if value.endswith(_OF_POINTS):
+            wrong = f"is read as a curve of points z, y: {wrong}"
+        raise StudyError(field, value, wrong) from None

@@ -92,6 +92,13 @@ def test_an_axis_of_points_may_have_any_name_and_there_may_be_several(tmp_path: 
     assert study.size == 12
 
 
+@pytest.mark.parametrize("table", ["parameters", "sweep"])
+def test_a_file_of_points_in_a_wrong_table_is_told_its_place(tmp_path: Path, table: str) -> None:
+    allowed = f'write points = "tests.csv" above all tables, outside of [{table}]'
+    with pytest.raises(StudyError, match=re.escape(allowed)):
+        from_file(tmp_path, "friction\n0.1\n", f'[{table}]\npoints = "tests.csv"\n')
+
+
 def test_a_file_of_points_may_name_curves(tmp_path: Path) -> None:
     (tmp_path / "worn.csv").write_text("-40, 2.7\n-36, 2.2\n0, 0\n40, 1\n")
     (tmp_path / "tests.csv").write_text("case,wheel_profile\nnew,s1002\nworn,worn.csv\n")
