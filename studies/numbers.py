@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import math
 
-ROUNDED = 1e-9
-"""Ratio of a number to the largest of its unit in a table; below it, it is shown as 0."""
+_ROUNDED, _STRESS = 1e-9, 1e-6
+"""Ratio of a number to the largest of its unit below which it is shown as 0; that of stress is the
+accuracy of a balance of forces."""
 _TIMES = ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"), (1.0, "seconds"))
+
+
+def rounding(unit: str, level: float) -> float:
+    """Return the size below which numbers are shown as 0, given the largest of their unit."""
+    return level * (_STRESS if unit == "MPa" else _ROUNDED)
 
 
 def number_text(value: float, digits: int = 4) -> str:

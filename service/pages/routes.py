@@ -9,6 +9,7 @@ import gzip
 import json
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import partial
 from http import HTTPStatus
 from typing import Annotated, Any
 from urllib.parse import urlencode
@@ -48,7 +49,6 @@ from studies.errors import StudyError
 from studies.kinds import kind_of
 from studies.scenes.registry import known_names
 from studies.storage.store import Store
-from studies.views.html import number
 from studies.views.table import MESSAGE, RUN, STATUS, RunTable, varied
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
@@ -107,6 +107,7 @@ def studies_page(
         "studies",
         scenes=scenes,
         items=items,
+        sizes={job.id: _size(jobs, job) for job in found},
         total=total,
         which=which,
         states=[*StudyState],
@@ -115,6 +116,13 @@ def studies_page(
         live=any(each.status in POLLED for each, _ in items),
         turn=lambda **other: "?" + urlencode({**which, **other}),
     )
+
+
+def _size(jobs: Jobs, job: Job) -> str:
+    """Return the number of runs of a job as text: those asked for, if it has chosen them."""
+    if not job.stage:
+        return str(job.size)
+    return str(len(jobs.runs(job.id))) if job.state.final else f"at most {job.size}"
 
 
 def _said(jobs: Jobs, job: Job) -> Mapping[str, Any]:
@@ -173,7 +181,7 @@ def _study(
             "id": table.columns[RUN].values[at],
             "status": table.columns[STATUS].values[at],
             "message": table.columns[MESSAGE].values[at],
-            "at": [(each, _cell(each, at)) for each in varied(table)],
+            "at": [(each, chosen.cell_text(each, at, {})) for each in varied(table)],
         }
     csv = urlencode({**part.where, **({"sort": part.sort} if part.sort else {})})
     return page(
@@ -183,7 +191,7 @@ def _study(
         scene_name=scene.name if scene else study["scene"],
         table=table,
         part=part,
-        cell=_cell,
+        cell=partial(chosen.cell_text, floors=chosen.floors_of(table)),
         number=number,
         chosen=run,
         turn=turn,
@@ -202,14 +210,6 @@ def _study(
             **chosen.described(table),
         },
     )
-
-
-def _cell(column: Any, at: int) -> str:
-    """Return a value as the tables show it: four digits, a flag by its word."""
-    value = column.values[at]
-    if column.flags and value == value:
-        return str(column.flags.get(int(value), value)).replace("_", " ")
-    return number(value)
 
 
 @router.get("/runs/{run_id}")

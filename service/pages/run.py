@@ -11,7 +11,7 @@ from solver.audit.figures import LIMITS
 from solver.results.quantities import QUANTITIES
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
-from studies.numbers import ROUNDED
+from studies.numbers import rounding
 from studies.storage.dataset import attributes_of
 from studies.views.columns import COMPUTED, computed_text, unit_text
 from studies.views.figures import group_of, meter
@@ -82,7 +82,7 @@ def numbers_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str,
     for each in sized:
         levels[each["unit"]] = max(levels.get(each["unit"], 0.0), abs(each["value"]))
     for each in sized:
-        if abs(each["value"]) < ROUNDED * levels[each["unit"]]:
+        if abs(each["value"]) < rounding(each["unit"], levels[each["unit"]]):
             each["value"] = 0.0
     return sorted(found, key=lambda each: rank(each["name"]))
 

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from studies.definition.vocabulary import OK
+from studies.numbers import rounding
 from studies.views.figures import FIGURES, group_of
+from studies.views.html import number
 from studies.views.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, varied
 
 ROWS = 25
@@ -61,6 +63,26 @@ def rank(name: str) -> tuple[int, int]:
     """Return the place of a number among others: by its group, the main ones first."""
     main = list(FIGURES)
     return NUMBERS.index(group_of(name)), main.index(name) if name in main else len(main)
+
+
+def floors_of(table: RunTable) -> dict[str, float]:
+    """Return the size below which numbers are rounding, by unit; see `rounding`."""
+    levels: dict[str, float] = {}
+    for each in usual(table):
+        if each.unit and each.group != "audit":
+            size = float(np.nanmax(np.abs(each.values)))
+            levels[each.unit] = max(levels.get(each.unit, 0.0), size)
+    return {unit: rounding(unit, level) for unit, level in levels.items()}
+
+
+def cell_text(column: Column, at: int, floors: Mapping[str, float]) -> str:
+    """Return a value as the tables show it: four digits, a flag by its word, rounding as 0."""
+    value = column.values[at]
+    if column.flags and value == value:
+        return str(column.flags.get(int(value), value)).replace("_", " ")
+    if column.number and column.group in NUMBERS and abs(value) < floors.get(column.unit, 0.0):
+        value = 0.0
+    return number(value)
 
 
 def part(table: RunTable, query: Mapping[str, str]) -> TablePart:

@@ -21,7 +21,7 @@ from studies.definition.vocabulary import LABEL_ATTRIBUTES, MISSING, OK
 from studies.errors import StudyError
 from studies.execution.run import StudyOutcome
 from studies.kinds.kind import Kind
-from studies.numbers import ROUNDED
+from studies.numbers import rounding
 from studies.scenes.registry import scene_of
 from studies.storage.ugrid import owns
 from studies.views.columns import (
@@ -124,7 +124,7 @@ def _clean(values: xr.DataArray, levels: Mapping[str, float]) -> xr.DataArray:
     """Return numbers with zero for what is rounding beside others of their unit."""
     if values.dtype.kind != "f" or not (unit := _unit(values)):
         return values
-    return values.where(~(abs(values) < ROUNDED * levels.get(unit, 0.0)), 0.0)
+    return values.where(~(abs(values) < rounding(unit, levels.get(unit, 0.0))), 0.0)
 
 
 def _cells(values: xr.DataArray, spoiled: xr.DataArray) -> np.ndarray:

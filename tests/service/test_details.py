@@ -6,9 +6,11 @@ import asyncio
 import json
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from service.errors import NotFound
@@ -16,9 +18,12 @@ from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.overview import KEPT, Detail, Details
 from service.pages.run import numbers_shown
+from service.pages.study import cell_text, floors_of
 from service.schemas import StudyDetail, Window
 from service.turns import Share, Turns
 from studies import Store
+from studies.views.figures import group_of
+from studies.views.table import RunTable, column_of
 
 STUDY = {"name": "a", "scene": "fake", "parameters": {}, "sweep": {}}
 
@@ -144,8 +149,29 @@ def test_nothing_is_kept_of_a_study_that_does_not_exist(details: Counted) -> Non
 def test_a_number_that_is_rounding_is_shown_as_zero() -> None:
     """Beside others of its unit, as in tables of the command; a ratio has no level."""
     scalars = {
-        "peak_patch_pressure": 2863.0, "peak_residual_tension": 4.5e-12, "lateral_force": 2.8e-9,
+        "peak_patch_pressure": 2863.0, "peak_residual_tension": 2e-5, "lateral_force": 2.8e-9,
         "longitudinal_force": 6.1, "max_plastic_strain": 1e-12,
     }  # fmt: skip
     shown = {each["name"]: each["value"] for each in numbers_shown({"scalars": scalars}, None)}
     assert shown == scalars | {"peak_residual_tension": 0.0, "lateral_force": 0.0}
+
+
+def test_the_table_of_runs_shows_rounding_as_zero() -> None:
+    """Beside others of its unit in all runs; not what was asked for, nor the audit."""
+    numbers = {
+        "peak_patch_pressure": [900.0, 1200.0],
+        "peak_residual_tension": [2e-5, 31.0],
+        "audit_residual": [1e-13, 2.0],
+    }
+    columns = {
+        name: column_of(name, np.array(values), group_of(name)) for name, values in numbers.items()
+    }
+    columns["yield_stress"] = replace(
+        columns["peak_residual_tension"], name="yield_stress", group="sweep"
+    )
+    floors = floors_of(RunTable(axes={}, columns=columns))
+    shown = {name: cell_text(each, 0, floors) for name, each in columns.items()}
+    assert shown == {
+        "peak_patch_pressure": "900", "peak_residual_tension": "0", "audit_residual": "1e−13",
+        "yield_stress": "2e−05",
+    }  # fmt: skip

@@ -74,7 +74,8 @@ def test_a_wheel_of_a_sequence_may_have_a_file_of_points(tmp_path: Path) -> None
 
 def test_a_file_that_cannot_be_read_is_named_with_its_place(tmp_path: Path) -> None:
     path = written(tmp_path, fixed('"other.csv"'))
-    with pytest.raises(StudyError, match=r"parameters\.wheel_profile = 'other\.csv': file must be"):
+    wrong = r"parameters\.wheel_profile = 'other\.csv': is read as a curve .*: file must be"
+    with pytest.raises(StudyError, match=wrong):
         Study.from_toml(path)
     (tmp_path / "other.csv").write_text("0,0\n1,0\n1,1\n2,0\n")
     with pytest.raises(StudyError, match=r"other\.csv': points must be points whose z increases"):

@@ -13,6 +13,7 @@ from solver.results.invariants import component as derived
 from solver.tensors import AXES, components
 from studies.definition.vocabulary import SYMMETRIC
 from studies.errors import StudyError, one_of
+from studies.numbers import rounding
 from studies.views.picking import sweep_axes
 from studies.views.plots.captions import DISTANCE
 
@@ -31,8 +32,8 @@ _LEVELS = (
     "contact_pressure", "patch_pressure", "map_mises", "map_stress",
 )  # fmt: skip
 """Stresses under load; the largest value of the first that a run has is its level."""
-_ROUNDING, _NO_STRESS = 1e-6, 1e-3
-"""Share of the level of a run up to which stress is rounding; without a level, stress [MPa]."""
+_NO_STRESS = 1e-3
+"""Stress up to which it is rounding where a run has no level [MPa]."""
 _DECAYED = 0.02
 """Depth is shown as far as values exceed this share of the peak."""
 OUTLINE = "outline"
@@ -128,7 +129,7 @@ def floor_of(values: xr.DataArray, run: xr.Dataset) -> float:
     if values.attrs.get("units") != "MPa":
         return 0.0
     known = (float(abs(run[name]).max()) for name in _LEVELS if name in run)
-    return next((_ROUNDING * level for level in known if level > 0.0), _NO_STRESS)
+    return next((rounding("MPa", level) for level in known if level > 0.0), _NO_STRESS)
 
 
 def without_rounding(values: xr.DataArray, run: xr.Dataset) -> xr.DataArray:
