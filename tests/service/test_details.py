@@ -17,7 +17,7 @@ from service.errors import NotFound
 from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.overview import KEPT, Detail, Details
-from service.pages.run import numbers_shown
+from service.pages.run import numbers_shown, parameters_shown
 from service.pages.study import cell_text, floors_of
 from service.schemas import StudyDetail, Window
 from service.turns import Share, Turns
@@ -154,6 +154,13 @@ def test_a_number_that_is_rounding_is_shown_as_zero() -> None:
     }  # fmt: skip
     shown = {each["name"]: each["value"] for each in numbers_shown({"scalars": scalars}, None)}
     assert shown == scalars | {"peak_residual_tension": 0.0, "lateral_force": 0.0}
+
+
+def test_a_run_shows_the_accuracy_with_which_it_was_computed() -> None:
+    for stored, told in ((0, "draft"), (1, "draft, computed with standard")):
+        run = {"parameters": {"accuracy": "draft"}, "scalars": {"computed_accuracy": stored}}
+        (shown,) = parameters_shown(run, None)
+        assert shown["value"] == told
 
 
 def test_the_table_of_runs_shows_rounding_as_zero() -> None:

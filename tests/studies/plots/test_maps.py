@@ -134,6 +134,16 @@ def test_a_map_reaches_its_outline_where_the_edges_of_elements_are_chords() -> N
     np.testing.assert_array_equal(drawn[3], run["quantity"][2])
 
 
+def test_a_caption_has_the_accuracy_with_which_a_run_was_computed() -> None:
+    words = {"flag_values": [0, 1], "flag_meanings": "draft standard"}
+    run = grid_map(np.arange(3.0), np.arange(-2.0, 1.0))
+    run.attrs |= {"scene": "wheel_rail", "parameters": '{"accuracy": "draft"}'}
+    for stored, told in ((0, "accuracy draft"), (1, "accuracy draft, computed with standard")):
+        given = run.assign(computed_accuracy=((), stored, words))
+        shown = " ".join(texts_of(map_figure(given, "quantity")).split())
+        assert f"{told} A quantity" in shown
+
+
 def test_a_map_ends_at_the_outlines_of_the_bodies() -> None:
     """A square with a hole, on a grid that meets neither its sides nor those of the hole."""
     square = np.array([[0.0, 4.2, 4.2, 0.0, 0.0], [-4.2, -4.2, 0.0, 0.0, -4.2]])
