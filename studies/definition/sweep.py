@@ -40,7 +40,7 @@ from studies.definition.schema import (
     parsed,
 )
 from studies.errors import Mistakes, StudyError
-from studies.materials import MATERIAL, name_in
+from studies.materials import MATERIAL, NAME, name_in
 from studies.scenes.names import in_use
 from studies.toml import CASE
 
@@ -290,7 +290,10 @@ def _materials(given: Sequence[Any]) -> dict[Any, Any]:
     found, wrong = dict[Any, Any](), Mistakes()
     for position, material in enumerate(given):
         with wrong.at(f"[{position}]"):
-            label = checked_text(name_in(material))
+            label = name_in(material)
+            if label is None:
+                raise StudyError(NAME, None, "must be given: the label of this material")
+            label = checked_text(label)
             if label in found:
                 raise StudyError("", label, "occurs already: keep one")
             found[label] = {MATERIAL: material}
