@@ -172,6 +172,8 @@ def test_shear_beyond_yield_is_named_with_coulombs_law_alone() -> None:
     )
     assert "set shear_limit = 1" in remedies(usual, 1e3)[NoContact]
     assert remedies(other, 1e3)[NoContact] == "choose accuracy = standard"
+    assert remedies(usual, 1e3)[Status.AUDIT_FAILED] == remedies(usual, 1e3)[NoContact]
+    assert remedies(usual, 1e2)[Status.AUDIT_FAILED] == "choose accuracy = standard"
 
 
 def test_a_lateral_force_that_no_contact_at_this_position_has_is_told_with_the_least() -> None:
