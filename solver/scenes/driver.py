@@ -63,8 +63,15 @@ def record(scene: Scene, run: FinishedRun) -> Record:
 
 
 def _message(scene: Scene, run: FinishedRun, status: Status, messages: tuple[str, ...]) -> str:
-    """Return the message of a run, with what the user can do."""
-    advice = "" if status is Status.OK else scene.remedy(run.parameters, run.outcome.error, status)
+    """Return the message of a run, with what the user can do.
+
+    A message of a violation begins with the name of its figure.
+    """
+    violated = [each.partition(" ")[0] for each in messages]
+    error = run.outcome.error
+    advice = (
+        scene.remedy(run.parameters, error, status, violated) if status is not Status.OK else ""
+    )
     return "; ".join((*messages, advice) if advice else messages)
 
 

@@ -66,8 +66,8 @@ Monitor = Callable[[float], None]
 """Called after every increment with the fraction of the work done (0-1).
 An exception it raises stops the work and reaches the caller unchanged."""
 
-Advice = Mapping[Status | type[NotConverged], str]
-"""What the user can do, by status or by error."""
+Advice = Mapping[Status | type[NotConverged] | str, str]
+"""What the user can do, by status, by error, or by the figure of the audit that is violated."""
 
 Method = Callable[..., Iterator[Any]]
 """(scene, parameters of the runs, monitor) -> their `FinishedRun`s, in the order of the branch
@@ -208,7 +208,11 @@ class Scene:
             yield self.record(run)
 
     def remedy(
-        self, parameters: Any, error: NotConverged | None, status: Status = Status.NOT_CONVERGED
+        self,
+        parameters: Any,
+        error: NotConverged | None,
+        status: Status = Status.NOT_CONVERGED,
+        violated: Sequence[str] = (),
     ) -> str:
         """Return what the user can do about an outcome; empty if nothing is known.
 
@@ -217,7 +221,7 @@ class Scene:
         if isinstance(error, TooLong):
             return ""
         table = self.advice(parameters) if callable(self.advice) else self.advice
-        reasons: tuple[Any, ...] = (*type(error).__mro__, status)
+        reasons: tuple[Any, ...] = (*violated, *type(error).__mro__, status)
         return next((table[each] for each in reasons if each in table), "")
 
     def record(self, run: Any) -> Record:

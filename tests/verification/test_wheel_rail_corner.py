@@ -173,6 +173,9 @@ def test_shear_beyond_yield_is_named_with_coulombs_law_alone() -> None:
     assert "set shear_limit = 1" in remedies(usual, 1e3)[NoContact]
     assert remedies(other, 1e3)[NoContact] == "choose accuracy = standard"
     assert remedies(usual, 1e3)[Status.AUDIT_FAILED] == remedies(usual, 1e3)[NoContact]
+    reasons = {"audit_yield": "shear_limit = 1", "audit_contact_resolution": "accuracy = standard"}
+    for figure, remedy in reasons.items():
+        assert SCENE.remedy(usual, None, Status.AUDIT_FAILED, [figure]).endswith(remedy)
     assert remedies(usual, 1e2)[Status.AUDIT_FAILED] == "choose accuracy = standard"
 
 

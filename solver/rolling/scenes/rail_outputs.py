@@ -224,6 +224,7 @@ def remedies(parameters: PrismParameters, pressure: float) -> Advice:
         WindowTooSmall: "lower the load",
         NoContact: limited if beyond else accuracy,
         Status.NOT_CONVERGED: accuracy,
+        "audit_contact_resolution": accuracy,
         Status.AUDIT_FAILED: limited if beyond else accuracy,
     }
 
