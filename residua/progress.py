@@ -22,6 +22,8 @@ from studies.views.summary import bar
 
 _REDRAW = 0.1
 """Seconds between two drawings of the bar."""
+_KNOWN = 0.05
+"""Share of the work up to which its pace is that of the start of workers, and not told."""
 _QUIET = 10.0
 """Seconds after which a log gets a line although no run has ended."""
 
@@ -105,7 +107,7 @@ class Progress:
     def _remaining(self, progress: float) -> str:
         """Return the remaining time, at the pace so far."""
         gained = progress - (self._begun or 0.0)
-        if gained <= 0.02 or progress >= 1.0:
+        if gained <= _KNOWN or progress >= 1.0:
             return ""
         seconds = (time.monotonic() - self._started) * (1.0 - progress) / gained
         minutes, rest = divmod(int(seconds), 60)

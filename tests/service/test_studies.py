@@ -347,6 +347,7 @@ def test_a_goal_is_estimated_searched_and_answered(service: Server) -> None:
     assert shown.text.count("data-choose=") == min(len(at), 25)
     listed = service.client.get("/ui", params={"text": "goal"}).text
     assert f'<td class="right">{len(at)}</td>' in listed
+    assert "2 of 2 searches ended" in listed
     low, high = (found[f"load_ratio_{end}"].to_numpy().ravel() for end in ("low", "high"))
     marks = json.loads(re.search(r'"found": (\[.*?\]\}\])', shown.text)[1])
     assert [each["test"][0] for each in marks] == ["A", "B"]
