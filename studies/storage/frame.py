@@ -10,6 +10,7 @@ from typing import Any
 import h5netcdf
 import h5py
 import numpy as np
+from h5py import h5d, h5p, h5s
 
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
@@ -279,7 +280,7 @@ def _created(
     """
     scales = [file[dimension] for dimension in dimensions]
     text, absent = kind.kind == "O", _absent(name, kind)
-    made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    made = h5p.create(h5p.DATASET_CREATE)
     if dimensions and not text:  # before compression, as netCDF does in the files of runs
         made.set_fletcher32()
         storage = {"chunks": True} | storage
@@ -300,25 +301,23 @@ def _created(
     return variable
 
 
-def _id(file: h5py.File, name: str) -> h5py.h5d.DatasetID:
+def _id(file: h5py.File, name: str) -> h5d.DatasetID:
     """Return a variable without h5py's objects: all of a run are read in half the time."""
-    return h5py.h5d.open(file.id, name.encode())
+    return h5d.open(file.id, name.encode())
 
 
 def _number(run: h5py.File, name: str) -> Any:
     """Return the only value of a variable."""
     variable = _id(run, name)
     found = np.empty(variable.shape, variable.dtype)
-    variable.read(h5py.h5s.ALL, h5py.h5s.ALL, found)
+    variable.read(h5s.ALL, h5s.ALL, found)
     return found.item()
 
 
-def _chunk_copied(
-    source: h5py.h5d.DatasetID, target: h5py.h5d.DatasetID, at: tuple[int, ...]
-) -> bool:
+def _chunk_copied(source: h5d.DatasetID, target: h5d.DatasetID, at: tuple[int, ...]) -> bool:
     """Copy the chunk of a run as it is stored, if both store it alike; return whether they do."""
     shape, made = source.shape, source.get_create_plist()
-    if made.get_layout() != h5py.h5d.CHUNKED or made.get_chunk() != shape:
+    if made.get_layout() != h5d.CHUNKED or made.get_chunk() != shape:
         return False
     inner = source.rank + len(at) - target.rank  # its number of usual dimensions
     chunk, theirs = (*(1,) * len(at), *shape[inner:]), target.get_create_plist()
@@ -330,7 +329,7 @@ def _chunk_copied(
     return True
 
 
-def _stored(variable: h5py.h5d.DatasetID, made: h5py.h5p.PropDCID) -> list[Any]:
+def _stored(variable: h5d.DatasetID, made: h5p.PropDCID) -> list[Any]:
     """Return the kind of a variable's numbers and the filters of its chunks."""
     return [variable.dtype, *(made.get_filter(k)[:3] for k in range(made.get_nfilters()))]
 
