@@ -14,7 +14,9 @@ from studies.materials import read_material
 from studies.scenes.formats import FORMATS
 from studies.toml import CASE, read_given, read_toml
 
-_MAY_NAME_FILES, _OF_POINTS = ("parameters", "points", "sweep"), (".csv", ".txt")
+POINTS = "points"
+"""Entry of a study: its points, or the file that has them."""
+_MAY_NAME_FILES, _OF_POINTS = ("parameters", POINTS, "sweep"), (".csv", ".txt")
 _LONGEST_CHAIN = 20
 """Largest number of study files that extend one another."""
 
@@ -50,10 +52,10 @@ def read_study(
         name = Path(path).name
         allowed = f'is a scene file, not a study: a study has the line scene = "{name}"'
         raise StudyError("file", str(path), allowed)
-    if "points" in tables:
-        given = tables["points"]
+    if POINTS in tables:
+        given = tables[POINTS]
         given = {"file": given} if isinstance(given, str) else given
-        tables["points"] = _with_table(given, "points", folder)
+        tables[POINTS] = _with_table(given, POINTS, folder)
     if isinstance(sweep := tables.get("sweep"), dict):
         for name in sweep:
             sweep[name] = _with_table(sweep[name], f"sweep.{name}", folder)
@@ -72,13 +74,6 @@ def read_study(
             if str(theirs.get("scene", "")).endswith(".toml"):
                 theirs["scene"] = str(Path(before).parent / theirs["scene"])
             theirs = theirs.get("extends")
-    for table in ("parameters", "sweep"):
-        own = tables.get(table)
-        given = own.get("points") if isinstance(own, dict) else None
-        if isinstance(given, str):
-            allowed = f"is no {'parameter' if table == 'parameters' else 'axis'}: "
-            allowed += f'write points = "{given}" above all tables, outside of [{table}]'
-            raise StudyError(f"{table}.points", given, allowed)
     for table in _MAY_NAME_FILES:
         if table in tables:
             tables[table] = _with_files(tables[table], table, folder)
@@ -95,11 +90,14 @@ def _with_table(axis: Any, field: str, folder: Path) -> Any:
 
 
 def _with_files(value: Any, field: str, folder: Path) -> Any:
-    """Return a value with what is in files in place of their names; that of a case is none."""
+    """Return a value with what is in files in place of their names.
+
+    That of a case is none, nor is one of points, which are refused in these tables.
+    """
     if isinstance(value, dict):
         return {
             key: each
-            if key == CASE and isinstance(each, str)
+            if key in (CASE, POINTS) and isinstance(each, str)
             else _with_files(each, f"{field}.{key}", folder)
             for key, each in value.items()
         }

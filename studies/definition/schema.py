@@ -162,6 +162,13 @@ Whole = Annotated[int, Strict()]
 Number = Annotated[float, Strict()]
 
 
+OF_STUDY = (
+    "points", "sample", "extends", "goal", "refine", "fit", "minimise", "keep", "allow", "fatigue",
+    "derivatives", "note", "tags",
+)  # fmt: skip
+"""Entries of a study that are often written among its parameters."""
+
+
 def listed(given: Any) -> Any:
     """Return a list of what may be given alone."""
     return [*given] if isinstance(given, list | tuple) else [given]
@@ -169,6 +176,9 @@ def listed(given: Any) -> Any:
 
 def known_name(name: Any, known: Mapping[str, Any], value: Any) -> None:
     """Refuse a value if its name is no parameter of the scene."""
+    if name in OF_STUDY and name not in known:
+        allowed = f"is an entry of the study, not of this table: write {name} above all tables"
+        raise StudyError("", value, f"{allowed}, or as the table [{name}]")
     if name not in known:
         allowed = f"the scene has no such parameter; it has {', '.join(known)}"
         raise StudyError("", value, allowed + nearest(name, known))

@@ -94,9 +94,12 @@ def test_an_axis_of_points_may_have_any_name_and_there_may_be_several(tmp_path: 
 
 @pytest.mark.parametrize("table", ["parameters", "sweep"])
 def test_a_file_of_points_in_a_wrong_table_is_told_its_place(tmp_path: Path, table: str) -> None:
-    allowed = f'write points = "tests.csv" above all tables, outside of [{table}]'
-    with pytest.raises(StudyError, match=re.escape(allowed)):
-        from_file(tmp_path, "friction\n0.1\n", f'[{table}]\npoints = "tests.csv"\n')
+    """It is not read as a curve. The fake scene has a parameter of this name."""
+    path = tmp_path / "study.toml"
+    path.write_text(f'name = "p"\nscene = "punch"\n[{table}]\npoints = "tests.csv"\n')
+    allowed = "is an entry of the study, not of this table: write points above all tables"
+    with pytest.raises(StudyError, match=f"^{table}.points = 'tests.csv': {allowed}"):
+        Study.from_toml(path)
 
 
 def test_a_file_of_points_may_name_curves(tmp_path: Path) -> None:

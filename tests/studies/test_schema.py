@@ -13,6 +13,7 @@ from solver.results.quantities import QUANTITIES
 from solver.shipped import SCENES
 from studies import Study, StudyError
 from studies.definition.files import read_study
+from studies.definition.schema import OF_STUDY
 from studies.errors import MOST_MISTAKES
 
 ROOT = Path(__file__).parents[2]
@@ -108,6 +109,13 @@ def test_of_many_mistakes_the_first_are_listed_and_all_are_counted() -> None:
     error = refused(points=[{"friction": "x"}] * 1000)
     assert (len(error.each), error.count) == (MOST_MISTAKES, 1000)
     assert str(error).endswith("and 980 more")
+
+
+def test_an_entry_of_the_study_among_its_parameters_is_told_its_place() -> None:
+    entries = {*Study.model_json_schema()["properties"]}
+    assert entries == {*OF_STUDY, "name", "scene", "parameters", "sweep"}
+    with pytest.raises(StudyError, match=r"parameters\.goal = .*: write goal above all tables"):
+        Study.from_dict({"name": "a", "scene": "punch", "parameters": {"goal": RIGHT[0]["goal"]}})
 
 
 def test_a_number_of_a_scene_has_no_name_that_a_kind_of_study_uses() -> None:
