@@ -28,7 +28,8 @@ class Effort:
     Attributes
     ----------
     elements : number in all bodies, also in those condensed to their surface
-    unknowns : displacement unknowns that no support holds, as `System.n_unknowns` counts them
+    unknowns : displacement unknowns that no support holds, as `System.n_unknowns` counts them; the
+        most, as the memory is, if smaller elements may be tried
     increments : number in all runs, shared ones counted once, if none is cut; the smallest number
         if passes end when the shakedown state is decided
     most_increments : the same with all halvings of `Scene.refinement`, or if the shakedown state is
