@@ -15,6 +15,7 @@ from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.definition.vocabulary import MISSING
 from studies.storage import dataset as layout
+from studies.storage.estimated import ANCILLARY, WITHOUT, errors_of, without
 from studies.storage.runfile import variables
 
 SAME = 1e-9
@@ -171,6 +172,16 @@ class Frame:
                 compression_opts=1,
                 shuffle=True,
             )
+
+    def name_errors(self) -> dict[str, str]:
+        """Name the estimated error of each number in its attributes, and return those without."""
+        small = {name: ((), attributes) for name, (_, attributes) in self.small.items()}
+        every = small | self.fields
+        for name, (_, attributes) in every.items():
+            if found := errors_of(name, every):
+                attributes[ANCILLARY] = " ".join(found)
+        numbers = [name for name, (values, _) in self.small.items() if values.dtype.kind == "f"]
+        return {WITHOUT: without(every, [*numbers, *self.fields])}
 
     def fill(self, file: h5py.File, run: h5py.File, at: tuple[int, ...]) -> None:
         """Write the fields of one run in their place, compressed as in its file where that fits."""
