@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -74,7 +74,7 @@ at = 0.007
 between = [0.1, 2.0]
 within = 0.1
 """
-PREFIXES = "https://w3id.org/ro/wfrun/process/0.5", "https://w3id.org/ro/wfrun/workflow/0.5"
+PROFILES = "https://w3id.org/ro/wfrun/process/0.5", "https://w3id.org/ro/wfrun/workflow/0.5"
 
 
 def computed(folder: Path) -> Path:
@@ -140,7 +140,7 @@ def test_every_file_is_described_with_its_digest_and_every_reference_exists(crat
 def test_the_crate_says_which_profiles_it_follows(crate: Path) -> None:
     known = entities(crate)
     root, descriptor = known["./"], known[METADATA]
-    assert {*PREFIXES} <= {*references(root["conformsTo"])}
+    assert {*PROFILES} <= {*references(root["conformsTo"])}
     assert "https://w3id.org/ro/crate/1.1" in {*references(descriptor["conformsTo"])}
     assert [*references(descriptor["about"])] == ["./"]
     (main_entity,) = references(root["mainEntity"])
@@ -149,9 +149,8 @@ def test_the_crate_says_which_profiles_it_follows(crate: Path) -> None:
     assert root["identifier"] == "https://doi.org/10.5281/zenodo.1"
     assert [*references(root["license"])] == ["https://spdx.org/licenses/CC-BY-4.0"]
     assert known["#residua"]["softwareVersion"] == __version__
-    assert {"#residua", *(each["@id"] for each in actions(crate))} <= {
-        *references(root["mentions"])
-    }
+    runs = {each["@id"] for each in actions(crate)}
+    assert {"#residua", *runs} <= {*references(root["mentions"])}
 
 
 @pytest.mark.solves
@@ -207,9 +206,6 @@ def test_a_crate_is_computed_again_to_the_same_ids_and_bits(
             numbers = [each for each in {*one} - {"cpu_seconds"} if one[each].dtype.kind in "fi"]
             for each in numbers:
                 np.testing.assert_array_equal(one[each][...], other[each][...])
-
-
-Change = Callable[[pytest.MonkeyPatch], None]
 
 
 def test_another_version_names_the_one_that_is_needed_and_compares(
