@@ -121,7 +121,7 @@ def _machine() -> str:
 def _processor() -> str:
     """Return the model of the processor, as Linux names it, or else as Python does."""
     try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = read_file("/proc/cpuinfo").decode(errors="replace").splitlines()
     except OSError:
         lines = []
     named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))

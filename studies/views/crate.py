@@ -22,6 +22,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple, Self
 from urllib.parse import quote
 
+from solver.files import opened
 from solver.version import __version__
 from studies.definition.identity import canonical, solver_hash
 from studies.definition.study import Study
@@ -202,7 +203,8 @@ class _Writer:
     def _copy(self, source: Path, name: str, words: str, **more: Any) -> None:
         path = self.folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source, path)
+        with opened(source) as file, path.open("xb") as copy:
+            shutil.copyfileobj(file, copy)
         self._file(name, words, **more)
 
     def _text(self, name: str, text: str, **more: Any) -> str:
