@@ -100,7 +100,7 @@ def _content(
         with suppress(FileDamaged), runfile.opened(store.run_path(run_id)) as run:
             known[k] = runfile.global_attributes(run)
     variables["run_id"] = runfile.described("run_number", runs, "id of the run")
-    variables |= ran.of_runs(["run_number"], [len(runs)], known)
+    said, machines = ran.of_runs(["run_number"], [len(runs)], known)
     attrs = provenance(study.name, study.problem, study.fixed) | origin(study)
-    attrs |= {**entry, "id": study.id, SYMMETRIC: 0}
-    return with_errors(RunContent(variables, attrs))
+    attrs |= {**machines, **entry, "id": study.id, SYMMETRIC: 0}
+    return with_errors(RunContent(variables | said, attrs))

@@ -92,10 +92,10 @@ def _combined(
             computed[number] = {name: known[name] for name in ran.MEANINGS if name in known}
             if SYMMETRIC in run.attrs:  # a run without a record lacks it
                 halves.add(int(run.attrs[SYMMETRIC].item()))
-    for name, each in ran.of_runs(tuple(frame.axes), frame.shape, computed).items():
-        frame.small[name] = each.values, dict(each.attrs)
+    said, machines = ran.of_runs(tuple(frame.axes), frame.shape, computed)
+    frame.small |= {name: (each.values, dict(each.attrs)) for name, each in said.items()}
     attrs = provenance(study.name, scene, study.fixed) | together(software) | origin(study)
-    attrs |= seal.SEALED | frame.name_errors() | (dict(beside.attrs) if beside else {})
+    attrs |= machines | seal.SEALED | frame.name_errors() | (dict(beside.attrs) if beside else {})
     if elsewhere is None:
         with suppress(FileDamaged):
             store.dataset(study.id)  # a damaged or foreign one is set aside, not lost

@@ -33,17 +33,19 @@ LOCK = "requirements.lock"
 MEANINGS = {
     "run_started": "time at which the computation of the run began, UTC",
     "run_ended": "time at which the computation of the run ended, UTC",
-    "run_machine": "machine that computed the run: processor, cores, linear algebra, as JSON",
-    "run_lock": f"SHA-256 of {LOCK} of the installation that computed the run",
+    "run_machine": "machine that computed the run, a key of the attribute `machines`",
     "run_peak_memory": "largest memory of the process that computed the run, until its end",
 }
 """Names and meanings of what is known of the computation of a run, all of them texts: they are no
 numbers of the run."""
+MACHINES = "machines"
+"""Attribute of a data set with the machines of its runs, which the file of a run has in full."""
 
 
 def now() -> str:
     """Return the time, UTC."""
-    return datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
+    time = datetime.datetime.now(datetime.UTC).replace(tzinfo=None)
+    return f"{time.isoformat(timespec='milliseconds')}Z"
 
 
 def how(began: str) -> dict[str, str]:
@@ -55,14 +57,13 @@ def how(began: str) -> dict[str, str]:
     """
     if not began:
         return {}
-    values = began, now(), _machine(), lock(), _peak_memory()
-    return dict(zip(MEANINGS, values, strict=True))
+    return dict(zip(MEANINGS, (began, now(), _machine(), _peak_memory()), strict=True))
 
 
 def of_runs(
     dims: Sequence[str], shape: Sequence[int], runs: Mapping[int, Mapping[str, Any]]
-) -> dict[str, Variable]:
-    """Return the variables of a data set on the computation of its runs.
+) -> tuple[dict[str, Variable], dict[str, str]]:
+    """Return the variables and attributes of a data set on the computation of its runs.
 
     Parameters
     ----------
@@ -70,14 +71,17 @@ def of_runs(
     runs : attributes of the files of runs by their number, the last dimension fastest; one of an
         earlier version has none of these
     """
+    known = sorted({each["run_machine"] for each in runs.values() if "run_machine" in each})
+    keys = {machine: str(k) for k, machine in enumerate(known, start=1)}
     found = {}
     for name, words in MEANINGS.items():
         values = np.full(shape, "", dtype=object)
         for k, attributes in runs.items():
-            if name in attributes:
-                values.flat[k] = attributes[name]
+            value = attributes.get(name, "")
+            values.flat[k] = keys.get(value, value)
         found[name] = Variable(tuple(dims), values, {"long_name": words})
-    return found
+    machines = {key: json.loads(machine) for machine, key in keys.items()}
+    return found, {MACHINES: json.dumps(machines)}
 
 
 @cache
@@ -91,7 +95,7 @@ def lock() -> str:
 
 @cache
 def _machine() -> str:
-    """Return processor, system, cores and libraries of linear algebra of this process as JSON.
+    """Return processor, system, lock and libraries of linear algebra of this process as JSON.
 
     It is asked for after a run, so that the libraries are those that the run has loaded.
     """
@@ -113,6 +117,7 @@ def _machine() -> str:
             "system": f"{platform.system()} {platform.machine()}",
             "python": platform.python_version(),
             "cores": os.cpu_count(),
+            "lock": lock(),
             "blas": blas,
         }
     )

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import datetime
 import json
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pytest
 
@@ -14,9 +16,10 @@ from solver.memory import bytes_in
 from studies import Store, Study, open_study, run_study
 from studies.errors import StudyError
 from studies.storage import ran
+from studies.storage.combine import combine
 from studies.storage.estimated import errors_of, without
 from tests.studies.conftest import fake_study
-from tests.studies.fakes import NUMBERS
+from tests.studies.fakes import NUMBERS, record
 
 
 def run(study: Study, store: Store) -> Path:
@@ -58,13 +61,14 @@ def test_each_run_says_when_and_where_it_was_computed(tmp_path: Path) -> None:
     ]
     assert all(began - datetime.timedelta(seconds=1) < a <= b <= ended for a, b in spans)
     assert "error" in every["status"]
-    machine = json.loads(every["run_machine"].to_numpy().flat[0])
+    (machine,) = json.loads(every.attrs["machines"]).values()
+    assert set(every["run_machine"].to_numpy().flat) == {"1"}
     assert machine["cores"] >= 1
     assert machine["processor"]
     assert all(each["threads"] == 1 for each in machine["blas"])
     assert all(1e7 < bytes_in(each) < 1e12 for each in every["run_peak_memory"].to_numpy().flat)
     lock = Path(ran.__file__).parents[2] / ran.LOCK
-    assert every.attrs["lock"] == sha256(lock.read_bytes()).hexdigest()
+    assert every.attrs["lock"] == machine["lock"] == sha256(lock.read_bytes()).hexdigest()
 
 
 def test_runs_of_a_goal_say_it_over_their_number(tmp_path: Path) -> None:
@@ -139,7 +143,35 @@ def test_stress_names_the_estimate_of_its_stage_and_positions_none() -> None:
     assert errors_of("residual_max", every) == []
 
 
-def test_a_run_of_an_earlier_version_says_nothing_of_its_computation() -> None:
-    found = ran.of_runs(["friction"], [2], {1: {"run_ended": "2026"}})
-    np.testing.assert_array_equal(found["run_ended"].values, ["", "2026"])
-    np.testing.assert_array_equal(found["run_machine"].values, ["", ""])
+def test_machines_are_named_once_and_a_run_of_an_earlier_version_has_none() -> None:
+    runs = [{"run_ended": "2026"}, {"run_machine": '{"cores": 2}'}, {"run_machine": '{"cores": 8}'}]
+    found, attributes = ran.of_runs(["friction"], [4], dict(enumerate(runs)))
+    assert found["run_ended"].values.tolist() == ["2026", "", "", ""]
+    assert found["run_machine"].values.tolist() == ["", "1", "2", ""]
+    assert json.loads(attributes["machines"]) == {"1": {"cores": 2}, "2": {"cores": 8}}
+
+
+def test_a_data_set_keeps_rules_of_cf_on_coordinates_and_flags(store: Store) -> None:
+    study = fake_study(sweep={"load_ratio": [0.3, 0.5]})
+    places, z = np.array([0.0, 1.0]), np.array([-1.0, 0.0, 1.0])
+    for case in study.cases():
+        one = record(case.parameters)
+        more = {
+            "line_x": (("line", "fraction"), places[None]),
+            "line_mises": (("line", "stage", "fraction"), np.ones((1, 2, 2))),
+            "patch_status": (("x", "z"), np.ones((len(one.coordinates["x"]), 3))),
+        }
+        labels = {"line": np.array(["below"]), "fraction": places, "z": z}
+        known = replace(
+            one, coordinates={**one.coordinates, **labels}, fields={**one.fields, **more}
+        )
+        store.write_run(case, known)
+    combine(study, store, list(study.cases()))
+    with netCDF4.Dataset(store.dataset_path(study.id)) as file:
+        assert file["line_mises"].coordinates == "line_x"  # no place has y, z or s
+        assert not hasattr(file["z"], "axis"), "it is not vertical"
+        assert file["x"].axis == "X"
+        assert file["patch_status"].flag_values.dtype == file["patch_status"].dtype
+        assert not [n for n in file.dimensions if hasattr(file[n], "_FillValue")]
+    with netCDF4.Dataset(store.run_path(next(study.run_ids()))) as file:
+        assert not [n for n in file.dimensions if hasattr(file[n], "_FillValue")]
