@@ -74,6 +74,13 @@ def _doi(text: str) -> str:
     return text
 
 
+def _named(files: dict[str, str]) -> dict[str, str]:
+    for name in files:
+        if not re.fullmatch(r"(?!\.{1,2}$)[^/\\\x00-\x1f]{1,200}", name):
+            raise StudyError("", name, "must be the name of a file, without its folder")
+    return files
+
+
 Line = Annotated[str, StringConstraints(max_length=1000), AfterValidator(_printable)]
 """A short text, empty if it is not given."""
 
@@ -134,7 +141,9 @@ class Study(StudyTable):
     licence: Line = ""
     cite: Line = ""
     doi: Annotated[str, StringConstraints(max_length=200), AfterValidator(_doi)] = ""
-    files: Annotated[dict[str, str], Field(max_length=50)] = Field(default_factory=dict)
+    files: Annotated[dict[str, str], Field(max_length=50), AfterValidator(_named)] = Field(
+        default_factory=dict
+    )
     _problem: Scene = PrivateAttr()
     _kind: Kind = PrivateAttr()
 

@@ -17,7 +17,7 @@ from studies.execution.asking import Asking
 from studies.kinds.kind import Answers
 from studies.storage import ran, runfile, seal
 from studies.storage.dataset import RunContent
-from studies.storage.estimated import with_errors
+from studies.storage.estimated import WITHOUT, described, numbers_in, with_errors, without
 from studies.storage.made import Combined, Made, held
 from studies.storage.origin import origin
 from studies.storage.provenance import provenance
@@ -103,4 +103,6 @@ def _content(
     said, machines = ran.of_runs(["run_number"], [len(runs)], known)
     attrs = provenance(study.name, study.problem, study.fixed) | origin(study)
     attrs |= {**machines, **entry, "id": study.id, SYMMETRIC: 0}
-    return with_errors(RunContent(variables | said, attrs))
+    every = described(variables := variables | said)
+    attrs[WITHOUT] = without(every, numbers_in(variables))
+    return RunContent(with_errors(variables, every), attrs)

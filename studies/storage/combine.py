@@ -95,7 +95,12 @@ def _combined(
     said, machines = ran.of_runs(tuple(frame.axes), frame.shape, computed)
     frame.small |= {name: (each.values, dict(each.attrs)) for name, each in said.items()}
     attrs = provenance(study.name, scene, study.fixed) | together(software) | origin(study)
-    attrs |= machines | seal.SEALED | frame.name_errors() | (dict(beside.attrs) if beside else {})
+    attrs |= (
+        machines
+        | seal.SEALED
+        | frame.name_errors(beside.variables if beside else {})
+        | (dict(beside.attrs) if beside else {})
+    )
     if elsewhere is None:
         with suppress(FileDamaged):
             store.dataset(study.id)  # a damaged or foreign one is set aside, not lost

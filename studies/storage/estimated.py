@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
-from studies.storage.dataset import RunContent
+from studies.storage.dataset import Variable
 
 Described = Mapping[str, tuple[Sequence[str], Mapping[str, Any]]]
 """Dimensions and attributes of the variables of a data set, by name."""
@@ -65,14 +65,21 @@ def without(variables: Described, numbers: Iterable[str]) -> str:
     return " ".join(name for name in results if not errors_of(name, variables))
 
 
-def with_errors(content: RunContent) -> RunContent:
-    """Return the content of a data set in which each number names its estimated error."""
-    every = {name: (each.dims, each.attrs) for name, each in content.variables.items()}
-    variables = dict(content.variables)
+def described(variables: Mapping[str, Variable]) -> dict[str, tuple[Sequence[str], Any]]:
+    """Return dimensions and attributes of variables, for `errors_of`."""
+    return {name: (each.dims, each.attrs) for name, each in variables.items()}
+
+
+def numbers_in(variables: Mapping[str, Variable]) -> list[str]:
+    """Return the names of the variables with numbers that are no coordinates."""
+    floats = (name for name, each in variables.items() if each.values.dtype.kind == "f")
+    return [name for name in floats if variables[name].dims != (name,)]
+
+
+def with_errors(variables: Mapping[str, Variable], among: Described) -> dict[str, Variable]:
+    """Return variables in which each number names its estimated errors ``among`` others."""
+    found = dict(variables)
     for name, each in variables.items():
-        if found := errors_of(name, every):
-            variables[name] = each._replace(attrs={**each.attrs, ANCILLARY: " ".join(found)})
-    numbers = [n for n, each in variables.items() if each.values.dtype.kind == "f"]
-    coordinates = {name for name in numbers if variables[name].dims == (name,)}
-    left = without(every, [name for name in numbers if name not in coordinates])
-    return RunContent(variables, {**content.attrs, WITHOUT: left})
+        if errors := errors_of(name, among):
+            found[name] = each._replace(attrs={**each.attrs, ANCILLARY: " ".join(errors)})
+    return found

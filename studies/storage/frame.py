@@ -15,7 +15,7 @@ from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.definition.vocabulary import MISSING
 from studies.storage import dataset as layout
-from studies.storage.estimated import ANCILLARY, WITHOUT, errors_of, without
+from studies.storage.estimated import ANCILLARY, WITHOUT, described, errors_of, numbers_in, without
 from studies.storage.runfile import variables
 
 SAME = 1e-9
@@ -176,15 +176,18 @@ class Frame:
                 shuffle=True,
             )
 
-    def name_errors(self) -> dict[str, str]:
-        """Name the estimated error of each number in its attributes, and return those without."""
+    def name_errors(self, beside: Mapping[str, layout.Variable]) -> dict[str, str]:
+        """Name the estimated error of each number in its attributes, and return those without.
+
+        Numbers that are written ``beside`` count, too.
+        """
         small = {name: ((), attributes) for name, (_, attributes) in self.small.items()}
-        every = small | self.fields
-        for name, (_, attributes) in every.items():
+        every = described(beside) | small | self.fields
+        for name, (_, attributes) in (small | self.fields).items():
             if found := errors_of(name, every):
                 attributes[ANCILLARY] = " ".join(found)
         numbers = [name for name, (values, _) in self.small.items() if values.dtype.kind == "f"]
-        return {WITHOUT: without(every, [*numbers, *self.fields])}
+        return {WITHOUT: without(every, [*numbers, *self.fields, *numbers_in(beside)])}
 
     def fill(self, file: h5py.File, run: h5py.File, at: tuple[int, ...]) -> None:
         """Write the fields of one run in their place, compressed as in its file where that fits."""

@@ -18,11 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_info
 
 import solver
 from solver.files import read_file
-from solver.linear.threads import one_thread
 from studies.storage.dataset import Variable
 from studies.storage.provenance import NONE
 from studies.storage.seal import digest_of
@@ -99,6 +97,10 @@ def _machine() -> str:
 
     It is asked for after a run, so that the libraries are those that the run has loaded.
     """
+    from threadpoolctl import threadpool_info  # not needed by those who read files
+
+    from solver.linear.threads import one_thread
+
     with one_thread():  # as in the increments of a run
         loaded = threadpool_info()
     blas = [
@@ -111,6 +113,7 @@ def _machine() -> str:
         for each in loaded
         if each["user_api"] == "blas"
     ]
+    blas.sort(key=json.dumps)  # whichever was loaded first
     return json.dumps(
         {
             "processor": _processor(),

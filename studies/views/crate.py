@@ -188,9 +188,10 @@ class _Writer:
         self._copy(dataset, f"{of_study}/{dataset.name}", f"data set of {study.name}")
         definition = store.study_path(study.id, "study.json")
         self._copy(definition, f"{of_study}/{definition.name}", f"entries of {study.name}")
+        self._text(_README, _readme(study, attrs), about=_to("./"))
+        (self.folder / "runs").mkdir()
         texts = [self._text(name, text) for name, text in files_of(study).items()]
         given = [*texts, f"{of_study}/{definition.name}", *self._scene()]
-        self._text(_README, _readme(study, attrs), about=_to("./"))
         runs = self._runs(sorted(there), texts[0], given[1:])
         whole = self._whole(texts[0], given[1:], f"{of_study}/{dataset.name}", runs)
         self._workflow(texts[0], attrs)
@@ -209,7 +210,8 @@ class _Writer:
 
     def _text(self, name: str, text: str, **more: Any) -> str:
         """Write a text, and return its name in the crate."""
-        name = PurePosixPath(name).name
+        if (self.folder / name).exists() or name == METADATA:
+            name = f"study-{name}"
         (self.folder / name).write_bytes(text.encode())
         self._file(name, f"{name} as it was written", **more)
         return name

@@ -247,3 +247,16 @@ def test_what_is_not_complete_or_no_crate_is_refused(tmp_path: Path) -> None:
     assert not [*tmp_path.glob("crate*")], "nothing is left of what failed"
     assert main(["run", str(tmp_path / "full"), "--out", str(tmp_path / "b")]) == 2
     assert main(["export", str(store.directory), "--crate", "a", "--csv", "b"]) == 2
+
+
+def test_a_file_of_a_study_does_not_take_the_place_of_another_one(tmp_path: Path) -> None:
+    for name in ("../a.toml", "..", "", "a/b", "a\\b"):
+        with pytest.raises(StudyError, match=r"files.*must be the name of a file"):
+            Study.from_dict(fake_study().to_dict() | {"files": {name: "x"}})
+    names = ("runs", METADATA, "README.md", "größer.toml")
+    study = Study.from_dict(fake_study().to_dict() | {"files": dict.fromkeys(names, "x")})
+    run_study(study, Store(tmp_path / "out"), workers=0)
+    export(tmp_path / "out", tmp_path / "crate")
+    assert entities(tmp_path / "crate")["./"]["name"] == "fake"
+    assert len([*tmp_path.glob("crate/runs/*.nc")]) == 4
+    assert "residua run" in (tmp_path / "crate" / "README.md").read_text()
