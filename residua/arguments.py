@@ -52,6 +52,10 @@ def parser() -> argparse.ArgumentParser:
         "--vtu", type=_path, metavar="FOLDER", help="fields at the nodes, for ParaView"
     )
     one.add_argument("--csv", type=_path, metavar="FILE", help="a line for each value of --field")
+    one.add_argument(
+        "--crate", type=_path, metavar="FOLDER",
+        help="the whole study as an RO-Crate, which `residua run FOLDER` computes again",
+    )  # fmt: skip
     one.add_argument("--field", help="a map or lines, such as residual_stress")
     one.add_argument("--component", help="of a tensor; default: the first")
     one.add_argument("--stage", help="of a map; default: the last")
@@ -157,7 +161,9 @@ def _add_window(one: argparse.ArgumentParser) -> None:
 
 
 def _add_run(one: argparse.ArgumentParser) -> None:
-    one.add_argument("study", type=_path, metavar="STUDY.toml")
+    one.add_argument(
+        "study", type=_path, metavar="STUDY.toml|CRATE", help="a study file, or an exported crate"
+    )
     _results(one)
     one.add_argument(
         "--workers", type=_integer(0, 1024),

@@ -20,7 +20,6 @@ from studies.errors import StudyError
 def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
     from residua.progress import ALONE, Foreseen, Progress, dry_run
-    from studies.definition.study import Study
     from studies.execution.access import Access
     from studies.execution.limits import Limits
     from studies.execution.run import StudyEvent, run_study
@@ -34,8 +33,7 @@ def run(options: argparse.Namespace) -> int:
         memory=options.memory, patience=options.patience,
     )  # fmt: skip
     store = Store(options.out)
-    measured = getattr(options, "measured", ())
-    study = Study.from_toml(options.study, measured, store.definition, store.scene)
+    study, crate = _study(options, store)
     if options.command is fit and study.kind.name != Fit.name:
         raise StudyError("fit", None, NO_FIT)
     if options.dry_run:
@@ -86,7 +84,29 @@ def run(options: argparse.Namespace) -> int:
         print(f"{'wrote' if anew else 'kept'} {path}")
     if outcome.stopped:
         return INTERRUPTED
+    if crate:
+        again = crate.compared(store, outcome)
+        print(again.text)
+        return OK if again.same else FAILED
     return OK if outcome.ok else FAILED
+
+
+def _study(options: argparse.Namespace, store: Any) -> tuple[Any, Any]:
+    """Return the study of a file, or that of a crate with the crate itself, else None."""
+    from studies.definition.study import Study
+
+    path: Path = options.study
+    if not path.is_dir():
+        measured = getattr(options, "measured", ())
+        return Study.from_toml(path, measured, store.definition, store.scene), None
+    from studies.views.crate import METADATA, Crate
+
+    if not (path / METADATA).is_file():
+        raise StudyError("file", str(path), f"must be a study file, or a crate with {METADATA}")
+    crate = Crate.read(path)
+    if crate.other:
+        print(f"residua: {crate.other}", file=sys.stderr, flush=True)
+    return crate.study, crate
 
 
 def _part(study: Any, options: argparse.Namespace) -> int:
@@ -298,12 +318,19 @@ def sensitivity(options: argparse.Namespace) -> int:
 
 
 def export(options: argparse.Namespace) -> int:
-    """Write a map or lines of a run as CSV, or its fields at the nodes for ParaView."""
+    """Write a map or lines of a run as CSV, its fields for ParaView, or a study as RO-Crate."""
     from studies.views.picking import run_file, sweep_axes
     from studies.views.reading import open_netcdf
 
-    if (options.vtu is None) == (options.csv is None):
-        raise StudyError("--csv, --vtu", None, "give one of them, with where it goes")
+    forms = options.csv, options.vtu, options.crate
+    if sum(each is not None for each in forms) != 1:
+        raise StudyError("--csv, --vtu, --crate", None, "give one of them, with where it goes")
+    if options.crate is not None:
+        from studies.views.crate import export as write_crate
+
+        write_crate(options.path, options.crate)
+        print(f"wrote {options.crate}")
+        return OK
     with open_netcdf(run_file(options.path, _selection(options.select))) as run:
         if options.vtu is not None:
             print(f"wrote {_written_nodes(run, options.vtu)}")

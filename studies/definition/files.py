@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from studies.errors import StudyError
 from studies.kinds import KINDS
 from studies.materials import read_material
 from studies.scenes.formats import FORMATS
-from studies.toml import CASE, read_given, read_toml
+from studies.toml import CASE, read_given, toml_of
 
 POINTS = "points"
 """Entry of a study: its points, or the file that has them."""
@@ -32,7 +33,8 @@ def read_study(
     ending of a mesh file (`FORMATS`) the mesh of a section, and ``steels.toml#40Cr`` a
     material. Entries of kinds of study name files too, see `Kind.with_files`. The study that
     this one ``extends`` may be a file. What is in the files takes their place, so that the
-    content of a study needs no other file.
+    content of a study needs no other file. The entry ``files`` has the texts of the study, of the
+    studies that it extends and of their scene file.
 
     Parameters
     ----------
@@ -47,7 +49,9 @@ def read_study(
         for ``file``, when the study cannot be read or is no TOML; for the place that names another
         file which cannot be read; for ``extends``, when files extend one another in a circle
     """
-    tables, folder = read_toml(path, "file"), Path(path).parent
+    text, folder = read_given(path, "file"), Path(path).parent
+    tables = toml_of(text, "file", str(path))
+    files = {Path(path).name: text.decode(), **_scene_file(tables.get("scene"), folder)}
     if "bodies" in tables and "scene" not in tables:
         name = Path(path).name
         allowed = f'is a scene file, not a study: a study has the line scene = "{name}"'
@@ -70,6 +74,7 @@ def read_study(
             raise StudyError("extends", before, allowed)
         theirs: Any = read_study(folder / before, (), chain - 1)
         tables["extends"] = theirs
+        files = {**theirs["files"], **files}
         while isinstance(theirs, dict):  # the scenes of all are beside their files
             if str(theirs.get("scene", "")).endswith(".toml"):
                 theirs["scene"] = str(Path(before).parent / theirs["scene"])
@@ -77,7 +82,15 @@ def read_study(
     for table in _MAY_NAME_FILES:
         if table in tables:
             tables[table] = _with_files(tables[table], table, folder)
-    return tables
+    return {**tables, "files": files}
+
+
+def _scene_file(scene: Any, folder: Path) -> dict[str, str]:
+    """Return the text of the scene file that a study names, by its name, if it can be read."""
+    if isinstance(scene, str) and scene.endswith(".toml"):
+        with suppress(StudyError, UnicodeDecodeError):  # the scene is refused where it is read
+            return {Path(scene).name: read_given(folder / scene, "scene").decode()}
+    return {}
 
 
 def _with_table(axis: Any, field: str, folder: Path) -> Any:

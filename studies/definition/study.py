@@ -68,6 +68,23 @@ def _distinct(tags: list[str]) -> list[str]:
     return tags
 
 
+def _doi(text: str) -> str:
+    if text and not re.fullmatch(r"10\.\d{4,9}/[!-~]+", text):
+        raise StudyError("", text, "must be a DOI without its address, such as 10.5281/zenodo.123")
+    return text
+
+
+def _named(files: dict[str, str]) -> dict[str, str]:
+    for name in files:
+        if not re.fullmatch(r"(?!\.{1,2}$)[^/\\\x00-\x1f]{1,200}", name):
+            raise StudyError("", name, "must be the name of a file, without its folder")
+    return files
+
+
+Line = Annotated[str, StringConstraints(max_length=1000), AfterValidator(_printable)]
+"""A short text, empty if it is not given."""
+
+
 class Written(StudyTable):
     """Entries of studies that `Study` keeps as others.
 
@@ -102,6 +119,9 @@ class Study(StudyTable):
         includes what the scene allows
     fatigue : criterion, limits and cycle, by which every run is assessed (see `assessed`)
     derivatives : numbers of every run and parameters by which they are derived (see `derived`)
+    licence, cite, doi : of its data: a licence, such as ``CC-BY-4.0`` or its address; how to cite
+        them; their DOI, such as ``10.5281/zenodo.123``. They do not count for the id
+    files : text of each file that the study was read from, by name, the study file first
     """
 
     name: Text
@@ -118,6 +138,12 @@ class Study(StudyTable):
     )
     fatigue: dict[str, Any] | None = None
     derivatives: dict[str, Any] | None = None
+    licence: Line = ""
+    cite: Line = ""
+    doi: Annotated[str, StringConstraints(max_length=200), AfterValidator(_doi)] = ""
+    files: Annotated[dict[str, str], Field(max_length=50), AfterValidator(_named)] = Field(
+        default_factory=dict
+    )
     _problem: Scene = PrivateAttr()
     _kind: Kind = PrivateAttr()
 
@@ -443,6 +469,11 @@ class Study(StudyTable):
         chosen = self.known(content, lambda name: self.problem)
         chosen.__dict__["id"] = self.id
         return chosen
+
+    @property
+    def published(self) -> dict[str, Any]:
+        """The entries that the data set holds, and that do not count for the id."""
+        return self.model_dump(include={"licence", "cite", "doi", "files"})
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `from_dict` reads."""

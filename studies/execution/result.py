@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -10,11 +12,14 @@ from studies.definition.identity import canonical
 from studies.definition.points import POINT
 from studies.definition.study import Study
 from studies.definition.vocabulary import OK, SYMMETRIC
+from studies.errors import FileDamaged
 from studies.execution.asking import Asking
 from studies.kinds.kind import Answers
-from studies.storage import runfile, seal
+from studies.storage import ran, runfile, seal
 from studies.storage.dataset import RunContent
+from studies.storage.estimated import WITHOUT, described, numbers_in, with_errors, without
 from studies.storage.made import Combined, Made, held
+from studies.storage.origin import origin
 from studies.storage.provenance import provenance
 from studies.storage.store import Store
 
@@ -76,7 +81,7 @@ def answered(study: Study, store: Store, asking: Asking, anew: bool) -> Combined
     path, made = store.dataset_path(study.id), Made(study, store)
     written = made.kept(_NAME, found.of) is None
     if written:
-        packed = runfile.packed(RunContent(found.content(), _attributes(study) | entry))
+        packed = runfile.packed(_content(study, store, asking, found, entry))
         with store.appearing(study.id) as part:
             part.write_bytes(seal.sealed(f"dataset {study.id}", packed))
         made.note(_NAME, found.of, [path.name])
@@ -85,9 +90,19 @@ def answered(study: Study, store: Store, asking: Asking, anew: bool) -> Combined
     return Combined(path=path, counts=counts, failed=failed, missing=(), anew=written)
 
 
-def _attributes(study: Study) -> dict[str, Any]:
-    """Return the attributes of a data set of answers."""
-    attrs = provenance(study.name, study.problem, study.fixed)
-    words = {"note": study.note, "tags": " ".join(study.tags)}
-    attrs |= {key: text for key, text in words.items() if text}
-    return {**attrs, "id": study.id, SYMMETRIC: 0}
+def _content(
+    study: Study, store: Store, asking: Asking, found: Answers, entry: Mapping[str, Any]
+) -> RunContent:
+    """Return the content of a data set of answers, and how its runs were computed."""
+    variables = dict(found.content())
+    runs, known = sorted(asking.asked), {}
+    for k, run_id in enumerate(runs):
+        with suppress(FileDamaged), runfile.opened(store.run_path(run_id)) as run:
+            known[k] = runfile.global_attributes(run)
+    variables["run_id"] = runfile.described("run_number", runs, "id of the run")
+    said, machines = ran.of_runs(["run_number"], [len(runs)], known)
+    attrs = provenance(study.name, study.problem, study.fixed) | origin(study)
+    attrs |= {**machines, **entry, "id": study.id, SYMMETRIC: 0}
+    every = described(variables := variables | said)
+    attrs[WITHOUT] = without(every, numbers_in(variables))
+    return RunContent(with_errors(variables, every), attrs)

@@ -19,6 +19,7 @@ from studies.definition.place import Limit, Place
 from studies.definition.study import Study
 from studies.errors import StoreFull, StudyError, without_folders
 from studies.execution.proof import Proof, Unfit
+from studies.storage.ran import now
 from studies.storage.store import Store
 
 NO_RECORD = "the scene ended its loading path without a record of this run"
@@ -196,7 +197,7 @@ def _walk(
 
     if ended():
         return
-    reason = NO_RECORD
+    reason, began = NO_RECORD, now()
     try:
         if owed:
             monitor(0.0)
@@ -204,7 +205,8 @@ def _walk(
             begun = known[1:] if known else ()  # a scene of its own kind need not know it
             for record in task.scene.path(path.parameters, list(owed), monitor, *begun):
                 value = getattr(record.parameters, branch, None)
-                row = _written(store, task, owed[value], record)
+                row = _written(store, task, owed[value], record, began)
+                began = now()
                 del owed[value]
                 keep(row)
                 rows[row["id"]] = row
@@ -215,7 +217,7 @@ def _walk(
     except Exception as error:
         reason = _reason(error)
     for case in owed.values():
-        keep(store.write_run(case, reason))
+        keep(store.write_run(case, reason, began=began))
 
 
 def _follow(
@@ -227,7 +229,7 @@ def _follow(
     monitor: Callable[[float], None],
 ) -> None:
     """Compute the runs that a program asks for, one after the other, on one path; see `walk`."""
-    program, owed = place.program, deque[Case]()
+    program, owed, began = place.program, deque[Case](), now()
 
     def known(row: dict[str, Any]) -> None:
         place.hear(row)
@@ -254,24 +256,27 @@ def _follow(
     reason = NO_RECORD
     try:
         for record in task.scene.follow(path.parameters, values(), program.largest, monitor):
-            known(_written(store, task, owed.popleft(), record))
+            known(_written(store, task, owed.popleft(), record, began))
+            began = now()
     except (StopAsked, StoreFull, StudyError):
         raise
     except Exception as error:
         reason = _reason(error)
     # a scene may fail before it asks for a value
     if case := owed.popleft() if owed else lacking():
-        known(store.write_run(case, reason))
+        known(store.write_run(case, reason, began=began))
 
 
-def _written(store: Store, task: PathTask, case: Case, record: Record) -> dict[str, Any]:
+def _written(
+    store: Store, task: PathTask, case: Case, record: Record, began: str
+) -> dict[str, Any]:
     """Write the run of a record, with the status ``error`` if the record cannot be written."""
     try:
-        return store.write_run(case, record, task.keep)
+        return store.write_run(case, record, task.keep, began)
     except (StoreFull, StudyError):
         raise
     except Exception as error:
-        return store.write_run(case, _reason(error))
+        return store.write_run(case, _reason(error), began=began)
 
 
 def _reason(error: Exception) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 
 import h5netcdf
 import h5py
+import numpy as np
 
 from solver.files import appearing
 from solver.scenes import Scene
@@ -18,9 +19,10 @@ from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK, SYMMETRIC
 from studies.errors import FileDamaged
 from studies.storage import dataset as layout
-from studies.storage import seal
+from studies.storage import ran, seal
 from studies.storage.frame import Frame, write_beside
 from studies.storage.made import Combined
+from studies.storage.origin import origin
 from studies.storage.provenance import provenance, together, what_ran
 from studies.storage.room import Reservoir, needs_room
 from studies.storage.runfile import global_attributes, opened
@@ -71,7 +73,8 @@ def _combined(
     scene = study.problem
     usual = layout.usual_dimensions(scene)
     frame = Frame(scene=scene, axes=_axes(study, scene), usual=usual, linked=study.linked)
-    ran: set[tuple[str, str]] = set()
+    software: set[tuple[str, str]] = set()
+    computed: dict[int, dict[str, Any]] = {}
     halves: set[int] = set()
     outcomes: dict[str, tuple[str, str]] = {}
     places: dict[str, tuple[int, ...]] = {}
@@ -83,11 +86,21 @@ def _combined(
             status, message = (frame.small[name][0][at] for name in ("status", "message"))
             outcomes[run_id] = study.taken(str(status)), str(message)
             frame.small["status"][0][at] = outcomes[run_id][0]
-            ran.add(what_ran(global_attributes(run)))
+            known = global_attributes(run)
+            software.add(what_ran(known))
+            number = int(np.ravel_multi_index(at, frame.shape))
+            computed[number] = {name: known[name] for name in ran.MEANINGS if name in known}
             if SYMMETRIC in run.attrs:  # a run without a record lacks it
                 halves.add(int(run.attrs[SYMMETRIC].item()))
-    attrs = provenance(study.name, scene, study.fixed) | together(ran) | _words(study)
-    attrs |= seal.SEALED | (dict(beside.attrs) if beside else {})
+    said, machines = ran.of_runs(tuple(frame.axes), frame.shape, computed)
+    frame.small |= {name: (each.values, dict(each.attrs)) for name, each in said.items()}
+    attrs = provenance(study.name, scene, study.fixed) | together(software) | origin(study)
+    attrs |= (
+        machines
+        | seal.SEALED
+        | frame.name_errors(beside.variables if beside else {})
+        | (dict(beside.attrs) if beside else {})
+    )
     if elsewhere is None:
         with suppress(FileDamaged):
             store.dataset(study.id)  # a damaged or foreign one is set aside, not lost
@@ -119,12 +132,6 @@ def _combined(
         missing=missing,
         anew=True,
     )
-
-
-def _words(study: Study) -> dict[str, str]:
-    """Return note and tags of the study as attributes, if it has them."""
-    words = {"note": study.note, "tags": " ".join(study.tags)}
-    return {name: text for name, text in words.items() if text}
 
 
 def _axes(study: Study, scene: Scene) -> dict[str, list[Any]]:

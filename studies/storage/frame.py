@@ -16,6 +16,7 @@ from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.definition.vocabulary import MISSING
 from studies.storage import dataset as layout
+from studies.storage.estimated import ANCILLARY, WITHOUT, described, errors_of, numbers_in, without
 from studies.storage.runfile import variables
 
 SAME = 1e-9
@@ -72,10 +73,13 @@ class Frame:
     def _with_auxiliary(self, attributes: Mapping[str, Any]) -> dict[str, Any]:
         """Return the attributes of a variable over the sweep with its auxiliary coordinates.
 
-        These are coordinates that are not dimensions, those of the sweep and its own.
+        These are coordinates that are not dimensions, those of the sweep and its own, as far as the
+        runs have them: those of a plane have no z.
         """
-        every = [*self.linked, *attributes.get("coordinates", "").split()]
-        return dict(attributes) | ({"coordinates": " ".join(every)} if every else {})
+        own = attributes.get("coordinates", "").split()
+        every = [*self.linked, *(each for each in own if each in self.fields or each in self.small)]
+        rest = {name: value for name, value in attributes.items() if name != "coordinates"}
+        return rest | ({"coordinates": " ".join(every)} if every else {})
 
     def learn(self, run: h5py.File, at: tuple[int, ...]) -> None:
         """Add the grids and variables of one run, and its small values."""
@@ -90,7 +94,7 @@ class Frame:
                 self._learn_coordinate(name, _values(variable))
             elif variable.ndim > len(self.usual):
                 inner = [axis[0].name.strip("/") for axis in variable.dims][len(self.usual) :]
-                self.fields[name] = (inner, layout.attributes_of(name, self.scene))
+                self.fields[name] = (inner, _attributes(name, self.scene))
             else:
                 if name not in self.small:
                     self._hold(name, variable.dtype)
@@ -147,9 +151,9 @@ class Frame:
             _write(file, name, (name,), texts, layout.attributes_of(name))
         for name, grid in self.grids.items():
             if name in self.ragged:
-                self.fields[name] = ([name], layout.attributes_of(name))
+                self.fields[name] = ([name], _attributes(name))
             else:
-                _write(file, name, (name,), grid, layout.attributes_of(name))
+                _write(file, name, (name,), grid, _attributes(name))
         for name, share in self.fractions.items():
             words = f"{name} / the largest {name} of the run"
             attrs = {"long_name": words, "units": "1"}
@@ -175,6 +179,19 @@ class Frame:
                 compression_opts=1,
                 shuffle=True,
             )
+
+    def name_errors(self, beside: Mapping[str, layout.Variable]) -> dict[str, str]:
+        """Name the estimated error of each number in its attributes, and return those without.
+
+        Numbers that are written ``beside`` count, too.
+        """
+        small = {name: ((), attributes) for name, (_, attributes) in self.small.items()}
+        every = described(beside) | small | self.fields
+        for name, (_, attributes) in (small | self.fields).items():
+            if found := errors_of(name, every):
+                attributes[ANCILLARY] = " ".join(found)
+        numbers = [name for name, (values, _) in self.small.items() if values.dtype.kind == "f"]
+        return {WITHOUT: without(every, [*numbers, *self.fields, *numbers_in(beside)])}
 
     def fill(self, file: h5py.File, run: h5py.File, at: tuple[int, ...]) -> None:
         """Write the fields of one run in their place, compressed as in its file where that fits."""
@@ -239,6 +256,20 @@ def _axis_attributes(scene: Scene, name: str) -> dict[str, str]:
     """Return the attributes of a parameter of the scene, or of an axis of labels or points."""
     known = name in parameters_of(scene)
     return layout.axis_attributes(scene, name) if known else layout.attributes_of(name)
+
+
+def _attributes(name: str, scene: Scene | None = None) -> dict[str, Any]:
+    """Return the attributes of a variable of numbers or of a grid, by rules of CF.
+
+    Values of flags have the type of the variable (section 3.5), and an axis Z is vertical (4.3),
+    which the position across a track is not.
+    """
+    found: dict[str, Any] = dict(layout.attributes_of(name, scene))
+    if found.get("axis") == "Z":
+        del found["axis"]
+    if "flag_values" in found:
+        found["flag_values"] = np.asarray(found["flag_values"], dtype=float)
+    return found
 
 
 def _values(variable: h5py.Dataset) -> np.ndarray:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from solver.files import read_file, special
-from studies.definition.identity import sources
+from studies.definition.identity import canonical, sources
 from studies.definition.study import Study
 from studies.definition.vocabulary import MISSING, OK
 from studies.errors import FileDamaged
@@ -89,7 +89,8 @@ class Made:
             part.write_bytes(content)
 
     def _made_of(self, of: str) -> str:
-        return digest_of("\n".join([of, *self._makers]).encode())
+        own = canonical(self._study.published)
+        return digest_of("\n".join([of, own, *self._makers]).encode())
 
     @cached_property
     def _makers(self) -> list[str]:

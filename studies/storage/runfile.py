@@ -62,7 +62,10 @@ def _write(file: Any, name: str, variable: layout.Variable) -> None:
     for dimension, length in zip(variable.dims, values.shape, strict=True):
         if dimension not in file.dimensions:
             file.createDimension(dimension, length)
-    stored = file.createVariable(name, dimensions=variable.dims, **layout.storage_of(variable))
+    storage = layout.storage_of(variable)
+    if variable.dims == (name,):  # a coordinate has all of its values (CF, section 2.5.1)
+        storage.pop("fill_value", None)
+    stored = file.createVariable(name, dimensions=variable.dims, **storage)
     stored.setncatts(variable.attrs)
     stored.set_auto_maskandscale(False)
     stored[...] = values.astype(object) if values.dtype.kind in "OU" else values

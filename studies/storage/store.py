@@ -27,6 +27,7 @@ import uuid
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any, TypeVar
@@ -41,7 +42,7 @@ from studies.errors import CatalogueDamaged, FileDamaged, StoreFull, StudyError,
 from studies.scenes.file_scene import FileScene
 from studies.scenes.registry import known_names
 from studies.storage import dataset as layout
-from studies.storage import runfile, seal, shelf, ugrid
+from studies.storage import ran, runfile, seal, shelf, ugrid
 from studies.storage.blobs import blobs_at
 from studies.storage.catalogue import BATCH, Catalogue, Row
 from studies.storage.readback import verified
@@ -308,27 +309,33 @@ class Store:
         return self.save_definition(study.id, study.to_dict())
 
     def save_definition(self, study_id: str, content: Mapping[str, Any]) -> Path:
-        """Store the content of a study, unless it is stored, and return its directory."""
+        """Store the content of a study, unless it is stored, and return its directory.
+
+        What does not count for the id, such as its DOI, is that of the last time.
+        """
         path, name = self.study_path(study_id, _STUDY), f"study {study_id}"
         text = seal.sealed_json(name, content)
         try:
             seal.check(path, name)
+            if seal.digest(path) == seal.digest_of(text):
+                return path.parent
         except FileDamaged as error:
             with suppress(FileDamaged):  # one of an earlier version has no seal
                 if seal.sealed_json(name, seal.content_of(path, name)) == text:
                     error.state = None
             self.set_aside(error, "it is written again")
-            with self._writable(), self.blobs.appearing(_study(study_id, _STUDY)) as part:
-                part.write_bytes(text)
+        with self._writable(), self.blobs.appearing(_study(study_id, _STUDY)) as part:
+            part.write_bytes(text)
         return path.parent
 
-    def write_run(self, case: Case, outcome: Record | str, keep: str = "") -> Row:
+    def write_run(self, case: Case, outcome: Record | str, keep: str = "", began: str = "") -> Row:
         """Write the file of one run, read it back, and return its row for the catalogue.
 
         Parameters
         ----------
         outcome : the record of the run, or the reason why there is none
         keep : what is kept in addition to the results of the scene
+        began : time at which this process began to compute it (`ran.now`); empty if it did not
 
         Raises
         ------
@@ -337,10 +344,11 @@ class Store:
         """
         if not isinstance(outcome, str):
             outcome = outcome.with_one_mesh()
-        content = runfile.sealed(layout.run_content(case.scene, case, outcome, keep))
+        content = layout.run_content(case.scene, case, outcome, keep)
+        whole = runfile.sealed(replace(content, attrs={**content.attrs, **ran.how(began)}))
         with self._writable():
             with self.blobs.appearing(_run(case.id)) as part:
-                part.write_bytes(content)
+                part.write_bytes(whole)
                 row = verified(part, case, outcome, keep)
             return row | runfile.stamp(self.run_path(case.id))
 

@@ -356,7 +356,7 @@ def test_the_example_in_the_description_is_a_study(app: FastAPI) -> None:
     schema = post["requestBody"]["content"]["application/json"]["schema"]
     own = {"name", "scene", "parameters", "sweep", "points", "sample", "goal", "note", "tags"}
     own |= {"refine", "fit", "minimise", "extends", "keep", "priority", "allow", "fatigue"}
-    own |= {"derivatives"}
+    own |= {"derivatives", "licence", "cite", "doi", "files"}
     assert set(schema["properties"]) == own
     (example,) = schema["examples"]
     assert Study.from_dict(example).size == 4

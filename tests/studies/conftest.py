@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import xarray as xr
 
 from solver.scenes import Scene
 from studies import Store, Study
 from studies.definition.identity import solver_hash
 from studies.execution.task import PathTask, walk
 from studies.storage.combine import combine
+from studies.storage.ran import MEANINGS
 from tests.studies.fakes import FAKE
 
 AXES = {"load_ratio": [0.3, 0.9], "friction": [0.0, 0.4]}
@@ -35,6 +37,11 @@ def compute_here(study: Study, store: Store, scene: Scene = FAKE) -> list[dict[s
     store.save_study(study)
     combine(study, store, list(study.cases()))
     return reports
+
+
+def results_of(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a data set without what differs from one computation of its runs to the next."""
+    return dataset.drop_vars(["cpu_seconds", *MEANINGS], errors="ignore")
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ import pytest
 from studies import Store, StudyEvent, open_study, run_study
 from studies.execution.executor import Event, Finished, Function, Message, StopCheck
 from studies.execution.limits import Limits
-from tests.studies.conftest import fake_study
+from tests.studies.conftest import fake_study, results_of
 
 
 class Threads:
@@ -67,9 +67,7 @@ def test_a_study_is_computed_as_by_the_executors_of_the_package(goal: bool, tmp_
     assert set(outcome.computed) == set(expected.computed)
     assert sorted(event.run for event in events if event.kind == "run") == list(outcome.computed)
     with open_study(outcome.dataset) as found, open_study(expected.dataset) as same:
-        assert found.drop_vars("cpu_seconds", errors="ignore").identical(
-            same.drop_vars("cpu_seconds", errors="ignore").assign_attrs(found.attrs)
-        )
+        assert results_of(found).identical(results_of(same).assign_attrs(found.attrs))
     again = run_study(study, own, executor=Threads(), resume=True)
     assert again.computed == [] and not again.anew
 
