@@ -140,7 +140,7 @@ def drawn(table: pd.DataFrame) -> Figure:
         len(heights), len(parts), sharex="col", squeeze=False, height_ratios=heights
     )
     for (above, *below), rows in zip(grid.T, parts, strict=True):
-        last = [at[-1] for at in rows["at"]]
+        last = [at[-1] if at else ("", "") for at in rows["at"]]
         words = [of for _, of in last if isinstance(of, str)]
         curve = not words and len(rows) < LONGEST
         x = np.array([of for _, of in last] if curve else range(len(rows)), dtype=float)
