@@ -12,7 +12,7 @@ export PYTHONDONTWRITEBYTECODE :=
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run check test serve lint docs gallery bench stress stress-service lock sbom clean
+.PHONY: help setup run check test serve lint docs gallery measured bench stress stress-service lock sbom clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -45,6 +45,9 @@ docs: setup ## write the reference of the public names as HTML into build/docs
 
 gallery: setup ## compute and draw the pictures of docs/gallery.md that take minutes
 	$(BIN)/python docs/pictures/make.py
+
+measured: setup ## compute, compare and draw what stands in docs/measured.md (5 minutes of processor time)
+	$(BIN)/python docs/pictures/measured.py
 
 bench: setup ## draw CPU time against error
 	$(BIN)/python -m tests.benchmarks

@@ -90,7 +90,7 @@ def main():
         cases = ("T1", "T3", "T6", "T7", "T8")  # there are no published numbers for the others
         study["sweep"]["case"] = {case: study["sweep"]["case"][case] for case in cases}
         assert run_study(Study.from_dict(study), Store(directory), workers=0).ok
-    published = pd.read_csv(DATA / "reference/rolling.csv")
+    published = pd.read_csv(DATA / "measured/rolling.csv")
     published = published.rename(columns={"pass": "number", "from": "top", "to": "bottom"})
     published = published.fillna({"top": 0.0, "bottom": np.inf})
     with open_study(directory) as dataset:

@@ -49,7 +49,9 @@ BLOCK = re.compile(
     r"(?:\n```text\n(?P<shown>.*?)^```)?",
     re.DOTALL | re.MULTILINE,
 )
-COSTLY = re.compile(r"https?://|residua (?:run|serve|view|submit|status|cancel|fetch)")
+COSTLY = re.compile(
+    r"https?://|residua (?:run|serve|view|submit|status|cancel|fetch)|measured(?:\.py|\n)"
+)
 SNIPPET = "snippet.py"
 CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")

@@ -53,7 +53,8 @@ def make(name: str, section: str, folder: Path) -> None:
             subprocess.run(call, cwd=folder, env=environment, check=True)
     for name in PICTURE.findall(section):
         with Image.open(folder / name) as picture:
-            picture.convert("RGB").save(HERE / name, optimize=True)
+            small = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+            small.save(HERE / name, optimize=True)
 
 
 def main(names: list[str]) -> None:
