@@ -49,6 +49,7 @@ from studies.errors import StudyError
 from studies.kinds import kind_of
 from studies.scenes.registry import known_names
 from studies.storage.store import Store
+from studies.views.elasticities import elasticities
 from studies.views.table import MESSAGE, RUN, STATUS, RunTable, varied
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
@@ -230,6 +231,7 @@ def _run(
         parameters=parameters_shown(run, scene),
         audit=audited(run, scene),
         numbers=numbers_shown(run, scene),
+        elasticities=elasticities(run["scalars"], run["parameters"]),
         drawn=drawn,
         data={"run": run["id"], "fields": drawn},
     )

@@ -1,4 +1,4 @@
-"""What a user asks for: derivatives of numbers of runs by parameters of a scene."""
+"""What a user asks for: derivatives of results of runs by parameters of a scene."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ accuracy, .7 on a ball, whose surface turns."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Derivatives:
-    """Derivatives of numbers by parameters.
+    """Derivatives of results by parameters.
 
     Attributes
     ----------
     by : names of parameters
-    of : names of numbers
+    of : names of numbers, lines or maps
     """
 
     by: tuple[str, ...]
@@ -44,7 +44,7 @@ class Derivatives:
         return 1 + _SHARE * (1 + len(self.by))
 
     def quantities(self, kind: Any, known: Mapping[str, Quantity]) -> list[Quantity]:
-        """Return the declarations of the derivatives, ``d_<number>_d_<parameter>``.
+        """Return the declarations of the derivatives, ``d_<result>_d_<parameter>``.
 
         Parameters
         ----------
@@ -54,21 +54,21 @@ class Derivatives:
         Raises
         ------
         ModelError
-            for a parameter or a number that has no derivative
+            for a parameter or a result that has no derivative
         """
         hints = typing.get_type_hints(kind, include_extras=True)
         marks = {name: (hint, *_marks(hint)) for name, hint in hints.items()}
-        numbers = [
+        results = [
             name
             for name, each in known.items()
-            if not (each.dims or each.count or name.startswith("audit_"))
+            if not (each.coordinate or each.count or each.flags or name.startswith("audit_"))
         ]
         real = [name for name, each in marks.items() if float in each]
-        for field, given, allowed in (("by", self.by, real), ("of", self.of, numbers)):
+        for field, given, allowed in (("by", self.by, real), ("of", self.of, results)):
             for k, name in enumerate(given):
                 if name not in allowed:
-                    what = "a parameter with decimals" if field == "by" else "one number a run"
-                    raise ModelError(f"{field}[{k}]", name, f"must be {what}")
+                    what = "a parameter" if field == "by" else "a result"
+                    raise ModelError(f"{field}[{k}]", name, f"must be {what} with decimals")
                 if name in given[:k]:
                     raise ModelError(f"{field}[{k}]", name, "is there already")
         return [
@@ -102,7 +102,7 @@ class Derivatives:
 
 
 def named(of: str, by: str) -> str:
-    """Return the name of the derivative of a number by a parameter."""
+    """Return the name of the derivative of a result by a parameter."""
     return f"d_{of}_d_{by}"
 
 

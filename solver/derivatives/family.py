@@ -1,4 +1,4 @@
-"""The neighbouring runs of a scene, and the derivatives of its numbers by their differences."""
+"""The neighbouring runs of a scene, and the derivatives of its results by their differences."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from solver.results.samples import Samples
 
 _JUMP = 100.0
 """Relative change of a number over that of a parameter: above this ratio it is a jump, as of the
-place of a maximum that two places share. It has no derivative."""
+place of a maximum that two places share. It has no derivative. Changes of a line or a map are
+relative to its largest value."""
 
 
 class Family:
@@ -113,11 +114,11 @@ class Family:
     def values(
         self, watched: Sequence[Sequence[Any]], run: FinishedRun, outputs: Iterable[Output]
     ) -> Values:
-        """Return the derivatives of numbers of a run, given its outputs.
+        """Return the derivatives of results of a run, given its outputs.
 
         They are NaN where a neighbour failed or has no such number, and where the number jumps.
         """
-        steps, found = self._steps(run.parameters), dict[str, float]()
+        steps, found = self._steps(run.parameters), dict[str, Any]()
         runs = self.finished(run, watched)
         for output in outputs if runs else ():
             first = _numbers(output(runs[0]))
@@ -127,11 +128,13 @@ class Family:
             for (by, step), other in zip(steps.items(), runs[1:], strict=True):
                 after = _numbers(output(other))
                 for of in wanted:
-                    change = after.get(of, np.nan) - first[of]
+                    level, values = np.abs(first[of]), np.asarray(after.get(of, np.nan))
                     share = abs(step / getattr(run.parameters, by))
-                    jumps = abs(change) > _JUMP * share * abs(first[of])
-                    found[named(of, by)] = np.nan if jumps else change / step
-        return {quantity: found.get(quantity.name, np.nan) for quantity in self._declared}
+                    most = _JUMP * share * np.nanmax(level, initial=0.0)
+                    change = values - first[of]
+                    found[named(of, by)] = np.where(np.abs(change) > most, np.nan, change / step)
+        lacks = {q.name: np.nan for q in self._declared if not q.dims}
+        return {q: (lacks | found)[q.name] for q in self._declared if q.name in lacks | found}
 
 
 def _numbers(values: Values) -> dict[str, Any]:

@@ -50,7 +50,7 @@ def record(scene: Scene, run: FinishedRun) -> Record:
     if run.derived is not None:
         derived = run.derived(run, scene.outputs)
         values |= derived
-        if lacks := [q.name for q, value in derived.items() if np.isnan(value)]:
+        if lacks := [q.name for q, value in derived.items() if np.isnan(value).all()]:
             own = (*own, f"no derivative was found for {', '.join(lacks)}")
     if check.violations:
         status = Status.AUDIT_FAILED

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, SupportsIndex
 import numpy as np
 import xarray as xr
 
+from solver.derivatives.asked import named
 from solver.errors import ModelError
 from solver.results.quantities import QUANTITIES
 from solver.tensors import AXES
@@ -34,6 +35,7 @@ from studies.views.columns import (
     unit_text,
     value_text,
 )
+from studies.views.elasticities import TITLE, derived
 from studies.views.figures import FIGURES, worst
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.reading import open_study
@@ -179,11 +181,12 @@ def _spoiled(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def _own(dataset: xr.Dataset) -> list[str]:
-    """Return the outputs that a scene file declares, without the positions of extreme values."""
+    """Return the outputs that a scene file declares, without places of extremes and derivatives."""
     rank = dataset["status"].dims
     numbers = {str(n): v for n, v in dataset.data_vars.items() if v.dtype.kind in "fiub"}
     names = [name for name, each in numbers.items() if each.dims == rank]
     known = QUANTITIES.keys() | LABEL_ATTRIBUTES.keys()
+    known |= {named(*each) for each in _derived(dataset)}
     own = [name for name in names if name not in known and not name.startswith(_AUDIT)]
     ends = {f"_{axis}" for axis in AXES}
     return [name for name in own if name[-2:] not in ends or name[:-2] not in own]
@@ -374,6 +377,37 @@ def place_of(dataset: xr.Dataset, at: Sequence[SupportsIndex]) -> str:
     return placed({name: dataset[name].to_numpy()[k] for name, k in several})
 
 
+def _derived(runs: xr.Dataset) -> list[tuple[str, str]]:
+    """Return each number and each parameter of which the runs have a derivative."""
+    numbers = [str(name) for name in runs if runs[name].dims == runs["status"].dims]
+    fixed = json.loads(runs.attrs.get("parameters", "{}"))
+    return list(derived(numbers, dict.fromkeys([*fixed, *map(str, runs.coords)])))
+
+
+def elasticity_table(runs: xr.Dataset) -> str:
+    """Return the elasticities of the runs of a study as text; empty if there are none.
+
+    Of several runs they are the median, and the least and the largest.
+    """
+    fixed = json.loads(runs.attrs.get("parameters", "{}"))
+    cells: dict[str, dict[str, str]] = {}
+    for of, by in _derived(runs):
+        parameter = runs[by] if by in runs else fixed[by]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            each = (runs[named(of, by)] * parameter / runs[of]).values
+        known = each[np.isfinite(each)]
+        if known.size:
+            least, median, most = np.quantile(known, [0.0, 0.5, 1.0])
+            span = f" ({least:+.2f} to {most:+.2f})" if known.size > 1 else ""
+            cells.setdefault(of, {})[by] = f"{median:+.2f}{span}"
+    if not cells:
+        return ""
+    every = list(dict.fromkeys(by for row in cells.values() for by in row))
+    rows = [[of, *(row.get(by, "") for by in every)] for of, row in cells.items()]
+    how = ": median (least to largest) of the runs" if runs["status"].size > 1 else ""
+    return f"\n{TITLE}{how}\n{aligned([['', *every], *rows], right=1)}\n"
+
+
 def report_text(dataset: xr.Dataset, kind: Kind, outcome: StudyOutcome, note: str) -> str:
     """Return the runs of a study, or what it has found, and their messages; last their numbers."""
     size = dataset["status"].size
@@ -386,4 +420,4 @@ def report_text(dataset: xr.Dataset, kind: Kind, outcome: StudyOutcome, note: st
     warning = f"; {int(warned.sum())} with a warning" if warned.any() else ""
     ended = f"{dataset.attrs['title']}: {size} {kind.rows} ({counts}{warning})"
     noted = f"\nnote: {note}\n" if note else ""
-    return f"{table}{messages(dataset)}{noted}\n{ended}\n"
+    return f"{table}{elasticity_table(dataset)}{messages(dataset)}{noted}\n{ended}\n"

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import tomllib
 from typing import Any
 
+import numpy as np
 import pytest
 
-from studies import Store, Study, StudyError, open_study
+from studies import Store, Study, StudyError, fit, open_study
 from studies.execution.estimate import estimate
-from studies.scenes.scene import read_scene
+from studies.scenes.description import Description
+from studies.scenes.scene import file_scene, read_scene
+from studies.views.elasticities import elasticities
+from studies.views.tables import elasticity_table, runs_table
 from tests.marks import HERE
 from tests.studies.conftest import compute_here
 
@@ -36,6 +41,35 @@ def test_the_data_set_has_them_with_their_units(store: Store) -> None:
     assert data["d_residual_d_ratio"].values == pytest.approx([300.0, 300.0], rel=1e-5)
     assert data["d_residual_d_ratio"].attrs["units"] == "MPa"
     assert "derivative of" in data["d_residual_d_ratio"].attrs["long_name"]
+    *_, row = elasticity_table(data).splitlines()
+    assert row.split() == ["residual", "+7.67", "(+4.33", "to", "+11.00)"], "ratio / (ratio - 1)"
+    assert "residual" in runs_table(data)
+    assert "d residual" not in runs_table(data), "they are in the data set"
+
+
+@pytest.mark.solves
+def test_lines_have_the_derivatives_of_differences(store: Store) -> None:
+    of, width = ["line_stress", "line_plastic_strain"], 1e-5
+    study = bent(derivatives={"by": ["ratio"], "of": of}, sweep={"ratio": [1.2]})
+    beside = bent(sweep={"ratio": [1.2 * (1 - width), 1.2 * (1 + width)]})
+    runs = []
+    for each in (study, beside):
+        compute_here(each, store, each.problem)
+        runs.append(open_study(store.dataset_path(each.id)))
+    for name in of:
+        found = runs[0][f"d_{name}_d_ratio"].isel(ratio=0)
+        expected = runs[1][name].diff("ratio").isel(ratio=0) / (2 * width * 1.2)
+        assert found.dims == runs[0][name].isel(ratio=0).dims
+        assert float(abs(expected).max()) > 1e-4
+        assert float(abs(found - expected).max()) < 2e-5 * float(abs(expected).max())
+
+
+def test_elasticities_are_of_numbers_and_parameters_that_a_run_has() -> None:
+    scalars = {"force": 50.0, "d_force_d_size": 20.0, "d_force_d_friction": None, "d_x_d_size": 1.0}
+    found = elasticities(
+        scalars | {"zero": 0.0, "d_zero_d_size": 1.0}, {"size": 5.0, "friction": 0.0}
+    )
+    assert found == {"force": {"size": 2.0}}
 
 
 def test_they_change_the_ids_of_runs_and_are_extended_with_them() -> None:
@@ -56,7 +90,7 @@ def test_they_change_the_ids_of_runs_and_are_extended_with_them() -> None:
         ({"by": ["friction"]}, "derivatives.of", "must be given"),
         ({"by": ["elemnt"], "of": ["plastic_work"]}, "derivatives.by[0]", "with decimals"),
         ({"by": ["element"], "of": ["plastic_work"]}, "derivatives.by[0]", "with decimals"),
-        ({"by": ["friction"], "of": ["map_mises"]}, "derivatives.of[0]", "one number a run"),
+        ({"by": ["friction"], "of": ["increments"]}, "derivatives.of[0]", "a result with decimals"),
         ({"by": ["friction"], "of": []}, "derivatives.of", "1 or more"),
     ],
 )
@@ -78,3 +112,73 @@ def test_an_estimate_counts_them(store: Store) -> None:
         for more in ({"derivatives": {"by": ["friction"], "of": ["plastic_work"]}}, {})
     ]
     assert both[0] and both[1] and both[0][1] > 1.2 * both[1][1]
+
+
+BAR = """
+name = "cyclic_bar"
+summary = "a bar that is strained back and forth"
+kinematics = "plane_strain"
+[parameters]
+strength = { default = 200.0, range = [50.0, 500.0], description = "yield stress" }
+growth = { default = 60.0, range = [0.0, 500.0], description = "isotropic saturation" }
+modulus = { default = 4e4, range = [1e3, 2e5], description = "modulus of the back stress" }
+recall = { default = 250.0, range = [1.0, 2000.0], description = "its recall" }
+[materials.m]
+youngs_modulus = 2e5
+poisson_ratio = 0.3
+yield_stress = "$strength"
+hardening = "chaboche"
+saturation = "$growth"
+saturation_rate = 50.0
+back_stresses = [["$modulus", "$recall"]]
+[bodies.b]
+material = "m"
+shape = { kind = "rectangle", x = [0, 4], y = [0, 4], size = 4 }
+supports = { left = "x", bottom = "y" }
+[rigid.grip]
+y = { moved = 0.04, amplitude = { AMPLITUDE } }
+[[links]]
+slave = "b.top"
+rigid = "grip"
+components = "y"
+"""
+STRAINED = (0.2, 0.5, 1.0, -0.2, -1.0, 0.4, 1.0)
+
+
+@pytest.mark.solves
+def test_four_parameters_are_fitted_by_a_fifth_of_the_runs_of_differences(store: Store) -> None:
+    """By differences the same fit takes 47 runs."""
+    of = [f"f{k}" for k in range(len(STRAINED))]
+    amplitude = ", ".join(f"s{k} = {each}" for k, each in enumerate(STRAINED))
+    content = tomllib.loads(BAR.replace("AMPLITUDE", amplitude))
+    content["stages"] = [{"name": f"s{k}", "increments": 1} for k in range(len(of))]
+    content["outputs"] = {
+        f"f{k}": {"of": "stress.yy", "body": "b", "stage": f"s{k}", "take": "maximum"}
+        for k in range(len(of))
+    }
+    scene = file_scene(Description("bar.toml", content, {}))
+    truth = {"strength": 200.0, "growth": 60.0, "modulus": 4e4, "recall": 250.0}
+    (record,) = scene.path(scene.parameters(**truth), [], lambda share: None)
+    noise = np.random.default_rng(3).normal(size=len(of))
+    measured = [
+        {"of": name, "values": [record.scalars[name] * (1 + 0.005 * each)], "sigma": 2.0}
+        for name, each in zip(of, noise, strict=True)
+    ]
+    ranges = {
+        "strength": [120, 320],
+        "growth": [10, 150],
+        "modulus": [1e4, 1e5],
+        "recall": [80, 700],
+    }
+    study = Study.from_dict(
+        {
+            "name": "four", "scene": "cyclic_bar", "fit": {"measured": measured, "ranges": ranges},
+            "derivatives": {"by": list(ranges), "of": of},
+        },
+        scene,
+    )  # fmt: skip
+    found = fit(study, store, workers=0)
+    assert found.status == "ok" and found.runs <= 47 / 5
+    for name, value in truth.items():
+        assert abs(found[name] - value) < 2 * found[f"{name}_sigma"], name
+        assert found[f"{name}_sigma"] < 0.1 * value

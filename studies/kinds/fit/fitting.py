@@ -1,8 +1,9 @@
 """Calibration: the values of parameters with which runs come closest to what was measured.
 
 The sum of squared differences over standard deviations is made smallest by a trust region method
-within bounds. Each evaluation is a run, or one for each position on the axes of the study; those of
-the differences for the Jacobian matrix are asked for together. After each answer the method begins
+within bounds. Each evaluation is a run, or one for each position on the axes of the study. The
+Jacobian matrix is that of their derivatives, if the study has them; else that of differences, whose
+runs are asked for together. After each answer the method begins
 anew with what is known: what it asks for next depends only on the runs that it has asked for, so
 that one that is taken up after a crash asks for the same runs.
 
@@ -26,6 +27,7 @@ import numpy as np
 from annotated_types import Interval
 from pydantic import Field, ValidationInfo, model_validator
 
+from solver.derivatives.asked import named
 from solver.late import Late
 from solver.typing import Array
 from studies.definition.quantity import Read
@@ -54,6 +56,7 @@ class Fit(Ranged):
     measured : the measured lines
     step : step of the differences, as a share of the range
     most : largest number of runs
+    derived : whether runs have the derivatives of all lines by all parameters
     """
 
     name = "fit"
@@ -67,11 +70,15 @@ class Fit(Ranged):
     measured: Annotated[list[MeasuredLine], Field(min_length=1, max_length=1000)]
     step: Annotated[Number, Interval(ge=1e-4, le=0.5)] = 0.05
     most: Annotated[Whole, Interval(ge=1, le=10_000)] = 100
+    _derived: bool = False
 
     @model_validator(mode="after")
     def _check(self, info: ValidationInfo) -> Self:
         axes, free, wrong = Context.of(info).axes, len(self.ranges), Mistakes()
-        if (count := math.prod(map(len, axes.values())) * (1 + free)) > self.most:
+        scene = Context.of(info).scene
+        self._derived = all(each.derived(by, scene) for each in self.measured for by in self.ranges)
+        count = math.prod(map(len, axes.values())) * (1 if self._derived else 1 + free)
+        if count > self.most:
             allowed = f"must be at least {count}, the runs of the first round"
             raise StudyError("most", self.most, allowed)
         every = standings(axes)
@@ -86,6 +93,11 @@ class Fit(Ranged):
             allowed = f"must have as many values as there are parameters: {free} at least"
             raise StudyError("measured", f"{len(self.measured)} lines", allowed)
         return self
+
+    @property
+    def derived(self) -> bool:
+        """Whether runs have the derivatives of all lines by all parameters."""
+        return self._derived
 
     @property
     def values(self) -> Array:
@@ -117,6 +129,7 @@ class Fit(Ranged):
     def programs(self, axes: Axes, read: Reading, allow: Sequence[str]) -> Iterator[Placed]:
         """Yield the program of the fit."""
         names = {name for line in self.measured for name in (line.of, line.over)}
+        names |= {named(each, by) for each in names for by in self.ranges if self.derived}
         yield Placed([], {}, Fitting(self, standings(axes), read(names)))
 
     @property
@@ -171,16 +184,28 @@ class Fitting(Replayed):
             seen = self._all(values)
         except (Lacking, Ends):
             return math.nan
-        return math.nan if seen is None else float(np.mean(self._over_sigma(seen) ** 2))
+        return math.nan if seen is None else float(np.mean(self._over_sigma(seen[:, 0]) ** 2))
 
     def seen(self, key: Evaluation, row: Mapping[str, Any]) -> list[Array] | None:
-        """Return what a run says at the measured places of its lines; None if it failed."""
+        """Return what a run says at the measured places of its lines; None if it failed.
+
+        Behind the values are the columns of their derivatives by the shares of the ranges, if the
+        study has them.
+        """
         if row["status"] not in SOLVED:
             self.refusals[key] = ": ".join(filter(None, (row["status"], row["message"])))
             return None
         read = self.read(row)
+        lines = [self.asked.measured[k] for k in self._of[key.position]]
+        each = zip(self.asked.ranges.items(), key.values, strict=True)
+        free = [(name, of.slope(at)) for (name, of), at in each if self.asked.derived]
         try:
-            return [self.asked.measured[k].seen(read) for k in self._of[key.position]]
+            return [
+                np.column_stack(
+                    [line.seen(read), *(line.slope(read, by, width) for by, width in free)]
+                )
+                for line in lines
+            ]
         except ValueError as error:
             self.refusals[key] = str(error)
             return None
@@ -191,12 +216,8 @@ class Fitting(Replayed):
 
         first = np.array(self.asked.first_shares).round(DIGITS)
         self.answer = None
-        self._ask(
-            [
-                self.asked.values_at(first),
-                *(self.asked.values_at(each) for each in self._stepped(first)),
-            ]
-        )
+        stepped = [] if self.asked.derived else self._stepped(first)
+        self._ask([self.asked.values_at(each) for each in (first, *stepped)])
         found = least_squares(
             self._differences, first, self._jacobian, bounds=(0.0, 1.0), x_scale=1.0,
             ftol=_TOLERANCE, xtol=_TOLERANCE, gtol=1e-10, max_nfev=10 * self.asked.most,
@@ -204,7 +225,9 @@ class Fitting(Replayed):
         values = self.asked.values_at(found.x)
         seen = self._all(values)
         assert seen is not None
-        self.answer = Fitted(np.array(values), found.x.round(DIGITS), seen, found.jac)
+        self.answer = Fitted(np.array(values), found.x.round(DIGITS), seen[:, 0], found.jac)
+        if self.asked.derived:
+            return
         with suppress(Ends):  # no runs are left: narrow differences tell less well
             self.answer = self.answer._replace(jacobian=self._wide(self.answer))
 
@@ -217,6 +240,7 @@ class Fitting(Replayed):
                 why = next(self.refusals[key] for key in keys if key in self.refusals)
                 raise Ends(f"the run of the first values has no line: {why}")
             return np.full(len(self.asked.values), np.nan)  # the method goes half as far
+        seen = seen[:, 0]
         found = self._over_sigma(seen)
         best = self.answer
         if best is None or np.sum(found**2) < np.sum(self._over_sigma(best.seen) ** 2):
@@ -227,6 +251,9 @@ class Fitting(Replayed):
     def _jacobian(self, shares: Array, *_: Any) -> Array:
         here = self._all(self.asked.values_at(shares))
         assert here is not None
+        if np.isfinite(slopes := here[:, 1:]).all() and self.asked.derived:
+            return self._told(here[:, 0], slopes / self.asked.sigma[:, None])
+        here = here[:, 0]
         steps = self._stepped(shares)
         self._ask([self.asked.values_at(step) for step in steps])
         columns = []
@@ -239,16 +266,19 @@ class Fitting(Replayed):
                 inside = 0.0 <= step[k] <= 1.0
                 there = self._all(self.asked.values_at(step)) if inside else None
                 if there is not None:
-                    columns.append((there - here) / (step[k] - at) / self.asked.sigma)
+                    columns.append((there[:, 0] - here) / (step[k] - at) / self.asked.sigma)
                     break
             else:
                 raise Ends(
                     f"runs fail on both sides of {name} = {self.asked.values_at(shares)[k]:.6g}"
                 )
-        found = np.column_stack(columns)
+        return self._told(here, np.column_stack(columns))
+
+    def _told(self, here: Array, jacobian: Array) -> Array:
+        """Return a Jacobian matrix, and keep that of the best values so far."""
         if self.answer is not None and np.array_equal(self.answer.seen, here):
-            self.answer = self.answer._replace(jacobian=found)
-        return found
+            self.answer = self.answer._replace(jacobian=jacobian)
+        return jacobian
 
     def _wide(self, answer: Fitted) -> Array:
         """Return the Jacobian matrix of central differences over what the parameters may be.
@@ -271,7 +301,7 @@ class Fitting(Replayed):
         for k in wide:
             ends = [self._all(self.asked.values_at(each)) for each in pairs[k]]
             if ends[0] is not None and ends[1] is not None:
-                found[:, k] = (ends[0] - ends[1]) / (2.0 * widths[k]) / self.asked.sigma
+                found[:, k] = (ends[0] - ends[1])[:, 0] / (2.0 * widths[k]) / self.asked.sigma
         return found
 
     def _stepped(self, shares: Array) -> list[Array]:
@@ -288,7 +318,7 @@ class Fitting(Replayed):
         self.ask([Evaluation(values, k) for values in every for k in range(len(self.positions))])
 
     def _all(self, values: tuple[float, ...]) -> Array | None:
-        """Return what runs say at all measured places; None if one of them failed."""
+        """Return what runs say at all measured places, as of `seen`; None if one failed."""
         self._ask([values])
         found: list[Array] = [np.empty(0)] * len(self.asked.measured)
         for k, of in enumerate(self._of):

@@ -18,11 +18,12 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, GetJsonSchemaHandler, PlainValidator, ValidationInfo, model_validator
 
+from solver.derivatives.asked import named
 from solver.files import number_of
 from solver.scenes import Scene
 from solver.typing import Array
 from studies.definition.parameters import in_unit
-from studies.definition.quantity import Read, Variable, known_variable, picked
+from studies.definition.quantity import Line, Read, Variable, known_variable, picked
 from studies.definition.rows import read_table
 from studies.definition.schema import Context, StudyTable, is_finite
 from studies.definition.sweep import linked_values
@@ -40,6 +41,8 @@ _TURN = 0.02
 _BEYOND = 0.5
 """Largest distance from the ends of a curve to which it is continued, as a share of its range."""
 _MOST = 100_000
+_STEP = 1e-6
+"""Difference of a parameter, over its range, by which derivatives of curves move them."""
 
 
 def _numbers(content: Any, info: ValidationInfo) -> list[float]:
@@ -140,6 +143,30 @@ class MeasuredLine(StudyTable):
         """The standard deviations of the values."""
         usual = _USUAL * max(map(abs, self.values)) or 1.0
         return self.sigma or [usual] * len(self.values)
+
+    def derived(self, by: str, scene: Scene) -> bool:
+        """Whether runs have the derivatives of the line by a parameter."""
+        known = scene.known_quantities
+        curves = {self.of, self.over} - {"", *known[self.of].dims}
+        return all(named(each, by) in known for each in curves)
+
+    def slope(self, read: Read, by: str, width: float) -> Array:
+        """Return the derivatives (n,) of `seen` by a parameter, times the width of its range.
+
+        Raises
+        ------
+        ValueError
+            as of `seen`
+        """
+        step = _STEP * width
+
+        def moved(name: str) -> Line | None:
+            line, change = read(name), read(named(name, by))
+            return line and line._replace(
+                values=line.values + step * change.values if change else line.values
+            )
+
+        return np.asarray((self.seen(moved) - self.seen(read)) / _STEP)
 
     def seen(self, read: Read) -> Array:
         """Return what a run says at the places (n,).

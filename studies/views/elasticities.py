@@ -1,0 +1,40 @@
+"""Elasticities: by how many percent a number of a run changes if a parameter is 1 % larger.
+
+They follow from the derivatives of the runs (`solver.derivatives`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from solver.derivatives.asked import named
+
+TITLE = "Change in % if a parameter is 1 % larger"
+
+
+def derived(names: Iterable[str], parameters: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Yield each number and each parameter of which there is a derivative among the names."""
+    known = set(names)
+    slopes = [name for name in known if name.startswith(named("", "")[:2])]
+    for by in parameters:
+        ends = {name for name in slopes if name.endswith(named("", by)[2:])}
+        yield from ((of, by) for of in sorted(known) if ends and named(of, by) in ends)
+
+
+def elasticities(
+    scalars: Mapping[str, Any], parameters: Mapping[str, Any]
+) -> dict[str, dict[str, float]]:
+    """Return the elasticities of the numbers of a run: by number, by parameter.
+
+    Parameters
+    ----------
+    scalars : numbers and derivatives by name; None where one is not known
+    parameters : of the run
+    """
+    found: dict[str, dict[str, float]] = {}
+    for of, by in derived(scalars, parameters):
+        value, slope = scalars[of], scalars[named(of, by)]
+        if value and slope is not None:
+            found.setdefault(of, {})[by] = slope * parameters[by] / value
+    return found
