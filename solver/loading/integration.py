@@ -4,6 +4,10 @@ Backward Euler gives plastic flow one direction. The strain of the increment is 
 `_PARTS` equal parts along the same straight path, in which the direction of flow changes. Their
 error is smaller by this number, so the difference between the two stresses estimates the error. It
 is of second order in the length of an increment; the sum over a path is of first order.
+
+Of the first flow of a body this says nothing: from no stress along a straight path, stress and flow
+keep one direction. There the path leads through the strain at half of the increment, which a
+growing contact or heat may take aside.
 """
 
 from __future__ import annotations
@@ -21,19 +25,39 @@ _PARTS = 4
 """Number of parts of an increment; with two, flow that begins in the second half could not turn."""
 
 
-def integrated(system: System, before: Converged, now: Converged) -> Converged:
-    """Return the increment ``now`` with its error, and the remaining sum of errors of the path."""
+def integrated(
+    system: System, before: Converged, now: Converged, half: Converged | None = None
+) -> Converged:
+    """Return the increment ``now`` with its error, and the remaining sum of errors of the path.
+
+    The path of strain leads through the end of ``half``, half of the increment, if it is given.
+    """
     sums, added = list(before.missed or (None,) * len(system.parts)), 0.0
     for k, part in enumerate(system.parts):
         grown = now.responses[k].state.accumulated - now.start.plastic[k].accumulated
         flows = grown > 0
         if not (isinstance(part, Discretisation) and flows.any()):
             continue
-        own = _missed(part, now, k, flows)
+        own = _missed(part, now, k, flows, half)
         added = float(np.maximum(added, _mean(part, own, flows)))
         had = sums[k]
         sums[k] = own if had is None else _carried(part, now, k, had) + own
     return replace(now, missed=tuple(sums), added=added)
+
+
+def doubtful(system: System, now: Converged, most: float) -> bool:
+    """Whether an increment has the first flow of a body, and its error may be above ``most``.
+
+    Whatever the path of strain is, the stress differs by no more than twice what the plastic strain
+    makes.
+    """
+    for part, response, start in zip(system.parts, now.responses, now.start.plastic, strict=True):
+        grown = response.state.accumulated
+        if isinstance(part, Discretisation) and grown.any() and not start.accumulated.any():
+            stress = 6.0 * part.body.law.elasticity.shear_modulus * grown[None]
+            if _mean(part, stress / np.sqrt(1.5), grown > 0) > most:
+                return True
+    return False
 
 
 def missed(system: System, now: Converged) -> float:
@@ -47,18 +71,24 @@ def missed(system: System, now: Converged) -> float:
     return float(np.max(errors, initial=0.0))
 
 
-def _missed(part: Discretisation, now: Converged, number: int, flows: Bools) -> Array:
+def _missed(
+    part: Discretisation, now: Converged, number: int, flows: Bools, half: Converged | None
+) -> Array:
     """Return the exact stress minus that of the increment (n_components, n_points) [MPa].
 
     The exact stress is extrapolated to infinitely many parts.
     """
     within = np.asarray(flows.reshape(part.weights.shape).any(axis=1))
     points = np.flatnonzero(np.repeat(within, part.weights.shape[1]))
-    ends = (now.start.time, now.start.u[number]), (now.state.time, now.state.u[number])
-    start, end = ((part.strain(u) - part.eigenstrain(time))[:, points] for time, u in ends)
+    states = now.start, (half or now).state, now.state
+    start, middle, end = (
+        (part.strain(at.u[number]) - part.eigenstrain(at.time))[:, points] for at in states
+    )
+    aside = 2.0 * middle - start - end if half else 0.0
     law, state = part.law(now.state.time).at(points), now.start.plastic[number].at(points)
     for share in np.arange(1, _PARTS + 1) / _PARTS:
-        stress, _, state, _ = law.respond(start + share * (end - start), state)
+        strain = start + share * (end - start) + 2.0 * share * (1.0 - share) * aside
+        stress, _, state, _ = law.respond(strain, state)
     at_once = now.responses[number].stress
     found = np.zeros_like(at_once)
     found[:, points] = (stress - at_once[:, points]) * _PARTS / (_PARTS - 1)

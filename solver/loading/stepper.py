@@ -21,7 +21,7 @@ from solver.linear.threads import one_thread
 from solver.loading.control import Control
 from solver.loading.energy import worked
 from solver.loading.increment import Increment
-from solver.loading.integration import integrated, lost
+from solver.loading.integration import doubtful, integrated, lost
 from solver.loading.narrowing import FailedInWindows, narrowed
 from solver.loading.outcome import IncrementFailed, Mechanism, PathEnded, Point, Tally, Yielded
 from solver.loading.prediction import MEMORY, Predictor
@@ -243,7 +243,8 @@ class Stepper:
                     converged = coarse
                 size.resumed(converged.state.time - now)
             else:
-                converged = integrated(self.system, point.now, converged)
+                half = self._half(point, converged, contact=contact)
+                converged = integrated(self.system, point.now, converged, half)
                 # shares of uncertain friction refer to the larger forces of the coarse increment
                 known = converged.timing.beside(known)
                 halvings = max(int(_coarse(known)), _halvings(converged.added, most))
@@ -261,6 +262,16 @@ class Stepper:
                 raise PathEnded(NotConverged(message, now, reached), point)
             self._report()
         return point
+
+    def _half(self, point: Point, converged: Converged, *, contact: bool) -> Converged | None:
+        """Return half of an increment if it is needed to know the error, and converges."""
+        if not doubtful(self.system, converged, self.control.increment_error):
+            return None
+        middle = (point.now.state.time + converged.state.time) / 2
+        try:
+            return self._increment(point, middle, contact=contact, patient=False, whole=False)
+        except IncrementFailed:
+            return None
 
     def _step_size(self, point: Point, target: float) -> _StepSize:
         """Return the step of the increments to a time.
