@@ -160,6 +160,8 @@ class Pardiso:
         return object.__sizeof__(self) + 1024 * int(max(highest, analysis + factors))
 
     def _call(self, phase: int, b: Array, x: Array, which: int = 0) -> None:
+        if not self.n:  # every displacement of a body is prescribed
+            return
         _pardiso(
             phase, self._handle, self.kind, self._iparm, self.n, b.shape[1] if b.ndim == 2 else 1,
             (self._data, self._indptr, self._indices), self._last, b, x,

@@ -6,8 +6,8 @@ error is smaller by this number, so the difference between the two stresses esti
 is of second order in the length of an increment; the sum over a path is of first order.
 
 Of the first flow of a body this says nothing: from no stress along a straight path, stress and flow
-keep one direction. There the path leads through the strain at half of the increment, which a
-growing contact or heat may take aside.
+keep one direction. There half of the increment is solved too, in which a growing contact or heat
+may have led strain aside, and the stress is that of the whole strain after the state at half.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ def integrated(
 ) -> Converged:
     """Return the increment ``now`` with its error, and the remaining sum of errors of the path.
 
-    The path of strain leads through the end of ``half``, half of the increment, if it is given.
+    The error is the larger one of the estimates by parts and by ``half``, half of the increment, if
+    it is given.
     """
     sums, added = list(before.missed or (None,) * len(system.parts)), 0.0
     for k, part in enumerate(system.parts):
@@ -38,7 +39,8 @@ def integrated(
         flows = grown > 0
         if not (isinstance(part, Discretisation) and flows.any()):
             continue
-        own = _missed(part, now, k, flows, half)
+        each = [_missed(part, now, k, flows, at) for at in ((None, half) if half else (None,))]
+        own = max(each, key=lambda error: _mean(part, error, flows))
         added = float(np.maximum(added, _mean(part, own, flows)))
         had = sums[k]
         sums[k] = own if had is None else _carried(part, now, k, had) + own
@@ -80,18 +82,17 @@ def _missed(
     """
     within = np.asarray(flows.reshape(part.weights.shape).any(axis=1))
     points = np.flatnonzero(np.repeat(within, part.weights.shape[1]))
-    states = now.start, (half or now).state, now.state
-    start, middle, end = (
-        (part.strain(at.u[number]) - part.eigenstrain(at.time))[:, points] for at in states
+    start, end = (
+        (part.strain(at.u[number]) - part.eigenstrain(at.time))[:, points]
+        for at in (now.start, now.state)
     )
-    aside = 2.0 * middle - start - end if half else 0.0
-    law, state = part.law(now.state.time).at(points), now.start.plastic[number].at(points)
-    for share in np.arange(1, _PARTS + 1) / _PARTS:
-        strain = start + share * (end - start) + 2.0 * share * (1.0 - share) * aside
-        stress, _, state, _ = law.respond(strain, state)
+    state = half.responses[number].state if half else now.start.plastic[number]
+    law, state, parts = part.law(now.state.time).at(points), state.at(points), 2 if half else _PARTS
+    for share in np.arange(2 if half else 1, parts + 1) / parts:
+        stress, _, state, _ = law.respond(start + share * (end - start), state)
     at_once = now.responses[number].stress
     found = np.zeros_like(at_once)
-    found[:, points] = (stress - at_once[:, points]) * _PARTS / (_PARTS - 1)
+    found[:, points] = (stress - at_once[:, points]) * parts / (parts - 1)
     return found
 
 

@@ -18,7 +18,7 @@ from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.fem.fields import elastic_energy
 from solver.fem.rigid import RigidPart
 from solver.linear.threads import one_thread
-from solver.loading.control import Control
+from solver.loading.control import INCREMENT_ERROR, Control
 from solver.loading.energy import worked
 from solver.loading.increment import Increment
 from solver.loading.integration import doubtful, integrated, lost
@@ -265,7 +265,8 @@ class Stepper:
 
     def _half(self, point: Point, converged: Converged, *, contact: bool) -> Converged | None:
         """Return half of an increment if it is needed to know the error, and converges."""
-        if not doubtful(self.system, converged, self.control.increment_error):
+        most = min(self.control.increment_error, INCREMENT_ERROR)
+        if not doubtful(self.system, converged, most):
             return None
         middle = (point.now.state.time + converged.state.time) / 2
         try:
