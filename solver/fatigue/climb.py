@@ -32,7 +32,7 @@ _LOSSES, _WIDEST, _WAYS = (1e-3, 2e-2), 0.25, 6
 lost these shares of the sizes of its parts, but no farther than an angle."""
 _GAINED = 5e-3
 """Share of the sizes of its parts by which other instants may raise a maximum."""
-_BESIDE, _REACHED = math.cos(0.02), math.cos(0.06)
+_BESIDE, _REACHED = math.cos(0.02), math.cos(0.1)
 """Cosines of the angles between planes that lead to one maximum of a simplified path, and of a
 whole one."""
 _AROUND = 0.15
@@ -222,7 +222,10 @@ def _polished(x: Array, a: Array, active: Ints, model: Model, room: Room) -> Non
     and rounding, by a complex step.
     """
     real, _scratch, work = room
-    _stepped(x, a, active, model, real, work)
+    before = a.copy()
+    if _stepped(x, a, active, model, real, work) > _ROUGH:
+        a[:] = before
+        return
     at, T = np.empty(3, dtype=np.complex128), np.empty((4, 3), dtype=np.complex128)
     value, slopes = np.empty(3 * len(x), dtype=np.complex128), np.empty(2)
     for _step in range(2):
