@@ -9,13 +9,16 @@ is one of a smooth function.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import float64, int64, njit
+from numpy.typing import NDArray
 
 from solver.fatigue.balls import ball
 from solver.typing import Array, Bools, Ints
 
+AnyArray = NDArray[Any]  # of real or complex numbers
 Model = tuple[Ints, Array, Array, Array]
 """Which values on planes a function reads (n_kinds, 3), the values at its start, and its first and
 second derivatives there."""
@@ -40,7 +43,7 @@ _AROUND = 0.15
 
 
 @njit(cache=True, inline="always")
-def _turned(a: Array, u: float, b: Array, v: float, c: Array, out: Array) -> None:
+def _turned(a: Array, u: complex, b: Array, v: complex, c: Array, out: AnyArray) -> None:
     """Write the unit vector along a + u b + v c."""
     for j in range(3):
         out[j] = a[j] + u * b[j] + v * c[j]
@@ -122,7 +125,7 @@ def _decided(
 
 
 @njit(cache=True, inline="always")
-def _given(x: Array, a: Array, active: Ints, used: Ints, value: Array, T: Array) -> None:
+def _given(x: Array, a: AnyArray, active: Ints, used: Ints, value: AnyArray, T: AnyArray) -> None:
     """Write what acts on the plane a, real or complex, for given instants of each kind.
 
     `T` (4, 3) is overwritten.
@@ -164,7 +167,7 @@ def _given(x: Array, a: Array, active: Ints, used: Ints, value: Array, T: Array)
 
 
 @njit(cache=True, inline="always")
-def _risen(value: Array, model: Model) -> float:
+def _risen(value: AnyArray, model: Model) -> Any:
     """Return the rise of the function from its value at the start."""
     _used, start, weight, curve = model
     rise = 0.0
@@ -226,8 +229,8 @@ def _polished(x: Array, a: Array, active: Ints, model: Model, room: Room) -> Non
     if _stepped(x, a, active, model, real, work) > _ROUGH:
         a[:] = before
         return
-    at, T = np.empty(3, dtype=np.complex128), np.empty((4, 3), dtype=np.complex128)
-    value, slopes = np.empty(3 * len(x), dtype=np.complex128), np.empty(2)
+    slopes, at = np.empty(2), np.empty(3, dtype=np.complex128)
+    value, T = np.empty(3 * len(x), dtype=np.complex128), np.empty((4, 3), dtype=np.complex128)
     for _step in range(2):
         for j in range(2):
             _turned(a, 1e-30j, work[j], 0.0, work[j], at)

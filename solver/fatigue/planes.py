@@ -32,6 +32,8 @@ _PLANES = 216
 """Number of planes in a scan; neighbours are 9 degrees apart."""
 _NEIGHBOURS = 2
 """Newton's method starts at planes that are better than so many neighbours."""
+_MOST = 20
+"""Newton's method starts at so many planes at most."""
 _FALLS = 2 * np.sin(0.132) ** 2
 """Share by which a wave falls from its largest value within the largest angle from a plane of the
 scan."""
@@ -161,7 +163,9 @@ def _maxima(paths: Array, used: Ints, search: Value) -> tuple[Ints, Array, Array
     np.put_along_axis(peak, top, True, axis=1)
     points, starts = np.nonzero(peak)
     order = np.lexsort((-found[points, starts], points))
-    points, normal = points[order], _NORMALS[starts[order]]
+    points, starts = points[order], starts[order]
+    first = np.arange(len(points)) - np.searchsorted(points, points) < _MOST
+    points, normal = points[first], _NORMALS[starts[first]]
     known = (own[points] for own in (level, falls, slack, at_top.T, weights, curves))
     normal, values, own = _climb(paths, *path, points, normal, used, *known)
     points, normal, values = points[own], normal[own], values[:, own]
