@@ -33,6 +33,8 @@ MOST = 16
 """Largest number of values of a source that stand in a table one by one."""
 LONGEST = 40
 """Numbers of values from which a picture has them in the order of the file, without a line."""
+LABELLED = 4
+"""Largest number of curves of a panel that have their places beside them."""
 OURS, THEIRS = "#D55E00", "0.35"
 
 
@@ -149,7 +151,7 @@ def drawn(table: pd.DataFrame) -> Figure:
         for label, own in groups:
             style = ".-" if curve else "_"
             above.plot(own["x"], own["computed"], style, color=OURS, ms=6 if curve else 14, mew=2)
-            if len(groups) > 1:
+            if 1 < len(groups) <= LABELLED:
                 above.annotate(label, (own["x"].iloc[-1], own["computed"].iloc[-1]), va="bottom")
         for axes in below:
             axes.plot(x, rows["difference"], "o", color=THEIRS, ms=3)

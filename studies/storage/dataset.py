@@ -75,11 +75,18 @@ def usual_dimensions(scene: Scene) -> tuple[str, ...]:
     return tuple(name for name in USUAL_AXES if name in known)
 
 
-def run_content(scene: Scene, case: Case, outcome: Record | str, keep: str = "") -> RunContent:
+def run_content(
+    scene: Scene,
+    case: Case,
+    outcome: Record | str,
+    keep: str = "",
+    how: Mapping[str, Any] | None = None,
+) -> RunContent:
     """Return the content of the file of a run: its record, or the reason why there is none.
 
     It does not depend on the study, except for ``keep``: with it a complete run has the fields at
-    the nodes, and the state from which a longer one goes on.
+    the nodes, and the state from which a longer one goes on. ``how`` are attributes that say how it
+    was computed (`ran.how`).
     """
     sweep, attrs = usual_dimensions(scene), dict[str, Any]()
     record = None if isinstance(outcome, str) else outcome
@@ -103,7 +110,7 @@ def run_content(scene: Scene, case: Case, outcome: Record | str, keep: str = "")
             name: Variable((dims,) if isinstance(dims, str) else dims, np.asarray(values), words)
             for name, (dims, values, words) in every.items()
         },
-        {**known, "id": case.id, **attrs},
+        {**known, "id": case.id, **attrs, **(how or {})},
     )
 
 

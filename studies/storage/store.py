@@ -27,7 +27,6 @@ import uuid
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import replace
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any, TypeVar
@@ -344,8 +343,8 @@ class Store:
         """
         if not isinstance(outcome, str):
             outcome = outcome.with_one_mesh()
-        content = layout.run_content(case.scene, case, outcome, keep)
-        whole = runfile.sealed(replace(content, attrs={**content.attrs, **ran.how(began)}))
+        content = layout.run_content(case.scene, case, outcome, keep, ran.how(began))
+        whole = runfile.sealed(content)
         with self._writable():
             with self.blobs.appearing(_run(case.id)) as part:
                 part.write_bytes(whole)

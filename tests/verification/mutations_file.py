@@ -32,8 +32,8 @@ def written(change: Callable[[xr.Dataset], xr.Dataset]) -> Fault:
     """The data set of a record that is written is changed."""
     make = layout.run_content
 
-    def changed(scene: Any, case: Any, outcome: Any, keep: Any) -> Any:
-        made = make(scene, case, outcome, keep)
+    def changed(scene: Any, case: Any, outcome: Any, *more: Any) -> Any:
+        made = make(scene, case, outcome, *more)
         return change(labelled(made)) if isinstance(outcome, Record) else made
 
     return lambda patch: patch.setattr(layout, "run_content", changed)
