@@ -164,7 +164,7 @@ Number = Annotated[float, Strict()]
 
 OF_STUDY = (
     "points", "sample", "extends", "goal", "refine", "fit", "minimise", "keep", "allow", "fatigue",
-    "derivatives", "note", "tags",
+    "derivatives", "note", "tags", "licence", "cite", "doi", "files",
 )  # fmt: skip
 """Entries of a study that are often written among its parameters."""
 

@@ -99,6 +99,8 @@ def test_a_run_is_the_same_bit_for_bit_whichever_others_share_its_path(
     shared = both.sel(load_ratio=[0.7])
     assert float(abs(alone["residual_stress"]).max()) > 1.0, "the run yields"
     for name in set(alone.variables) - {"cpu_seconds"}:
+        if name.startswith("run_"):  # when and where
+            continue
         np.testing.assert_array_equal(shared[name], alone[name], err_msg=str(name))
 
 

@@ -179,7 +179,9 @@ def test_keys_are_refused(special: Special, tmp_path: Path) -> None:
 @KINDS
 def test_files_beside_a_study_file_are_refused(special: Special, tmp_path: Path) -> None:
     special(tmp_path / "points.csv")
-    path = write_study(tmp_path, 'name = "a"\nscene = "fake"\n[sweep]\npoints = "points.csv"\n')
+    path = write_study(
+        tmp_path, 'name = "a"\nscene = "fake"\n[parameters]\nprofile = "points.csv"\n'
+    )
     with pytest.raises(StudyError, match=r"readable text file: .*points\.csv: it is a "):
         Study.from_toml(path)
 
