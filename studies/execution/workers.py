@@ -98,7 +98,7 @@ def own_workers(workers: int, memory: str | None = None, need: int = 0) -> Itera
                 )
                 return ends.enter_context(cluster)
 
-        # When the cluster has closed, logs are no longer silenced, and some connections still close.
+        # Logs are no longer silenced when the cluster has closed, and some connections still close.
         logging.getLogger("distributed.batched").setLevel(logging.CRITICAL)
         # An interrupt while the thread itself starts would leave a thread that nobody waits for.
         starter.submit(int).result()
