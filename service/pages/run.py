@@ -90,7 +90,8 @@ def numbers_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str,
 def parameters_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str, Any]]:
     """Return name, meaning, unit and value of each parameter; whether it is the scene's default."""
     known = parameters_of(scene) if scene else {}
-    words = {each["name"]: str(each["value"]) for each in numbers_shown(run, scene)}
+    numbers = numbers_shown(run, scene)
+    words = {each["name"]: str(each["value"]) for each in numbers if each["value"] is not None}
     return [
         {
             "name": name,

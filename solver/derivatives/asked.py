@@ -32,7 +32,7 @@ class Derivatives:
     Attributes
     ----------
     by : names of parameters
-    of : names of numbers, lines or maps
+    of : names of numbers, lines, maps or coordinates
     """
 
     by: tuple[str, ...]
@@ -42,6 +42,11 @@ class Derivatives:
     def cost(self) -> float:
         """Time of a run with them over that of a run without."""
         return 1 + _SHARE * (1 + len(self.by))
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the derivatives."""
+        return [named(of, by) for by in self.by for of in self.of]
 
     def quantities(self, kind: Any, known: Mapping[str, Quantity]) -> list[Quantity]:
         """Return the declarations of the derivatives, ``d_<result>_d_<parameter>``.
@@ -61,7 +66,8 @@ class Derivatives:
         results = [
             name
             for name, each in known.items()
-            if not (each.coordinate or each.count or each.flags or name.startswith("audit_"))
+            if not (each.count or each.flags or name.startswith("audit_"))
+            and not (each.coordinate and each.units == "1")
         ]
         real = [name for name, each in marks.items() if float in each]
         for field, given, allowed in (("by", self.by, real), ("of", self.of, results)):

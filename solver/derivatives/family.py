@@ -15,6 +15,7 @@ from solver.derivatives.neighbours import NeighbouringRuns
 from solver.errors import ModelError
 from solver.loading.program import Program
 from solver.results.acting import acting_on
+from solver.results.quantities import QUANTITIES
 from solver.results.run import FinishedRun, Output, Values
 from solver.results.samples import Samples
 
@@ -116,11 +117,13 @@ class Family:
     ) -> Values:
         """Return the derivatives of results of a run, given its outputs.
 
-        They are NaN where a neighbour failed or has no such number, and where the number jumps.
+        They are NaN where a neighbour failed or has no such number, and where the number jumps. Of
+        a line or a map they are those at places of equal number, which may move: the derivatives of
+        its coordinates say how.
         """
         steps, found = self._steps(run.parameters), dict[str, Any]()
         runs = self.finished(run, watched)
-        for output in outputs if runs else ():
+        for output in (_coordinates, *outputs) if runs else ():
             first = _numbers(output(runs[0]))
             wanted = [name for name in self._asked.of if name in first]
             if not wanted:
@@ -135,6 +138,13 @@ class Family:
                     found[named(of, by)] = np.where(np.abs(change) > most, np.nan, change / step)
         lacks = {q.name: np.nan for q in self._declared if not q.dims}
         return {q: (lacks | found)[q.name] for q in self._declared if q.name in lacks | found}
+
+
+def _coordinates(run: FinishedRun) -> Values:
+    """Return the coordinates of a run that are numbers."""
+    each = {name: np.asarray(values) for name, values in run.view.coordinates.items()}
+    numbers = {name: values for name, values in each.items() if values.dtype.kind == "f"}
+    return {QUANTITIES[name]: values for name, values in numbers.items() if name in QUANTITIES}
 
 
 def _numbers(values: Values) -> dict[str, Any]:

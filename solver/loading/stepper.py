@@ -243,11 +243,14 @@ class Stepper:
                     converged = coarse
                 size.resumed(converged.state.time - now)
             else:
-                half = self._half(point, converged, contact=contact)
+                most_known = min(most, INCREMENT_ERROR)
+                doubt = doubtful(self.system, converged, most_known)
+                half = self._half(point, converged) if doubt else None
                 converged = integrated(self.system, point.now, converged, half)
                 # shares of uncertain friction refer to the larger forces of the coarse increment
                 known = converged.timing.beside(known)
-                halvings = max(int(_coarse(known)), _halvings(converged.added, most))
+                unknown = doubt and half is None
+                halvings = max(int(_coarse(known) or unknown), _halvings(converged.added, most))
                 if size.divided(time - now, halvings):
                     coarse = converged
                     continue
@@ -263,14 +266,11 @@ class Stepper:
             self._report()
         return point
 
-    def _half(self, point: Point, converged: Converged, *, contact: bool) -> Converged | None:
-        """Return half of an increment if it is needed to know the error, and converges."""
-        most = min(self.control.increment_error, INCREMENT_ERROR)
-        if not doubtful(self.system, converged, most):
-            return None
+    def _half(self, point: Point, converged: Converged) -> Converged | None:
+        """Return half of an increment, None if it does not converge."""
         middle = (point.now.state.time + converged.state.time) / 2
         try:
-            return self._increment(point, middle, contact=contact, patient=False, whole=False)
+            return self._increment(point, middle, contact=True, patient=False, whole=False)
         except IncrementFailed:
             return None
 

@@ -47,10 +47,11 @@ def record(scene: Scene, run: FinishedRun) -> Record:
     own = scene.warnings(run) if scene.warnings else ()
     figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
     values = {**cost, **figures, **_merged(run, (singular_points, outlines, *scene.outputs))}
-    if run.derived is not None:
+    if run.derived is not None and scene.derivatives is not None:
         derived = run.derived(run, scene.outputs)
         values |= derived
-        if lacks := [q.name for q, value in derived.items() if np.isnan(value).all()]:
+        there = {q.name for q, value in derived.items() if not np.isnan(value).all()}
+        if lacks := [name for name in scene.derivatives.names if name not in there]:
             own = (*own, f"no derivative was found for {', '.join(lacks)}")
     if check.violations:
         status = Status.AUDIT_FAILED

@@ -10,12 +10,14 @@ from __future__ import annotations
 import atexit
 import ctypes
 import errno
+import fcntl
 import gc
 import multiprocessing
 import os
 import pickle
 import signal
 import sys
+import termios
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -256,7 +258,10 @@ def _watched(fork: BaseProcess) -> int:
 
     That of `multiprocessing` can be read too when the process has closed its files.
     """
-    return os.pidfd_open(fork.pid or 0) if sys.platform == "linux" else os.dup(fork.sentinel)
+    try:
+        return os.pidfd_open(fork.pid or 0)
+    except (AttributeError, OSError):  # another system, or an old one
+        return os.dup(fork.sentinel)
 
 
 def _begun(pipe: Connection, context: Any) -> tuple[BaseProcess, Connection]:
@@ -285,6 +290,10 @@ def _call(others: Sequence[Connection], content: bytes, pipes: Sequence[Connecti
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
     os.setpgid(0, 0)  # not a session: Linux shares processors among sessions, however nice
+    with suppress(OSError):  # there is a terminal, none of which is for this process
+        terminal = os.open("/dev/tty", os.O_RDWR | os.O_CLOEXEC)
+        fcntl.ioctl(terminal, termios.TIOCNOTTY)
+        os.close(terminal)
     function, given = pickle.loads(content)
     try:
         function(*pipes, *given)

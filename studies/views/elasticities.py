@@ -5,7 +5,7 @@ They follow from the derivatives of the runs (`solver.derivatives`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 from solver.derivatives.asked import named
@@ -13,13 +13,11 @@ from solver.derivatives.asked import named
 TITLE = "Change in % if a parameter is 1 % larger"
 
 
-def derived(names: Iterable[str], parameters: Iterable[str]) -> Iterator[tuple[str, str]]:
+def derived(names: Collection[str], parameters: Iterable[str]) -> Iterator[tuple[str, str]]:
     """Yield each number and each parameter of which there is a derivative among the names."""
-    known = set(names)
-    slopes = [name for name in known if name.startswith(named("", "")[:2])]
+    known = sorted(names)
     for by in parameters:
-        ends = {name for name in slopes if name.endswith(named("", by)[2:])}
-        yield from ((of, by) for of in sorted(known) if ends and named(of, by) in ends)
+        yield from ((of, by) for of in known if named(of, by) in names)
 
 
 def elasticities(

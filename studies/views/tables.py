@@ -242,7 +242,8 @@ def run_details(dataset: xr.Dataset) -> str:
     for name, value in (_parameters(dataset) | swept).items():
         own = left_out.get(name)
         text = value_text(value) if own is None else f"{own} {BY_ACCURACY}".lstrip()
-        if (computed := f"{COMPUTED}{name}") in dataset:
+        computed = f"{COMPUTED}{name}"
+        if computed in dataset and flags(dataset[computed]).get(dataset[computed].item()):
             text = computed_text(text, _figure(dataset[computed]))
         lines.append([name, text])
     lines.append(["status", _figure(dataset["status"])])

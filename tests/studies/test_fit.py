@@ -491,3 +491,28 @@ def test_a_killed_fit_is_taken_up_and_computes_no_run_twice(tmp_path: Path) -> N
     file.write_text(FAKE_FIT.format(seconds=0.1, mark=marks) + LINES)
     asked = Study.from_toml(file)
     see_it_taken_up(asked, out, 4)
+
+
+def test_derivatives_of_a_line_count_where_its_places_move_and_only_if_they_are_known() -> None:
+    x = np.linspace(0.0, 1.0, 11)
+    line = parsed(
+        MeasuredLine,
+        {"of": "surface_displacement", "over": "s", "places": [0.25, 0.5], "values": [0.0, 0.0],
+         "at": {"stage": "free"}},
+        Context(FAKE, {}),
+    )  # fmt: skip
+    given = {
+        "s": Line(("s",), x),
+        "stage": Line(("stage",), np.array(["loaded", "free"])),
+        "surface_displacement": Line(("stage", "s"), np.stack([x, 3.0 * x])),
+        "d_s_d_slope": Line(("s",), 0.1 * x),
+        "d_surface_displacement_d_slope": Line(("stage", "s"), np.stack([x, 2.0 * x])),
+    }
+    # u = (3 + 2 h) X at s = (1 + 0.1 h) X
+    assert line.slope(given.get, "slope", 10.0) == pytest.approx(
+        10.0 * np.array([0.25, 0.5]) * (2.0 - 3.0 * 0.1), rel=1e-4
+    )
+    assert np.isnan(line.slope({**given, "d_s_d_slope": None}.get, "slope", 10.0)).all()
+    gap = np.stack([x, np.where(x == x[3], np.nan, 2.0 * x)])
+    given["d_surface_displacement_d_slope"] = Line(("stage", "s"), gap)
+    assert np.isnan(line.slope(given.get, "slope", 10.0)).all()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import signal
 import subprocess
 import sys
+import termios
 import threading
 import time
 from collections.abc import Iterator
@@ -144,3 +146,44 @@ def test_workers_end_though_ctrl_c_comes_while_they_start(monkeypatch: pytest.Mo
     finally:
         signal.signal(signal.SIGINT, before)
     assert ended == [True]
+
+
+def terminal(pipe: Connection) -> None:
+    """Send whether this process has a terminal, and its session."""
+    try:
+        Path("/dev/tty").open().close()
+        pipe.send([True, os.getsid(0)])
+    except OSError:
+        pipe.send([False, os.getsid(0)])
+
+
+ON_A_TERMINAL = """
+import json, os
+from multiprocessing import Pipe
+from studies.execution.forks import Forks
+from tests.studies.test_forks import terminal
+if __name__ == "__main__":
+    open("/dev/tty").close()
+    ours, theirs = Pipe(duplex=False)
+    forks = Forks(())
+    forks.start(terminal, pipes=(theirs,))
+    print(json.dumps([ours.recv(), os.getsid(0)]))
+    forks.close()
+"""
+
+
+def test_a_fork_stays_in_the_session_and_cannot_type_into_its_terminal(tmp_path: Path) -> None:
+    """Of sessions, Linux does not ask how nice their processes are."""
+    (tmp_path / "program.py").write_text(ON_A_TERMINAL)
+    ours, theirs = os.openpty()
+    done = subprocess.run(
+        [sys.executable, str(tmp_path / "program.py")],
+        env=os.environ | {"PYTHONPATH": str(ROOT)}, stdin=theirs, capture_output=True, text=True,
+        check=True, timeout=60, start_new_session=True,
+        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+    )  # fmt: skip
+    os.close(ours)
+    os.close(theirs)
+    (has_terminal, session), own = json.loads(done.stdout)
+    assert session == own
+    assert not has_terminal

@@ -170,6 +170,7 @@ class Fitting(Replayed):
     read: Callable[[Mapping[str, Any]], Read]
     answer: Fitted | None = None
     _of: list[list[int]] = field(default_factory=list)
+    _exact: bool = False
 
     def __post_init__(self) -> None:
         self._of = [
@@ -226,7 +227,7 @@ class Fitting(Replayed):
         seen = self._all(values)
         assert seen is not None
         self.answer = Fitted(np.array(values), found.x.round(DIGITS), seen[:, 0], found.jac)
-        if self.asked.derived:
+        if self._exact:
             return
         with suppress(Ends):  # no runs are left: narrow differences tell less well
             self.answer = self.answer._replace(jacobian=self._wide(self.answer))
@@ -251,7 +252,9 @@ class Fitting(Replayed):
     def _jacobian(self, shares: Array, *_: Any) -> Array:
         here = self._all(self.asked.values_at(shares))
         assert here is not None
-        if np.isfinite(slopes := here[:, 1:]).all() and self.asked.derived:
+        self._exact = self.asked.derived and bool(np.isfinite(here).all())
+        if self._exact:
+            slopes = here[:, 1:]
             return self._told(here[:, 0], slopes / self.asked.sigma[:, None])
         here = here[:, 0]
         steps = self._stepped(shares)

@@ -145,26 +145,37 @@ class MeasuredLine(StudyTable):
         return self.sigma or [usual] * len(self.values)
 
     def derived(self, by: str, scene: Scene) -> bool:
-        """Whether runs have the derivatives of the line by a parameter."""
-        known = scene.known_quantities
-        curves = {self.of, self.over} - {"", *known[self.of].dims}
-        return all(named(each, by) in known for each in curves)
+        """Whether runs have the derivatives of the line by a parameter.
+
+        That of another line at a number of a dimension is not known: the number may move.
+        """
+        known, fixed = (
+            scene.known_quantities,
+            not any(isinstance(at, float) for at in self.at.values()),
+        )
+        return fixed and all(named(each, by) in known for each in {self.of, self.over} - {""})
 
     def slope(self, read: Read, by: str, width: float) -> Array:
         """Return the derivatives (n,) of `seen` by a parameter, times the width of its range.
+
+        They are NaN if the run lacks one.
 
         Raises
         ------
         ValueError
             as of `seen`
         """
-        step = _STEP * width
+        step, lines = _STEP * width, dict[str, Line]()
+        for name in {self.of, self.over} - {""}:
+            line, change = read(name), read(named(name, by))
+            if line is None or change is None:
+                return np.full(len(self.values), math.nan)
+            if not np.isfinite(change.values[np.isfinite(line.values)]).all():
+                return np.full(len(self.values), math.nan)
+            lines[name] = line._replace(values=line.values + step * change.values)
 
         def moved(name: str) -> Line | None:
-            line, change = read(name), read(named(name, by))
-            return line and line._replace(
-                values=line.values + step * change.values if change else line.values
-            )
+            return lines.get(name) or read(name)
 
         return np.asarray((self.seen(moved) - self.seen(read)) / _STEP)
 
