@@ -3,7 +3,7 @@ BIN := .venv/bin
 INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 STAMP := .venv/installed
 COMPILED := .venv/compiled
-KERNELS := solver/rolling/kernels.py solver/fatigue/balls.py solver/fatigue/scan.py solver/fatigue/climb.py
+KERNELS := solver/rolling/kernels.py solver/fatigue/kernels.py
 DENO = DENO_DIR=.venv/deno DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 # Python keeps what it has compiled, whatever the caller says: tests and studies start many processes.

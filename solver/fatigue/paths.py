@@ -10,7 +10,7 @@ from solver.errors import ModelError
 from solver.late import late
 from solver.typing import Array
 
-_balls, _largest_shear = late("fatigue.balls", "balls", "largest_shear")
+_balls, _largest_shear = late("fatigue.kernels", "balls", "largest_shear")
 
 _DEVIATOR = np.array(
     [[1, -1, 0, 0, 0, 0], [-1 / 3**0.5, -1 / 3**0.5, 2 / 3**0.5, 0, 0, 0], *2 * np.eye(6)[3:]]

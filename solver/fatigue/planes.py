@@ -5,9 +5,10 @@
    along a great circle a normal component is such a wave, and the amplitude of shear R satisfies
    R'' >= -4 R. So the plane of a scan next to the largest maximum is smaller by a known share at
    most, and all others are dropped.
-2. Newton's method from those that are better than their neighbours (`solver.fatigue.climb`). The
-   criterion is taken as quadratic in what acts on a plane, and again at the plane found if it is
-   not.
+2. Newton's method from those that are better than their neighbours
+   (`solver.fatigue.kernels.climb`). Amplitude and maximum are the largest of functions that are
+   smooth in the normal, so that a maximum over planes is one of a smooth function. The criterion is
+   taken as quadratic in what acts on a plane, and again at the plane found if it is not.
 3. The best of these planes; of planes with equal values the one with the largest second value.
 
 A criterion must not fall where a value of what acts on a plane rises.
@@ -25,20 +26,21 @@ from solver.late import late
 from solver.tensors import _PLACES
 from solver.typing import Array, Bools, Ints
 
-_simplified, _scan = late("fatigue.scan", "simplified", "scan")
-(_climb,) = late("fatigue.climb", "climb")
+_simplified, _scan, _resolve, _climb = late(
+    "fatigue.kernels", "simplified", "scan", "resolve", "climb"
+)
 
 _PLANES = 216
 """Number of planes in a scan; neighbours are 9 degrees apart."""
-_NEIGHBOURS = 2
+_NEIGHBOURS = 3
 """Newton's method starts at planes that are better than so many neighbours."""
-_MOST = 20
-"""Newton's method starts at so many planes at most."""
 _FALLS = 2 * np.sin(0.132) ** 2
 """Share by which a wave falls from its largest value within the largest angle from a plane of the
 scan."""
-_SIMPLE = 0.01
+_SIMPLE = 0.02
 """Distance of instants that the scan leaves out, over the size of the path."""
+_ROUNDED = 1e-6
+"""Rounding of the scan in single precision, over the largest stress."""
 _DIFFERENCE = 1e-3
 """Relative change for the derivatives of a criterion by what acts on a plane: those of a product of
 two are exact, and rounding matters little."""
@@ -100,17 +102,16 @@ _AROUND = np.argsort(-np.abs(_NORMALS @ _NORMALS.T), axis=1)[:, :_NEIGHBOURS]
 def critical_planes(paths: Paths, search: Value, value: Value | None = None) -> Critical:
     """Return the planes on which ``search`` is largest; of equal ones those of ``value``.
 
-    What neither of the two reads is not computed: it is 0.
+    Amplitudes of shear that neither of the two reads are not computed: they are 0.
     """
     value = value or search
     kinds = [own for own in (paths.stress, paths.strain) if own is not None]
     used = _used(kinds, search) | _used(kinds, value)
-    kinds = kinds[: 1 + used[1:].any()]
-    reads = used[: len(kinds)].astype(np.int64)
+    kinds, circles = kinds[: 1 + used[1:].any()], used[:, 0].astype(np.int64)
     each = []
     for k in range(0, len(paths), _AT_ONCE):
         some = np.stack([own[k : k + _AT_ONCE] for own in kinds], axis=1).swapaxes(2, 3)
-        each.append(_critical(np.ascontiguousarray(some), reads, search, value))
+        each.append(_critical(np.ascontiguousarray(some), circles[: len(kinds)], search, value))
     normals, ons = zip(*each, strict=True)
     return Critical(np.concatenate(normals), OnPlanes(*map(np.concatenate, zip(*ons, strict=True))))
 
@@ -128,75 +129,45 @@ def _axes(paths: Array) -> Array:
     return np.asarray(axes)
 
 
-def _critical(given: Array, used: Ints, search: Value, value: Value) -> Critical:
+def _critical(given: Array, circles: Ints, search: Value, value: Value) -> Critical:
     axes = _axes(given)
     i, j = np.array(_PLACES).T
     first, second = axes[:, i].swapaxes(1, 2), axes[:, j].swapaxes(1, 2)  # (n, axis, component)
     turn = first[:, i] * second[:, j] + np.where(i == j, 0.0, 1.0) * second[:, i] * first[:, j]
-    points, normal, values = _maxima(np.ascontiguousarray(turn[:, None] @ given), used, search)
-    on, top = OnPlanes(*values), np.full(len(given), -np.inf)
+    paths = np.ascontiguousarray(turn[:, None] @ given)
+    every = np.arange(len(paths))
+    low, high, sizes = _bounds(paths, circles)
+    found, most = search(OnPlanes(*low)), search(OnPlanes(*high))
+    top = found.argmax(axis=1)
+    values = _resolve(paths, every, _NORMALS[top], circles)
+    weights, curves = _derivatives(search, values)
+    falls = (weights + np.einsum("nkm,mn->nk", curves, sizes) / 2).T * sizes
+    falls = _FALLS * falls.sum(axis=0)
+    least = search(OnPlanes(*values)) - falls
+    most[every, top] = np.inf  # single precision may round by more than the maximum falls
+    points, starts = map(np.ascontiguousarray, np.nonzero(most >= least[:, None]))
+    values = _resolve(paths, points, _NORMALS[starts], circles)
+    exact = search(OnPlanes(*values))
+    found[:] = -np.inf
+    found[points, starts] = exact
+    least = found.max(axis=1) - falls
+    near = found >= np.maximum(found[:, _AROUND].max(axis=2), least[:, None])
+    near = np.flatnonzero(near[points, starts])
+    near = near[np.lexsort((-exact[near], points[near]))]
+    points = points[near]
+    normal, values = _climbed(
+        paths, points, search, circles, _NORMALS[starts[near]], values[:, near], falls[points]
+    )
+    on, top = OnPlanes(*values), np.full(len(found), -np.inf)
     best = search(on)
     np.maximum.at(top, points, best)
     equal = best >= (top - _SAME * np.abs(top))[points]
     order = np.lexsort((np.where(equal, value(on), -np.inf), points))
-    chosen = order[np.flatnonzero(np.diff(points[order], append=len(given)))]
+    chosen = order[np.flatnonzero(np.diff(points[order], append=len(found)))]
     normal = (axes @ normal[chosen, :, None])[:, :, 0]
     last = 2 - (np.abs(normal[:, ::-1]) > _SAME).argmax(axis=1)  # the last component not zero
     normal *= np.sign(normal[np.arange(len(normal)), last])[:, None]
     return Critical(normal, OnPlanes(*(own[chosen] if own.size else own for own in on)))
-
-
-def _maxima(paths: Array, used: Ints, search: Value) -> tuple[Ints, Array, Array]:
-    """Return points (n,) and planes (n, 3) of maxima that may be the largest; what acts (m, n)."""
-    path = _simplified(paths, _SIMPLE)
-    below, above = _scan(paths, *path, _NORMALS, used, _SIMPLE)
-    found, most = search(OnPlanes(*below)), search(OnPlanes(*above))
-    top = found.argmax(axis=1)[:, None]
-    at_top = np.take_along_axis(below, top[None], axis=2)[:, :, 0].astype(float)
-    level, (weights, curves) = search(OnPlanes(*at_top)), _derivatives(search, at_top)
-    falls = _FALLS * _risen(weights, curves, _sizes(below))
-    apart = np.repeat((above - below)[1::3, :, 0], 3, axis=0)  # of simplified paths
-    slack = _risen(weights, curves, apart * used.reshape(-1, 1))
-    least = np.take_along_axis(found, top, axis=1) - falls[:, None]
-    peak = (found >= found[:, _AROUND].max(axis=2)) & (most >= least)
-    peak &= found > found.min(axis=1, keepdims=True)  # all are equal where nothing does damage
-    np.put_along_axis(peak, top, True, axis=1)
-    points, starts = np.nonzero(peak)
-    order = np.lexsort((-found[points, starts], points))
-    points, starts = points[order], starts[order]
-    first = np.arange(len(points)) - np.searchsorted(points, points) < _MOST
-    points, normal = points[first], _NORMALS[starts[first]]
-    known = (own[points] for own in (level, falls, slack, at_top.T, weights, curves))
-    normal, values, own = _climb(paths, *path, points, normal, used, *known)
-    points, normal, values = points[own], normal[own], values[:, own]
-    start, was, active = at_top[:, points], level[points], np.arange(len(points))
-    weights, curves = weights[points], curves[points]
-    for _ in range(_ROUNDS):
-        now, reached = search(OnPlanes(*values[:, active])), values[:, active]
-        far = np.abs(now - was - _risen(weights, curves, reached - start)) > _EXACT * np.abs(now)
-        active, start, was = active[far], reached[:, far], now[far]
-        if not active.size:
-            break
-        weights, curves = _derivatives(search, start)
-        wide = np.full((2, len(active)), np.inf)
-        normal[active], values[:, active], _own = _climb(
-            paths, *path, points[active], normal[active], used, was, *wide, start.T.copy(),
-            weights, curves,
-        )  # fmt: skip
-    return points, normal, values
-
-
-def _risen(weights: Array, curves: Array, change: Array) -> Array:
-    """Return the rise (n,) of a criterion from its derivatives and a change (m, n) of values."""
-    slopes = weights + np.einsum("nkm,mn->nk", curves, change) / 2
-    return np.asarray((slopes.T * change).sum(axis=0))
-
-
-def _sizes(below: Array) -> Array:
-    """Return the largest differences (m, n) of values from their means over circles of planes."""
-    most = below.max(axis=2)
-    most[1::3] = most[1::3] / 2 - (below[1::3] / 2 - below[2::3]).min(axis=2)
-    return most.astype(float)
 
 
 def _used(kinds: list[Array], search: Value) -> Bools:
@@ -209,6 +180,59 @@ def _used(kinds: list[Array], search: Value) -> Bools:
         moved[k] += size[k]
         used[k] = (search(OnPlanes(*moved)) != before).any()
     return used.reshape(-1, 3)
+
+
+def _bounds(paths: Array, circles: Ints) -> tuple[list[Array], list[Array], Array]:
+    """Return bounds (m, n, n_planes) of what acts on the planes of the scan; and sizes (m, n).
+
+    A size is the largest difference of a value from its mean over a great circle of planes.
+    """
+    low: list[Array] = []
+    high: list[Array] = []
+    sizes: list[Array] = []
+    for k, circle in enumerate(circles):
+        simple = _simplified(np.ascontiguousarray(paths[:, k]), _SIMPLE)
+        shear, normal, half = _scan(*simple, _NORMALS, circle)
+        # instants that were left out, and single precision
+        full = paths[:, k][:, _FULL]
+        apart = np.linalg.norm(full - full[..., :1], axis=(1, 2)).max(axis=1)
+        largest = np.linalg.norm(full, axis=(1, 2)).max(axis=1)
+        apart = (_SIMPLE * apart + _ROUNDED * largest)[:, None]
+        low += [shear[0], normal, half]
+        high += [shear[1] + circle * apart, normal + apart, half + apart]
+        most, widest = normal.max(axis=1), half.max(axis=1)
+        sizes += [shear[0].max(axis=1), most / 2 - (normal / 2 - half).min(axis=1), widest]
+    return low, high, np.stack(sizes)
+
+
+def _climbed(
+    paths: Array,
+    points: Ints,
+    search: Value,
+    circles: Ints,
+    normal: Array,
+    values: Array,
+    falls: Array,
+) -> tuple[Array, Array]:
+    """Return the planes (n, 3) of the maxima near some planes at points (n,), and what acts.
+
+    ``values`` (m, n) are what acts on those planes; the arrays given are overwritten.
+    """
+    active = np.arange(len(points))
+    for _ in range(_ROUNDS):
+        before = np.ascontiguousarray(values[:, active])
+        was = search(OnPlanes(*before))
+        weights, curves = _derivatives(search, before)
+        normal[active], values[:, active] = _climb(
+            paths, points[active], normal[active], circles, was, falls[active], weights, curves
+        )
+        change = (values[:, active] - before).T
+        rise = ((weights + np.einsum("nkm,nm->nk", curves, change) / 2) * change).sum(axis=1)
+        now = search(OnPlanes(*values[:, active]))
+        active = active[np.abs(now - was - rise) > _EXACT * np.abs(now)]
+        if not active.size:
+            break
+    return normal, values
 
 
 def _derivatives(search: Value, values: Array) -> tuple[Array, Array]:
