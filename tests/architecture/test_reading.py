@@ -12,6 +12,7 @@ from tests.architecture.sources import PACKAGES, ROOT, modules
 ONE = "solver/files.py"
 
 OTHERS = {
+    "studies/execution/forks.py": "the terminal, to leave it",
     "service/sandbox.py": "devices and folders that are named in the code",
     "service/keys.py": "a folder, to lock it",
     "studies/scratch.py": "folders of its own, to lock them",
