@@ -43,10 +43,14 @@ def there(array: xr.DataArray, places: dict[str, object]) -> float:
     for name, value in places.items():
         known = array[name]
         same = known == value if isinstance(value, str) else np.isclose(known, value)
+        if not known.dims and not same:
+            raise ValueError(f"{name} is {known.item()}, not {value}")
         if known.dims and not same.any():
             array = array.swap_dims({known.dims[0]: name}).interp({name: value})
         elif known.dims:
             array = array.isel({known.dims[0]: np.flatnonzero(same)})
+    if np.isnan(array.item()):
+        raise ValueError(f"nothing was computed at {places}")
     return array.item()
 
 
@@ -69,7 +73,7 @@ def compared(source: str, dataset: xr.Dataset) -> pd.DataFrame:
         )
     columns = ["source", "at", "quantity", "unit", "value", "sigma", "computed"]
     table = pd.DataFrame(found, columns=columns)
-    parts = [different(rows) for _, rows in table.groupby("quantity", sort=False)]
+    parts = [different(rows) for _, rows in table.groupby(["quantity", "unit"], sort=False)]
     return pd.concat(parts)
 
 
