@@ -64,7 +64,10 @@ def test_values_are_taken_at_labels_parameters_and_places_in_the_unit_of_the_fil
     monkeypatch.setitem(PROGRAM["compared"].__globals__, "DATA", tmp_path)
     found = PROGRAM["compared"]("own", dataset)
     np.testing.assert_allclose(found["computed"], [10.25, 0.011, 0.0])
-    np.testing.assert_allclose(found["difference"][:2], [0.25, 0.001])
+    np.testing.assert_allclose(found["difference"][:2], [0.25, 2.0])
+    assert found["per"].to_list() == ["MPa", "sigma", "MPa"], "rows of one unit have one measure"
+    with pytest.raises(ValueError, match="load is 3"):
+        PROGRAM["compared"]("own", dataset.isel(run=2))
 
 
 @pytest.mark.pages

@@ -74,7 +74,7 @@ def compared(source: str, dataset: xr.Dataset) -> pd.DataFrame:
     columns = ["source", "at", "quantity", "unit", "value", "sigma", "computed"]
     table = pd.DataFrame(found, columns=columns)
     parts = [different(rows) for _, rows in table.groupby(["quantity", "unit"], sort=False)]
-    return pd.concat(parts)
+    return pd.concat(parts).sort_index()
 
 
 def different(rows: pd.DataFrame) -> pd.DataFrame:
