@@ -28,7 +28,8 @@ OUTDATED = "the solver has changed since the study was accepted: post it again"
 def compute(order: Mapping[str, Any], outlet: Outlet, stop: threading.Event) -> None:
     """Compute the missing runs of the study in the order, and report its progress."""
     store = Store(order["data"], held=True)
-    study = Study.known(order["study"], store.scene)
+    # The store has what `residua run` may have added since then, such as a DOI.
+    study = Study.known(store.definition(order["id"]) or order["study"], store.scene)
     if study.id != order["id"]:
         outlet.send("refused", {"reason": OUTDATED})
         return

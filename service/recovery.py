@@ -109,7 +109,7 @@ class Mender:
         self._look_at(self.store.catalogue, self.store.reconcile)
         for study_id in computed:
             with suppress(NotFound):
-                self.store.save_definition(study_id, self.jobs.study(study_id))
+                self.store.save_definition(study_id, self.jobs.study(study_id), keep=True)
 
     def _look_at(self, file: Database, mend: Callable[[], None]) -> None:
         """Mend a file if it has changed, is missing, or damage was found in it."""

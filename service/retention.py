@@ -100,7 +100,7 @@ class Keeper:
         with self._one:
             self.check_room(found)
             there = bool(self.store.blobs.names(f"studies/{study.id}/*"))  # also damaged ones
-            self.store.save_study(study)
+            self.store.save_study(study, keep=True)
             content, most = study.to_dict(), study.size
             try:
                 return self.jobs.accept(

@@ -293,7 +293,7 @@ def test_a_directory_that_hangs_is_told(app: FastAPI, monkeypatch: pytest.Monkey
 def test_a_directory_that_cannot_be_written_in_is_told_without_its_path(
     app: FastAPI, monkeypatch: pytest.MonkeyPatch, failed: Exception, status: int, detail: str
 ) -> None:
-    def save(self: Store, study: Study) -> Path:
+    def save(self: Store, study: Study, keep: bool) -> Path:
         raise failed
 
     async def post() -> httpx.Response:

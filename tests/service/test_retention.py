@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import shutil
+import threading
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,15 +15,18 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from service import child
 from service.app import create_app
 from service.errors import Busy, Conflict, NotFound
 from service.job import StudyState
 from service.jobs import Jobs, put
 from service.pool import Pool
 from service.processes import Starter
+from service.recovery import Mender
 from service.retention import Keeper
 from service.settings import Settings
 from studies import Store, Study
+from studies.execution.access import Access
 from tests.service.test_runner import Scripted
 from tests.studies.conftest import compute_here
 from tests.studies.test_goal import search_here
@@ -310,3 +315,31 @@ def test_a_full_queue_deletes_nothing_that_was_there(place: Place, there: bool) 
     with pytest.raises(Busy):
         place.keeper().accept(found, 0)  # type: ignore[arg-type]
     assert (folder / "dataset.nc").exists() == there == folder.exists()
+
+
+def test_a_study_that_is_posted_again_or_retried_keeps_its_licence(
+    place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = place.computed("mine", [0.1])
+    queued, store = study.to_dict(), place.store
+    store.save_study(Study.from_dict(queued | {"licence": "CC-BY-4.0"}))  # `residua run`
+    other = Study.from_dict(queued | {"licence": "CC0-1.0", "files": {"a.toml": "x"}})
+    found = SimpleNamespace(study=other, estimate=SimpleNamespace(bytes=0), runs=ids(study))
+    assert not place.keeper().accept(found, 0)[1]
+    Mender(place.jobs, store).look([study.id])
+    assert (store.study(study.id).licence, store.study(study.id).files) == ("CC-BY-4.0", {})
+    computed: list[Study] = []
+
+    def run(study: Study, *_: Any, **__: Any) -> SimpleNamespace:
+        computed.append(study)
+        return SimpleNamespace(counts={}, asked=(), stage="")
+
+    monkeypatch.setattr(child, "run_study", run)
+    order = {"data": store.directory, "id": study.id, "study": queued, "since": 0, "priority": 0}
+    outlet = SimpleNamespace(send=lambda *_: None)
+    order |= {"access": asdict(Access("tcp://127.0.0.1:1")), "limits": {}}
+    child.compute(order, outlet, threading.Event())
+    assert [each.licence for each in computed] == ["CC-BY-4.0"]
+    store.study_path(study.id, "study.json").unlink()
+    Mender(place.jobs, store).look([study.id])
+    assert store.study(study.id).licence == "", "what is lost is written from the queue"

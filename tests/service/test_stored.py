@@ -663,8 +663,8 @@ def test_a_scene_is_not_deleted_while_a_study_of_it_is_accepted(
     keeper = create_app(Settings(data=store.directory)).state.keeper
     saved, deleting = Store.save_study, threading.Thread(target=keeper.delete_scene, args=(pin.id,))
 
-    def save(self: Store, study: Study) -> Path:
-        folder = saved(self, study)
+    def save(self: Store, study: Study, keep: bool) -> Path:
+        folder = saved(self, study, keep)
         shutil.rmtree(folder)  # else the file would tell of the study
         deleting.start()
         deleting.join(0.5)
