@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import chain
 from typing import Any
 
+from solver.scenes import Scene
+from studies.definition.parameters import build
 from studies.storage.dataset import Variable
 
 Described = Mapping[str, tuple[Sequence[str], Mapping[str, Any]]]
@@ -22,47 +23,70 @@ WITHOUT = "without_estimated_error"
 """Attribute of a data set with the names of its numbers that have none."""
 
 _OWN_ENDS = (("_error",), ("_sigma",), ("_low", "_high"))
-"""Ends of the names of variables with the error of one number: a bound, a standard deviation, or
-the ends of an interval."""
+"""Ends of the names of variables with the error of one number, of which the first that is there
+counts: a bound, a standard deviation, or the ends of an interval. Of a parameter that is fitted,
+these are the bounds in which it was searched."""
 _PRESSURES = re.compile(r"(peak_)?contact_pressure(_deformed)?")
 _NO_RESULT = re.compile(
     "cpu_seconds|median_iterations|(audit|run|tried|cell)_.*|.*_(error|sigma|low|high)"
 )
-_CLOSED_FORM = re.compile("(fatigue|hertz)_.*")
+_NOT_AUDITED = re.compile("(fatigue|hertz)_.*|d_.*_d_.*")
 """Stresses of which the audit estimates no error."""
 
 
-def errors_of(name: str, variables: Described) -> list[str]:
-    """Return the names of the variables with the estimated error of a number; empty for none."""
+def errors_of(name: str, variables: Described, requested: Mapping[str, str] = {}) -> list[str]:
+    """Return the names of the variables with the estimated error of a number; empty for none.
+
+    ``requested`` is what `of_requested` returns.
+    """
     own = ([name + end for end in ends] for ends in _OWN_ENDS)
-    whole = chain.from_iterable(each for each in own if variables.keys() >= {*each})
-    return [*whole, *(each for each in _of_stress(name, variables) if each in variables)]
+    first = next((each for each in own if variables.keys() >= {*each}), [])
+    stress = _of_stress(name, variables, requested)
+    return [*first, *(each for each in stress if each in variables)]
 
 
-def _of_stress(name: str, variables: Described) -> Iterator[str]:
+def of_requested(scene: Scene) -> dict[str, str]:
+    """Return the estimate of each number that a scene file requests, by the stage; else empty."""
+    if scene.places is None:
+        return {}
+    parameters = build(scene, {})
+    view = scene.view(parameters)
+    stages = {view.loaded: "loaded", view.unloaded: "residual"}
+    found = {}
+    for each in scene.places(parameters).numbers:
+        kind = "" if each.minus else stages.get(each.stage, "")
+        if each.contact is not None:
+            kind = "contact" if kind == "loaded" and each.of == "pressure" else ""
+        found[each.name] = f"audit_error_{kind}" if kind else ""
+    return found
+
+
+def _of_stress(name: str, variables: Described, requested: Mapping[str, str]) -> Iterator[str]:
     """Yield the estimates of the audit that a stress or a contact pressure has, if it is one."""
     dims, attrs = variables[name]
     words = str(attrs.get("long_name", ""))
     if attrs.get("units") != "MPa" or any(
-        each.fullmatch(name) for each in (_NO_RESULT, _CLOSED_FORM)
+        each.fullmatch(name) for each in (_NO_RESULT, _NOT_AUDITED)
     ):
         return
-    if _PRESSURES.fullmatch(name):
+    if name in requested:
+        yield requested[name]
+    elif _PRESSURES.fullmatch(name):
         yield "audit_error_contact"
     elif "residual stress" in words:
         yield "audit_error_residual"
         if "mid-track" in words:
             yield "advance_error"
-    elif "stress" in words:
+    elif "stress" in words and "stage" in dims:  # of which one is released
+        yield from ("audit_error_loaded", "audit_error_residual")
+    elif "stress" in words and "load" in words:
         yield "audit_error_loaded"
-        if "stage" in dims:  # of which one is released
-            yield "audit_error_residual"
 
 
-def without(variables: Described, numbers: Iterable[str]) -> str:
+def without(variables: Described, numbers: Iterable[str], requested: Mapping[str, str] = {}) -> str:
     """Return the names of the results among ``numbers`` that have no estimated error."""
     results = (name for name in numbers if not _NO_RESULT.fullmatch(name))
-    return " ".join(name for name in results if not errors_of(name, variables))
+    return " ".join(name for name in results if not errors_of(name, variables, requested))
 
 
 def described(variables: Mapping[str, Variable]) -> dict[str, tuple[Sequence[str], Any]]:

@@ -16,7 +16,15 @@ from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.definition.vocabulary import MISSING
 from studies.storage import dataset as layout
-from studies.storage.estimated import ANCILLARY, WITHOUT, described, errors_of, numbers_in, without
+from studies.storage.estimated import (
+    ANCILLARY,
+    WITHOUT,
+    described,
+    errors_of,
+    numbers_in,
+    of_requested,
+    without,
+)
 from studies.storage.runfile import variables
 
 SAME = 1e-9
@@ -186,12 +194,13 @@ class Frame:
         Numbers that are written ``beside`` count, too.
         """
         small = {name: ((), attributes) for name, (_, attributes) in self.small.items()}
-        every = described(beside) | small | self.fields
+        every, requested = described(beside) | small | self.fields, of_requested(self.scene)
         for name, (_, attributes) in (small | self.fields).items():
-            if found := errors_of(name, every):
+            if found := errors_of(name, every, requested):
                 attributes[ANCILLARY] = " ".join(found)
         numbers = [name for name, (values, _) in self.small.items() if values.dtype.kind == "f"]
-        return {WITHOUT: without(every, [*numbers, *self.fields, *numbers_in(beside)])}
+        results = [*numbers, *self.fields, *numbers_in(beside)]
+        return {WITHOUT: without(every, results, requested)}
 
     def fill(self, file: h5py.File, run: h5py.File, at: tuple[int, ...]) -> None:
         """Write the fields of one run in their place, compressed as in its file where that fits."""

@@ -15,11 +15,14 @@ import pytest
 from solver.memory import bytes_in
 from studies import Store, Study, open_study, run_study
 from studies.errors import StudyError
+from studies.scenes.scene import read_scene
 from studies.storage import ran
 from studies.storage.combine import combine
-from studies.storage.estimated import errors_of, without
+from studies.storage.estimated import errors_of, of_requested, without
 from tests.studies.conftest import fake_study
 from tests.studies.fakes import NUMBERS, record
+
+SCENES = Path(__file__).parents[2] / "data/scenes"
 
 
 def run(study: Study, store: Store) -> Path:
@@ -128,6 +131,9 @@ def test_stress_names_the_estimate_of_its_stage_and_positions_none() -> None:
         "contact_shear": (("stage", "s"), "contact shear", "MPa"),
         "fatigue_path_shear": (("instant",), "mesoscopic shear stress", "MPa"),
         "yield": ((), "load at first yield", "N"), "yield_sigma": ((), "its deviation", "N"),
+        "yield_low": ((), "its lower bound", "N"), "yield_high": ((), "its upper bound", "N"),
+        "d_residual_max_d_friction": ((), "derivative of largest residual stress", "MPa"),
+        "own": ((), "a stress of an own scene", "MPa"),
         **{f"audit_error_{of}": ((), "", "1") for of in ("loaded", "residual", "contact")},
     }  # fmt: skip
     every = {n: (d, {"long_name": w, "units": u}) for n, (d, w, u) in words.items()}
@@ -138,9 +144,31 @@ def test_stress_names_the_estimate_of_its_stage_and_positions_none() -> None:
         "peak_contact_pressure": ["audit_error_contact"],
         "yield": ["yield_sigma"],
     }
-    assert without(every, every) == "residual_max_x contact_shear fatigue_path_shear"
+    assert without(every, every) == (
+        "residual_max_x contact_shear fatigue_path_shear d_residual_max_d_friction own"
+    )
     del every["audit_error_residual"]
     assert errors_of("residual_max", every) == []
+
+
+@pytest.mark.parametrize(
+    ("scene", "errors"),
+    [
+        ("bending", {"residual": "residual"}),
+        ("peened", {"compression": "loaded"}),
+        ("pin", {"tension": "residual", "peak_pressure": "contact"}),
+        ("fretting", {}),  # its numbers are of a stage before the last one
+    ],
+)
+def test_a_number_of_a_scene_file_has_the_estimate_of_its_stage(
+    scene: str, errors: dict[str, str]
+) -> None:
+    own = read_scene(SCENES / f"{scene}.toml")
+    every = {each.name: (each.dims, each.attributes) for each in own.quantities}
+    every |= {f"audit_error_{of}": ((), {}) for of in ("loaded", "residual", "contact")}
+    found = {name: errors_of(name, every, of_requested(own)) for name in every}
+    named = {name: [f"audit_error_{of}"] for name, of in errors.items()}
+    assert {name: each for name, each in found.items() if each} == named
 
 
 def test_machines_are_named_once_and_a_run_of_an_earlier_version_has_none() -> None:
