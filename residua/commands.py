@@ -96,13 +96,18 @@ def _study(options: argparse.Namespace, store: Any) -> tuple[Any, Any]:
     from studies.definition.study import Study
 
     path: Path = options.study
+    measured: Sequence[Path] = getattr(options, "measured", ())  # of `residua fit`
     if not path.is_dir():
-        measured = getattr(options, "measured", ())
         return Study.from_toml(path, measured, store.definition, store.scene), None
     from studies.views.crate import METADATA, Crate
 
     if not (path / METADATA).is_file():
         raise StudyError("file", str(path), f"must be a study file, or a crate with {METADATA}")
+    if store.directory.resolve() == path.resolve():
+        raise StudyError("--out", str(path), "must be a new folder, not the crate")
+    if measured:
+        allowed = "must be left out: the crate has what was measured"
+        raise StudyError("--measured", str(measured[0]), allowed)
     crate = Crate.read(path)
     if crate.other:
         print(f"residua: {crate.other}", file=sys.stderr, flush=True)
@@ -328,6 +333,9 @@ def export(options: argparse.Namespace) -> int:
     if options.crate is not None:
         from studies.views.crate import export as write_crate
 
+        for name in ("select", "field", "component", "stage"):
+            if given := getattr(options, name):
+                raise StudyError(f"--{name}", given, "must be left out: a crate has all")
         write_crate(options.path, options.crate)
         print(f"wrote {options.crate}")
         return OK

@@ -26,7 +26,7 @@ from solver.files import opened
 from solver.version import __version__
 from studies.definition.identity import canonical, solver_hash
 from studies.definition.study import Study
-from studies.definition.vocabulary import SOLVED
+from studies.definition.vocabulary import MISSING, SOLVED
 from studies.errors import StudyError
 from studies.execution.run import StudyOutcome
 from studies.scenes.file_scene import FileScene
@@ -153,10 +153,15 @@ class Crate:
     def compared(self, store: Store, outcome: StudyOutcome) -> Compared:
         """Return what differs between the crate and its study as it was computed again."""
         ids = frozenset(store.runs_of(self.study))
-        with open_netcdf(self.dataset) as first, open_netcdf(outcome.dataset) as second:
-            found = diff(first, second)
-        same = not (any(found.only) or found.statuses or (ids != self.runs and not self.other))
         told = f"{len(ids & self.runs)} of {len(self.runs)} runs have the same id"
+        if before := len(ids - {*outcome.computed}):
+            told = f"{before} of {len(ids)} runs were not computed now: --out had them\n{told}"
+        same = ids == self.runs or bool(self.other)
+        with open_netcdf(self.dataset) as first, open_netcdf(outcome.dataset) as second:
+            if all((each["status"] == MISSING).all() for each in (first, second)):
+                return Compared(f"{told}; neither study has found a value", same)
+            found = diff(first, second)
+        same = same and not (any(found.only) or found.statuses)
         return Compared(f"{told}; {difference_table(found)}", same)
 
 
@@ -184,6 +189,9 @@ class _Writer:
         dataset = store.dataset(study.id)
         with open_netcdf(dataset) as found:
             attrs = dict(found.attrs)
+            if not study.kind.chooses and (found["status"] == MISSING).any():
+                allowed = "has runs that its data set lacks: run the study again"
+                raise StudyError("path", study.name, allowed)
         of_study = f"studies/{study.id}"
         self._copy(dataset, f"{of_study}/{dataset.name}", f"data set of {study.name}")
         definition = store.study_path(study.id, "study.json")
@@ -452,9 +460,10 @@ def _readme(study: Study, attrs: Mapping[str, Any]) -> str:
 
 Runs of the scene {study.problem.name}, computed with {attrs["source"]}{commit}.
 
-    residua run FOLDER
+    residua run FOLDER --out NEW
 
-with the path of this folder computes all runs again, and compares them with these. With the same
-version of Residua they have the same ids; another one names the version that is needed.
+with the path of this folder, and that of a new one, computes all runs again, and compares them
+with these. With the same version of Residua they have the same ids; another one names the version
+that is needed.
 `residua show FOLDER` lists the runs. `{METADATA}` describes each file and each run.
 """

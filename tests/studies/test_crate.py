@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -13,14 +14,17 @@ import h5py
 import meshio
 import numpy as np
 import pytest
+import xarray as xr
 
 from residua.cli import main
 from solver.version import __version__
-from studies import Store, Study, run_study
+from studies import Store, Study, open_study, run_study
 from studies.definition import identity
 from studies.errors import StudyError
+from studies.views import crate as crate_module
 from studies.views.crate import METADATA, export
 from tests.studies.conftest import fake_study
+from tests.studies.fakes import NUMBERS
 
 SCENE = """# A block that is pulled, and released.
 name = "pull"
@@ -260,3 +264,70 @@ def test_a_file_of_a_study_does_not_take_the_place_of_another_one(tmp_path: Path
     assert entities(tmp_path / "crate")["./"]["name"] == "fake"
     assert len([*tmp_path.glob("crate/runs/*.nc")]) == 4
     assert "residua run" in (tmp_path / "crate" / "README.md").read_text()
+
+
+def test_a_crate_is_computed_in_another_folder_and_told_what_was_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, crate = tmp_path / "out", tmp_path / "crate"
+    run_study(fake_study(), Store(out), workers=0)
+    export(out, crate)
+    before = {path: path.read_bytes() for path in crate.rglob("*") if path.is_file()}
+    assert main(["run", str(crate), "--out", str(crate / "." / "runs" / "..")]) == 2
+    assert "--out" in (told := capsys.readouterr().err) and "must be a new folder" in told
+    assert {path: path.read_bytes() for path in crate.rglob("*") if path.is_file()} == before
+    assert main(["run", str(crate), "--out", str(out), "--workers", "0"]) == 0
+    assert "4 of 4 runs were not computed now: --out had them" in capsys.readouterr().out
+    assert main(["run", str(crate), "--out", str(tmp_path / "new"), "--workers", "0"]) == 0
+    assert "not computed now" not in capsys.readouterr().out
+
+
+def test_a_goal_that_no_place_reaches_is_computed_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    goal = {"parameter": "load_ratio", "of": "peak_contact_pressure", "at": 1e9}
+    content = {"name": "g", "scene": "numbers", "goal": goal | {"between": [0.1, 4.0]}}
+    run_study(Study.from_dict(content, NUMBERS), Store(tmp_path / "out"), workers=0)
+    export(tmp_path / "out", tmp_path / "crate")
+    status = main(["run", str(tmp_path / "crate"), "--out", str(tmp_path / "b"), "--workers", "0"])
+    assert "neither study has found a value" in capsys.readouterr().out
+    assert status == 0
+
+
+def test_another_status_of_a_run_is_a_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_study(fake_study(), Store(tmp_path / "out"), workers=0)
+    export(tmp_path / "out", tmp_path / "crate")
+    monkeypatch.setattr(crate_module, "diff", partial(relabelled, crate_module.diff))
+    assert main(["run", str(tmp_path / "crate"), "--out", str(tmp_path / "b"), "--workers", "0"])
+    assert "with another status" in capsys.readouterr().out
+
+
+def relabelled(diff: Any, first: xr.Dataset, second: xr.Dataset) -> Any:
+    """Compare with a run that has ended in another way."""
+    statuses = second["status"].copy(data=np.full(second["status"].shape, "no_convergence"))
+    return diff(first, second.assign(status=statuses))
+
+
+def test_a_data_set_that_lacks_a_run_of_another_study_is_refused(tmp_path: Path) -> None:
+    store, study, stopped = Store(tmp_path / "out"), fake_study("a"), iter([False] * 14)
+    run_study(study, store, workers=0, should_stop=lambda: next(stopped, True))
+    with open_study(store.dataset_path(study.id)) as dataset:
+        assert (dataset["status"] == "missing").any()
+    run_study(fake_study("b"), store, workers=0)
+    with pytest.raises(StudyError, match="has runs that its data set lacks: run the study again"):
+        export(store.dataset_path(study.id), tmp_path / "crate")
+
+
+@pytest.mark.parametrize("option", ["--select=friction=0.3", "--field=map_mises", "--stage=loaded"])
+def test_an_option_that_a_crate_does_not_have_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str
+) -> None:
+    crate = tmp_path / "crate"
+    assert main(["export", str(tmp_path), "--crate", str(crate), option]) == 2
+    assert f"{option.partition('=')[0]} = " in capsys.readouterr().err
+    crate.mkdir()
+    (crate / METADATA).touch()
+    assert main(["fit", str(crate), "--measured", "a.csv", "--out", str(tmp_path / "b")]) == 2
+    assert "--measured = 'a.csv': must be left out" in capsys.readouterr().err
