@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -33,8 +33,8 @@ def read_study(
     ending of a mesh file (`FORMATS`) the mesh of a section, and ``steels.toml#40Cr`` a
     material. Entries of kinds of study name files too, see `Kind.with_files`. The study that
     this one ``extends`` may be a file. What is in the files takes their place, so that the
-    content of a study needs no other file. The entry ``files`` has the texts of the study, of the
-    studies that it extends and of their scene file.
+    content of a study needs no other file. The entry ``files`` has the texts of the study, of its
+    scene file and of the studies that it extends, in this order; see `texts_with`.
 
     Parameters
     ----------
@@ -47,11 +47,16 @@ def read_study(
     ------
     StudyError
         for ``file``, when the study cannot be read or is no TOML; for the place that names another
-        file which cannot be read; for ``extends``, when files extend one another in a circle
+        file which cannot be read; for ``extends``, when files extend one another in a circle; for
+        ``files``, if it is given
     """
     text, folder = read_given(path, "file"), Path(path).parent
     tables = toml_of(text, "file", str(path))
-    files = {Path(path).name: text.decode(), **_scene_file(tables.get("scene"), folder)}
+    if "files" in tables:
+        allowed = "are the texts of the study and of the files that it names: leave it out"
+        raise StudyError("files", tables["files"], allowed)
+    files = {Path(path).name: text.decode()}
+    files = texts_with(files, _scene_file(tables.get("scene"), folder))
     if "bodies" in tables and "scene" not in tables:
         name = Path(path).name
         allowed = f'is a scene file, not a study: a study has the line scene = "{name}"'
@@ -74,7 +79,7 @@ def read_study(
             raise StudyError("extends", before, allowed)
         theirs: Any = read_study(folder / before, (), chain - 1)
         tables["extends"] = theirs
-        files = {**theirs["files"], **files}
+        files = texts_with(files, theirs["files"])
         while isinstance(theirs, dict):  # the scenes of all are beside their files
             if str(theirs.get("scene", "")).endswith(".toml"):
                 theirs["scene"] = str(Path(before).parent / theirs["scene"])
@@ -83,6 +88,17 @@ def read_study(
         if table in tables:
             tables[table] = _with_files(tables[table], table, folder)
     return {**tables, "files": files}
+
+
+def texts_with(texts: Mapping[str, str], others: Mapping[str, str]) -> dict[str, str]:
+    """Return texts by name with others behind them; of two texts of a name both are kept."""
+    found = dict(texts)
+    for name, text in others.items():
+        own, path, k = name, Path(name), 1
+        while found.get(own, text) != text:
+            own, k = f"{path.stem}-{k + 1}{path.suffix}", k + 1
+        found[own] = text
+    return found
 
 
 def _scene_file(scene: Any, folder: Path) -> dict[str, str]:

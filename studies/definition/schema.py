@@ -162,11 +162,11 @@ Whole = Annotated[int, Strict()]
 Number = Annotated[float, Strict()]
 
 
-OF_STUDY = (
-    "points", "sample", "extends", "goal", "refine", "fit", "minimise", "keep", "allow", "fatigue",
-    "derivatives", "note", "tags", "licence", "cite", "doi", "files",
+_TABLES = (
+    "points", "sample", "goal", "refine", "fit", "minimise", "fatigue", "derivatives",
 )  # fmt: skip
-"""Entries of a study that are often written among its parameters."""
+OF_STUDY = (*_TABLES, "extends", "keep", "allow", "note", "tags", "licence", "cite", "doi")
+"""Entries of a study that are often written among its parameters, those that are tables first."""
 
 
 def listed(given: Any) -> Any:
@@ -178,7 +178,8 @@ def known_name(name: Any, known: Mapping[str, Any], value: Any) -> None:
     """Refuse a value if its name is no parameter of the scene."""
     if name in OF_STUDY and name not in known:
         allowed = f"is an entry of the study, not of this table: write {name} above all tables"
-        raise StudyError("", value, f"{allowed}, or as the table [{name}]")
+        table = f", or as the table [{name}]" if name in _TABLES else ""
+        raise StudyError("", value, allowed + table)
     if name not in known:
         allowed = f"the scene has no such parameter; it has {', '.join(known)}"
         raise StudyError("", value, allowed + nearest(name, known))

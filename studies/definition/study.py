@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, reduce
@@ -463,12 +464,17 @@ class Study(StudyTable):
         return self.expansion.paths()
 
     def with_points(self, points: Points) -> Self:
-        """Return this study with other runs under its id: those that it has chosen."""
+        """Return this study with other runs under its id and texts: those that it has chosen."""
         content = self.to_dict() | {"sweep": {POINT: points}}
         del content[self.kind.name]
         chosen = self.known(content, lambda name: self.problem)
-        chosen.__dict__["id"] = self.id
+        chosen.__dict__ |= {"id": self.id, "texts": self.texts}
         return chosen
+
+    @cached_property
+    def texts(self) -> dict[str, str]:
+        """Texts of its files by name; of a study that was not read from one its entries as JSON."""
+        return self.files or {"study.json": json.dumps(self.to_dict(), indent=2)}
 
     @property
     def published(self) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import solver
 from solver.files import read_file
+from studies.definition.files import texts_with
 from studies.definition.study import Study
 from studies.scenes.file_scene import FileScene
 from studies.scenes.shipped import SHIPPED
@@ -43,11 +44,10 @@ def files_of(study: Study) -> dict[str, str]:
     The first one is the study; of one that was not read from a file it is the JSON of its entries.
     """
     scene = study.problem
-    found = dict(study.files) or {"study.json": json.dumps(study.to_dict(), indent=2)}
     if isinstance(scene, FileScene) and not scene.posted and scene.name in SHIPPED:
         path = SHIPPED[scene.name]
-        found.setdefault(path.name, read_file(path).decode())
-    return found
+        return texts_with(study.texts, {path.name: read_file(path).decode()})
+    return study.texts
 
 
 def meshes_of(study: Study) -> list[tuple[str, bytes]]:

@@ -102,6 +102,12 @@ def test_a_file_of_points_in_a_wrong_table_is_told_its_place(tmp_path: Path, tab
         Study.from_toml(path)
 
 
+def test_a_text_of_the_study_is_not_told_to_be_a_table() -> None:
+    content = {"name": "p", "scene": "punch", "sweep": {"doi": ["10.5281/zenodo.1"]}}
+    with pytest.raises(StudyError, match=r"write doi above all tables$"):
+        Study.from_dict(content)
+
+
 def test_a_file_of_points_may_name_curves(tmp_path: Path) -> None:
     (tmp_path / "worn.csv").write_text("-40, 2.7\n-36, 2.2\n0, 0\n40, 1\n")
     (tmp_path / "tests.csv").write_text("case,wheel_profile\nnew,s1002\nworn,worn.csv\n")

@@ -16,9 +16,11 @@ from solver.memory import bytes_in
 from studies import Store, Study, open_study, run_study
 from studies.errors import StudyError
 from studies.scenes.scene import read_scene
+from studies.scenes.shipped import SHIPPED
 from studies.storage import ran
 from studies.storage.combine import combine
 from studies.storage.estimated import errors_of, of_requested, without
+from studies.storage.origin import files_of
 from tests.studies.conftest import fake_study
 from tests.studies.fakes import NUMBERS, record
 
@@ -39,8 +41,38 @@ def test_texts_of_study_and_scene_are_kept_as_they_were_written(tmp_path: Path) 
         files = json.loads(dataset.attrs["files"])
     assert files["more.toml"] == text.replace("\n", "\r\n")
     assert files["own.toml"] == (tmp_path / "own.toml").read_text()
+    assert [*files] == ["more.toml", "own.toml"], "the study comes first"
     assert store.study(study.id).files == study.files
     assert study.id == Study.from_dict(study.to_dict() | {"files": {}}).id
+
+
+def test_two_files_of_a_name_are_both_kept(tmp_path: Path) -> None:
+    own = 'name = "a"\nscene = "fake"\n[sweep]\nfriction = [0]\n'
+    texts = {
+        "b/a.toml": own,
+        "a.toml": 'extends = "b/a.toml"\nname = "more"\n[sweep]\nfriction = [0.25]\n',
+        "cone.toml": 'name = "cones"\nscene = "cone"\n',
+        "given.toml": 'files = ["a.csv"]\n' + own,
+    }
+    (tmp_path / "b").mkdir()
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    study = Study.from_toml(tmp_path / "a.toml")
+    assert files_of(study) == {"a.toml": texts["a.toml"], "a-2.toml": own}
+    shipped = files_of(Study.from_toml(tmp_path / "cone.toml"))
+    assert shipped["cone.toml"] == texts["cone.toml"]
+    assert shipped["cone-2.toml"] == SHIPPED["cone"].read_text()
+    with pytest.raises(StudyError, match=r"files = .*leave it out"):
+        Study.from_toml(tmp_path / "given.toml")
+
+
+def test_a_study_that_chooses_its_runs_is_kept_as_json_of_its_own_entries(tmp_path: Path) -> None:
+    refine = {"of": ["peak_contact_pressure"], "until": 0.2, "halvings": 1}
+    content = {"name": "r", "scene": "numbers", "sweep": {"load_ratio": [0.5, 1.0, 2.0]}}
+    study = Study.from_dict(content | {"refine": refine}, NUMBERS)
+    with open_study(run(study, Store(tmp_path))) as dataset:
+        (text,) = json.loads(dataset.attrs["files"]).values()
+    assert Study.from_dict(json.loads(text), NUMBERS).id == study.id
 
 
 def test_a_study_without_a_file_is_kept_as_json(tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_of_many_mistakes_the_first_are_listed_and_all_are_counted() -> None:
 
 def test_an_entry_of_the_study_among_its_parameters_is_told_its_place() -> None:
     entries = {*Study.model_json_schema()["properties"]}
-    assert entries == {*OF_STUDY, "name", "scene", "parameters", "sweep"}
+    assert entries == {*OF_STUDY, "name", "scene", "parameters", "sweep", "files"}
     with pytest.raises(StudyError, match=r"parameters\.goal = .*: write goal above all tables"):
         Study.from_dict({"name": "a", "scene": "punch", "parameters": {"goal": RIGHT[0]["goal"]}})
 
