@@ -55,6 +55,11 @@ _COMPLETED, _FAILED = (
     f"http://schema.org/{status}ActionStatus" for status in ("Completed", "Failed")
 )
 _PROGRAM, _LANGUAGE, _README = "#residua", "#study-file", "README.md"
+_SPDX = (
+    r"CC0-1\.0|CC-BY(-NC)?(-SA|-ND)?-[1-4]\.\d|ODbL-1\.0|ODC-By-1\.0|PDDL-1\.0|MIT|"
+    r"BSD-[23]-Clause|Apache-2\.0|MPL-2\.0|EUPL-1\.[12]|[AL]?GPL-\d\.\d-(only|or-later)"
+)
+"""Licences that are called by their names in the list of SPDX; others are texts."""
 _KINDS = {
     ".nc": "application/x-netcdf",
     ".json": "application/json",
@@ -83,6 +88,7 @@ def export(path: Path, target: Path) -> None:
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise StudyError("--crate", str(target), "must be a folder that is new or empty")
     study, store = study_of(find_study(path))
+    target = target.resolve()  # a name, also of `.`
     part = target.with_name(f"{target.name}.{uuid.uuid4().hex}.part")
     try:
         part.mkdir(parents=True)
@@ -139,14 +145,20 @@ class Crate:
             attrs = found.attrs
         with one_error(dataset):
             content = seal.content_of(dataset.with_name("study.json"), name)
-        study = Study.from_dict(content, scenes=Store(folder).scene)
+        commit = f", commit {attrs['commit']}" if "commit" in attrs else ""
+        made = f"the crate was computed by {attrs['source']}{commit}, sources "
+        made += str(attrs["solver_source"])
+        try:
+            study = Study.from_dict(content, scenes=Store(folder).scene)
+        except StudyError as error:
+            allowed = f"{error.allowed} ({made}; this is Residua {__version__})"
+            first = StudyError(error.field, error.value, allowed)
+            raise StudyError.of([first, *error.others], error.count) from None
         if study.id != dataset.parent.name:
-            commit = f", commit {attrs['commit']}" if "commit" in attrs else ""
-            other = (
-                f"the crate was computed by {attrs['source']}{commit}, sources "
-                f"{attrs['solver_source']}: install it to compute the same ids. This is Residua "
-                f"{__version__}, sources {solver_hash()}: it computes the runs, and compares them"
-            )
+            differs = "the scene, or what reads the study, which differs here"
+            if attrs["solver_source"] != solver_hash():
+                differs = f"it, as this is Residua {__version__}, sources {solver_hash()}"
+            other = f"{made}. The same ids need {differs}. The runs are computed, and compared"
         runs = frozenset(path.stem for path in folder.glob("runs/*.nc"))
         return cls(study=study, dataset=dataset, runs=runs, other=other)
 
@@ -218,7 +230,7 @@ class _Writer:
 
     def _text(self, name: str, text: str, **more: Any) -> str:
         """Write a text, and return its name in the crate."""
-        if (self.folder / name).exists() or name == METADATA:
+        while (self.folder / name).exists() or name == METADATA:
             name = f"study-{name}"
         (self.folder / name).write_bytes(text.encode())
         self._file(name, f"{name} as it was written", **more)
@@ -411,7 +423,7 @@ def _license(given: str) -> tuple[Entity | str, list[Entity]]:
     """Return the licence of a crate: what stands for it, and its description if it has one."""
     if not given:
         return "none is given: ask the authors of the study", []
-    if not re.fullmatch(r"https?://\S+|[A-Za-z0-9.+-]+", given):
+    if not re.fullmatch(rf"https?://\S+|{_SPDX}", given):
         return given, []
     own = given if given.startswith("http") else f"https://spdx.org/licenses/{given}"
     return _to(own), [{"@id": own, "@type": "CreativeWork", "name": given}]

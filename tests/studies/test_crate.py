@@ -19,8 +19,9 @@ import xarray as xr
 from residua.cli import main
 from solver.version import __version__
 from studies import Store, Study, open_study, run_study
-from studies.definition import identity
+from studies.definition import expansion, identity
 from studies.errors import StudyError
+from studies.storage import seal
 from studies.views import crate as crate_module
 from studies.views.crate import METADATA, export
 from tests.studies.conftest import fake_study
@@ -219,13 +220,42 @@ def test_another_version_names_the_one_that_is_needed_and_compares(
     export(tmp_path / "out", tmp_path / "crate")
     sources = identity.solver_hash()
     monkeypatch.setattr(identity, "solver_hash", lambda: "0" * 32)
+    monkeypatch.setattr(crate_module, "solver_hash", lambda: "0" * 32)
     status = main(["run", str(tmp_path / "crate"), "--out", str(tmp_path / "b"), "--workers", "0"])
     told = capsys.readouterr()
     assert f"computed by Residua {__version__}" in told.err
-    assert f"sources {sources}: install it to compute the same ids" in told.err
+    assert f"sources {sources}. The same ids need it, as this is Residua" in told.err
     assert "0 of 4 runs have the same id; 4 runs in common" in told.out
     assert "no value differs" in told.out
     assert status == 0
+
+
+def test_a_scene_that_has_changed_is_told_apart_from_another_version(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study, crate = fake_study(), tmp_path / "crate"
+    run_study(study, Store(tmp_path / "out"), workers=0)
+    export(tmp_path / "out", crate)
+    monkeypatch.setattr(expansion, "written", lambda scene: [["changed", ""]])
+    assert main(["run", str(crate), "--out", str(tmp_path / "b"), "--workers", "0"]) == 0
+    assert "need the scene, or what reads the study, which differs here" in capsys.readouterr().err
+    definition = crate / "studies" / study.id / "study.json"
+    changed = study.to_dict() | {"parameters": {"gone": 1}}
+    definition.write_bytes(seal.sealed_json(f"study {study.id}", changed))
+    assert main(["run", str(crate), "--out", str(tmp_path / "c")]) == 2
+    told = capsys.readouterr().err
+    assert "parameters.gone = 1: the scene has no such parameter" in told
+    assert f"the crate was computed by Residua {__version__}" in told
+
+
+def test_a_licence_is_one_of_spdx_only_by_a_known_name(tmp_path: Path) -> None:
+    names = {"CC-BY-SA-4.0": True, "GPL-3.0-or-later": True, "proprietary": False, "CC-BY": False}
+    for name, known in names.items():
+        study = Study.from_dict(fake_study(name).to_dict() | {"licence": name})
+        run_study(study, Store(tmp_path / name / "out"), workers=0)
+        export(tmp_path / name / "out", tmp_path / name / "crate")
+        given = entities(tmp_path / name / "crate")["./"]["license"]
+        assert given == ({"@id": f"https://spdx.org/licenses/{name}"} if known else name)
 
 
 def test_a_run_with_another_status_or_id_is_a_failure(
@@ -253,15 +283,22 @@ def test_what_is_not_complete_or_no_crate_is_refused(tmp_path: Path) -> None:
     assert main(["export", str(store.directory), "--crate", "a", "--csv", "b"]) == 2
 
 
-def test_a_file_of_a_study_does_not_take_the_place_of_another_one(tmp_path: Path) -> None:
+def test_a_file_of_a_study_does_not_take_the_place_of_another_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name in ("../a.toml", "..", "", "a/b", "a\\b"):
         with pytest.raises(StudyError, match=r"files.*must be the name of a file"):
             Study.from_dict(fake_study().to_dict() | {"files": {name: "x"}})
-    names = ("runs", METADATA, "README.md", "größer.toml")
+    names = ("runs", METADATA, "study-README.md", "README.md", "größer.toml")
     study = Study.from_dict(fake_study().to_dict() | {"files": dict.fromkeys(names, "x")})
     run_study(study, Store(tmp_path / "out"), workers=0)
-    export(tmp_path / "out", tmp_path / "crate")
+    (tmp_path / "crate").mkdir()
+    monkeypatch.chdir(tmp_path / "crate")
+    export(tmp_path / "out", Path())
     assert entities(tmp_path / "crate")["./"]["name"] == "fake"
+    assert {each.name for each in tmp_path.glob("crate/*README.md")} == {
+        "README.md", "study-README.md", "study-study-README.md"
+    }  # fmt: skip
     assert len([*tmp_path.glob("crate/runs/*.nc")]) == 4
     assert "residua run" in (tmp_path / "crate" / "README.md").read_text()
 
