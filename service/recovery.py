@@ -75,16 +75,16 @@ def add(study_id: str, jobs: Jobs, store: Store, begun: bool = True) -> None:
         if getattr(error, "value", None) != study_id:  # that is of another version of the solver
             log.warning("studies/%s: not restored: %s", study_id, error)
         return
-    counts = store.outcomes(study.id)
+    counts, content = store.outcomes(study.id), study.to_dict(files=True)
     if not (counts or begun):
         return
     if study.kind.chooses:
         asked = store.asked(study)
         ended = asked is not None and len(store.modified(asked)) == len(asked)
         stage = study.stage(study.expansion.size if ended else 0)
-        jobs.accept(study.id, study.to_dict(), sorted(asked or ()), most=study.size, stage=stage)
+        jobs.accept(study.id, content, sorted(asked or ()), most=study.size, stage=stage)
     else:
-        jobs.accept(study.id, study.to_dict(), study.run_ids())
+        jobs.accept(study.id, content, study.run_ids())
         there = len(store.modified(study.run_ids()))
         ended = not begun or there >= counts.total() - counts[MISSING]
     if counts and (ended or not begun):

@@ -101,7 +101,7 @@ class Keeper:
             self.check_room(found)
             there = bool(self.store.blobs.names(f"studies/{study.id}/*"))  # also damaged ones
             self.store.save_study(study, keep=True)
-            content, most = study.to_dict(), study.size
+            content, most = study.to_dict(files=True), study.size
             try:
                 return self.jobs.accept(
                     study.id, content, found.runs, priority, size, most, study.stage()

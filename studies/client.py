@@ -94,7 +94,7 @@ class Client:
         if isinstance(study, Path | str):
             return self._submit(read_study(Path(study)), Path(study).parent)
         if isinstance(study, Study):
-            content, scene = study.to_dict(), study.problem
+            content, scene = study.to_dict(files=True), study.problem
             if isinstance(scene, FileScene) and scene.posted:
                 content["scene"] = self._post(scene.description)["id"]
             return self._submit(content, Path())

@@ -481,10 +481,15 @@ class Study(StudyTable):
         """The entries that the data set holds, and that do not count for the id."""
         return self.model_dump(include={"licence", "cite", "doi", "files"})
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `from_dict` reads."""
+    def to_dict(self, files: bool = False) -> dict[str, Any]:
+        """Return what `from_dict` reads.
+
+        The texts of the ``files`` are left out, as they would not be those of a study that is made
+        of the entries with others: ``study.to_dict() | {"sweep": ...}``.
+        """
         whole = self.model_dump(include={"parameters", "sweep"})
-        return self.model_dump(exclude_defaults=True) | whole | self.choice
+        left_out = None if files else {"files"}
+        return self.model_dump(exclude_defaults=True, exclude=left_out) | whole | self.choice
 
 
 def _words(tree: Any) -> Iterator[str]:

@@ -305,7 +305,7 @@ class Store:
     def save_study(self, study: Study, keep: bool = False) -> Path:
         """Store the definition of the study and its scene, and return its directory."""
         self.save_scene(study.problem)
-        return self.save_definition(study.id, study.to_dict(), keep)
+        return self.save_definition(study.id, study.to_dict(files=True), keep)
 
     def save_definition(
         self, study_id: str, content: Mapping[str, Any], keep: bool = False

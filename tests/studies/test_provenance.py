@@ -43,7 +43,11 @@ def test_texts_of_study_and_scene_are_kept_as_they_were_written(tmp_path: Path) 
     assert files["own.toml"] == (tmp_path / "own.toml").read_text()
     assert [*files] == ["more.toml", "own.toml"], "the study comes first"
     assert store.study(study.id).files == study.files
-    assert study.id == Study.from_dict(study.to_dict() | {"files": {}}).id
+    assert study.id == Study.from_dict(study.to_dict(files=True)).id
+    other = Study.from_dict(study.to_dict() | {"sweep": {"friction": [0.5]}})
+    with open_study(run(other, store)) as dataset:
+        (name,) = json.loads(dataset.attrs["files"])
+    assert name == "study.json", "the texts are those of another study"
 
 
 def test_two_files_of_a_name_are_both_kept(tmp_path: Path) -> None:
