@@ -73,10 +73,8 @@ def numbers_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str,
     for name, value in run["scalars"].items():
         if group_of(name) == "audit":
             continue
-        meanings = QUANTITIES[name].flags if name in QUANTITIES else None
-        word = meanings(int(value)).name.lower() if meanings and value is not None else value
         each = {"name": name, "words": words_of(name, scene), "unit": unit_of(name, scene)}
-        found.append(each | {"value": word})
+        found.append(each | {"value": _in_words(name, value)})
     levels: dict[str, float] = {}
     sized = [each for each in found if each["unit"] and isinstance(each["value"], float)]
     for each in sized:
@@ -90,18 +88,28 @@ def numbers_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str,
 def parameters_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str, Any]]:
     """Return name, meaning, unit and value of each parameter; whether it is the scene's default."""
     known = parameters_of(scene) if scene else {}
-    numbers = numbers_shown(run, scene)
-    words = {each["name"]: str(each["value"]) for each in numbers if each["value"] is not None}
     return [
         {
             "name": name,
             "words": known[name].description if name in known else "",
             "unit": unit if (unit := known[name].unit if name in known else "") != "1" else "",
-            "value": computed_text(value, words.get(f"{COMPUTED}{name}", "")),
+            "value": computed_text(value, _computed(run, name)),
             "usual": name in known and known[name].default == value,
         }
         for name, value in run["parameters"].items()
     ]
+
+
+def _computed(run: Mapping[str, Any], parameter: str) -> str:
+    """Return the word of the parameter with which a run was computed; empty if it has none."""
+    value = run["scalars"].get(name := f"{COMPUTED}{parameter}")
+    return "" if value is None else str(_in_words(name, value))
+
+
+def _in_words(name: str, value: Any) -> Any:
+    """Return a flag as its word, and any other value as it is."""
+    meanings = QUANTITIES[name].flags if name in QUANTITIES else None
+    return meanings(int(value)).name.lower() if meanings and value is not None else value
 
 
 def words_of(name: str, scene: Scene | None) -> str:

@@ -243,8 +243,7 @@ class Stepper:
                     converged = coarse
                 size.resumed(converged.state.time - now)
             else:
-                most_known = min(most, INCREMENT_ERROR)
-                doubt = doubtful(self.system, converged, most_known)
+                doubt = doubtful(self.system, converged, min(most, INCREMENT_ERROR))
                 half = self._half(point, converged) if doubt else None
                 converged = integrated(self.system, point.now, converged, half)
                 # shares of uncertain friction refer to the larger forces of the coarse increment

@@ -10,8 +10,6 @@ from typing import Any
 
 from solver.derivatives.asked import named
 
-TITLE = "Change in % if a parameter is 1 % larger"
-
 
 def derived(names: Collection[str], parameters: Iterable[str]) -> Iterator[tuple[str, str]]:
     """Yield each number and each parameter of which there is a derivative among the names."""

@@ -35,7 +35,7 @@ from studies.views.columns import (
     unit_text,
     value_text,
 )
-from studies.views.elasticities import TITLE, derived
+from studies.views.elasticities import derived
 from studies.views.figures import FIGURES, worst
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.reading import open_study
@@ -265,7 +265,8 @@ def run_details(dataset: xr.Dataset) -> str:
 
 
 def _parameters(dataset: xr.Dataset) -> dict[str, Any]:
-    return json.loads(dataset.attrs["parameters"])
+    found: dict[str, Any] = json.loads(dataset.attrs.get("parameters", "{}"))
+    return found
 
 
 def _figure(variable: xr.DataArray) -> str:
@@ -294,7 +295,7 @@ def set_by_accuracy(dataset: xr.Dataset) -> dict[str, str]:
     The text is empty where the number is not known: the data set is of another version of the
     solver, does not tell all parameters of its runs, as that of a search, or has too many runs.
     """
-    given = json.loads(dataset.attrs.get("parameters", "{}"))
+    given = _parameters(dataset)
     names = [name for name, value in given.items() if value is None]
     if not names or "accuracy" not in {*given, *dataset.coords}:
         return {}
@@ -381,8 +382,7 @@ def place_of(dataset: xr.Dataset, at: Sequence[SupportsIndex]) -> str:
 def _derived(runs: xr.Dataset) -> list[tuple[str, str]]:
     """Return each number and each parameter of which the runs have a derivative."""
     numbers = [str(name) for name in runs if runs[name].dims == runs["status"].dims]
-    fixed = json.loads(runs.attrs.get("parameters", "{}"))
-    return list(derived(numbers, dict.fromkeys([*fixed, *map(str, runs.coords)])))
+    return list(derived(numbers, dict.fromkeys([*_parameters(runs), *map(str, runs.coords)])))
 
 
 def elasticity_table(runs: xr.Dataset) -> str:
@@ -390,7 +390,7 @@ def elasticity_table(runs: xr.Dataset) -> str:
 
     Of several runs they are the median, and the least and the largest.
     """
-    fixed = json.loads(runs.attrs.get("parameters", "{}"))
+    fixed = _parameters(runs)
     cells: dict[str, dict[str, str]] = {}
     for of, by in _derived(runs):
         parameter = runs[by] if by in runs else fixed[by]
@@ -406,7 +406,8 @@ def elasticity_table(runs: xr.Dataset) -> str:
     every = list(dict.fromkeys(by for row in cells.values() for by in row))
     rows = [[of, *(row.get(by, "") for by in every)] for of, row in cells.items()]
     how = ": median (least to largest) of the runs" if runs["status"].size > 1 else ""
-    return f"\n{TITLE}{how}\n{aligned([['', *every], *rows], right=1)}\n"
+    table = aligned([["", *every], *rows], right=1)
+    return f"\nChange in % if a parameter is 1 % larger{how}\n{table}\n"
 
 
 def report_text(dataset: xr.Dataset, kind: Kind, outcome: StudyOutcome, note: str) -> str:

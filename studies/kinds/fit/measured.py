@@ -149,11 +149,10 @@ class MeasuredLine(StudyTable):
 
         That of another line at a number of a dimension is not known: the number may move.
         """
-        known, fixed = (
-            scene.known_quantities,
-            not any(isinstance(at, float) for at in self.at.values()),
-        )
-        return fixed and all(named(each, by) in known for each in {self.of, self.over} - {""})
+        if any(isinstance(at, float) for at in self.at.values()):
+            return False
+        known = scene.known_quantities
+        return all(named(each, by) in known for each in {self.of, self.over} - {""})
 
     def slope(self, read: Read, by: str, width: float) -> Array:
         """Return the derivatives (n,) of `seen` by a parameter, times the width of its range.
