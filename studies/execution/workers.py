@@ -190,10 +190,13 @@ def _work(address: str, security: Security, memory: int, configuration: dict[str
     async def work() -> None:
         async with Worker(
             address, host="127.0.0.1", protocol="tls://", nthreads=1, security=security,
-            memory_limit=memory, silence_logs=logging.CRITICAL,
+            memory_limit=memory,
         ) as worker:  # fmt: skip
             await worker.finished()
 
+    # The error of a task goes to who asked for it. The option of `Worker` silences the handlers of
+    # dask alone, and a service has its own.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with dask.config.set(configuration):
         asyncio.run(work())
 

@@ -14,8 +14,14 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from service import logs
 from service.app import check_port, create_app, serve
 from service.settings import Settings
+from studies import StoreFull
+from studies.execution.forks import SHARED
+from studies.execution.grid import Grid
+from studies.execution.limits import Limits
+from studies.execution.workers import own_workers
 from tests.architecture.sources import ROOT
 from tests.service.servers import Server, fake_study
 
@@ -167,3 +173,34 @@ def test_a_lost_connection_to_workers_is_one_line_without_a_traceback() -> None:
     assert {each["message"] for each in lost} == {"lost CommClosedError: in a connection"}
     assert [each["study"] for each in lost] == ["a"] * 3 and "exc_info" not in lost[0]
     assert "Traceback" in defect["exc_info"]
+
+
+FAILING = """
+from studies.execution.forks import Forks
+from tests.service.test_logs import fail_at_a_worker
+assert Forks(()).start(fail_at_a_worker).end.poll(60)
+"""
+
+
+def fail(*_: object) -> None:
+    """Fail as a task does that finds no room on the disk."""
+    raise StoreFull("nowhere")
+
+
+def fail_at_a_worker() -> None:
+    """Let a task fail at a worker that is a fork of a process with the log of a service."""
+    logs.configure("json")
+    SHARED.prepare()
+    ended: list[Any] = []
+    with own_workers(1) as access, Grid(access) as grid:
+        grid.run(fail, [1], ended.append, lambda: False, Limits(), 0)
+    print(repr(ended[0].error), flush=True)
+
+
+@pytest.mark.processes
+def test_an_error_of_a_task_is_answered_and_not_logged_by_its_worker_too() -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", FAILING], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert run.stdout == "StoreFull('nowhere')\n"
+    assert "distributed.worker" not in run.stderr
