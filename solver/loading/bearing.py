@@ -1,4 +1,4 @@
-"""Check prescribed shear against the shear yield stress of the material."""
+"""Check prescribed shear against the shear that the surface of a body can carry."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from solver.contact.system import System
-from solver.errors import LimitLoad
+from solver.errors import LimitLoad, NotConverged, Runaway
 from solver.materials.law import Law
 from solver.model.loads import TravellingPressure
+
+FAR = 1.0
+"""Equivalent plastic strain beyond which no search for a pass has an answer."""
 
 
 def excess_shear(system: System, targets: Sequence[float]) -> LimitLoad | None:
@@ -46,4 +49,23 @@ def too_much_shear(material: Law, shear: float) -> LimitLoad | None:
         f"{strength:.4g} MPa: no equilibrium without hardening",
         strength / shear,
         1.0,
+    )
+
+
+def uncarried(material: Law, shear: float) -> NotConverged | None:
+    """Return the error if a shear [MPa] flows the surface without bound or very far, else None.
+
+    Linear hardening carries any shear in the end, but a small modulus only at a plastic strain that
+    no small-strain analysis allows.
+    """
+    linear = material.linear_hardening
+    if linear is None or not linear.modulus:
+        return too_much_shear(material, shear)
+    carried = material.surface.shear(linear.yield_stress + linear.modulus * FAR)
+    if shear <= carried:
+        return None
+    return Runaway(
+        f"the prescribed shear, {shear:.4g} MPa, is above {carried:.4g} MPa, which the surface "
+        f"carries at a plastic strain of {FAR:.0%}, far beyond small strains; the material "
+        "hardens, this is not its limit"
     )

@@ -243,6 +243,13 @@ def test_a_prescribed_shear_above_the_shear_yield_stress_is_refused() -> None:
     assert "is above the shear yield stress" in record.message
 
 
+def test_a_shear_that_hardening_carries_only_far_beyond_small_strains_is_refused() -> None:
+    shear = {"load": "hertz", "friction": 0.3, "traction": 1.0, "load_ratio": 3.4 / sqrt(3)}
+    record = rolled(**shear, hardening="isotropic", hardening_ratio=1e-6)
+    assert record.status is Status.NOT_CONVERGED
+    assert "carries at a plastic strain of 100%" in record.message
+
+
 def test_the_limit_without_friction_is_that_of_the_alternating_shear() -> None:
     """Residual stress cannot change the range of shear xy, which is symmetric about x = 0."""
     x, depth = (each.ravel() for each in np.meshgrid(np.linspace(0.7, 1.0, 13), [0.3, 0.35, 0.4]))

@@ -260,6 +260,21 @@ def test_what_no_track_bears_is_a_limit():
 # -- sequences of different loads ----------------------------------------------------------------
 
 
+def test_a_shear_that_hardening_carries_only_far_beyond_small_strains_is_not_searched(monkeypatch):
+    """Else the search, and passes by increments after it, take minutes and find none."""
+    monkeypatch.setattr(rolling_endless, "by_increments", None)
+    shear = {"load": "hertz", "friction": 0.5, "traction": -0.9, "load_ratio": 2.5}
+    hardens = {"hardening": "kinematic", "hardening_ratio": 1e-5}
+    (record,) = records(**shear, **hardens)
+    assert record.status is Status.NOT_CONVERGED
+    usual = RollingParameters(**COARSE, **shear, **hardens)
+    modulus = usual.youngs_modulus * 1e-5 / (1 - 1e-5)
+    carried = (usual.yield_stress + modulus) / 3**0.5
+    assert f"above {carried:.4g} MPa, which the surface carries at a plastic strain of 100%" in (
+        record.message
+    )
+
+
 def test_a_sequence_of_equal_passes_is_that_many_passes():
     plain, sequence = roll(passes=3), roll(passes=3, sequence=({"times": 3},))
     for name, (_, values) in plain.fields.items():

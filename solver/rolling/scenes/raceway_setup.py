@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from solver.errors import ModelError
-from solver.loading.bearing import too_much_shear
+from solver.loading.bearing import uncarried
 from solver.memory import kept
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values
@@ -141,9 +141,8 @@ class RolledRaceway(RolledPrism):
         p, ellipse = own, own.ellipse
         if p.load == "hertz":
             shear = p.traction * p.friction
-            limit = too_much_shear(p.material(), abs(shear) * ellipse.peak_pressure)
-            if limit is not None:
-                raise limit
+            if error := uncarried(p.material(), abs(shear) * ellipse.peak_pressure):
+                raise error
             return EllipticPatch(
                 grid=track.grid, load=RollingLoad(force=ellipse.force), a=ellipse.a, b=ellipse.b,
                 shear=(shear, 0.0),

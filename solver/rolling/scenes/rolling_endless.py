@@ -14,7 +14,7 @@ import numpy as np
 from solver.audit.report import Audit
 from solver.errors import LimitLoad, ModelError, NotConverged, Spins
 from solver.linear.threads import one_thread
-from solver.loading.bearing import too_much_shear
+from solver.loading.bearing import uncarried
 from solver.materials.material import Material
 from solver.memory import kept
 from solver.model.amplitude import Amplitude
@@ -123,14 +123,13 @@ def load_on(track: Track, run: RollingParameters, parameters: RollingParameters)
 
     Raises
     ------
-    LimitLoad
-        if its prescribed shear is above the shear strength of the material
+    LimitLoad, Runaway
+        if the surface does not carry its prescribed shear
     """
     p = parameters
     if p.load == "hertz":
-        shear = p.friction * abs(p.traction) * p.peak_pressure
-        if (limit := too_much_shear(p.material(), shear)) is not None:
-            raise limit
+        if error := _sheared(p):
+            raise error
         return track.hertz(p.peak_pressure, p.friction * p.traction, p.half_width)
     friction = effective_friction(p.friction)
     return RollingWheel(
@@ -144,6 +143,11 @@ def load_on(track: Track, run: RollingParameters, parameters: RollingParameters)
             creepage=FULL_SLIP if p.traction == 1.0 else p.given_creepage,
         ),
     )
+
+
+def _sheared(p: RollingParameters) -> NotConverged | None:
+    """Return the error if the surface does not carry the shear of a prescribed pressure."""
+    return uncarried(p.material(), p.friction * abs(p.traction) * p.peak_pressure)
 
 
 _REACHES = (1.0, 1.5, 2.5, 4.0)
@@ -161,8 +165,8 @@ def by_steady_passes(
     """Compute pass after pass; yield the runs, which differ in the number of passes.
 
     If no steady pass is found, roll the remaining runs by increments on a short track: there a
-    wheel that sinks in may still be in equilibrium. A prescribed pressure above the limit load and
-    a wheel that spins cannot be.
+    wheel that sinks in may still be in equilibrium. A prescribed pressure above the limit load, a
+    shear that the surface does not carry and a wheel that spins cannot be.
     """
 
     def otherwise(
@@ -184,12 +188,12 @@ def by_steady_passes(
 
 
 def _on_short_track(runs: Sequence[RollingParameters]) -> list[RollingParameters]:
-    """Return the runs on a track of given length; none if they have too many passes.
+    """Return the runs on a track of given length; none if they cannot be there, or take too long.
 
     Their elements have the usual side on such a track, or that of the runs if it is larger.
     """
     last = runs[-1]
-    if last.passes > _MOST_PASSES:
+    if last.passes > _MOST_PASSES or any(p.load == "hertz" and _sheared(p) for p in last.block):
         return []
     ends: dict[str, Any] = {"track": _LENGTH * last.half_width, "until": "passes"}
     usual: dict[str, Any] = dict.fromkeys(("element_size", "advance_step"))
