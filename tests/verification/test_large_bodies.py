@@ -29,11 +29,14 @@ from solver.fem.dofs import vectors
 from solver.fem.large import LargeDiscretisation
 from solver.fem.log_strain import _Stretch
 from solver.loading.control import Tolerances
+from solver.materials import Chaboche, Elasticity, Voce
 from solver.mesh import grid
 from solver.model.loads import Centrifugal
 from solver.model.rigid import Moved, line
 from solver.results.record import Status
 from studies.scenes.registry import scene_named
+from studies.scenes.scene import read_scene
+from tests.architecture.sources import ROOT
 
 pytestmark = pytest.mark.solves
 
@@ -283,6 +286,42 @@ def test_a_cone_has_the_published_force_of_its_depth() -> None:
     (quick,) = cone.path(cone.parameters(**own | {"unload_steps": 5}), [1], lambda fraction: None)
     assert np.isnan(quick.scalars["irreversible_work"])
     assert "irreversible_work is unknown: use more of them" in quick.message
+
+
+def test_a_bar_necks_as_in_another_program() -> None:
+    """CalculiX 2.20, CAX8R on this mesh, 196 increments: 79.61 kN at most; 67.64 kN, 4.995 mm."""
+    law = Chaboche(
+        elasticity=Elasticity(youngs_modulus=206.9e3, poisson_ratio=0.29),
+        curve=Voce(yield_stress=450.0, saturation=265.0, rate=16.93, modulus=129.24),
+    )
+    clamped = Displacement(boundary="top", x=0.0, y=4.9)
+    held = {"bottom": "y", "left": "x"}
+    bar = block((0.0, 6.413), (0.0, 26.667), (5, 10), material=law, kinematics="axisymmetric",
+                element="quad8", supports=held, loads=(clamped,))  # fmt: skip
+    stages = (
+        Stage(name="most", target=4 / 7, steps=16),
+        Stage(name="necked", target=1.0, steps=12),
+    )
+    found = solve(Model(bodies=(bar,)), stages=stages)
+    assert found.audit("necked").passed
+    part = found.system.full("b")
+    forces = [
+        vectors(point.forces[0], 2)[1, part.boundary_nodes("top")].sum() / 1e3
+        for point in found.stages.values()
+    ]
+    assert forces[0] == pytest.approx(79.61, rel=0.003)
+    assert forces[-1] == pytest.approx(67.64, rel=0.015)
+    neck = np.flatnonzero((part.X[0] == part.X[0].max()) & (part.X[1] == 0.0))
+    radius = 6.413 + found.displacement("b", "necked")[0, neck].item()
+    assert radius == pytest.approx(4.995, rel=0.015)
+
+
+def test_the_scene_of_the_neck_has_the_force_and_the_radius_of_that_bar() -> None:
+    scene = read_scene(ROOT / "data/scenes/neck.toml")
+    (record,) = scene.path(scene.parameters(elongation=9.8), [0.0], lambda done: None)
+    assert record.status is Status.OK
+    assert record.scalars["pull"] / 1e3 == pytest.approx(67.64, rel=0.015)
+    assert 6.413 + record.scalars["neck"] == pytest.approx(4.995, rel=0.015)
 
 
 @pytest.mark.parametrize(
