@@ -116,6 +116,8 @@ class Surfaces:
         )
 
         self.curved = is_curved(self.slave) or is_curved(self.master)
+        rigid = pair.master[0] not in system.names
+        self._round_tool = rigid and self.master.thickness is None and is_curved(self.master)
         bodies = [system.model.body(name) for name, _ in (pair.slave, pair.master)]
         self._overlap = largest_overlap(*bodies)
         narrow = [float(body.box.min()) for body in bodies]
@@ -224,7 +226,8 @@ class Surfaces:
             partner = _Partner(master.X, master, on_slave(slave.X), n, self._overlap)
         if self.pair.presence is not None and not load_factor(self.pair.presence, state.time):
             true.faces, partner.faces = 0 * true.faces, 0 * partner.faces  # an absent pair
-        t = np.stack([-n[1], n[0]])
+        push = partner.inward(xm) if self.finite and self._round_tool else n
+        t = np.stack([-push[1], push[0]])
         apart = partner.of(xm) - on_slave(xs)
         moved = on_slave(xs - xs0) - partner.of(xm - xm0)
         since = on_slave(xs - slave.X) - partner.of(xm - master.X)
@@ -246,7 +249,7 @@ class Surfaces:
         area = total(partner.faces)
         safe = np.where(area > 0, area, 1.0)
         pressure, shear = ((hats * (f / safe)[ends]).sum(axis=0) for f in (normal, tangential))
-        force = partner.faces * (-pressure * n + shear * t)
+        force = partner.faces * (-pressure * push + shear * t)
         true_gap = true.distance(on_slave(xs))
         factor = load_factor(self.pair.amplitude, state.time)
         offset = self.pair.gap - factor * self.pair.interference
@@ -371,6 +374,12 @@ class _Partner:
     def distance(self, points: Array) -> Array:
         """Return the signed distance (n,) from the points to the intersections [mm]."""
         return np.asarray(((self.point - points) * self.way).sum(axis=0))
+
+    def inward(self, x: Array) -> Array:
+        """Return the unit normals (2, n) of the surface at the intersections, into its body."""
+        slope = shape_derivatives(self.eta, self.nodes.shape[1])
+        t = (x[:, self.nodes] * slope).sum(axis=-1)
+        return np.stack([-t[1], t[0]]) / np.linalg.norm(t, axis=0)
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -44,6 +44,7 @@ class Points:
     edge, partner : (n,) their edges of the slave and of the master
     xi, eta : (n,) their places on these edges
     normal : (2, n) normals of the slave
+    push : (2, n) directions of the normal forces on the master
     distance : (n,) distance of the surfaces along them [mm]
     shares : (n, 2) weights in the means under the hats of the two vertices of the edge
     """
@@ -54,6 +55,7 @@ class Points:
     xi: Array
     eta: Array
     normal: Array
+    push: Array
     distance: Array
     shares: Array
 
@@ -73,8 +75,8 @@ class Pairing:
     gap : (n,) mean gap under the hat, negative where the bodies overlap [mm]; inf where
         no master faces the vertex
     normal, tangent : pairs ``(slave, master)`` of rows (n, 2 n_nodes) of gap and of slip (slave
-        relative to master along the surface) on the surfaces' unknowns, along the slave's normals,
-        as the forces act
+        relative to master along the surface) on the surfaces' unknowns, as the forces act: along
+        the slave's normals, or those of the master
     closing : the derivatives of the gap, rows as ``normal`` along the master's normals. The two
         differ where the hat of a curved body is wider than the contact: a round body that rotates
         changes its gaps
@@ -239,11 +241,13 @@ def pair(
     reach: float = np.inf,
     *,
     tied: bool = False,
+    along_master: bool = False,
 ) -> Pairing:
     """Pair two surfaces displaced by ``slave_u`` and ``master_u`` (2, n_nodes) [mm].
 
     A master more than ``reach`` [mm] behind the slave does not face it. If ``tied``, ``normal`` and
-    ``tangent`` have the displacement of the master relative to the slave along x and y.
+    ``tangent`` have the displacement of the master relative to the slave along x and y. If
+    ``along_master``, forces act along the master's normals, else along the slave's.
     """
     xs, xm = slave.X + slave_u, master.X + master_u
     own, its = _powers(xs, slave), _powers(xm, master)
@@ -269,13 +273,14 @@ def pair(
     else:
         x, y = _value(_slopes(its), eta)
         facing_master = np.stack([-y, x]) / (n[1] * x - n[0] * y)
-        ways = np.stack([n, [n[1], -n[0]], facing_master])
+        push = facing_master / np.hypot(*facing_master) if along_master else n
+        ways = np.stack([push, [push[1], -push[0]], facing_master])
     areas = [
         weight * _area_per_xi(slave, powers[..., each], at)
         for powers in (_powers(slave.X, slave), own)
     ]
     return _integrate(
-        slave, master, (xs, xm), edge, partner, at, eta, ways, distance, weight, areas
+        slave, master, (xs, xm), edge, partner, at, eta, n, ways, distance, weight, areas
     )
 
 
@@ -287,6 +292,7 @@ def _integrate(
     partner: Ints,
     xi: Array,
     eta: Array,
+    normal: Array,
     ways: Array,
     distance: Array,
     weight: Array,
@@ -340,7 +346,8 @@ def _integrate(
             partner=np.repeat(partner, points[1]),
             xi=xi.ravel(),
             eta=eta.ravel(),
-            normal=ways[0].reshape(2, -1),
+            normal=normal,
+            push=ways[0].reshape(2, -1),
             distance=distance.ravel(),
             shares=means.transpose(1, 2, 0).reshape(-1, 2),
         ),

@@ -28,7 +28,10 @@ class Interface:
 
     ``hot`` is the thermal softening of slave and master; ``reach`` the largest overlap [mm] at
     which surfaces still face each other; ``reference`` the pairing before loading, which small
-    sliding keeps.
+    sliding keeps. ``along_master`` says that forces act along the master's normals. Those of a
+    curved rigid body are exact, those of a surface that bends around it are not: forces along them
+    work as the body slides. Along the slave's normals, a force and its reaction have one line of
+    action, which an axisymmetric body does not need.
     """
 
     declared: ContactPair
@@ -40,6 +43,7 @@ class Interface:
     parts: tuple[Part, Part]
     reach: float
     reference: Pairing | None
+    along_master: bool
 
     @property
     def rough(self) -> bool:
@@ -114,7 +118,10 @@ class Interface:
             )
             known = self.reference
             return replace(known, gap=known.gap + change, closing=known.normal)
-        return pair(self.slave_surface, motions[0], self.master_surface, motions[1], self.reach)
+        return pair(
+            self.slave_surface, motions[0], self.master_surface, motions[1], self.reach,
+            along_master=self.along_master,
+        )  # fmt: skip
 
 
 def _mean(rows: Array, values: Array) -> Array:
@@ -206,7 +213,13 @@ def interface_of(
         parts=both,
         reach=reach,
         reference=reference if small else None,
+        along_master=_round_tool(both[1], master_surface),
     )
+
+
+def _round_tool(part: Part, surface: Surface) -> bool:
+    """Whether a surface is that of a rigid body of revolution, and its normal changes along it."""
+    return isinstance(part, RigidPart) and surface.thickness is None and is_curved(surface)
 
 
 def _hot(part: Part, surface: Surface) -> Softening | None:

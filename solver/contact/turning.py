@@ -1,11 +1,11 @@
 """How contact forces turn and move with the surfaces that they act on.
 
-At a point of the slave with the normal n and the tangent t, the forces N and T of contact push
-with ``p = N n + T t`` on the master, and with -p on the slave. If the normal turns by theta, p
-changes by ``(T n - N t) theta``; if the point that it meets moves by d eta along the edge of the
-master, the shape functions of the master change. Both are linear in the displacements of the
-surfaces. Without them Newton's method converges like a geometric series, the slower the larger the
-forces are.
+At a point of the slave, the forces N and T of contact push with ``p = N n + T t`` on the master,
+and with -p on the slave; n is the normal of the slave, or that of the master reversed. If it turns
+by theta, p changes by ``(T n - N t) theta``; if the point that it meets moves by d eta along the
+edge of the master, the shape functions of the master change. Both are linear in the displacements
+of the surfaces. Without them Newton's method converges like a geometric series, the slower the
+larger the forces are.
 """
 
 from __future__ import annotations
@@ -156,6 +156,13 @@ def turning(pairing: Pairing, interface: Interface, contact: ContactState) -> tu
     across -= at.distance[acts, None, None] * turn
     tx, ty = (at.x[1][:, other] * slopes).sum(axis=-1)
     across /= (y * tx - x * ty)[:, None, None]
+    if interface.along_master:
+        bend = np.diff(shape_derivatives(np.array([0.0, 1.0]), other.shape[1]), axis=0)[0]
+        bx, by = at.x[1][:, other] @ bend
+        turn[:] = across * (tx * by - ty * bx)[:, None, None]
+        turn[:, 3 * k :] += slopes[:, :, None] * np.stack([-ty, tx], axis=1)[:, None]
+        turn /= (tx**2 + ty**2)[:, None, None]
+        x, y = at.push[:, acts]
     turned, push = (
         np.stack([T * x - N * y, T * y + N * x]),
         np.stack([N * x + T * y, N * y - T * x]),

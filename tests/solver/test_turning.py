@@ -44,19 +44,25 @@ def standing(pressure: float, element: str = "quad4", **sides: Any) -> Model:
     return Model(bodies=(block, base), contacts=(ContactPair(friction=0.5, **pairs),))
 
 
+@pytest.mark.parametrize("along_master", [False, True])
 @pytest.mark.parametrize("element", ["quad4", "quad8"])
-def test_forces_turn_with_the_surfaces_as_their_differences_do(element: str) -> None:
+def test_forces_turn_with_the_surfaces_as_their_differences_do(
+    element: str, along_master: bool
+) -> None:
     system, rng = System(standing(1.0, element)), np.random.default_rng(7)
-    (interface,) = system.interfaces
+    (interface,) = (replace(each, along_master=along_master) for each in system.interfaces)
     slave, master = interface.slave_surface, interface.master_surface
     n, cut = len(slave.vertices), slave.X.size
     at = 2e-3 * rng.standard_normal(cut + master.X.size)
+    if along_master:  # a surface without kinks, where the forces would jump
+        x = master.X[0]
+        at[cut:] = np.stack([0 * x, 0.01 * x + 0.02 * x**2 * (element == "quad8")]).T.ravel()
     zero = ContactState.at_rest(np.zeros(n), np.ones(n, dtype=bool), finite=True, before=None)
     contact = replace(zero, normal=rng.random(n), tangential=rng.standard_normal(n))
 
     def forces(u: Array) -> tuple[Array, Pairing]:
         own, other = (of.reshape(-1, 2).T for of in np.split(u, [cut]))
-        found = pair(slave, own, master, other)
+        found = pair(slave, own, master, other, along_master=along_master)
         both = zip(found.normal, found.tangent, strict=True)
         each = [contact.normal @ normal + contact.tangential @ along for normal, along in both]
         return np.concatenate(each), found

@@ -324,6 +324,20 @@ def test_the_scene_of_the_neck_has_the_force_and_the_radius_of_that_bar() -> Non
     assert 6.413 + record.scalars["neck"] == pytest.approx(4.995, rel=0.015)
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_a_mandrel_moves_through_a_hole_and_the_work_of_its_force_is_found_again(
+    friction: float,
+) -> None:
+    """Forces along the normals of the hole, not of the mandrel, lose a sixth of it."""
+    scene = read_scene(ROOT / "data/scenes/mandrel.toml")
+    own = scene.parameters(friction=friction, size=0.5)
+    (record,) = scene.path(own, [0.0], lambda done: None)
+    assert record.status is Status.OK, record.message
+    assert record.scalars["audit_energy"] < 0.01
+    assert 0.5 * 0.12 < record.scalars["widened"] < 1.2 * 0.12
+    assert record.scalars["hoop_at_hole"] < -320.0
+
+
 @pytest.mark.parametrize(
     "law",
     [
