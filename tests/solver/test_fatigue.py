@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ from solver.fatigue import (
     t_gamma,
 )
 from solver.fatigue.kernels import balls, resolve
-from solver.fatigue.planes import OnPlanes, _climbed, _hemisphere, critical_planes
+from solver.fatigue.planes import _FULL, OnPlanes, _climbed, _hemisphere, critical_planes
 from solver.tensors import _PLACES
 from solver.typing import Array
 
@@ -225,6 +225,94 @@ def test_no_plane_is_worse_than_the_critical_one(kind: str) -> None:
     np.testing.assert_allclose(criterion.assess(paths).value, best, rtol=1e-12)
 
 
+def barely_opened(share: float) -> Paths:
+    """Return paths whose largest principal stress is a share of the range of principal stress."""
+    stress = paths_of("out of phase", 40)
+    values = np.linalg.eigvalsh(stress[..., _FULL])
+    size = np.ptp(values.reshape(len(stress), -1), axis=1)
+    stress[..., :3] += (share * size - values.max(axis=(1, 2)))[:, None, None]
+    return elastic(stress)
+
+
+def densely(stress: Array, strain: Array) -> float:
+    """Return the largest Smith-Watson-Topper parameter of a path, from many planes by trial.
+
+    Planes are those of a hemisphere and of the largest principal stress at each instant; the best
+    four move to the best of eight planes around them, at distances that are halved.
+    """
+    full, other = stress[:, _FULL], strain[:, _FULL]
+
+    def value(normals: Array) -> Array:
+        normal, across = (((each @ normals.T) * normals.T).sum(axis=1) for each in (full, other))
+        return np.asarray(np.maximum(normal.max(axis=0), 0.0) * np.ptp(across, axis=0) / 2)
+
+    normals = np.concatenate([_hemisphere(300), np.linalg.eigh(full)[1][:, :, 2]])
+    best = value(normals)
+    normals, best = normals[np.argsort(-best)[:4]], np.sort(best)[:-5:-1]
+    step, angle = 0.05, np.arange(8) * np.pi / 4
+    while step > 1e-6:
+        first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+        second = np.cross(normals, first)
+        around = np.cos(angle)[:, None] * first[:, None] + np.sin(angle)[:, None] * second[:, None]
+        moved = normals[:, None] + step * around
+        moved /= np.linalg.norm(moved, axis=2)[..., None]
+        values = value(moved.reshape(-1, 3)).reshape(4, 8)
+        k = values.argmax(axis=1)
+        higher = values.max(axis=1) > best
+        normals[higher], best[higher] = moved[higher, k[higher]], values.max(axis=1)[higher]
+        step /= 1 if higher.any() else 2
+    return float(best.max())
+
+
+@pytest.mark.parametrize("share", [0.02, 0.005, 0.001])
+def test_tension_between_the_planes_of_the_scan_is_found(share: float) -> None:
+    """The planes in tension are within asin(sqrt(share)) of a direction: the scan misses many."""
+    paths = barely_opened(share)
+    assert paths.strain is not None
+    dense = [densely(*each) for each in zip(paths.stress, paths.strain, strict=True)]
+    value = SmithWatsonTopper().assess(paths).value
+    assert (value > 0).all() and (value >= np.array(dense) * (1 - 1e-9)).all()
+
+
+CURVED: dict[str, Callable[[OnPlanes], Array]] = {
+    "root of shear": lambda on: np.sqrt(on.shear),
+    "root of a product": lambda on: np.sqrt(np.maximum(on.normal, 0.0) * on.strain_half * 2e5),
+    "powers": lambda on: np.maximum(on.normal, 0.0) ** 0.25 * on.shear**0.75,
+    "a high power": lambda on: np.maximum(on.normal, 0.0) ** 8 + on.shear**8,
+    "logarithm": lambda on: np.log1p(on.shear / 100) + np.log1p(on.normal_half / 100),
+}
+
+
+@pytest.mark.parametrize("kind", ["in phase", "few instants", "out of phase"])
+@pytest.mark.parametrize("form", CURVED)
+def test_a_criterion_may_curve_either_way(form: str, kind: str) -> None:
+    """No plane of many is worse, and what acts is that on the plane reported."""
+    paths, criterion = elastic(paths_of(kind)), CURVED[form]
+    found, points, circles = critical_planes(paths, criterion), np.arange(60), np.array([1, 1])
+    most = np.zeros(60)
+    for plane in _hemisphere(800):
+        acting = resolve(paths.turned, points, np.tile(plane, (60, 1)), circles)
+        most = np.maximum(most, criterion(OnPlanes(*acting)))
+    value = criterion(found.on)
+    assert (value >= most).all()
+    acting = resolve(paths.turned, points, found.normal, circles)
+    np.testing.assert_allclose(value, criterion(OnPlanes(*acting)), rtol=1e-12)
+
+
+@pytest.mark.parametrize("modulus", [1.0, 1e2, 1e6])
+def test_units_of_stress_and_strain_change_nothing(modulus: float) -> None:
+    """A curved criterion of both, of strain that is much larger or smaller than stress."""
+    paths = elastic(paths_of("few instants"))
+    assert paths.strain is not None
+
+    def criterion(on: OnPlanes) -> Array:
+        return np.sqrt(np.maximum(on.normal, 0.0) * on.strain_half)
+
+    other = Paths(1e-3 * paths.stress, 200e3 / modulus * paths.strain)
+    value, scaled = (criterion(critical_planes(each, criterion).on) for each in (paths, other))
+    np.testing.assert_allclose(scaled, value * np.sqrt(200 / modulus), rtol=1e-12)
+
+
 @pytest.mark.parametrize("turn", [0.0, 15.0, 45.0])
 def test_a_triangle_of_shear_is_as_bad_as_its_circle(turn: float) -> None:
     """The scan sees .8365 of it at 15 degrees: less than of a smaller straight path elsewhere."""
@@ -278,6 +366,17 @@ def test_mistakes_name_their_field() -> None:
         with pytest.raises(ModelError) as error:
             make()
         assert error.value.field == field
+
+
+def test_a_criterion_that_cannot_be_searched_is_refused() -> None:
+    still, pulled = Paths(np.zeros((1, 2, 6))), Paths(PULLED.stress)
+    with np.errstate(divide="ignore"), pytest.raises(ModelError, match="must be finite"):
+        critical_planes(still, lambda on: np.log(on.shear))
+    with pytest.raises(ModelError, match="must not fall where `normal_half` rises"):
+        critical_planes(pulled, lambda on: on.normal - on.normal_half)
+
+
+def test_criteria_have_words() -> None:
     assert set(CRITERIA) >= {"dang_van", "crossland", "findley", "matake", "fatemi_socie"}
 
 
