@@ -180,11 +180,12 @@ def balls(x: Array) -> tuple[Array, Array]:
 
 
 @njit((_STEPS, float64), cache=True)
-def simplified(paths: Array, share: float) -> tuple[Array, Ints]:
-    """Return paths of fewer instants near the given ones, and the number of instants of each.
+def simplified(paths: Array, share: float) -> tuple[Array, Ints, Array, Array]:
+    """Return paths of fewer instants, the number of instants of each, their sizes and lengths.
 
-    Every instant that is left out is nearer to the line between those before and after it than a
-    share of the size of the path: the components on planes change by no more.
+    The size of a path is the largest distance of an instant from the first; its length is the
+    largest norm. Every instant that is left out is nearer to the line between those before and
+    after it than a share of the size: the components on planes change by no more.
 
     Parameters
     ----------
@@ -193,14 +194,17 @@ def simplified(paths: Array, share: float) -> tuple[Array, Ints]:
     n_points, _, n = paths.shape
     made: Any = np.empty(paths.shape, dtype=np.float32)
     counts = np.empty(n_points, dtype=np.int64)
+    sizes, lengths = np.empty(n_points), np.empty(n_points)
     for point in range(n_points):
         x, count, last = paths[point], 1, 0
-        size = 0.0
+        size = length = 0.0
         for t in range(n):
-            own = 0.0
+            own = whole = 0.0
             for a in range(6):
                 own += (2.0 if a > 2 else 1.0) * (x[a, t] - x[a, 0]) ** 2
-            size = max(size, own)
+                whole += (2.0 if a > 2 else 1.0) * x[a, t] ** 2
+            size, length = max(size, own), max(length, whole)
+        sizes[point], lengths[point] = math.sqrt(size), math.sqrt(length)
         made[point, :, 0] = x[:, 0]
         for t in range(2, n + 1):
             far = t == n or t - last > _LONGEST
@@ -219,7 +223,7 @@ def simplified(paths: Array, share: float) -> tuple[Array, Ints]:
                 made[point, :, count] = x[:, last]
                 count += 1
         counts[point] = count
-    return made, counts
+    return made, counts, sizes, lengths
 
 
 _COSINES = tuple(math.cos(math.radians(30.0 * j)) for j in range(6))

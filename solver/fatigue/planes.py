@@ -57,7 +57,7 @@ _SAME = 1e-9
 """Relative difference of values that are equal."""
 _FULL = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 """Components of a tensor as a matrix."""
-_AT_ONCE = 1000
+_AT_ONCE = 300
 """Number of points that are scanned together."""
 
 
@@ -102,7 +102,7 @@ def _hemisphere(count: int) -> Array:
 
 
 _NORMALS = _hemisphere(_PLANES)
-_AROUND = np.argsort(-np.abs(_NORMALS @ _NORMALS.T), axis=1)[:, :_NEIGHBOURS]
+_AROUND = np.argsort(-np.abs(_NORMALS @ _NORMALS.T), axis=1)[:, 1:_NEIGHBOURS].T
 
 
 def critical_planes(paths: Paths, search: Value, value: Value | None = None) -> Critical:
@@ -118,11 +118,12 @@ def critical_planes(paths: Paths, search: Value, value: Value | None = None) -> 
     value = value or search
     kinds = [own for own in (paths.stress, paths.strain) if own is not None]
     used = _used(kinds, search) | _used(kinds, value)
-    kinds, circles = kinds[: 1 + used[1:].any()], used[:, 0].astype(np.int64)
+    used = used[: 1 + used[1:].any()]
+    kinds = kinds[: len(used)]
     each = []
     for k in range(0, len(paths), _AT_ONCE):
         some = np.stack([own[k : k + _AT_ONCE] for own in kinds], axis=1).swapaxes(2, 3)
-        each.append(_critical(np.ascontiguousarray(some), circles[: len(kinds)], search, value))
+        each.append(_critical(np.ascontiguousarray(some), used, search, value))
     normals, ons = zip(*each, strict=True)
     return Critical(np.concatenate(normals), OnPlanes(*map(np.concatenate, zip(*ons, strict=True))))
 
@@ -132,16 +133,17 @@ def _axes(paths: Array) -> Array:
 
     They are the principal axes of the sum of its squares; signs follow from its mean in time.
     """
-    full = paths[:, 0][:, _FULL]
-    flat = full.reshape(len(full), 3, -1)
-    _, axes = np.linalg.eigh(flat @ flat.swapaxes(1, 2))
-    late = axes.swapaxes(1, 2) @ (full @ np.arange(1.0, full.shape[3] + 1)) @ axes
+    x = paths[:, 0]
+    products = x @ x.swapaxes(1, 2)
+    _, axes = np.linalg.eigh(products[:, _FULL[:, :, None], _FULL].sum(axis=2))
+    late = (x @ np.arange(1.0, x.shape[2] + 1))[:, _FULL]
+    late = axes.swapaxes(1, 2) @ late @ axes
     axes[:, :, 1:] *= np.where(late[:, :1, 1:] < 0, -1.0, 1.0)
     return np.asarray(axes)
 
 
-def _critical(given: Array, circles: Ints, search: Value, value: Value) -> Critical:
-    axes = _axes(given)
+def _critical(given: Array, used: Bools, search: Value, value: Value) -> Critical:
+    axes, circles = _axes(given), used[:, 0].astype(np.int64)
     i, j = np.array(_PLACES).T
     first, second = axes[:, i].swapaxes(1, 2), axes[:, j].swapaxes(1, 2)  # (n, axis, component)
     turn = first[:, i] * second[:, j] + np.where(i == j, 0.0, 1.0) * second[:, i] * first[:, j]
@@ -151,7 +153,7 @@ def _critical(given: Array, circles: Ints, search: Value, value: Value) -> Criti
     found, most = search(OnPlanes(*low)), search(OnPlanes(*high))
     top = found.argmax(axis=1)
     values = _resolve(paths, every, _NORMALS[top], circles)
-    weights, curves = _derivatives(search, values)
+    weights, curves = _derivatives(search, values, used)
     _check(search, values, weights)
     falls = (weights + np.einsum("nkm,mn->nk", np.abs(curves), sizes) / 2).T * sizes
     falls = _FALLS * falls.sum(axis=0)
@@ -163,8 +165,9 @@ def _critical(given: Array, circles: Ints, search: Value, value: Value) -> Criti
     found[:] = -np.inf
     found[points, starts] = exact
     least = found.max(axis=1) - falls
-    near = found >= np.maximum(found[:, _AROUND].max(axis=2), least[:, None])
-    near = near[points, starts] & ((exact != 0.0) | (starts == top[points]))
+    near = (exact >= least[points]) & ((exact != 0.0) | (starts == top[points]))
+    for beside in _AROUND:
+        near &= exact >= found[points, beside[starts]]
     normal = _NORMALS[starts]
     flat = np.unique(points[exact == 0.0])
     flat = flat[search(OnPlanes(*(np.stack(high).max(axis=2) + _FALLS * sizes)[:, flat])) > 0.0]
@@ -181,7 +184,7 @@ def _critical(given: Array, circles: Ints, search: Value, value: Value) -> Criti
     near = near[np.lexsort((-exact[near], points[near]))]
     points = points[near]
     values = np.ascontiguousarray(values[:, near])
-    normal, values = _climbed(paths, points, search, circles, normal[near], values, falls[points])
+    normal, values = _climbed(paths, points, search, used, normal[near], values, falls[points])
     on, top = OnPlanes(*values), np.full(len(found), -np.inf)
     best = search(on)
     np.maximum.at(top, points, best)
@@ -240,13 +243,10 @@ def _bounds(paths: Array, circles: Ints) -> tuple[list[Array], list[Array], Arra
     high: list[Array] = []
     sizes: list[Array] = []
     for k, circle in enumerate(circles):
-        simple = _simplified(np.ascontiguousarray(paths[:, k]), _SIMPLE)
-        shear, normal, half = _scan(*simple, _NORMALS, circle)
+        made, counts, far, largest = _simplified(np.ascontiguousarray(paths[:, k]), _SIMPLE)
+        shear, normal, half = _scan(made, counts, _NORMALS, circle)
         # instants that were left out, and single precision
-        full = paths[:, k][:, _FULL]
-        apart = np.linalg.norm(full - full[..., :1], axis=(1, 2)).max(axis=1)
-        largest = np.linalg.norm(full, axis=(1, 2)).max(axis=1)
-        apart = (_SIMPLE * apart + _ROUNDED * largest)[:, None]
+        apart = (_SIMPLE * far + _ROUNDED * largest)[:, None]
         low += [shear[0], normal, half]
         high += [shear[1] + circle * apart, normal + apart, half + apart]
         most, widest = normal.max(axis=1), half.max(axis=1)
@@ -258,7 +258,7 @@ def _climbed(
     paths: Array,
     points: Ints,
     search: Value,
-    circles: Ints,
+    used: Bools,
     normal: Array,
     values: Array,
     falls: Array,
@@ -267,11 +267,11 @@ def _climbed(
 
     ``values`` (m, n) are what acts on those planes; the arrays given are overwritten.
     """
-    active = np.arange(len(points))
+    active, circles = np.arange(len(points)), used[:, 0].astype(np.int64)
     for _ in range(_ROUNDS):
         before = np.ascontiguousarray(values[:, active])
         was = search(OnPlanes(*before))
-        weights, curves = _derivatives(search, before)
+        weights, curves = _derivatives(search, before, used)
         reached, after = _climb(
             paths, points[active], normal[active], circles, was, falls[active], weights, curves
         )
@@ -286,10 +286,11 @@ def _climbed(
     return normal, values
 
 
-def _derivatives(search: Value, values: Array) -> tuple[Array, Array]:
+def _derivatives(search: Value, values: Array, used: Bools) -> tuple[Array, Array]:
     """Return first and second derivatives (n, m), (n, m, m) of a criterion by values (m, n).
 
-    A step is a share of a value and of the largest of its kind; no amplitude becomes negative.
+    They are zero by values that it does not use. A step is a share of a value and of the largest of
+    its kind; no amplitude becomes negative.
     """
     count = len(values)
     h = np.abs(values)
@@ -299,8 +300,9 @@ def _derivatives(search: Value, values: Array) -> tuple[Array, Array]:
     for k in (0, 2):
         values[k::3] = np.maximum(values[k::3], 2 * h[k::3])
     each = np.zeros((count, count, 4, values.shape[1]))
-    for k in range(count):
-        for m in range(k + 1):
+    read = np.flatnonzero(used).tolist()
+    for i, k in enumerate(read):
+        for m in read[: i + 1]:
             for place, (a, b) in enumerate(_SIGNS):
                 moved = values.copy()
                 moved[k] += a * h[k]
