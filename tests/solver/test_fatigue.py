@@ -428,9 +428,9 @@ def test_a_residual_compression_closes_a_crack_and_holds_it() -> None:
 
 
 def test_wear_and_fretting_are_integrals_over_a_cycle() -> None:
-    """100 MPa that slides .02 mm forth and back, with friction of .3."""
+    """100 MPa that slides .02 mm forth and back, with friction of .3 against it."""
     slip = np.array([[0.0], [0.02], [0.0]])
-    pressure, shear = np.full((3, 1), 100.0), 30 * np.array([[1.0], [1.0], [1.0]])
+    pressure, shear = np.full((3, 1), 100.0), 30 * np.array([[-1.0], [1.0], [-1.0]])
     assert archard_depth(pressure, slip, 1e-7)[0] == pytest.approx(1e-7 * 100 * 0.04)
     assert slip_work(shear, slip)[0] == pytest.approx(30 * 0.04)
     assert ruiz(np.array([[50.0], [-80.0], [0.0]]), shear, slip)[0] == pytest.approx(50 * 30 * 0.02)
