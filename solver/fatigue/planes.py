@@ -116,13 +116,12 @@ def critical_planes(paths: Paths, search: Value, value: Value | None = None) -> 
         if ``search`` is not finite, or falls where a value of what acts on a plane rises
     """
     value = value or search
-    kinds = [own for own in (paths.stress, paths.strain) if own is not None]
-    used = _used(kinds, search) | _used(kinds, value)
+    used = _used(paths.known, search) | _used(paths.known, value)
     used = used[: 1 + used[1:].any()]
-    kinds = kinds[: len(used)]
     each = []
     for k in range(0, len(paths), _AT_ONCE):
-        some = np.stack([own[k : k + _AT_ONCE] for own in kinds], axis=1).swapaxes(2, 3)
+        kinds = [own[k : k + _AT_ONCE] for own in paths.known[: len(used)]]
+        some = np.stack(kinds, axis=1).swapaxes(2, 3)
         each.append(_critical(np.ascontiguousarray(some), used, search, value))
     normals, ons = zip(*each, strict=True)
     return Critical(np.concatenate(normals), OnPlanes(*map(np.concatenate, zip(*ons, strict=True))))

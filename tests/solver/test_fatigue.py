@@ -57,6 +57,11 @@ def elastic(stress: Array) -> Paths:
     return Paths(stress, strain)
 
 
+def turned(paths: Paths) -> Array:
+    """Return paths (n, n_kinds, 6, n_instants) for kernels."""
+    return np.ascontiguousarray(np.stack(paths.known, axis=1).swapaxes(2, 3))
+
+
 def rotated(tensor: Array, turns: Array) -> Array:
     """Return tensors (n, n_instants, 6), each path turned by its matrix (n, 3, 3)."""
     full = np.empty((*tensor.shape[:2], 3, 3))
@@ -133,8 +138,8 @@ def paths_of(kind: str, count: int = 60) -> Array:
 @pytest.mark.parametrize("criterion", EVERY, ids=lambda each: type(each).__name__)
 def test_rotation_changes_nothing(criterion: Criterion, kind: str) -> None:
     stress = paths_of(kind)
-    turned = rotated(stress, Rotation.random(len(stress), random_state=3).as_matrix())
-    before, after = (criterion.assess(elastic(paths)).value for paths in (stress, turned))
+    other = rotated(stress, Rotation.random(len(stress), random_state=3).as_matrix())
+    before, after = (criterion.assess(elastic(paths)).value for paths in (stress, other))
     np.testing.assert_allclose(after, before, rtol=1e-12, atol=1e-12 * np.abs(before).max())
 
 
@@ -216,14 +221,14 @@ def test_hardly_a_plane_is_worse_than_the_critical_one(kind: str) -> None:
     used = np.array([[False, True, False], [True, False, False]])
     planes, values = _hemisphere(1000), np.empty((count, 1000))
     for k, plane in enumerate(planes):
-        found = resolve(paths.turned, points, np.tile(plane, (count, 1)), used[:, 0].astype(int))
+        found = resolve(turned(paths), points, np.tile(plane, (count, 1)), used[:, 0].astype(int))
         values[:, k] = criterion.on_plane(OnPlanes(*found))
     best = values.max(axis=1)
     for _ in range(4):
         start = planes[values.argmax(axis=1)]
-        found = resolve(paths.turned, points, start, used[:, 0].astype(int))
+        found = resolve(turned(paths), points, start, used[:, 0].astype(int))
         far = np.full(count, np.inf)
-        _, found = _climbed(paths.turned, points, criterion.on_plane, used, start, found, far)
+        _, found = _climbed(turned(paths), points, criterion.on_plane, used, start, found, far)
         best = np.maximum(best, criterion.on_plane(OnPlanes(*found)))
         values[np.abs(np.einsum("mj,nj->nm", planes, start)) > np.cos(0.05)] = -np.inf
     least = criterion.assess(paths).value / best
@@ -238,7 +243,7 @@ def test_the_plane_reported_is_that_of_the_value(criterion: PlaneCriterion) -> N
 
     def acting(normals: Array) -> OnPlanes:
         normals = normals / np.linalg.norm(normals, axis=1)[:, None]
-        return OnPlanes(*resolve(paths.turned, points, normals, circles))
+        return OnPlanes(*resolve(turned(paths), points, normals, circles))
 
     on = acting(found.plane)
     np.testing.assert_allclose(criterion.on_plane(on), found.value, rtol=1e-9)
@@ -314,11 +319,11 @@ def test_a_criterion_may_curve_either_way(form: str, kind: str) -> None:
     found, points, circles = critical_planes(paths, criterion), np.arange(60), np.array([1, 1])
     most = np.zeros(60)
     for plane in _hemisphere(800):
-        acting = resolve(paths.turned, points, np.tile(plane, (60, 1)), circles)
+        acting = resolve(turned(paths), points, np.tile(plane, (60, 1)), circles)
         most = np.maximum(most, criterion(OnPlanes(*acting)))
     value = criterion(found.on)
     assert (value >= most).all()
-    acting = resolve(paths.turned, points, found.normal, circles)
+    acting = resolve(turned(paths), points, found.normal, circles)
     np.testing.assert_allclose(value, criterion(OnPlanes(*acting)), rtol=1e-12)
 
 
