@@ -163,7 +163,7 @@ def _critical(given: Array, used: Bools, search: Value, value: Value) -> Critica
     exact = search(OnPlanes(*values))
     found[:] = -np.inf
     found[points, starts] = exact
-    least = found.max(axis=1) - falls
+    least, top = found.max(axis=1) - falls, found.argmax(axis=1)
     near = (exact >= least[points]) & ((exact != 0.0) | (starts == top[points]))
     for beside in _AROUND:
         near &= exact >= found[points, beside[starts]]

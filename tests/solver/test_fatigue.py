@@ -307,6 +307,7 @@ CURVED: dict[str, Callable[[OnPlanes], Array]] = {
     "root of a product": lambda on: np.sqrt(np.maximum(on.normal, 0.0) * on.strain_half * 2e5),
     "powers": lambda on: np.maximum(on.normal, 0.0) ** 0.25 * on.shear**0.75,
     "a high power": lambda on: np.maximum(on.normal, 0.0) ** 8 + on.shear**8,
+    "never positive": lambda on: np.minimum(on.normal - 150.0, 0.0),
     "logarithm": lambda on: np.log1p(on.shear / 100) + np.log1p(on.normal_half / 100),
 }
 
@@ -317,7 +318,7 @@ def test_a_criterion_may_curve_either_way(form: str, kind: str) -> None:
     """No plane of many is worse, and what acts is that on the plane reported."""
     paths, criterion = elastic(paths_of(kind)), CURVED[form]
     found, points, circles = critical_planes(paths, criterion), np.arange(60), np.array([1, 1])
-    most = np.zeros(60)
+    most = np.full(60, -np.inf)
     for plane in _hemisphere(800):
         acting = resolve(turned(paths), points, np.tile(plane, (60, 1)), circles)
         most = np.maximum(most, criterion(OnPlanes(*acting)))
