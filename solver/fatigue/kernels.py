@@ -180,11 +180,12 @@ def balls(x: Array) -> tuple[Array, Array]:
 
 
 @njit((_STEPS, float64), cache=True)
-def simplified(paths: Array, share: float) -> tuple[Array, Ints]:
-    """Return paths of fewer instants near the given ones, and the number of instants of each.
+def simplified(paths: Array, share: float) -> tuple[Array, Ints, Array, Array]:
+    """Return paths of fewer instants, the number of instants of each, their sizes and lengths.
 
-    Every instant that is left out is nearer to the line between those before and after it than a
-    share of the size of the path: the components on planes change by no more.
+    The size of a path is the largest distance of an instant from the first; its length is the
+    largest norm. Every instant that is left out is nearer to the line between those before and
+    after it than a share of the size: the components on planes change by no more.
 
     Parameters
     ----------
@@ -193,14 +194,17 @@ def simplified(paths: Array, share: float) -> tuple[Array, Ints]:
     n_points, _, n = paths.shape
     made: Any = np.empty(paths.shape, dtype=np.float32)
     counts = np.empty(n_points, dtype=np.int64)
+    sizes, lengths = np.empty(n_points), np.empty(n_points)
     for point in range(n_points):
         x, count, last = paths[point], 1, 0
-        size = 0.0
+        size = length = 0.0
         for t in range(n):
-            own = 0.0
+            own = whole = 0.0
             for a in range(6):
                 own += (2.0 if a > 2 else 1.0) * (x[a, t] - x[a, 0]) ** 2
-            size = max(size, own)
+                whole += (2.0 if a > 2 else 1.0) * x[a, t] ** 2
+            size, length = max(size, own), max(length, whole)
+        sizes[point], lengths[point] = math.sqrt(size), math.sqrt(length)
         made[point, :, 0] = x[:, 0]
         for t in range(2, n + 1):
             far = t == n or t - last > _LONGEST
@@ -219,7 +223,7 @@ def simplified(paths: Array, share: float) -> tuple[Array, Ints]:
                 made[point, :, count] = x[:, last]
                 count += 1
         counts[point] = count
-    return made, counts
+    return made, counts, sizes, lengths
 
 
 _COSINES = tuple(math.cos(math.radians(30.0 * j)) for j in range(6))
@@ -404,11 +408,24 @@ def _decided(
             active[k, 3 + i] = int(support[i])
 
 
+@njit(cache=True, inline="always")
+def _middle(p: float, q: float, g: float) -> tuple[float, float]:
+    """Return the shares of the last two of three points in the centre of the circle on them.
+
+    p and q are the squares of their distances from the first one, g is the product of these; of two
+    points q and g are zero.
+    """
+    det = p * q - g * g
+    if det <= 1e-14 * p * q:
+        return 0.5, 0.0
+    return q * (p - g) / (2 * det), p * (q - g) / (2 * det)
+
+
 @njit(cache=True)
 def _given(x: Array, k: int, a: Array, active: Ints, value: Array, slope: Array, T: Array) -> None:
     """Write what acts on a plane for given instants of a kind, and its slopes by the normal.
 
-    Of three instants the radius is that of the circle through them. `T` (6, 3) is overwritten.
+    Of three instants the radius is that of the circle through them. `T` (8, 3) is overwritten.
     """
     o = 3 * k
     high = _traction(x, k, active[k, 0], a, T[0])
@@ -420,20 +437,16 @@ def _given(x: Array, k: int, a: Array, active: Ints, value: Array, slope: Array,
     n = active[k, 2]
     if n < 2:
         return
+    across, moved = T[6], T[7]
     for i in range(n):
-        along = _traction(x, k, active[k, 3 + i], a, T[i])
+        across[i] = _traction(x, k, active[k, 3 + i], a, T[i])
         for j in range(3):
-            T[i, j] -= along * a[j]
+            T[i, j] -= across[i] * a[j]
     for j in range(3):
         T[3, j] = T[1, j] - T[0, j]
         T[4, j] = T[2, j] - T[0, j] if n == 3 else 0.0
     p, q, g = _dot(T[3], T[3]), _dot(T[4], T[4]), _dot(T[3], T[4])
-    u, v = 0.5, 0.0
-    if n == 3:
-        det = p * q - g * g
-        if det <= 1e-14 * p * q:
-            return
-        u, v = q * (p - g) / (2 * det), p * (q - g) / (2 * det)
+    u, v = _middle(p, q, g)
     radius = math.sqrt(max(u * u * p + v * v * q + 2 * u * v * g, 0.0))
     value[o] = radius
     if radius == 0.0:
@@ -444,20 +457,9 @@ def _given(x: Array, k: int, a: Array, active: Ints, value: Array, slope: Array,
         s = (1 - u - v if i == 0 else (u if i == 1 else v)) / radius
         for j in range(3):
             d[j] = T[i, j] - T[0, j] - u * T[3, j] - v * T[4, j]
-        along = (
-            a[0] * (x[k, 0, t] * a[0] + 2 * x[k, 3, t] * a[1])
-            + a[1] * (x[k, 1, t] * a[1] + 2 * x[k, 4, t] * a[2])
-            + a[2] * (x[k, 2, t] * a[2] + 2 * x[k, 5, t] * a[0])
-        )
-        slope[o, 0] += s * (
-            x[k, 0, t] * d[0] + x[k, 3, t] * d[1] + x[k, 5, t] * d[2] - along * d[0]
-        )
-        slope[o, 1] += s * (
-            x[k, 3, t] * d[0] + x[k, 1, t] * d[1] + x[k, 4, t] * d[2] - along * d[1]
-        )
-        slope[o, 2] += s * (
-            x[k, 5, t] * d[0] + x[k, 4, t] * d[1] + x[k, 2, t] * d[2] - along * d[2]
-        )
+        _traction(x, k, t, d, moved)
+        for j in range(3):
+            slope[o, j] += s * (moved[j] - across[i] * d[j])
     along = _dot(slope[o], a)
     for j in range(3):
         slope[o, j] -= along * a[j]
@@ -616,18 +618,24 @@ def _around(
     x: Array, k: int, a: Array, active: Ints, w: float, flat: Array, across: Array, work: Array,
     T: Array, scale: tuple[float, float], near: Array, count: int, little: float,
 ) -> int:  # fmt: skip
-    """Note the instants near a smallest circle: see `_rivals`. `T` (6, 3) is overwritten."""
+    """Note the instants near a smallest circle: see `_rivals`. `T` (8, 3) is overwritten."""
     b, c = work[0], work[1]
     cosine, sine = work[3, 0], work[3, 1]
     n = active[k, 2]
-    share, middle, moved = T[0], T[1], T[2:4]
-    _shares(flat, active[k], share)
+    share, middle, moved, room = T[0], T[1], T[2:4], T[6]
+    share[1], share[2] = 0.5, 0.0
+    if n == 3:
+        i, j, m = active[k, 3], active[k, 4], active[k, 5]
+        d, e = flat[0, j] - flat[0, i], flat[1, j] - flat[1, i]
+        u, v = flat[0, m] - flat[0, i], flat[1, m] - flat[1, i]
+        share[1], share[2] = _middle(d * d + e * e, u * u + v * v, d * u + e * v)
+    share[0] = 1 - share[1] - share[2]
     middle[:], moved[:] = 0.0, 0.0
     for i in range(n):
         t = active[k, 3 + i]
         for j in range(2):
             middle[j] += share[i] * flat[j, t]
-        s = _turning(x, k, t, b, c, across[t])
+        s = _turning(x, k, t, b, c, across[t], room)
         moved[0, 0] += share[i] * s[0]
         moved[0, 1] += share[i] * s[1]
         moved[1, 1] += share[i] * s[2]
@@ -637,7 +645,7 @@ def _around(
     for i in range(n):
         t = active[k, 3 + i]
         d, e = (flat[0, t] - middle[0]) / radius, (flat[1, t] - middle[1]) / radius
-        s = _turning(x, k, t, b, c, across[t])
+        s = _turning(x, k, t, b, c, across[t], room)
         own[0, i] = d * (s[0] - moved[0, 0]) + e * (s[1] - moved[0, 1])
         own[1, i] = d * (s[1] - moved[0, 1]) + e * (s[2] - moved[1, 1])
     for t in range(len(across)):
@@ -653,7 +661,7 @@ def _around(
                 side, most = i, along
         if t == active[k, 3 + side]:
             continue
-        s = _turning(x, k, t, b, c, across[t])
+        s = _turning(x, k, t, b, c, across[t], room)
         d, e = d / away, e / away
         u = d * (s[0] - moved[0, 0]) + e * (s[1] - moved[0, 1]) - own[0, side]
         v = d * (s[1] - moved[0, 1]) + e * (s[2] - moved[1, 1]) - own[1, side]
@@ -665,40 +673,12 @@ def _around(
 
 @njit(cache=True, inline="always")
 def _turning(
-    x: Array, k: int, t: int, b: Array, c: Array, along: float
+    x: Array, k: int, t: int, b: Array, c: Array, along: float, room: Array
 ) -> tuple[float, float, float]:
     """Return slopes of the shear along b by b, along b by c or c by b, and along c by c."""
-    xx, yy, zz = x[k, 0, t], x[k, 1, t], x[k, 2, t]
-    xy, yz, zx = x[k, 3, t], x[k, 4, t], x[k, 5, t]
-    u = xx * b[0] + xy * b[1] + zx * b[2]
-    v = xy * b[0] + yy * b[1] + yz * b[2]
-    w = zx * b[0] + yz * b[1] + zz * b[2]
-    bb, bc = u * b[0] + v * b[1] + w * b[2], u * c[0] + v * c[1] + w * c[2]
-    u = xx * c[0] + xy * c[1] + zx * c[2]
-    v = xy * c[0] + yy * c[1] + yz * c[2]
-    w = zx * c[0] + yz * c[1] + zz * c[2]
-    return bb - along, bc, u * c[0] + v * c[1] + w * c[2] - along
-
-
-@njit(cache=True)
-def _shares(flat: Array, active: Ints, share: Array) -> None:
-    """Write the shares of the support of a circle in its centre."""
-    share[0] = share[1] = 0.5
-    share[2] = 0.0
-    if active[2] < 3:
-        return
-    i, j, m = active[3], active[4], active[5]
-    total = 0.0
-    for k in range(3):
-        d, e = flat[0, j] - flat[0, m], flat[1, j] - flat[1, m]
-        f, g = flat[0, m] - flat[0, i], flat[1, m] - flat[1, i]
-        h, o = flat[0, i] - flat[0, j], flat[1, i] - flat[1, j]
-        # of the corner i: square of the opposite side times the cosine at i
-        share[k] = -(d * d + e * e) * (f * h + g * o)
-        total += share[k]
-        i, j, m = j, m, i
-    for k in range(3):
-        share[k] /= total
+    bb = _traction(x, k, t, b, room)
+    bc = _dot(room, c)
+    return bb - along, bc, _traction(x, k, t, c, room) - along
 
 
 @njit(cache=True)
@@ -913,7 +893,7 @@ def climb(
     start, value, kept = np.empty((3, size))
     a, trial = np.empty((2, 3))
     flat, across, ball = np.empty((2, n)), np.empty(n), np.empty((6, 8))
-    slope, work, T = np.empty((size, 3)), np.empty((6, 3)), np.empty((6, 3))
+    slope, work, T = np.empty((size, 3)), np.empty((6, 3)), np.empty((8, 3))
     room = flat, across, ball, slope, work, T, value, trial, new
     normals, values = np.empty((len(points), 3)), np.empty((size, len(points)))
     met, reached = np.empty((len(points), 3)), np.empty(len(points))

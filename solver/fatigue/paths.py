@@ -52,10 +52,6 @@ class Paths:
         """Return the number of points."""
         return len(self.stress)
 
-    def at(self, points: slice) -> Paths:
-        """Return the paths at some of the points."""
-        return Paths(self.stress[points], None if self.strain is None else self.strain[points])
-
     @property
     def pressure(self) -> Array:
         """Hydrostatic stress (n, n_instants), positive in tension [MPa]."""
@@ -77,7 +73,6 @@ class Paths:
         return np.asarray(_largest_shear(np.ascontiguousarray(moved.swapaxes(1, 2))))
 
     @property
-    def turned(self) -> Array:
-        """The paths (n, n_kinds, 6, n_instants) of stress and, if known, of strain, for kernels."""
-        known = [own for own in (self.stress, self.strain) if own is not None]
-        return np.ascontiguousarray(np.stack(known, axis=1).swapaxes(2, 3))
+    def known(self) -> list[Array]:
+        """The paths of stress and, if known, of strain."""
+        return [own for own in (self.stress, self.strain) if own is not None]

@@ -11,7 +11,10 @@
    taken as quadratic in what acts on a plane, and again at the plane found if it is not.
 3. The best of these planes; of planes with equal values the one with the largest second value.
 
-A criterion must not fall where a value of what acts on a plane rises.
+A criterion that is zero on closed planes has no slope there. Where it is zero on planes that may be
+the worst, 2 also starts from the planes of the largest principal stress at instants.
+
+A criterion must be finite, and must not fall where a value of what acts on a plane rises.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solver.errors import ModelError
 from solver.fatigue.paths import Paths
 from solver.late import late
 from solver.tensors import _PLACES
@@ -47,11 +51,13 @@ two are exact, and rounding matters little."""
 _ROUNDS, _EXACT = 5, 1e-11
 """Largest number of times that the criterion is taken as quadratic, and the relative difference
 from it at which it is."""
+_FALLING = 1e-6
+"""Largest fall of a criterion with a value, over its largest change, that is rounding."""
 _SAME = 1e-9
 """Relative difference of values that are equal."""
 _FULL = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 """Components of a tensor as a matrix."""
-_AT_ONCE = 1000
+_AT_ONCE = 300
 """Number of points that are scanned together."""
 
 
@@ -96,22 +102,27 @@ def _hemisphere(count: int) -> Array:
 
 
 _NORMALS = _hemisphere(_PLANES)
-_AROUND = np.argsort(-np.abs(_NORMALS @ _NORMALS.T), axis=1)[:, :_NEIGHBOURS]
+_AROUND = np.argsort(-np.abs(_NORMALS @ _NORMALS.T), axis=1)[:, 1:_NEIGHBOURS].T
 
 
 def critical_planes(paths: Paths, search: Value, value: Value | None = None) -> Critical:
     """Return the planes on which ``search`` is largest; of equal ones those of ``value``.
 
     Amplitudes of shear that neither of the two reads are not computed: they are 0.
+
+    Raises
+    ------
+    ModelError
+        if ``search`` is not finite, or falls where a value of what acts on a plane rises
     """
     value = value or search
-    kinds = [own for own in (paths.stress, paths.strain) if own is not None]
-    used = _used(kinds, search) | _used(kinds, value)
-    kinds, circles = kinds[: 1 + used[1:].any()], used[:, 0].astype(np.int64)
+    used = _used(paths.known, search) | _used(paths.known, value)
+    used = used[: 1 + used[1:].any()]
     each = []
     for k in range(0, len(paths), _AT_ONCE):
-        some = np.stack([own[k : k + _AT_ONCE] for own in kinds], axis=1).swapaxes(2, 3)
-        each.append(_critical(np.ascontiguousarray(some), circles[: len(kinds)], search, value))
+        kinds = [own[k : k + _AT_ONCE] for own in paths.known[: len(used)]]
+        some = np.stack(kinds, axis=1).swapaxes(2, 3)
+        each.append(_critical(np.ascontiguousarray(some), used, search, value))
     normals, ons = zip(*each, strict=True)
     return Critical(np.concatenate(normals), OnPlanes(*map(np.concatenate, zip(*ons, strict=True))))
 
@@ -121,16 +132,17 @@ def _axes(paths: Array) -> Array:
 
     They are the principal axes of the sum of its squares; signs follow from its mean in time.
     """
-    full = paths[:, 0][:, _FULL]
-    flat = full.reshape(len(full), 3, -1)
-    _, axes = np.linalg.eigh(flat @ flat.swapaxes(1, 2))
-    late = axes.swapaxes(1, 2) @ (full @ np.arange(1.0, full.shape[3] + 1)) @ axes
+    x = paths[:, 0]
+    products = x @ x.swapaxes(1, 2)
+    _, axes = np.linalg.eigh(products[:, _FULL[:, :, None], _FULL].sum(axis=2))
+    late = (x @ np.arange(1.0, x.shape[2] + 1))[:, _FULL]
+    late = axes.swapaxes(1, 2) @ late @ axes
     axes[:, :, 1:] *= np.where(late[:, :1, 1:] < 0, -1.0, 1.0)
     return np.asarray(axes)
 
 
-def _critical(given: Array, circles: Ints, search: Value, value: Value) -> Critical:
-    axes = _axes(given)
+def _critical(given: Array, used: Bools, search: Value, value: Value) -> Critical:
+    axes, circles = _axes(given), used[:, 0].astype(np.int64)
     i, j = np.array(_PLACES).T
     first, second = axes[:, i].swapaxes(1, 2), axes[:, j].swapaxes(1, 2)  # (n, axis, component)
     turn = first[:, i] * second[:, j] + np.where(i == j, 0.0, 1.0) * second[:, i] * first[:, j]
@@ -140,24 +152,38 @@ def _critical(given: Array, circles: Ints, search: Value, value: Value) -> Criti
     found, most = search(OnPlanes(*low)), search(OnPlanes(*high))
     top = found.argmax(axis=1)
     values = _resolve(paths, every, _NORMALS[top], circles)
-    weights, curves = _derivatives(search, values)
-    falls = (weights + np.einsum("nkm,mn->nk", curves, sizes) / 2).T * sizes
+    weights, curves = _derivatives(search, values, used)
+    _check(search, values, weights)
+    falls = (weights + np.einsum("nkm,mn->nk", np.abs(curves), sizes) / 2).T * sizes
     falls = _FALLS * falls.sum(axis=0)
     least = search(OnPlanes(*values)) - falls
     most[every, top] = np.inf  # single precision may round by more than the maximum falls
-    points, starts = map(np.ascontiguousarray, np.nonzero(most >= least[:, None]))
+    points, starts = map(np.ascontiguousarray, np.nonzero(most > least[:, None]))
     values = _resolve(paths, points, _NORMALS[starts], circles)
     exact = search(OnPlanes(*values))
     found[:] = -np.inf
     found[points, starts] = exact
-    least = found.max(axis=1) - falls
-    near = found >= np.maximum(found[:, _AROUND].max(axis=2), least[:, None])
-    near = np.flatnonzero(near[points, starts])
+    least, top = found.max(axis=1) - falls, found.argmax(axis=1)
+    near = (exact >= least[points]) & ((exact != 0.0) | (starts == top[points]))
+    for beside in _AROUND:
+        near &= exact >= found[points, beside[starts]]
+    normal = _NORMALS[starts]
+    flat = np.unique(points[exact == 0.0])
+    flat = flat[search(OnPlanes(*(np.stack(high).max(axis=2) + _FALLS * sizes)[:, flat])) > 0.0]
+    if flat.size:
+        more, opened = _opened(paths, flat)
+        acting = _resolve(paths, more, opened, circles)
+        also = search(OnPlanes(*acting))
+        course = also.reshape(len(flat), -1)
+        before, after = np.roll(course, 1, axis=1), np.roll(course, -1, axis=1)
+        near = np.append(near, (course > 0) & (course >= np.maximum(before, after)))
+        points, exact = np.append(points, more), np.append(exact, also)
+        normal, values = np.append(normal, opened, axis=0), np.append(values, acting, axis=1)
+    near = np.flatnonzero(near)
     near = near[np.lexsort((-exact[near], points[near]))]
     points = points[near]
-    normal, values = _climbed(
-        paths, points, search, circles, _NORMALS[starts[near]], values[:, near], falls[points]
-    )
+    values = np.ascontiguousarray(values[:, near])
+    normal, values = _climbed(paths, points, search, used, normal[near], values, falls[points])
     on, top = OnPlanes(*values), np.full(len(found), -np.inf)
     best = search(on)
     np.maximum.at(top, points, best)
@@ -170,10 +196,35 @@ def _critical(given: Array, circles: Ints, search: Value, value: Value) -> Criti
     return Critical(normal, OnPlanes(*(own[chosen] if own.size else own for own in on)))
 
 
+def _opened(paths: Array, points: Ints) -> tuple[Ints, Array]:
+    """Return the planes (n, 3) of the largest principal stress at all instants of some points."""
+    full = paths[points, 0][:, _FULL].transpose(0, 3, 1, 2)
+    normals = np.linalg.eigh(full)[1][..., 2]
+    return np.repeat(points, normals.shape[1]), np.ascontiguousarray(normals.reshape(-1, 3))
+
+
+def _check(search: Value, values: Array, weights: Array) -> None:
+    """Refuse a criterion that is not finite, or that falls where a value rises.
+
+    ``weights`` (n, m) are its derivatives by what acts on planes, ``values`` (m, n).
+    """
+    name = getattr(search, "__qualname__", type(search).__name__)
+    found = search(OnPlanes(*values))
+    if not (np.isfinite(found).all() and np.isfinite(weights).all()):
+        allowed = "must be finite for all amplitudes from zero and all normal stresses"
+        raise ModelError("criterion", name, allowed)
+    changes = weights.T * np.abs(values)
+    falling = (changes < -_FALLING * np.abs(changes).max(axis=0)).any(axis=1)
+    if falling.any():
+        rising = OnPlanes._fields[int(falling.argmax())]
+        raise ModelError("criterion", name, f"must not fall where `{rising}` rises")
+
+
 def _used(kinds: list[Array], search: Value) -> Bools:
     """Return which values on planes (n_kinds, 3) a criterion reads."""
     size = np.repeat([max(own.max(), -own.min(), 1e-100) for own in kinds], 3)
-    values = np.array([1.0, -1.0, 0.1, 10.0]) * size[:, None]
+    values = np.array([1.0, 1.0, 0.1, 10.0]) * size[:, None]
+    values[1::3, 1] *= -1
     before, used = search(OnPlanes(*values)), np.empty(len(size), dtype=bool)
     for k in range(len(size)):
         moved = values.copy()
@@ -191,13 +242,10 @@ def _bounds(paths: Array, circles: Ints) -> tuple[list[Array], list[Array], Arra
     high: list[Array] = []
     sizes: list[Array] = []
     for k, circle in enumerate(circles):
-        simple = _simplified(np.ascontiguousarray(paths[:, k]), _SIMPLE)
-        shear, normal, half = _scan(*simple, _NORMALS, circle)
+        made, counts, far, largest = _simplified(np.ascontiguousarray(paths[:, k]), _SIMPLE)
+        shear, normal, half = _scan(made, counts, _NORMALS, circle)
         # instants that were left out, and single precision
-        full = paths[:, k][:, _FULL]
-        apart = np.linalg.norm(full - full[..., :1], axis=(1, 2)).max(axis=1)
-        largest = np.linalg.norm(full, axis=(1, 2)).max(axis=1)
-        apart = (_SIMPLE * apart + _ROUNDED * largest)[:, None]
+        apart = (_SIMPLE * far + _ROUNDED * largest)[:, None]
         low += [shear[0], normal, half]
         high += [shear[1] + circle * apart, normal + apart, half + apart]
         most, widest = normal.max(axis=1), half.max(axis=1)
@@ -209,7 +257,7 @@ def _climbed(
     paths: Array,
     points: Ints,
     search: Value,
-    circles: Ints,
+    used: Bools,
     normal: Array,
     values: Array,
     falls: Array,
@@ -218,30 +266,42 @@ def _climbed(
 
     ``values`` (m, n) are what acts on those planes; the arrays given are overwritten.
     """
-    active = np.arange(len(points))
+    active, circles = np.arange(len(points)), used[:, 0].astype(np.int64)
     for _ in range(_ROUNDS):
         before = np.ascontiguousarray(values[:, active])
         was = search(OnPlanes(*before))
-        weights, curves = _derivatives(search, before)
-        normal[active], values[:, active] = _climb(
+        weights, curves = _derivatives(search, before, used)
+        reached, after = _climb(
             paths, points[active], normal[active], circles, was, falls[active], weights, curves
         )
-        change = (values[:, active] - before).T
+        change = (after - before).T
         rise = ((weights + np.einsum("nkm,nm->nk", curves, change) / 2) * change).sum(axis=1)
-        now = search(OnPlanes(*values[:, active]))
-        active = active[np.abs(now - was - rise) > _EXACT * np.abs(now)]
+        now = search(OnPlanes(*after))
+        higher = now >= was - _EXACT * np.abs(was)
+        normal[active[higher]], values[:, active[higher]] = reached[higher], after[:, higher]
+        active = active[higher & (np.abs(now - was - rise) > _EXACT * np.abs(now))]
         if not active.size:
             break
     return normal, values
 
 
-def _derivatives(search: Value, values: Array) -> tuple[Array, Array]:
-    """Return first and second derivatives (n, m), (n, m, m) of a criterion by values (m, n)."""
+def _derivatives(search: Value, values: Array, used: Bools) -> tuple[Array, Array]:
+    """Return first and second derivatives (n, m), (n, m, m) of a criterion by values (m, n).
+
+    They are zero by values that it does not use. A step is a share of a value and of the largest of
+    its kind; no amplitude becomes negative.
+    """
     count = len(values)
-    h = _DIFFERENCE * np.abs(values) + 1e-6 * np.abs(values).max(axis=0) + 1e-100
+    h = np.abs(values)
+    h = _DIFFERENCE * h + 1e-6 * np.repeat(h.reshape(-1, 3, h.shape[1]).max(axis=1), 3, axis=0)
+    h += 1e-100
+    values = values.copy()
+    for k in (0, 2):
+        values[k::3] = np.maximum(values[k::3], 2 * h[k::3])
     each = np.zeros((count, count, 4, values.shape[1]))
-    for k in range(count):
-        for m in range(k + 1):
+    read = np.flatnonzero(used).tolist()
+    for i, k in enumerate(read):
+        for m in read[: i + 1]:
             for place, (a, b) in enumerate(_SIGNS):
                 moved = values.copy()
                 moved[k] += a * h[k]

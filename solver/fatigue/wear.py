@@ -26,9 +26,10 @@ def archard_depth(pressure: Array, slip: Array, coefficient: float) -> Array:
 def slip_work(shear: Array, slip: Array) -> Array:
     """Return the frictional work (n,) of a cycle per area [N/mm]; arguments as in `archard_depth`.
 
-    Friction acts against slip: the work is positive whatever the signs.
+    What slips between two instants has reached its shear by the second one. Friction acts against
+    slip: the work is positive whatever the signs.
     """
-    return np.asarray(np.abs((shear[1:] + shear[:-1]) / 2 * np.diff(slip, axis=0)).sum(axis=0))
+    return np.asarray(np.abs(shear[1:] * np.diff(slip, axis=0)).sum(axis=0))
 
 
 def ruiz(tension: Array, shear: Array, slip: Array) -> Array:

@@ -40,7 +40,7 @@ MODULES = tuple(
     f"solver.results.{module}"
     for module in (
         "contact", "corner", "cracks", "extremes", "fatigue", "figures", "increments",
-        "indentation", "maps", "places",
+        "indentation", "maps", "places", "wear",
     )
 )  # fmt: skip
 """Modules that define outputs of scene files, or quantities of these."""

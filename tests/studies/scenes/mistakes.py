@@ -287,6 +287,16 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "contacts[0].active",
         "one of pressed",
     ),
+    "unknown stage of a cycle of wear": (
+        put("results", "wear", {"cycle": ["pressed", "later"]}),
+        "results.wear.cycle",
+        "one of pressed",
+    ),
+    "cycle of wear of one stage": (
+        put("results", "wear", {"cycle": ["pressed"]}),
+        "results.wear.cycle",
+        "must have 2 or more",
+    ),
     "a line outside of its body": (
         put("results", "lines", "middle", {"body": "lower", "start": [9.0, 0.0], "end": [9, -2]}),
         "results.lines.middle",
