@@ -67,6 +67,7 @@ LESS = {
     "elastic-punch.toml": {"friction": [0.0, 0.4]},
     "first-yield.toml": {"    { friction = 0.2": None, "between": [1.2, 1.9]},
     "least-pressure.toml": {"starts": 1, "most": 9},
+    "punch-tests.toml": {"smallest_element": 0.05, "growth": 3.0},
     "refined-punch.toml": {"load_ratio": [0.6, 0.7], "friction": [0.2, 0.25]},
     "wheel-rail.toml": {"passes": [1]},
     "wheel-rail-lateral.toml": {"lateral_position": [-7.5, -3.0], "traction": [-0.75, 0.75]},
