@@ -118,6 +118,7 @@ BAR = """
 name = "cyclic_bar"
 summary = "a bar that is strained back and forth"
 kinematics = "plane_strain"
+increment_error = 0.1
 [parameters]
 strength = { default = 200.0, range = [50.0, 500.0], description = "yield stress" }
 growth = { default = 60.0, range = [0.0, 500.0], description = "isotropic saturation" }
