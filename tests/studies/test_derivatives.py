@@ -69,7 +69,7 @@ def test_elasticities_are_of_numbers_and_parameters_that_a_run_has() -> None:
     found = elasticities(
         scalars | {"zero": 0.0, "d_zero_d_size": 1.0}, {"size": 5.0, "friction": 0.0}
     )
-    assert found == {"force": {"size": 2.0}}
+    assert found == {"force": {"size": [2.0]}}
 
 
 def test_they_change_the_ids_of_runs_and_are_extended_with_them() -> None:
