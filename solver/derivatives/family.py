@@ -19,10 +19,10 @@ from solver.results.quantities import QUANTITIES
 from solver.results.run import FinishedRun, Output, Values
 from solver.results.samples import Samples
 
-_JUMP = 100.0
-"""Relative change of a number over that of a parameter: above this ratio it is a jump, as of the
-place of a maximum that two places share. It has no derivative. Changes of a line or a map are
-relative to its largest value."""
+_JUMP = 1e-3
+"""Change of a number over the number, above which it jumps, as the place of a maximum that two
+places share does. It has no derivative. Changes of a line or a map are relative to its largest
+value."""
 
 
 class Family:
@@ -135,7 +135,7 @@ class Family:
                 after = _numbers(output(other))
                 for of in wanted:
                     level, values = np.abs(first[of]), np.asarray(after.get(of, np.nan))
-                    most = _JUMP * shares[by] * np.nanmax(level, initial=0.0)
+                    most = _JUMP * np.nan_to_num(level).max(initial=0.0)
                     change = values - first[of]
                     found[named(of, by)] = np.where(np.abs(change) > most, np.nan, change / step)
         lacks = {q.name: np.nan for q in self._declared if not q.dims}
