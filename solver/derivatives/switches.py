@@ -27,7 +27,7 @@ def distances(system: System, now: Converged, candidates: Candidates) -> Array:
     """Return the distances (n,) of an increment from all switches, over their scales.
 
     They are NaN where there is no switch. The scales are the yield stress, the largest displacement
-    and the level of forces.
+    before and after the increment, and the level of forces.
     """
     found = [*_of_flow(system, now), *_of_contact(now, candidates)]
     return np.concatenate([np.zeros(0), *(each.ravel() for each in found)])
@@ -65,7 +65,8 @@ def _of_flow(system: System, now: Converged) -> Iterator[Array]:
 
 def _of_contact(now: Converged, candidates: Candidates) -> Iterator[Array]:
     """Yield for each pair: gap or normal force; shear below its bound, or slip; lines of bounds."""
-    length = max((float(np.abs(u).max(initial=0.0)) for u in now.state.u), default=0.0) or 1.0
+    every = (*now.start.u, *now.state.u)
+    length = max((float(np.abs(u).max(initial=0.0)) for u in every), default=0.0) or 1.0
     force, n = now.state.force_scale or 1.0, candidates.n
     normal, status = candidates.forces[:n], candidates.status
     found = [candidates.motion[:n] / length - normal / force]
