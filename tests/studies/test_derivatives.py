@@ -41,10 +41,12 @@ def test_the_data_set_has_them_with_their_units(store: Store) -> None:
     assert data["d_residual_d_ratio"].values == pytest.approx([300.0, 300.0], rel=1e-5)
     assert data["d_residual_d_ratio"].attrs["units"] == "MPa"
     assert "derivative of" in data["d_residual_d_ratio"].attrs["long_name"]
+    assert ((0 < data["derivative_range_ratio"]) & (data["derivative_range_ratio"] < 0.1)).all()
     *_, row = elasticity_table(data).splitlines()
     assert row.split() == ["residual", "+7.67", "(+4.33", "to", "+11.00)"], "ratio / (ratio - 1)"
     assert "residual" in runs_table(data)
-    assert "d residual" not in runs_table(data), "they are in the data set"
+    for name in ("d residual", "derivative"):
+        assert name not in runs_table(data), "they are in the data set"
 
 
 @pytest.mark.solves
