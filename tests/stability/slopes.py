@@ -106,9 +106,7 @@ def drawn(count: int) -> Iterator[Drawn]:
     for k in range(count):
         others = [
             *(partial(shipped, name, **given) for name, given in FILES.items()),
-            partial(
-                shipped, "ball", accuracy="draft", load_ratio=3.0, friction=0.1, cycles=1 + k % 2
-            ),
+            partial(shipped, "ball", accuracy="draft", load_ratio=3.0, friction=0.1),
             partial(shipped, "cone", accuracy="draft", friction=0.1),
             partial(shipped, "shaft_hub", smallest_element=0.02, growth=2.0, friction=0.2),
             partial(shipped, "elastic_punch", smallest_element=0.02, growth=2.0, friction=0.2),
